@@ -1,0 +1,108 @@
+"""What the agent's core asks of a vehicle and hears from it.
+
+The MAVLink bridge (agent.mavlink) and the virtual vehicle of the simulator both
+speak this; the core knows nothing else of flying. Leaves out: how any of it is
+done.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = [
+    "Arrived",
+    "GoTo",
+    "HandedOver",
+    "Home",
+    "NotReady",
+    "Orders",
+    "Prepare",
+    "Refused",
+    "Report",
+    "Return",
+    "Telemetry",
+    "VehicleReady",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Prepare:
+    """Get airborne at the start: wait until ready, arm, take off, reach the place."""
+
+    position_enu_m: tuple[float, float, float]
+    """Where to hover before the mission starts [m; mission origin, height included]."""
+    speed_m_s: float
+    """Cruise ground speed to set [m/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoTo:
+    """Fly to a place, at once, in place of whatever was being flown to."""
+
+    leg: int
+    """Number of this order; `Arrived` repeats it, so that late news is recognised."""
+    position_enu_m: tuple[float, float, float]
+    """Target [m; mission origin, height included]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Return:
+    """Return to launch and land."""
+
+    reason: str
+
+
+Orders = Prepare | GoTo | Return
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleReady:
+    """The vehicle is airborne and hovers at its start."""
+
+
+@dataclass(frozen=True, slots=True)
+class NotReady:
+    """What the vehicle still waits for, in words a person understands; may change often."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Arrived:
+    """The vehicle is at the target of that leg and has stopped there."""
+
+    leg: int
+
+
+@dataclass(frozen=True, slots=True)
+class Telemetry:
+    """Where the vehicle is and how it does."""
+
+    position_enu_m: tuple[float, float, float]
+    """[m; mission origin]."""
+    velocity_enu_m_s: tuple[float, float, float]
+    battery_frac: float | None
+    """Remaining charge, 0..1; None when the vehicle does not say."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """An order could not be carried out; the vehicle keeps what it did before."""
+
+    order: Orders
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class HandedOver:
+    """The vehicle is no longer ours to command (pilot took over, rebooted, link lost)."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """The vehicle has landed and disarmed."""
+
+
+Report = VehicleReady | NotReady | Arrived | Telemetry | Refused | HandedOver | Home

@@ -1,0 +1,1 @@
+"""Offline planning and the coordinator daemon."""

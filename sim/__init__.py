@@ -1,0 +1,1 @@
+"""Simulated autopilots, virtual-time worlds and the one-machine launcher."""

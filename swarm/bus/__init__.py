@@ -1,0 +1,1 @@
+"""The bus: one small port and the transports behind it."""
