@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from typing import NewType
 
-__all__ = ["ID_RULE", "TaskId", "UavId", "require_id", "valid_id"]
+__all__ = ["COORDINATOR", "ID_RULE", "TaskId", "UavId", "require_id", "valid_id"]
 
 UavId = NewType("UavId", str)
 TaskId = NewType("TaskId", str)
+
+COORDINATOR = "coordinator"
+"""Name of the coordinator among the writers on the bus; no UAV may bear it."""
 
 ID_RULE = "1 to 64 letters, digits, '_', '-' or '.', beginning with a letter or digit"
 _PATTERN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
-from swarm.model.ids import UavId, require_id
+from swarm.model.ids import COORDINATOR, UavId, require_id
 
 __all__ = ["Uav", "require_point", "require_probabilities"]
-
-_NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +24,16 @@ class Uav:
     """Start [m; east, north, up from the mission origin]."""
     speed_m_s: float
     """Cruise ground speed [m/s]; > 0."""
-    success: Mapping[str, float] = field(default=_NOTHING)
+    success: Mapping[str, float] = field(default_factory=dict)
     """Probability p of success, by task id or task kind; the id wins."""
-    survival: Mapping[str, float] = field(default=_NOTHING)
+    survival: Mapping[str, float] = field(default_factory=dict)
     """Probability of surviving the task, by task id or task kind; the id wins."""
     kind: str | None = None
 
     def __post_init__(self) -> None:
         require_id(self.id, "UAV id")
+        if self.id == COORDINATOR:
+            raise ValueError(f"UAV id {self.id!r} is taken: it names the coordinator on the bus")
         require_point(self.position_enu_m, f"position of UAV {self.id}")
         if not (math.isfinite(self.speed_m_s) and self.speed_m_s > 0.0):
             raise ValueError(f"speed of UAV {self.id} must be > 0 m/s, not {self.speed_m_s}")

@@ -1,0 +1,1 @@
+"""The replicated state: registers that join, and who holds which task."""

@@ -1,0 +1,87 @@
+"""Single-writer registers and their join.
+
+A `Replica` keeps of every register the statement with the highest stamp.
+Joining is commutative, associative and idempotent, so loss, duplication and
+reordering delay agreement and never break it. Leaves out: who is alive and what
+follows from the registers (swarm.state.board, swarm.state.claims).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from swarm.wire.codec import encode, key_of
+from swarm.wire.messages import Board, Brief, Claim, Epoch, Message, Outcome, Stamp, Status
+
+__all__ = ["Replica"]
+
+
+class Replica:
+    """One process's picture of all registers of a mission."""
+
+    def __init__(self) -> None:
+        self._registers: dict[str, Message] = {}
+        self.brief: Brief | None = None
+        self.epoch: Epoch | None = None
+        self.board: dict[str, Board] = {}
+        """By task id."""
+        self.claims: dict[str, Claim] = {}
+        """By UAV id."""
+        self.outcomes: dict[tuple[str, str], Outcome] = {}
+        """By UAV id and task id."""
+        self.stale = 0
+        """Statements that were older than what was known."""
+
+    def join(self, message: Message) -> bool:
+        """Take ``message`` in; whether it was news. Status is no register and never is."""
+        if isinstance(message.body, Status):
+            return False
+        key = key_of(message)
+        known = self._registers.get(key)
+        if known is not None and not _beats(message, known):
+            self.stale += message.stamp < known.stamp
+            return False
+        self._registers[key] = message
+        match message.body:
+            case Brief() as brief:
+                self.brief = brief
+            case Epoch() as epoch:
+                self.epoch = epoch
+            case Board(task=task) as entry:
+                self.board[task] = entry
+            case Claim() as claim:
+                self.claims[message.writer] = claim
+            case Outcome(task=task) as outcome:
+                self.outcomes[message.writer, task] = outcome
+        return True
+
+    def join_all(self, messages: Iterable[Message]) -> bool:
+        """Take many in; whether any was news."""
+        return sum(self.join(message) for message in messages) > 0
+
+    def messages(self, writers: Iterable[str] | None = None) -> Iterator[Message]:
+        """All registers, or those of ``writers``, in key order."""
+        wanted = None if writers is None else set(writers)
+        for _, message in sorted(self._registers.items()):
+            if wanted is None or message.writer in wanted:
+                yield message
+
+    def writers(self) -> set[str]:
+        """Everyone who has said something."""
+        return {message.writer for message in self._registers.values()}
+
+    def newest_stamp(self, writer: str) -> Stamp | None:
+        """The highest stamp known of ``writer``."""
+        stamps = [m.stamp for m in self._registers.values() if m.writer == writer]
+        return max(stamps, default=None)
+
+
+def _beats(new: Message, known: Message) -> bool:
+    """A total order on statements of one register.
+
+    Equal stamps with different contents need two processes under one name; the
+    larger bytes win then, so that all replicas still agree.
+    """
+    if new.stamp != known.stamp:
+        return new.stamp > known.stamp
+    return new.body != known.body and encode(new) > encode(known)

@@ -1,0 +1,187 @@
+"""Bytes <-> messages: MessagePack, checked field by field.
+
+`decode` never raises on what came from the network: whatever is not a valid
+message of this mission, on the key that belongs to its writer, is None and
+counted under a reason. Leaves out: whether a message is news (swarm.state).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+
+import msgpack
+from pydantic import TypeAdapter, ValidationError
+
+from swarm.model.ids import COORDINATOR, valid_id
+from swarm.wire.keys import Keys
+from swarm.wire.messages import (
+    SCHEMA_VERSION,
+    Board,
+    Body,
+    Brief,
+    Claim,
+    Epoch,
+    Message,
+    Outcome,
+    Snapshot,
+    Stamp,
+    Status,
+)
+
+__all__ = ["LARGE_LIMIT_BYTES", "SMALL_LIMIT_BYTES", "Codec", "encode", "key_of"]
+
+SMALL_LIMIT_BYTES: Final = 4 * 1024
+LARGE_LIMIT_BYTES: Final = 1024 * 1024
+
+_KINDS: Final[dict[str, type[Body]]] = {
+    "brief": Brief,
+    "epoch": Epoch,
+    "board": Board,
+    "claim": Claim,
+    "outcome": Outcome,
+    "status": Status,
+}
+_NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in _KINDS.items()}
+_LARGE: Final = frozenset({"brief", "epoch"})
+
+
+def key_of(message: Message) -> str:
+    """The one key on which ``message`` may be said."""
+    keys, writer = Keys(message.mission), message.writer
+    match message.body:
+        case Brief():
+            return keys.brief
+        case Epoch():
+            return keys.plan
+        case Board(task=task):
+            return keys.board(task)
+        case Claim():
+            return keys.claim(writer)
+        case Outcome(task=task):
+            return keys.outcome(writer, task)
+        case Status():
+            return keys.status(writer)
+
+
+def encode(message: Message | Snapshot) -> bytes:
+    """The bytes of a message or snapshot."""
+    packed: bytes = msgpack.packb(_packable(message))
+    return packed
+
+
+def _packable(message: Message | Snapshot) -> list[Any]:
+    if isinstance(message, Snapshot):
+        return [
+            SCHEMA_VERSION,
+            message.mission,
+            message.writer,
+            message.mission_s,
+            [_packable(each) for each in message.messages],
+        ]
+    return [
+        SCHEMA_VERSION,
+        message.mission,
+        message.writer,
+        message.stamp.incarnation,
+        message.stamp.counter,
+        _NAMES[type(message.body)],
+        dataclasses.asdict(message.body),
+    ]
+
+
+class Codec:
+    """Decodes what one mission's processes say, and counts what it drops."""
+
+    def __init__(self, mission: str) -> None:
+        self._mission = mission
+        self._bodies: dict[str, TypeAdapter[Body]] = {
+            name: TypeAdapter(kind) for name, kind in _KINDS.items()
+        }
+        self._stamps = TypeAdapter(Stamp)
+        self.dropped: Counter[str] = Counter()
+        """Messages dropped so far, by reason."""
+
+    def decode(self, key: str, data: bytes) -> Message | None:
+        """The message in ``data``, heard on ``key``; None when it must be dropped."""
+        try:
+            _require(len(data) <= LARGE_LIMIT_BYTES, "too large")
+            message = self._message(_unpack(data))
+            large = _NAMES[type(message.body)] in _LARGE
+            _require(large or len(data) <= SMALL_LIMIT_BYTES, "too large")
+            _require(key_of(message) == key, "said on another's key")
+        except _UnacceptableError as fault:
+            self.dropped[fault.reason] += 1
+            return None
+        return message
+
+    def decode_snapshot(self, key: str, data: bytes) -> Snapshot | None:
+        """The snapshot in ``data``, answered on ``key``; bad registers in it are left out."""
+        try:
+            _require(len(data) <= LARGE_LIMIT_BYTES, "too large")
+            parts = _unpack(data)
+            if not isinstance(parts, tuple) or len(parts) != 5:
+                raise _UnacceptableError("malformed")
+            version, mission, writer, mission_s, registers = parts
+            _require(version == SCHEMA_VERSION, "unknown version")
+            _require(mission == self._mission, "another mission")
+            _require(isinstance(writer, str) and valid_id(writer), "malformed")
+            _require(key == Keys(mission).state(writer), "said on another's key")
+            finite = isinstance(mission_s, float) and math.isfinite(mission_s)
+            _require(finite or mission_s is None, "malformed")
+            _require(isinstance(registers, tuple), "malformed")
+        except _UnacceptableError as fault:
+            self.dropped[fault.reason] += 1
+            return None
+        return Snapshot(mission, writer, mission_s, tuple(self._acceptable(registers)))
+
+    def _acceptable(self, registers: Iterable[object]) -> Iterator[Message]:
+        for register in registers:
+            try:
+                yield self._message(register)
+            except _UnacceptableError as fault:
+                self.dropped[fault.reason] += 1
+
+    def _message(self, parts: object) -> Message:
+        if not isinstance(parts, tuple) or len(parts) != 7:
+            raise _UnacceptableError("malformed")
+        version, mission, writer, incarnation, counter, kind, fields = parts
+        _require(version == SCHEMA_VERSION, "unknown version")
+        _require(mission == self._mission, "another mission")
+        _require(isinstance(writer, str) and valid_id(writer), "malformed")
+        adapter = self._bodies.get(kind) if isinstance(kind, str) else None
+        if adapter is None:
+            raise _UnacceptableError("unknown kind")
+        try:
+            stamp = self._stamps.validate_python({"incarnation": incarnation, "counter": counter})
+            body = adapter.validate_python(fields)
+        except (ValidationError, RecursionError):
+            raise _UnacceptableError("malformed") from None
+        from_coordinator = isinstance(body, Brief | Epoch | Board)
+        _require((writer == COORDINATOR) == from_coordinator, "said on another's key")
+        return Message(mission, writer, stamp, body)
+
+
+class _UnacceptableError(Exception):
+    """Received bytes that are not a message of ours; never leaves this module."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+def _require(condition: bool, reason: str) -> None:
+    if not condition:
+        raise _UnacceptableError(reason)
+
+
+def _unpack(data: bytes) -> object:
+    """What ``data`` holds, with tuples for arrays; None when it is not MessagePack."""
+    try:
+        return msgpack.unpackb(data, use_list=False, max_ext_len=0)
+    except (ValueError, TypeError, msgpack.exceptions.UnpackException, RecursionError):
+        # ValueError covers msgpack's FormatError, StackError, ExtraData and bad UTF-8.
+        return None

@@ -1,0 +1,73 @@
+"""Key expressions of one mission; every register key has exactly one writer.
+
+``swarm/<mission>/…``: ``brief``, ``plan`` and ``board/<task>`` are written by the
+coordinator, ``uav/<id>/…`` by that UAV's agent, ``alive/<id>`` holds the liveliness
+token of a process and ``state/<id>`` answers what that process knows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from swarm.model.ids import require_id
+
+__all__ = ["Keys"]
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """All keys of one mission.
+
+    Raises:
+        ValueError: the mission name is not a valid id.
+    """
+
+    mission: str
+
+    def __post_init__(self) -> None:
+        require_id(self.mission, "mission name")
+
+    @property
+    def root(self) -> str:
+        """Prefix of every key of the mission."""
+        return f"swarm/{self.mission}"
+
+    @property
+    def brief(self) -> str:
+        """Fleet, horizon and defaults."""
+        return f"{self.root}/brief"
+
+    @property
+    def plan(self) -> str:
+        """The current epoch."""
+        return f"{self.root}/plan"
+
+    def board(self, task: str) -> str:
+        """One task of the task board; ``*`` for all."""
+        return f"{self.root}/board/{task}"
+
+    def claim(self, uav: str) -> str:
+        """What a UAV is about to do; ``*`` for all."""
+        return f"{self.root}/uav/{uav}/claim"
+
+    def outcome(self, uav: str, task: str) -> str:
+        """How a UAV's attempt at a task ended; ``*`` for all."""
+        return f"{self.root}/uav/{uav}/outcome/{task}"
+
+    def status(self, uav: str) -> str:
+        """Where a UAV is and how it does; ``*`` for all."""
+        return f"{self.root}/uav/{uav}/status"
+
+    def alive(self, writer: str) -> str:
+        """Liveliness token of a process; ``*`` for all."""
+        return f"{self.root}/alive/{writer}"
+
+    def state(self, writer: str) -> str:
+        """Where a process answers with the registers it answers for; ``*`` for all."""
+        return f"{self.root}/state/{writer}"
+
+    def writer_of_token(self, key: str) -> str | None:
+        """The writer whose token ``key`` is; None if it is no token of this mission."""
+        prefix = self.alive("")
+        writer = key.removeprefix(prefix)
+        return writer if key.startswith(prefix) and writer and "/" not in writer else None

@@ -1,0 +1,245 @@
+"""What is said: one frozen dataclass per kind of message, with its bounds.
+
+Instants are mission time [s]; no machine's clock crosses the wire. Leaves out:
+bytes and checking (swarm.wire.codec), and what a reader makes of it (swarm.state).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated, ClassVar
+
+from annotated_types import Ge, Gt, Le, Len, Predicate
+from pydantic import Strict
+
+from swarm.model import Origin, valid_id
+
+__all__ = [
+    "SCHEMA_VERSION",
+    "Board",
+    "Body",
+    "Brief",
+    "Claim",
+    "ClaimPhase",
+    "Epoch",
+    "EpochPhase",
+    "Fleet",
+    "Message",
+    "Outcome",
+    "Result",
+    "Snapshot",
+    "Stamp",
+    "Status",
+    "StatusPhase",
+]
+
+SCHEMA_VERSION = 1
+
+_CHECKED = {"extra": "forbid", "allow_inf_nan": False}
+
+Id = Annotated[str, Strict(), Predicate(valid_id)]
+Number = Annotated[float, Strict()]
+Flag = Annotated[bool, Strict()]
+Point = tuple[Number, Number, Number]
+Probability = Annotated[float, Strict(), Ge(0.0), Le(1.0)]
+Positive = Annotated[float, Strict(), Gt(0.0)]
+NotNegative = Annotated[float, Strict(), Ge(0.0)]
+Count = Annotated[int, Strict(), Ge(0), Le(2**63 - 1)]
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Stamp:
+    """Order of one writer's statements in one register: later beats earlier."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    incarnation: Count
+    """Grows whenever the writer's process starts anew."""
+    counter: Count
+    """Grows with every statement of one incarnation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """One UAV as the brief describes it."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    id: Id
+    position_enu_m: Point
+    """Start [m; mission origin], without the height layer."""
+    speed_m_s: Positive
+    success: Mapping[str, Probability]
+    survival: Mapping[str, Probability]
+    kind: Id | None
+    layer_m: Number
+    """Height layer this UAV flies at [m], added to every place it flies to."""
+
+
+@dataclass(frozen=True, slots=True)
+class Brief:
+    """Register ``brief``: what stays the same for a whole mission."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    horizon_s: Positive
+    success_default: Probability
+    survival_default: Probability
+    reattempt_failed: Flag
+    origin: Point
+    """Latitude [deg], longitude [deg], height above mean sea level [m]."""
+    uavs: tuple[Fleet, ...]
+
+    def __post_init__(self) -> None:
+        Origin(*self.origin)
+        if len({uav.id for uav in self.uavs}) != len(self.uavs):
+            raise ValueError("UAV ids must differ")
+
+
+class EpochPhase(StrEnum):
+    """How far the mission is."""
+
+    PREPARING = "preparing"
+    RUNNING = "running"
+    ENDED = "ended"
+
+
+@dataclass(frozen=True, slots=True)
+class Epoch:
+    """Register ``plan``: the pecking order in force."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    number: Count
+    phase: EpochPhase
+    rule: Id
+    sequence: tuple[Id, ...]
+    """Best rank first."""
+    mission_s: Number
+    """Mission time at which this statement was made [s]."""
+    reason: Annotated[str, Strict(), Len(0, 200)]
+    """Why this epoch, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """Register ``board/<task>``: one task of the task board."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    task: Id
+    number: Count
+    """Position on the board; ties between equally good tasks go to the smaller."""
+    position_enu_m: Point
+    value: NotNegative
+    service_s: NotNegative
+    kind: Id | None
+    withdrawn: Flag
+
+
+class ClaimPhase(StrEnum):
+    """How firmly a UAV holds its claim, or why it has none."""
+
+    PROPOSED = "proposed"
+    HELD = "held"
+    IDLE = "idle"
+    """Airborne and free to take a task."""
+    OUT = "out"
+    """Not taking part (any more)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """Register ``uav/<id>/claim``: the task a UAV has taken."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    phase: ClaimPhase
+    task: Id | None
+    """None exactly when idle or out: the tombstone of an earlier claim."""
+    decided_s: Number
+    """Mission time at which the UAV was free to decide [s]."""
+    rank: Count
+    completion_s: Number
+    """Predicted completion [s mission time]."""
+
+    def __post_init__(self) -> None:
+        if (self.task is None) != (self.phase in (ClaimPhase.IDLE, ClaimPhase.OUT)):
+            raise ValueError(f"a claim that is {self.phase} names {self.task}")
+
+
+class Result(StrEnum):
+    """How an attempt ended."""
+
+    DONE = "done"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Register ``uav/<id>/outcome/<task>``: how this UAV's last attempt ended."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    task: Id
+    result: Result
+    attempt: Annotated[int, Strict(), Ge(1)]
+    completed_s: Number
+    """Mission time [s]."""
+
+
+class StatusPhase(StrEnum):
+    """What an agent is doing."""
+
+    LEARNING = "learning"
+    PREPARING = "preparing"
+    IDLE = "idle"
+    FLYING = "flying"
+    SERVING = "serving"
+    RETURNING = "returning"
+    HOME = "home"
+    OUT = "out"
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Key ``uav/<id>/status``: news that may be dropped."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    phase: StatusPhase
+    task: Id | None
+    position_enu_m: Point | None
+    """[m; mission origin], without the height layer."""
+    velocity_enu_m_s: Point | None
+    battery_frac: Probability | None
+    mission_s: Number | None
+    dropped: Count
+    """Messages this process has dropped as malformed, stale or too many."""
+    note: Annotated[str, Strict(), Len(0, 200)]
+    """What it waits for, in words."""
+
+
+Body = Brief | Epoch | Board | Claim | Outcome | Status
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A statement with its author and place in that author's order."""
+
+    mission: str
+    writer: str
+    stamp: Stamp
+    body: Body
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Answer of ``state/<id>``: registers, and the mission time of the one who answers."""
+
+    mission: str
+    writer: str
+    mission_s: Number | None
+    messages: tuple[Message, ...]
