@@ -1,0 +1,205 @@
+"""The `swarm` command: finds its subcommands by entry point and runs one.
+
+A subcommand is an entry point of the group ``peckorder.commands``: a plain
+function written for typer (annotated parameters, result an exit status or
+None), or a ``typer.Typer`` for a family such as ``swarm task add``. Only the
+one asked for is imported; ``--help`` imports all. Its docstring becomes its
+help: summary and description as they are, an ``Examples:`` section line by
+line, every other section (``Args:``, ``Raises:`` …) left to readers of code.
+
+Exit status: 0 done; 1 the mission or check failed, or an error at run time;
+2 wrong usage or input, one line each on standard error; 130 interrupted. An
+unexpected exception leaves `main` as it is, so that the interpreter ends with
+its traceback and 1. Leaves out: every subcommand.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from importlib.metadata import EntryPoint, entry_points
+from typing import Annotated, Any
+
+import typer
+import typer.main
+
+import swarm
+from swarm.errors import Fault, InputError, SwarmError
+
+__all__ = ["COMMAND_GROUP", "console_main", "main"]
+
+COMMAND_GROUP = "peckorder.commands"
+_DONE, _FAILED, _WRONG_USAGE, _INTERRUPTED = 0, 1, 2, 130
+_SECTION = re.compile(r"(Args|Arguments|Examples?|Notes?|Raises|Returns|Yields):")
+_HELP = """Task allocation for fleets of UAVs: plan, simulate and fly.
+
+Examples:
+    swarm plan table-1
+    swarm run table-1 --speedup 10
+    swarm plan --help
+"""
+
+
+def main(
+    argv: Sequence[str] | None = None, commands: Mapping[str, EntryPoint] | None = None
+) -> int:
+    """Run one command line and say how it ended.
+
+    Args:
+        argv: arguments after ``swarm``; those of this process if None.
+        commands: subcommands by name; the installed ones if None.
+
+    Returns:
+        The exit status.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    found = _installed_commands() if commands is None else commands
+    stdout = sys.stdout
+    try:
+        status = _run(arguments, found)
+        stdout.flush()
+    except InputError as error:
+        _complain(str(error))
+        status = _WRONG_USAGE
+    except SwarmError as error:
+        _complain(f"swarm: {error}")
+        status = _FAILED
+    except (KeyboardInterrupt, typer.Abort):
+        _complain("swarm: interrupted")
+        status = _INTERRUPTED
+    except BrokenPipeError:
+        status = _FAILED
+    finally:
+        sys.stdout = stdout  # typer swaps it when a pipe breaks
+    return status
+
+
+def console_main() -> int:
+    """Entry point of the console script; also quiet when nobody reads its output any more."""
+    status = main()
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # What is still buffered can reach nobody; the interpreter must not try again at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = _FAILED
+    return status
+
+
+def _installed_commands() -> dict[str, EntryPoint]:
+    found = entry_points(group=COMMAND_GROUP)
+    return {entry.name: entry for entry in sorted(found, key=lambda entry: entry.name)}
+
+
+def _run(arguments: list[str], commands: Mapping[str, EntryPoint]) -> int:
+    name = next((word for word in arguments if not word.startswith("-")), None)
+    if name is not None and name not in commands:
+        raise InputError(_unknown_command(name, commands))
+    completing = "_SWARM_COMPLETE" in os.environ
+    app = _application()
+    if name is not None and not completing:
+        _register(app, name, commands[name].load())
+    else:
+        for other, entry in commands.items():
+            _register(app, other, _load_or_explain(entry))
+    command = typer.main.get_command(app)
+    try:
+        result = command.main(arguments or ["--help"], prog_name="swarm", standalone_mode=False)
+    except typer.TyperException as error:
+        raise InputError(_usage_fault(error, name)) from error
+    except SystemExit as leaving:
+        result = leaving.code
+    if not arguments:
+        raise InputError(Fault("swarm", "", "no command given", "choose one of the above"))
+    if result is None:
+        return _DONE
+    if not isinstance(result, int):
+        raise TypeError(f"command {name} must return an exit status or None, not {result!r}")
+    return int(result)
+
+
+def _application() -> typer.Typer:
+    app = typer.Typer(
+        name="swarm",
+        rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback(help=_help_text(_HELP))(_root)
+    return app
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"swarm {swarm.__version__}")
+        raise typer.Exit
+
+
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_print_version, help="Show the version."),
+    ] = False,
+) -> None:
+    """Options before the subcommand."""
+
+
+def _register(app: typer.Typer, name: str, loaded: object) -> None:
+    if isinstance(loaded, typer.Typer):
+        app.add_typer(loaded, name=name)
+    elif callable(loaded):
+        app.command(name, help=_help_text(inspect.getdoc(loaded) or ""))(loaded)
+    else:
+        raise TypeError(f"command {name} must be a function or a typer.Typer, not {loaded!r}")
+
+
+def _load_or_explain(entry: EntryPoint) -> object:
+    """The command, or one whose help says why there is none: `swarm --help` always works."""
+    try:
+        return entry.load()
+    except (ImportError, AttributeError) as error:
+        reason = str(error)
+
+    def unavailable() -> None:
+        raise SwarmError(f"command {entry.name} cannot be loaded: {reason}")
+
+    unavailable.__doc__ = f"Cannot be loaded: {reason}."
+    return unavailable
+
+
+def _help_text(docstring: str) -> str:
+    """Help of a command from its docstring; ``\\b`` keeps the lines of examples apart."""
+    described: list[str] = []
+    examples: list[str] = []
+    section = ""
+    for line in inspect.cleandoc(docstring).splitlines():
+        if _SECTION.fullmatch(line):
+            section = line.rstrip(":")
+        elif not section:
+            described.append(line)
+        elif section.startswith("Example") and line.strip():
+            examples.append(line)
+    text = "\n".join(described).strip()
+    return f"{text}\n\n\b\nExamples:\n" + "\n".join(examples) if examples else text
+
+
+def _unknown_command(name: str, commands: Mapping[str, object]) -> Fault:
+    close = get_close_matches(name, commands, n=1)
+    remedy = f"did you mean {close[0]!r}?" if close else f"the commands are {', '.join(commands)}"
+    return Fault("swarm", "", f"no such command {name!r}", remedy)
+
+
+def _usage_fault(error: typer.TyperException, name: str | None) -> Fault:
+    context: Any = getattr(error, "ctx", None)
+    path = f"swarm {name}" if name else "swarm"
+    if context is not None:
+        path = context.command_path  # also names the member of a family: swarm task add
+    problem = " ".join(error.format_message().split()).rstrip(".").replace("Value error, ", "")
+    return Fault(path, "", problem[:1].lower() + problem[1:], f"see '{path} --help'")
+
+
+def _complain(text: str) -> None:
+    print(text, file=sys.stderr)
