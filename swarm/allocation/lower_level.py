@@ -1,0 +1,186 @@
+"""The lower level (Fig. 1): UAVs decide one after another, each for itself.
+
+The UAV that is free earliest decides next; at equal times the one earlier in the
+priority sequence; then the smaller index. Used unchanged by the offline planner and
+by every agent. Leaves out: how a UAV chooses (`swarm.allocation.rules`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+from typing import Protocol
+
+import numpy as np
+
+from swarm.allocation.problem import BoolArray, FloatArray, IntArray, Problem
+
+__all__ = ["Decision", "Rule", "TeamState", "decisions", "next_decision", "rank_of", "run"]
+
+
+@dataclass(slots=True, eq=False)
+class TeamState:
+    """What has been decided so far; the lower level reads nothing else of the past.
+
+    Raises:
+        ValueError: the arrays' shapes do not fit each other.
+    """
+
+    free_s: FloatArray
+    """(n_uav,) mission time at which each UAV is next free [s]."""
+    place_enu_m: FloatArray
+    """(n_uav, 3) where each UAV is then [m; east, north, up]."""
+    survived: FloatArray
+    """(n_uav,) S of eq. 1 so far: product of the survival probabilities of its tasks."""
+    open: BoolArray
+    """(n_task,) tasks nobody has taken."""
+    active: BoolArray
+    """(n_uav,) UAVs that take part."""
+
+    def __post_init__(self) -> None:
+        n_uav = len(self.free_s)
+        for name, shape in (
+            ("place_enu_m", (n_uav, 3)),
+            ("survived", (n_uav,)),
+            ("active", (n_uav,)),
+        ):
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"{name} must have shape {shape}")
+
+    @classmethod
+    def at_start(cls, problem: Problem) -> TeamState:
+        """Mission time 0: every UAV at its start, every task open."""
+        return cls(
+            free_s=np.zeros(problem.n_uav),
+            place_enu_m=problem.start_enu_m.copy(),
+            survived=np.ones(problem.n_uav),
+            open=np.ones(problem.n_task, dtype=np.bool_),
+            active=np.ones(problem.n_uav, dtype=np.bool_),
+        )
+
+    def copy(self) -> TeamState:
+        """An independent copy."""
+        return TeamState(
+            self.free_s.copy(),
+            self.place_enu_m.copy(),
+            self.survived.copy(),
+            self.open.copy(),
+            self.active.copy(),
+        )
+
+    def apply(self, problem: Problem, decision: Decision) -> None:
+        """Let ``decision`` happen: its UAV is next free at the completion, at the task's place."""
+        uav, task = decision.uav, decision.task
+        self.free_s[uav] = decision.completion_s
+        self.place_enu_m[uav] = problem.task_enu_m[task]
+        self.survived[uav] *= problem.survival[uav, task]
+        self.open[task] = False
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One UAV's choice of its next task."""
+
+    uav: int
+    """Index of the deciding UAV."""
+    task: int
+    """Index of the task it takes."""
+    decided_s: float
+    """Mission time of the decision: when the UAV became free [s]."""
+    completion_s: float
+    """Predicted completion, exactly ``(decided_s + distance / speed) + service`` [s]."""
+    score: float
+    """What the rule maximised, for this task [value·s]."""
+    second_score: float | None
+    """The same for the best other task; None when there was no other."""
+    certificate: bool
+    """Theorem 5 proves that greedy and lookahead agree on this decision."""
+    exact: bool
+    """The choice is proven to be the rule's own maximum, not a heuristic's guess at it."""
+
+
+class Rule(Protocol):
+    """A decision rule: a pure function of the shared state."""
+
+    @property
+    def name(self) -> str:
+        """Name under which plans and epochs refer to the rule."""
+        ...
+
+    def decide(
+        self, problem: Problem, state: TeamState, rank: IntArray, uav: int
+    ) -> Decision | None:
+        """The next task of ``uav``; None when no open task is one it is capable of."""
+        ...
+
+
+def rank_of(sequence: Sequence[int]) -> IntArray:
+    """(n_uav,) place of each UAV in a priority sequence of UAV indices; 0 decides first.
+
+    Raises:
+        ValueError: the sequence does not name each of 0..n_uav-1 once.
+    """
+    rank = np.full(len(sequence), -1, dtype=np.int64)
+    for place, uav in enumerate(sequence):
+        if not 0 <= uav < len(rank) or rank[uav] >= 0:
+            raise ValueError(f"sequence must name each UAV index once: {list(sequence)}")
+        rank[uav] = place
+    return rank
+
+
+def decisions(problem: Problem, state: TeamState, rank: IntArray, rule: Rule) -> Iterator[Decision]:
+    """Decide in the order of Fig. 1 until no active UAV has an open task it is capable of.
+
+    Args:
+        problem: the mission.
+        state: where the team stands; left unchanged.
+        rank: (n_uav,) place of each UAV in the priority sequence; smaller decides first.
+        rule: how each UAV chooses.
+    """
+    state = state.copy()
+    queue = [
+        (free_s, place, uav)
+        for uav, (free_s, place) in enumerate(
+            zip(state.free_s.tolist(), rank.tolist(), strict=True)
+        )
+        if state.active[uav]
+    ]
+    heapify(queue)
+    while queue:
+        _, place, uav = heappop(queue)
+        decision = rule.decide(problem, state, rank, uav)
+        if decision is None:
+            continue  # tasks only close, so this UAV has no further decision
+        state.apply(problem, decision)
+        heappush(queue, (decision.completion_s, place, uav))
+        yield decision
+
+
+def next_decision(
+    problem: Problem, state: TeamState, rank: IntArray, rule: Rule, uav: int
+) -> Decision | None:
+    """The decision ``uav`` takes if it is its turn now; None when nothing open suits it.
+
+    Whose turn it is, is the caller's knowledge; inactive UAVs take nothing.
+    """
+    if not state.active[uav]:
+        return None
+    return rule.decide(problem, state, rank, uav)
+
+
+def run(
+    problem: Problem, state: TeamState, rank: IntArray, rule: Rule
+) -> tuple[list[list[int]], FloatArray]:
+    """All decisions as lists.
+
+    Returns:
+        Task indices per UAV in order of execution, and (n_task,) completion times [s], NaN for
+        tasks nobody took.
+    """
+    routes: list[list[int]] = [[] for _ in range(problem.n_uav)]
+    completion_s = np.full(problem.n_task, np.nan)
+    for decision in decisions(problem, state, rank, rule):
+        routes[decision.uav].append(decision.task)
+        completion_s[decision.task] = decision.completion_s
+    return routes, completion_s

@@ -1,0 +1,86 @@
+"""Eq. 1: what ordered task lists are worth, planned or as executed.
+
+J = Σ p · S · m · (D − t), with S the probability that the UAV survived every task
+before this one on its list. Leaves out: finding good lists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.allocation.problem import FloatArray, Problem
+
+__all__ = ["evaluate", "executed_objective"]
+
+
+def evaluate(problem: Problem, routes: Sequence[Sequence[int]]) -> tuple[float, FloatArray]:
+    """Objective and completion times of lists flown from the starts at mission time 0.
+
+    Args:
+        problem: the mission.
+        routes: task indices per UAV in order of execution; tasks on no list count 0.
+
+    Returns:
+        J [value·s] and (n_task,) completion times [s], NaN for tasks on no list.
+
+    Raises:
+        ValueError: a list too many or too few, an unknown task, or a task taken twice.
+    """
+    _require_lists(problem, routes)
+    objective = 0.0
+    completion_s = np.full(problem.n_task, np.nan)
+    for uav, route in enumerate(routes):
+        free_s, survived, place = 0.0, 1.0, problem.start_enu_m[uav]
+        for task in route:
+            if not np.isnan(completion_s[task]):
+                raise ValueError(f"task {problem.task_ids[task]} is on the lists twice")
+            travel_s = problem.travel_s(uav, place)[task]
+            free_s = float((free_s + travel_s) + problem.service_s[task])
+            completion_s[task] = free_s
+            objective += survived * problem.weight[uav, task] * (problem.horizon_s - free_s)
+            survived *= problem.survival[uav, task]
+            place = problem.task_enu_m[task]
+    return float(objective), completion_s
+
+
+def executed_objective(
+    problem: Problem, routes: Sequence[Sequence[int]], completion_s: npt.ArrayLike
+) -> float:
+    """Eq. 1 with the completion times that came about.
+
+    Args:
+        problem: the mission.
+        routes: task indices per UAV as visited; S is the product along them, also over visits
+            without success. A task visited by several UAVs counts once, for the first of them.
+        completion_s: (n_task,) real completion times [s]; NaN for tasks not done, which count 0.
+
+    Raises:
+        ValueError: a list too many or too few, an unknown task, or a wrong shape.
+    """
+    _require_lists(problem, routes)
+    times_s = np.asarray(completion_s, dtype=np.float64)
+    if times_s.shape != (problem.n_task,):
+        raise ValueError(f"completion_s must have shape {(problem.n_task,)}, not {times_s.shape}")
+    objective = 0.0
+    counted = np.isnan(times_s)
+    for uav, route in enumerate(routes):
+        survived = 1.0
+        for task in route:
+            if not counted[task]:
+                counted[task] = True
+                left_s = problem.horizon_s - times_s[task]
+                objective += survived * problem.weight[uav, task] * left_s
+            survived *= problem.survival[uav, task]
+    return float(objective)
+
+
+def _require_lists(problem: Problem, routes: Sequence[Sequence[int]]) -> None:
+    if len(routes) != problem.n_uav:
+        raise ValueError(f"routes must hold {problem.n_uav} lists, not {len(routes)}")
+    for route in routes:
+        for task in route:
+            if not 0 <= task < problem.n_task:
+                raise ValueError(f"routes name task index {task} of {problem.n_task}")

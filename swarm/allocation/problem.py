@@ -1,0 +1,166 @@
+"""A mission as arrays: what allocation computes with, validated once.
+
+Rows are UAVs, columns are tasks, in the order of the ids. Leaves out: what has
+happened so far (`swarm.allocation.lower_level.TeamState`) and every decision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.model import Mission, Task, TaskId, Uav, UavId
+
+__all__ = ["BoolArray", "FloatArray", "IntArray", "Problem"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """Arrays of eq. 1; read-only copies of what is passed in.
+
+    A UAV whose success probability at a task is 0 is *incapable* of it and never takes it.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+
+    uav_ids: tuple[UavId, ...]
+    task_ids: tuple[TaskId, ...]
+    start_enu_m: FloatArray
+    """(n_uav, 3) starts [m; east, north, up from the mission origin]."""
+    task_enu_m: FloatArray
+    """(n_task, 3) task places [m; same frame]."""
+    speed_m_s: FloatArray
+    """(n_uav,) cruise speeds [m/s]; > 0."""
+    value: FloatArray
+    """(n_task,) m_i; >= 0."""
+    service_s: FloatArray
+    """(n_task,) time on the spot [s]; >= 0."""
+    success: FloatArray
+    """(n_uav, n_task) p within 0..1."""
+    survival: FloatArray
+    """(n_uav, n_task) probability of surviving the task, within 0..1."""
+    horizon_s: float
+    """D [s]; > 0."""
+    capable: BoolArray = field(init=False, repr=False)
+    """(n_uav, n_task) success > 0."""
+    weight: FloatArray = field(init=False, repr=False)
+    """(n_uav, n_task) p · m."""
+    _task_columns_m: FloatArray = field(init=False, repr=False)
+    """(3, n_task) the places again, one contiguous row per axis."""
+
+    def __post_init__(self) -> None:
+        n_uav, n_task = len(self.uav_ids), len(self.task_ids)
+        _require_distinct("uav_ids", self.uav_ids)
+        _require_distinct("task_ids", self.task_ids)
+        shapes: dict[str, tuple[int, ...]] = {
+            "start_enu_m": (n_uav, 3),
+            "task_enu_m": (n_task, 3),
+            "speed_m_s": (n_uav,),
+            "value": (n_task,),
+            "service_s": (n_task,),
+            "success": (n_uav, n_task),
+            "survival": (n_uav, n_task),
+        }
+        for name, shape in shapes.items():
+            self._freeze(name, _checked(name, getattr(self, name), shape))
+        object.__setattr__(self, "uav_ids", tuple(self.uav_ids))
+        object.__setattr__(self, "task_ids", tuple(self.task_ids))
+        object.__setattr__(self, "horizon_s", float(self.horizon_s))
+        if not 0.0 < self.horizon_s < float("inf"):
+            raise ValueError(f"horizon_s must be > 0 and finite, not {self.horizon_s}")
+        if (self.speed_m_s <= 0.0).any():
+            raise ValueError(f"speed_m_s must be > 0, not {self.speed_m_s.min()}")
+        for name in ("value", "service_s"):
+            if (getattr(self, name) < 0.0).any():
+                raise ValueError(f"{name} must be >= 0, not {getattr(self, name).min()}")
+        for name in ("success", "survival"):
+            array = getattr(self, name)
+            if ((array < 0.0) | (array > 1.0)).any():
+                raise ValueError(f"{name} must be within 0..1")
+        self._freeze("capable", self.success > 0.0)
+        self._freeze("weight", self.success * self.value)
+        self._freeze("_task_columns_m", np.ascontiguousarray(self.task_enu_m.T))
+
+    @classmethod
+    def from_mission(
+        cls,
+        mission: Mission,
+        uavs: Sequence[Uav] | None = None,
+        tasks: Sequence[Task] | None = None,
+    ) -> Problem:
+        """Arrays of ``mission``, or of some of its (or other) UAVs and tasks.
+
+        Args:
+            mission: gives horizon and default probabilities, and all that is not named below.
+            uavs: rows in this order; the mission's own when None.
+            tasks: columns in this order; the mission's own, pop-ups included, when None.
+        """
+        rows = tuple(mission.uavs if uavs is None else uavs)
+        columns = tuple(mission.tasks if tasks is None else tasks)
+        shape = (len(rows), len(columns))
+
+        def table(look_up: Callable[[Uav, Task], float]) -> FloatArray:
+            return np.array([[look_up(u, t) for t in columns] for u in rows], float).reshape(shape)
+
+        return cls(
+            uav_ids=tuple(uav.id for uav in rows),
+            task_ids=tuple(task.id for task in columns),
+            start_enu_m=np.array([u.position_enu_m for u in rows], float).reshape(-1, 3),
+            task_enu_m=np.array([t.position_enu_m for t in columns], float).reshape(-1, 3),
+            speed_m_s=np.array([u.speed_m_s for u in rows], float),
+            value=np.array([t.value for t in columns], float),
+            service_s=np.array([t.service_s for t in columns], float),
+            success=table(mission.success),
+            survival=table(mission.survival),
+            horizon_s=mission.horizon_s,
+        )
+
+    @property
+    def n_uav(self) -> int:
+        """Number of UAVs."""
+        return len(self.uav_ids)
+
+    @property
+    def n_task(self) -> int:
+        """Number of tasks."""
+        return len(self.task_ids)
+
+    def travel_s(self, uav: int, place_enu_m: FloatArray) -> FloatArray:
+        """(n_task,) straight-line flight times of ``uav`` from a (3,) place [m; ENU] [s].
+
+        Computed as sqrt(dx² + dy² + dz²) / speed with each operation rounded by itself, so that
+        every implementation of the same formula finds the same floats.
+        """
+        d = self._task_columns_m - place_enu_m[:, None]
+        d *= d
+        square = d[0] + d[1]
+        square += d[2]
+        travel: FloatArray = np.sqrt(square)
+        travel /= self.speed_m_s[uav]
+        return travel
+
+    def _freeze(self, name: str, array: npt.NDArray[np.generic]) -> None:
+        array.setflags(write=False)
+        object.__setattr__(self, name, array)
+
+
+def _require_distinct(name: str, ids: Sequence[str]) -> None:
+    if len(set(ids)) != len(ids):
+        raise ValueError(f"{name} must differ from each other: {list(ids)}")
+
+
+def _checked(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    array = np.array(value, dtype=np.float64, order="C")
+    if array.shape != shape:
+        raise ValueError(f"{name} must have shape {shape}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, not NaN or infinite")
+    return array
