@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = ["Origin", "enu_from_wgs84", "wgs84_from_enu"]
+__all__ = ["DEFAULT_ORIGIN", "Origin", "enu_from_wgs84", "wgs84_from_enu"]
 
 _SEMI_MAJOR_M = 6_378_137.0
 _ECCENTRICITY_SQUARED = 6.694_379_990_14e-3
@@ -36,6 +36,10 @@ class Origin:
             raise ValueError(f"lon_deg must be within -180..180, not {self.lon_deg}")
         if not math.isfinite(self.alt_m):
             raise ValueError(f"alt_m must be finite, not {self.alt_m}")
+
+
+DEFAULT_ORIGIN = Origin(lat_deg=47.397742, lon_deg=8.545594, alt_m=488.0)
+"""Where scenarios without an origin of their own are flown."""
 
 
 def wgs84_from_enu(
