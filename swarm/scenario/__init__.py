@@ -1,5 +1,13 @@
 """Scenario files: TOML in, a validated mission out, one clear line per fault."""
 
+from swarm.scenario.read import load_scenario, parse_scenario
 from swarm.scenario.shipped import resolve_scenario, shipped_scenarios
+from swarm.scenario.write import format_scenario
 
-__all__ = ["resolve_scenario", "shipped_scenarios"]
+__all__ = [
+    "format_scenario",
+    "load_scenario",
+    "parse_scenario",
+    "resolve_scenario",
+    "shipped_scenarios",
+]
