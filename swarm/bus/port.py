@@ -2,6 +2,7 @@
 
 Leaves out: what is said (swarm.wire) and how it travels (swarm.bus.memory,
 swarm.bus.zenoh_bus, sim.network). Every implementation passes tests/contract/.
+Keys and key expressions are those of swarm.bus.keyexpr.
 
 A bus hands everything that happens to one bounded `Inbox`, in order of arrival,
 from whichever thread; nothing of the runtime is ever called on a bus thread.
@@ -10,12 +11,14 @@ from whichever thread; nothing of the runtime is ever called on a bus thread.
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 __all__ = [
+    "MAX_PAYLOAD_BYTES",
     "Answer",
     "Bus",
     "BusEvent",
@@ -28,6 +31,9 @@ __all__ = [
     "TokenSeen",
 ]
 
+MAX_PAYLOAD_BYTES = 1 << 20
+"""Longest payload of a sample or an answer [bytes]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Sample:
@@ -39,7 +45,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class TokenSeen:
-    """A watched liveliness token is there."""
+    """A watched liveliness token is there; told again after each `LinkUp`."""
 
     key: str
 
@@ -58,14 +64,24 @@ class LinkUp:
 
 @dataclass(frozen=True, slots=True)
 class LinkDown:
-    """This process has lost its last transport: what it sees of others proves nothing."""
+    """This process has lost its last transport: what it sees of others proves nothing.
+
+    It comes before the `TokenGone` of every watched token, which it entails. A
+    token that went because the cut reached the others' side first comes earlier:
+    suspect nobody before some hysteresis has passed without a `LinkDown`.
+    """
 
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """Somebody asks on a key served here; call `reply` once, from any thread."""
+    """Somebody asks on a key served here; call `reply` once, from any thread.
+
+    Replies after the first, after the asker's timeout, or after the bus has closed
+    go nowhere and do no harm. An event thrown away counts as no answer.
+    """
 
     key: str
+    """The served key."""
     reply: Callable[[bytes], None]
 
 
@@ -86,8 +102,10 @@ class Inbox:
 
     Two lanes: events that must not be lost (commands, claims, tokens, queries)
     and *latest* samples (status), of which only the newest per key is kept. When
-    the first lane is full its oldest entry goes and `dropped` counts it: the
-    registers inside are re-announced, so a drop delays agreement only.
+    a lane is full its oldest sample or query goes and `dropped` counts it: the
+    registers inside are re-announced, so a drop delays agreement only. Tokens and
+    links are told once, so they go last. The bound holds also while the loop is
+    too busy to read.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop, capacity: int = 4096) -> None:
@@ -95,8 +113,10 @@ class Inbox:
             raise ValueError(f"capacity must be >= 1, not {capacity}")
         self._loop = loop
         self._capacity = capacity
+        self._lock = threading.Lock()
         self._events: deque[BusEvent] = deque()
         self._latest: dict[str, Sample] = {}
+        self._waking = False
         self._ready = asyncio.Event()
         self.dropped = 0
         """Events dropped because the reader was too slow."""
@@ -106,37 +126,72 @@ class Inbox:
 
         A loop that has ended takes nothing any more: the event is forgotten.
         """
+        with self._lock:
+            self._put(event, latest)
+            if self._waking:
+                return
+            self._waking = True
         try:
-            self._loop.call_soon_threadsafe(self.offer, event, latest)
-        except RuntimeError:
-            self.dropped += 1
+            self._loop.call_soon_threadsafe(self._ready.set)
+        except RuntimeError:  # the loop is closed
+            with self._lock:
+                self.dropped += len(self._events) + len(self._latest)
+                self._events.clear()
+                self._latest.clear()
+                self._waking = False
 
     def offer(self, event: BusEvent, latest: bool = False) -> None:
         """Hand ``event`` over from the loop's own thread."""
-        if latest and isinstance(event, Sample):
-            self._latest[event.key] = event
-        else:
-            if len(self._events) >= self._capacity:
-                self._events.popleft()
-                self.dropped += 1
-            self._events.append(event)
+        with self._lock:
+            self._put(event, latest)
+            self._waking = True
         self._ready.set()
 
     def take(self) -> list[BusEvent]:
         """All that has arrived, oldest first, latest-only samples last; maybe nothing."""
-        events = [*self._events, *self._latest.values()]
-        self._events.clear()
-        self._latest.clear()
         self._ready.clear()
+        with self._lock:
+            self._waking = False
+            events = [*self._events, *self._latest.values()]
+            self._events.clear()
+            self._latest.clear()
         return events
 
     async def wait(self) -> None:
-        """Return as soon as `take` has something to give."""
+        """Return as soon as `take` has something to give.
+
+        It may have less than expected: whoever took in between has the rest.
+        """
         await self._ready.wait()
+
+    def _put(self, event: BusEvent, latest: bool) -> None:
+        """Append under the lock, making room if there is none."""
+        if latest and isinstance(event, Sample):
+            if event.key not in self._latest and len(self._latest) >= self._capacity:
+                del self._latest[next(iter(self._latest))]
+                self.dropped += 1
+            self._latest[event.key] = event
+            return
+        if len(self._events) >= self._capacity:
+            for place, old in enumerate(self._events):
+                if isinstance(old, Sample | Query):
+                    del self._events[place]
+                    break
+            else:
+                self._events.popleft()
+            self.dropped += 1
+        self._events.append(event)
 
 
 class Bus(Protocol):
-    """One process's seat on the bus. Close it in ``finally``; closing twice is fine."""
+    """One process's seat on the bus. Close it in ``finally``; closing twice is fine.
+
+    All methods but `close` raise `BusError` once the bus is closed, and `ValueError`
+    for a key or key expression that is none. All are called from the loop's thread.
+    What is declared here takes a moment to reach the others: a sample published
+    before they know of a subscription is not for it. Whoever joins asks for the
+    current state after subscribing.
+    """
 
     @property
     def inbox(self) -> Inbox:
@@ -144,11 +199,15 @@ class Bus(Protocol):
         ...
 
     def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:
-        """Send ``payload`` on ``key``; not reliable means it may be dropped under load.
+        """Send ``payload`` on ``key``; never waits for the network.
+
+        Samples of one publisher arrive in the order published. Not reliable means
+        that one may be dropped under load.
 
         Raises:
             BusError: the bus is closed.
-            ValueError: ``key`` is not a concrete key expression.
+            ValueError: ``key`` is not a concrete key, or ``payload`` is longer than
+                `MAX_PAYLOAD_BYTES`.
         """
         ...
 
@@ -161,24 +220,34 @@ class Bus(Protocol):
         ...
 
     def declare_token(self, key: str) -> None:
-        """Hold a liveliness token on ``key`` until this process or its link ends."""
+        """Hold a liveliness token on ``key`` until this process or its link ends.
+
+        Two holders of one key look like one: it is gone when both are.
+        """
         ...
 
     def watch_tokens(self, key_expr: str) -> None:
-        """Receive `TokenSeen` for tokens there are and will be, and `TokenGone`."""
+        """Receive `TokenSeen` for tokens there are and will be, and `TokenGone`.
+
+        Tokens on keys held by this bus itself are not told.
+        """
         ...
 
     def serve(self, key: str) -> None:
-        """Receive a `Query` whenever somebody asks on ``key``."""
+        """Receive a `Query` whenever somebody else asks on ``key``."""
         ...
 
     async def query(self, key_expr: str, *, timeout_s: float) -> Sequence[Answer]:
-        """Ask everyone who serves a key matching ``key_expr``; never later than the timeout.
+        """Ask all others who serve a key matching ``key_expr``; never later than the timeout.
 
-        Answers that came in time are returned; whoever is too late is left out.
+        Answers that came in time are returned, in order of arrival; whoever is too
+        late is left out.
         """
         ...
 
     def close(self) -> None:
-        """Undeclare everything and leave; returns within a few seconds whatever the network."""
+        """Send what is published, undeclare everything and leave.
+
+        Returns within a few seconds whatever the network.
+        """
         ...
