@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+from swarm.allocation.problem import Problem
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.state.registers import Replica
 from swarm.wire.messages import Board, Brief, Outcome, Result
 
-__all__ = ["TaskState", "attempts", "first_done", "mission_of", "task_states"]
+__all__ = ["TaskBoard", "TaskState", "attempts", "first_done", "mission_of"]
 
 
 class TaskState(StrEnum):
@@ -35,8 +36,37 @@ def first_done(replica: Replica, task: str) -> tuple[str, Outcome] | None:
     return next(done, None)
 
 
-def task_states(replica: Replica) -> dict[str, TaskState]:
-    """State of every task on the board, in board order."""
+class TaskBoard:
+    """What the registers of one replica say about tasks, worked out once per change."""
+
+    def __init__(self, replica: Replica, mission: str) -> None:
+        self.replica = replica
+        self._mission = mission
+        self._states: dict[str, TaskState] = {}
+        self._states_version = -1
+        self._problem: Problem | None = None
+        self._problem_version = -1
+
+    @property
+    def states(self) -> dict[str, TaskState]:
+        """State of every task on the board, in board order."""
+        if self._states_version != self.replica.task_version:
+            self._states = _task_states(self.replica)
+            self._states_version = self.replica.task_version
+        return self._states
+
+    @property
+    def problem(self) -> Problem | None:
+        """Every UAV of the brief and every task posted so far; None before the brief."""
+        if self._problem_version != self.replica.board_version:
+            brief = self.replica.brief
+            mission = None if brief is None else mission_of(self.replica, self._mission, brief)
+            self._problem = None if mission is None else Problem.from_mission(mission)
+            self._problem_version = self.replica.board_version
+        return self._problem
+
+
+def _task_states(replica: Replica) -> dict[str, TaskState]:
     done = {task for (_, task), o in replica.outcomes.items() if o.result is Result.DONE}
     tried = {task for (_, task), o in replica.outcomes.items() if o.result is Result.FAILED}
     reattempt = replica.brief is not None and replica.brief.reattempt_failed

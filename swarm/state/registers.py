@@ -31,6 +31,10 @@ class Replica:
         """By UAV id and task id."""
         self.stale = 0
         """Statements that were older than what was known."""
+        self.board_version = 0
+        """Grows with every change of brief or board."""
+        self.task_version = 0
+        """Grows with every change of brief, board or outcomes."""
 
     def join(self, message: Message) -> bool:
         """Take ``message`` in; whether it was news. Status is no register and never is."""
@@ -42,6 +46,8 @@ class Replica:
             self.stale += message.stamp < known.stamp
             return False
         self._registers[key] = message
+        self.board_version += isinstance(message.body, Brief | Board)
+        self.task_version += isinstance(message.body, Brief | Board | Outcome)
         match message.body:
             case Brief() as brief:
                 self.brief = brief

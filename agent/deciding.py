@@ -1,0 +1,112 @@
+"""Which task this UAV should take next, from the state it shares with the others.
+
+The offline lower level (swarm.allocation.lower_level) is continued from the state
+the registers describe until this UAV's turn comes. So UAVs that are free at the
+same time and of better rank decide first in everyone's picture, and a faultless
+run repeats the offline plan decision for decision (section III.C of the paper).
+Leaves out: what is done with the decision (agent.core).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarm.allocation.lower_level import Decision, TeamState, decisions
+from swarm.allocation.problem import Problem
+from swarm.allocation.rules import rule_by_name
+from swarm.state.board import TaskBoard, TaskState
+from swarm.state.claims import claim_strength
+from swarm.wire.messages import Claim, ClaimPhase
+
+__all__ = ["Turn", "decide", "ranks"]
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One UAV's turn to decide."""
+
+    uav: str
+    now_s: float
+    """Mission time [s]."""
+    decided_s: float
+    """Mission time at which this UAV became free [s]; orders claims made at the same time."""
+    place_enu_m: tuple[float, float, float]
+    """Where it is now [m; mission origin], without the height layer."""
+    present: Collection[str]
+    """Writers believed alive."""
+    awaited: Collection[str]
+    """Free UAVs that may be expected to decide in their turn."""
+    excluded: Collection[str]
+    """Tasks this UAV cannot take, whatever their value."""
+
+
+def ranks(sequence: Sequence[str], uavs: Sequence[str]) -> dict[str, int]:
+    """Rank of every UAV: place in the sequence; those not in it follow by id."""
+    listed = [uav for uav in sequence if uav in uavs]
+    return {uav: rank for rank, uav in enumerate([*listed, *sorted(set(uavs) - set(listed))])}
+
+
+def decide(problem: Problem, board: TaskBoard, rule: str, turn: Turn) -> Decision | None:
+    """The decision of ``turn.uav``; None when there is no task it could take.
+
+    Args:
+        problem: every UAV and every task on the board.
+        board: the registers and what they say about tasks.
+        rule: name of the decision rule.
+        turn: who decides, when and where.
+    """
+    replica, epoch = board.replica, board.replica.epoch
+    rank = ranks(epoch.sequence if epoch is not None else (), problem.uav_ids)
+    mine = problem.uav_ids.index(turn.uav)
+    stronger = _stronger_claims(replica.claims, rank[turn.uav], turn)
+    state = TeamState.at_start(problem)
+    taken = {claim.task for claim in stronger.values()} | set(turn.excluded)
+    for index, task in enumerate(problem.task_ids):
+        state.open[index] = board.states.get(task) is TaskState.OPEN and task not in taken
+    if not state.open.any():
+        return None
+    places = dict(zip(problem.task_ids, problem.task_enu_m, strict=True))
+    for index, uav in enumerate(problem.uav_ids):
+        ended = sorted(
+            (outcome.completed_s, task)
+            for (who, task), outcome in replica.outcomes.items()
+            if who == uav and task in places
+        )
+        survived = [problem.survival[index, problem.task_ids.index(task)] for _, task in ended]
+        state.survived[index] = math.prod(survived)
+        claim = stronger.get(uav)
+        state.active[index] = True
+        if uav == turn.uav:
+            state.free_s[index] = turn.now_s
+            state.place_enu_m[index] = turn.place_enu_m
+        elif claim is not None and claim.task in places:
+            late = claim.completion_s < turn.now_s
+            state.free_s[index] = math.inf if late else claim.completion_s
+            state.place_enu_m[index] = places[claim.task]
+        elif uav in turn.awaited:
+            state.free_s[index] = turn.now_s
+            if ended:
+                state.place_enu_m[index] = places[ended[-1][1]]
+        else:
+            state.active[index] = False
+    order = np.array([rank[uav] for uav in problem.uav_ids])
+    process = decisions(problem, state, order, rule_by_name(rule))
+    return next((decision for decision in process if decision.uav == mine), None)
+
+
+def _stronger_claims(claims: Mapping[str, Claim], rank: int, turn: Turn) -> dict[str, Claim]:
+    """Claims of present others that would beat a claim this UAV makes now."""
+    proposal = Claim(ClaimPhase.PROPOSED, "-", turn.decided_s, rank, turn.now_s)
+    own = claim_strength(turn.uav, proposal)
+    return {
+        uav: claim
+        for uav, claim in claims.items()
+        if uav != turn.uav
+        and uav in turn.present
+        and claim.task is not None
+        and claim_strength(uav, claim) < own
+    }

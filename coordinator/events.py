@@ -1,0 +1,40 @@
+"""What the coordinator's core hears and what it wants done, beyond the common lot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from swarm.events import BusFact, Wish
+from swarm.model import Mission, Plan
+
+__all__ = ["Action", "Event", "MakePlan", "PlanFailed", "PlanMade"]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanMade:
+    """The answer to a `MakePlan`."""
+
+    request: int
+    plan: Plan
+
+
+@dataclass(frozen=True, slots=True)
+class PlanFailed:
+    """The answer to a `MakePlan` that could not be planned."""
+
+    request: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class MakePlan:
+    """Plan this mission in the background; ends in `PlanMade` or `PlanFailed`."""
+
+    request: int
+    mission: Mission
+    method: str
+    seed: int
+
+
+Event = BusFact | PlanMade | PlanFailed
+Action = Wish | MakePlan

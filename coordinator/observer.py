@@ -1,0 +1,240 @@
+"""What an onlooker on the bus knows of a mission: its state, and its story in sentences.
+
+Feeds the live table, the report and the dashboard; decides nothing. Leaves out:
+how any of it is shown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarm.allocation.objective import executed_objective
+from swarm.allocation.problem import Problem
+from swarm.config import Timing
+from swarm.events import BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen
+from swarm.model import Mission, Plan, TaskId, UavId
+from swarm.model.ids import COORDINATOR
+from swarm.state.board import TaskBoard, TaskState, first_done
+from swarm.state.claims import holders
+from swarm.state.membership import Membership
+from swarm.state.registers import Replica
+from swarm.wire.messages import (
+    Board,
+    Claim,
+    ClaimPhase,
+    Epoch,
+    EpochPhase,
+    Message,
+    Outcome,
+    Result,
+    Status,
+)
+
+__all__ = ["Happening", "MissionResult", "Observer"]
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """One line of the story."""
+
+    mission_s: float | None
+    """Mission time [s]; None before the start."""
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class MissionResult:
+    """What was executed, as far as it is known; DESIGN of the JSON: README, `swarm run`."""
+
+    executed_routes: dict[UavId, tuple[TaskId, ...]]
+    """Visits that ended done, in order, duplicates included."""
+    executed_completion_s: dict[TaskId, float]
+    """First successful visit of each task [s mission time]."""
+    executed_objective: float
+    """Eq. 1 over the tasks done, with the completion times that came about [value·s]."""
+    done: tuple[TaskId, ...]
+    failed: tuple[TaskId, ...]
+    open: tuple[TaskId, ...]
+    """Neither done nor failed nor withdrawn; pop-ups that never appeared included."""
+    duplicate_visits: int
+    """Visits to a task that had already been done."""
+    makespan_s: float
+    """Latest completion [s mission time]; 0 when nothing was done."""
+    lost_uavs: tuple[UavId, ...]
+    epochs: int
+    """Epochs in which the mission ran."""
+
+
+class Observer:
+    """One onlooker.
+
+    Args:
+        mission: the scenario being flown, pop-ups included.
+        timing: timers, in the seconds of ``now_s``.
+    """
+
+    def __init__(self, mission: Mission, timing: Timing) -> None:
+        self.mission = mission
+        self.plan: Plan | None = None
+        """The offline plan; set by whoever knows it."""
+        self.replica = Replica()
+        self.board = TaskBoard(self.replica, mission.name)
+        self.statuses: dict[str, Status] = {}
+        """Newest status by UAV id."""
+        self.present: set[str] = set()
+        """Writers believed to be there."""
+        self.lost: list[UavId] = []
+        """UAVs that disappeared while they took part."""
+        self.story: list[Happening] = []
+        self._membership = Membership(timing)
+        self._zero_s: float | None = None
+        self._orphans: dict[str, str] = {}
+        self._numbers: set[int] = set()
+        self._ended_told = False
+
+    def step(self, fact: BusFact, now_s: float) -> None:
+        """Take note of one fact."""
+        match fact:
+            case Heard(message):
+                self._hear(message, now_s)
+            case Learned(snapshots):
+                for snapshot in snapshots:
+                    if self._zero_s is None and snapshot.mission_s is not None:
+                        self._zero_s = now_s - snapshot.mission_s
+                    for message in snapshot.messages:
+                        self._hear(message, now_s)
+            case PeerSeen(writer):
+                self._membership.seen(writer)
+            case PeerGone(writer):
+                self._membership.gone(writer, now_s)
+            case LinkChanged(up):
+                self._membership.link(up, now_s)
+            case _:
+                pass
+        for writer in self._membership.lost(now_s):
+            self._lose(writer, now_s)
+        self.present = self._membership.present
+
+    def next_deadline_s(self) -> float | None:
+        """When `step` wants a tick."""
+        return self._membership.next_deadline_s()
+
+    def mission_s(self, now_s: float) -> float | None:
+        """Mission time; None before the start."""
+        return None if self._zero_s is None else now_s - self._zero_s
+
+    @property
+    def phase(self) -> EpochPhase:
+        """How far the mission is."""
+        epoch = self.replica.epoch
+        return EpochPhase.PREPARING if epoch is None else epoch.phase
+
+    @property
+    def holders(self) -> dict[str, str]:
+        """Task id -> UAV id that is on its way to it or serves it."""
+        claims = {u: c for u, c in self.replica.claims.items() if u in self.present}
+        states = self.board.states
+        return {t: u for t, u in holders(claims).items() if states.get(t) is TaskState.OPEN}
+
+    def result(self) -> MissionResult:
+        """What has been executed so far."""
+        problem = Problem.from_mission(self.mission)
+        index = {task: number for number, task in enumerate(problem.task_ids)}
+        routes: dict[UavId, tuple[TaskId, ...]] = {}
+        for uav in problem.uav_ids:
+            visits = sorted(
+                (outcome.completed_s, TaskId(task))
+                for (who, task), outcome in self.replica.outcomes.items()
+                if who == uav and outcome.result is Result.DONE and task in index
+            )
+            routes[uav] = tuple(task for _, task in visits)
+        first = {task: first_done(self.replica, task) for task in problem.task_ids}
+        completion_s = {
+            task: visit[1].completed_s for task, visit in first.items() if visit is not None
+        }
+        times_s = np.array([completion_s.get(task, np.nan) for task in problem.task_ids])
+        by = np.array(
+            [-1 if v is None else problem.uav_ids.index(UavId(v[0])) for v in first.values()],
+            dtype=np.int64,
+        )
+        lists = [[index[task] for task in route] for route in routes.values()]
+        states = self.board.states
+        return MissionResult(
+            executed_routes=routes,
+            executed_completion_s=completion_s,
+            executed_objective=executed_objective(problem, lists, times_s, by),
+            done=tuple(completion_s),
+            failed=tuple(t for t in problem.task_ids if states.get(t) is TaskState.FAILED),
+            open=tuple(
+                t
+                for t in problem.task_ids
+                if states.get(t, TaskState.OPEN) is TaskState.OPEN and t not in completion_s
+            ),
+            duplicate_visits=sum(len(route) for route in routes.values()) - len(completion_s),
+            makespan_s=max(completion_s.values(), default=0.0),
+            lost_uavs=tuple(self.lost),
+            epochs=len(self._numbers),
+        )
+
+    # -- the story --------------------------------------------------------------------
+
+    def _hear(self, message: Message, now_s: float) -> None:
+        if isinstance(message.body, Status):
+            self.statuses[message.writer] = message.body
+            return
+        before = self.replica.claims.get(message.writer)
+        if not self.replica.join(message):
+            return
+        match message.body:
+            case Epoch() as epoch:
+                self._hear_epoch(epoch, now_s)
+            case Board(task=task, withdrawn=True):
+                self._tell(f"task {task} withdrawn", now_s)
+            case Board(task=task) if self._zero_s is not None:
+                self._tell(f"task {task} appeared", now_s)
+            case Claim() as claim:
+                self._hear_claim(message.writer, claim, before, now_s)
+            case Outcome(task=task, result=result):
+                self._tell(f"{message.writer} ended {task}: {result}", now_s)
+            case _:
+                pass
+
+    def _hear_epoch(self, epoch: Epoch, now_s: float) -> None:
+        if epoch.phase is EpochPhase.RUNNING and epoch.number not in self._numbers:
+            self._numbers.add(epoch.number)
+            if self._zero_s is None:
+                self._zero_s = now_s - epoch.mission_s
+            order = " > ".join(epoch.sequence)
+            self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}", now_s)
+        elif epoch.phase is EpochPhase.ENDED and not self._ended_told:
+            self._ended_told = True
+            self._tell(f"mission ends: {epoch.reason}", now_s)
+
+    def _hear_claim(self, uav: str, claim: Claim, before: Claim | None, now_s: float) -> None:
+        if claim.phase is ClaimPhase.OUT and self.phase is EpochPhase.RUNNING:
+            self._tell(f"{uav} takes no further part", now_s)
+        if claim.task is None or (before is not None and before.task == claim.task):
+            return
+        if (former := self._orphans.pop(claim.task, None)) is not None:
+            self._tell(f"{uav} took over {claim.task} from {former}", now_s)
+
+    def _lose(self, writer: str, now_s: float) -> None:
+        if writer == COORDINATOR:
+            if self.phase is not EpochPhase.ENDED:
+                self._tell("coordinator lost; the fleet goes on with the last epoch", now_s)
+            return
+        claim = self.replica.claims.get(writer)
+        if claim is None or claim.phase is ClaimPhase.OUT:
+            return
+        self.lost.append(UavId(writer))
+        opened = self.board.states.get(claim.task or "") is TaskState.OPEN
+        if claim.task is not None and opened:
+            self._orphans[claim.task] = writer
+            self._tell(f"{writer} lost; task {claim.task} is open again", now_s)
+        else:
+            self._tell(f"{writer} lost", now_s)
+
+    def _tell(self, text: str, now_s: float) -> None:
+        self.story.append(Happening(self.mission_s(now_s), text))

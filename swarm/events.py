@@ -1,0 +1,106 @@
+"""What every core on the bus hears and what it wants done; shells translate both.
+
+Leaves out: what only one kind of process knows (agent.events, coordinator.events).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from swarm.wire.messages import Message, Snapshot
+
+__all__ = [
+    "Ask",
+    "BusFact",
+    "Finish",
+    "Heard",
+    "Learned",
+    "LinkChanged",
+    "Note",
+    "PeerGone",
+    "PeerSeen",
+    "Publish",
+    "Stop",
+    "Tick",
+    "Wish",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A checked message arrived while it was new."""
+
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """All answers to an `Ask`, maybe none."""
+
+    snapshots: tuple[Snapshot, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PeerSeen:
+    """The liveliness token of ``writer`` is there."""
+
+    writer: str
+
+
+@dataclass(frozen=True, slots=True)
+class PeerGone:
+    """The liveliness token of ``writer`` disappeared."""
+
+    writer: str
+
+
+@dataclass(frozen=True, slots=True)
+class LinkChanged:
+    """The own link to the bus came up or went down."""
+
+    up: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Whoever runs this process wants it to end."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """A deadline has come."""
+
+
+BusFact = Heard | Learned | PeerSeen | PeerGone | LinkChanged | Stop | Tick
+
+
+@dataclass(frozen=True, slots=True)
+class Publish:
+    """Say this on its key."""
+
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Ask everyone for the registers they answer for; ends in `Learned`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A line for the log."""
+
+    text: str
+    fields: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Everything is done; the process may end with this exit status."""
+
+    status: int
+
+
+Wish = Publish | Ask | Note | Finish

@@ -1,0 +1,58 @@
+"""Who is there: liveliness tokens with hysteresis.
+
+A writer is present from the first sign of its token until the token has been
+gone for a while *and* the own link was up all that time: without a link of one's
+own, the silence of others proves nothing. Each process judges for itself.
+"""
+
+from __future__ import annotations
+
+from swarm.config import Timing
+
+__all__ = ["Membership"]
+
+
+class Membership:
+    """One process's judgement of who is present."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._timing = timing
+        self._doubted_until_s: dict[str, float] = {}
+        self._linked = True
+        self.present: set[str] = set()
+        """Writers believed to be there."""
+
+    def seen(self, writer: str) -> bool:
+        """``writer``'s token is there; whether it was not present before."""
+        self._doubted_until_s.pop(writer, None)
+        new = writer not in self.present
+        self.present.add(writer)
+        return new
+
+    def gone(self, writer: str, now_s: float) -> None:
+        """``writer``'s token has disappeared."""
+        if writer in self.present:
+            self._doubted_until_s[writer] = now_s + self._timing.loss_delay_s
+
+    def link(self, up: bool, now_s: float) -> None:
+        """The own link came up or went down."""
+        if up and not self._linked:
+            grace_s = now_s + self._timing.relink_grace_s
+            self._doubted_until_s = dict.fromkeys(self._doubted_until_s, grace_s)
+        self._linked = up
+
+    def lost(self, now_s: float) -> list[str]:
+        """Writers given up by now, each told once, in id order."""
+        if not self._linked:
+            return []
+        lost = sorted(w for w, until_s in self._doubted_until_s.items() if until_s <= now_s)
+        for writer in lost:
+            del self._doubted_until_s[writer]
+            self.present.discard(writer)
+        return lost
+
+    def next_deadline_s(self) -> float | None:
+        """When `lost` may next have something to tell."""
+        if not self._linked:
+            return None
+        return min(self._doubted_until_s.values(), default=None)
