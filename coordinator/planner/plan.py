@@ -1,0 +1,123 @@
+"""From a mission to a plan: choose the method, bound the work, prove what can be proven.
+
+Pop-ups (tasks with ``appears_s > 0``) are unknown to a plan. Leaves out: scenario files,
+printing and drawing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from coordinator.planner.exact import estimated_s, optimum
+from coordinator.planner.sequence import EXHAUSTIVE_UAVS, SearchLimits, best_sequence
+from coordinator.planner.stop import ShouldStop, never
+from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
+from swarm.allocation.rules import EXACT_TASKS
+from swarm.clock import Clock
+from swarm.model import Mission, Plan
+
+__all__ = ["METHODS", "make_plan"]
+
+METHODS = ("greedy", "lookahead", "exact")
+
+_PROOF_S = 1.0
+"""The optimum is proven beside any method when that is estimated to take at most this long."""
+_EXHAUSTIVE_DECISIONS = 600_000
+"""Decisions all first rounds together may take to be tried one by one: some 10 s."""
+_LOCAL_DECISIONS = 120_000
+"""The same for the local search: some 2 s."""
+_LONG_LOOKAHEAD_EVALUATIONS = 6
+"""One of them takes about a second at 60 tasks, so a few must do."""
+
+
+def make_plan(
+    mission: Mission,
+    method: str,
+    *,
+    clock: Clock,
+    seed: int = 0,
+    stop: ShouldStop | None = None,
+) -> Plan:
+    """Plan a mission.
+
+    With the same seed and without a limit in time the same plan comes out every time.
+
+    Args:
+        mission: what to plan; its pop-ups are left out.
+        method: one of `METHODS`.
+        clock: measures the elapsed time; nothing is decided by it.
+        seed: of the local search, which only large fleets need.
+        stop: ends the search for a sequence; None means after a few seconds' worth of work.
+
+    Returns:
+        The plan. Its sequence is None for ``exact``, which has none.
+
+    Raises:
+        ValueError: there is no such method.
+        ProblemTooLargeError: method ``exact`` on a mission too large for it.
+    """
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
+    begin_s = clock.now_s()
+    problem = Problem.from_mission(mission.known_at_start())
+    sequence: tuple[int, ...] | None = None
+    evaluations = 0
+    proven: float | None = None
+    routes: Sequence[Sequence[int]]
+    if method == "exact":
+        routes = optimum(problem).routes
+        proven = evaluate(problem, routes)[0]
+    else:
+        search = best_sequence(
+            problem,
+            rule := rule_by_name(method),
+            np.random.default_rng(seed),
+            never if stop is None else stop,
+            limits=_limits(problem, method, stopped=stop is not None),
+        )
+        sequence, evaluations = search.sequence, search.evaluations
+        routes, _ = run(problem, TeamState.at_start(problem), rank_of(sequence), rule)
+        if estimated_s(problem) <= _PROOF_S:
+            proven = evaluate(problem, optimum(problem).routes)[0]
+    objective, completion_s = evaluate(problem, routes)
+    if proven is not None:
+        proven = max(proven, objective)  # the same lists summed in another order may be 1e-15 off
+    return Plan(
+        scenario=mission.name,
+        method=method,
+        routes={
+            uav: tuple(problem.task_ids[task] for task in route)
+            for uav, route in zip(problem.uav_ids, routes, strict=True)
+        },
+        objective=objective,
+        completion_s={
+            problem.task_ids[task]: float(completion_s[task]) for route in routes for task in route
+        },
+        sequence=None if sequence is None else tuple(problem.uav_ids[uav] for uav in sequence),
+        optimum=proven,
+        evaluations=evaluations,
+        elapsed_s=clock.now_s() - begin_s,
+        seed=seed,
+    )
+
+
+def _limits(problem: Problem, method: str, *, stopped: bool) -> SearchLimits:
+    """What is cheap here; with ``stopped`` the caller's limit alone ends the local search."""
+    n_task = max(1, problem.n_task)
+    if method == "lookahead" and n_task > EXACT_TASKS:
+        few = _LONG_LOOKAHEAD_EVALUATIONS
+        return SearchLimits(
+            first_rounds=few,
+            first_rounds_large_fleet=few,
+            decisions=few * n_task,
+            local_evaluations=None if stopped else few,
+        )
+    local = max(100, _LOCAL_DECISIONS // n_task)
+    return SearchLimits(
+        first_rounds=max(local, _EXHAUSTIVE_DECISIONS // n_task),
+        first_rounds_large_fleet=local,
+        partial_rounds=60_000 if problem.n_uav <= EXHAUSTIVE_UAVS else 20_000,
+        local_evaluations=None if stopped else local,
+    )
