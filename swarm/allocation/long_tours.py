@@ -14,7 +14,7 @@ from swarm.allocation.problem import FloatArray, IntArray
 
 __all__ = ["BEAM_WIDTH", "good_tours", "tour_values"]
 
-BEAM_WIDTH = 48
+BEAM_WIDTH = 64
 _SWEEPS = 4
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 

@@ -47,15 +47,20 @@ def evaluate(problem: Problem, routes: Sequence[Sequence[int]]) -> tuple[float, 
 
 
 def executed_objective(
-    problem: Problem, routes: Sequence[Sequence[int]], completion_s: npt.ArrayLike
+    problem: Problem,
+    routes: Sequence[Sequence[int]],
+    completion_s: npt.ArrayLike,
+    done_by: npt.ArrayLike | None = None,
 ) -> float:
     """Eq. 1 with the completion times that came about.
 
     Args:
         problem: the mission.
         routes: task indices per UAV as visited; S is the product along them, also over visits
-            without success. A task visited by several UAVs counts once, for the first of them.
+            that do not count.
         completion_s: (n_task,) real completion times [s]; NaN for tasks not done, which count 0.
+        done_by: (n_task,) index of the UAV whose visit counts, where several visited one task;
+            the first list that names the task when left out.
 
     Raises:
         ValueError: a list too many or too few, an unknown task, or a wrong shape.
@@ -64,12 +69,13 @@ def executed_objective(
     times_s = np.asarray(completion_s, dtype=np.float64)
     if times_s.shape != (problem.n_task,):
         raise ValueError(f"completion_s must have shape {(problem.n_task,)}, not {times_s.shape}")
+    by = None if done_by is None else np.asarray(done_by)
     objective = 0.0
     counted = np.isnan(times_s)
     for uav, route in enumerate(routes):
         survived = 1.0
         for task in route:
-            if not counted[task]:
+            if not counted[task] and (by is None or by[task] == uav):
                 counted[task] = True
                 left_s = problem.horizon_s - times_s[task]
                 objective += survived * problem.weight[uav, task] * left_s
