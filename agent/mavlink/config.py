@@ -1,0 +1,121 @@
+"""Settings of one vehicle's bridge."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from agent.mavlink.commands import CommandPolicy
+from swarm.model.frames import Origin
+
+__all__ = ["BridgeConfig"]
+
+
+@dataclass(frozen=True, slots=True)
+class BridgeConfig:
+    """How the bridge treats its vehicle; every duration is in vehicle seconds.
+
+    Raises:
+        ValueError: an id, rate, limit or duration is out of range.
+    """
+
+    system_id: int
+    """MAVLink system id of the vehicle; any other vehicle is never commanded."""
+    origin: Origin
+    """Zero of the mission's local frame."""
+    ground_system_id: int = 255
+    """Our own MAVLink system id."""
+    ground_component_id: int = 190
+    """Our own MAVLink component id."""
+    acceptance_radius_m: float = 1.0
+    """Distance to the target, height included, within which the vehicle has arrived."""
+    arrival_speed_m_s: float = 0.5
+    """Speed below which the vehicle counts as having stopped."""
+    position_rate_hz: float = 10.0
+    """Rate of GLOBAL_POSITION_INT that is asked for."""
+    status_rate_hz: float = 2.0
+    """Rate of the other streams that are asked for."""
+    heartbeat_interval_s: float = 1.0
+    """Interval of our own heartbeat."""
+    silence_timeout_s: float = 5.0
+    """Without a heartbeat for that long the vehicle is no longer ours."""
+    stream_timeout_s: float = 3.0
+    """A stream that does not come for that long, or three intervals, is asked for again."""
+    commands: CommandPolicy = field(default_factory=CommandPolicy)
+    mode_tries: int = 5
+    """Times a mode is set without being seen before giving up."""
+    arm_tries: int = 15
+    """Times arming is asked for, refusals and automatic disarming included."""
+    takeoff_tries: int = 8
+    """Times takeoff is asked for, refusals included."""
+    retry_delay_s: float = 2.0
+    """Pause after a refused mode, arming or takeoff."""
+    effect_timeout_s: float = 4.0
+    """Wait for the effect of an accepted command to be seen."""
+    climb_timeout_s: float = 15.0
+    """A takeoff that gains no height for that long has failed."""
+    takeoff_min_m: float = 0.5
+    """Lowest height above home at which a start is accepted."""
+    stall_timeout_s: float = 5.0
+    """A vehicle that stands still elsewhere than at its target for that long is told again."""
+    stall_tries: int = 3
+    """Times it is told again before the order is given up."""
+    fence_radius_m: float = 20_000.0
+    """Targets farther from the origin are refused [m, horizontally]."""
+    fence_height_m: float = 1_000.0
+    """Targets higher above the origin, or lower below it, are refused [m]."""
+
+    def __post_init__(self) -> None:
+        for name in ("system_id", "ground_system_id", "ground_component_id"):
+            value = getattr(self, name)
+            if not (isinstance(value, int) and 1 <= value <= 255):
+                raise ValueError(f"{name} must be a whole number within 1..255, not {value}")
+        for name in (
+            "acceptance_radius_m",
+            "arrival_speed_m_s",
+            "position_rate_hz",
+            "status_rate_hz",
+            "heartbeat_interval_s",
+            "silence_timeout_s",
+            "stream_timeout_s",
+            "mode_tries",
+            "arm_tries",
+            "takeoff_tries",
+            "retry_delay_s",
+            "effect_timeout_s",
+            "climb_timeout_s",
+            "takeoff_min_m",
+            "stall_timeout_s",
+            "stall_tries",
+            "fence_radius_m",
+            "fence_height_m",
+        ):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be a number > 0, not {value}")
+
+    def for_speedup(self, speedup: float) -> BridgeConfig:
+        """The same, but with patience for a vehicle whose time runs ``speedup`` times as fast.
+
+        Answers still take wall time to compute and travel: every wait for one lasts at
+        least half a wall second, and silence at least three.
+
+        Raises:
+            ValueError: ``speedup`` is not a number > 0.
+        """
+        if not (math.isfinite(speedup) and speedup > 0.0):
+            raise ValueError(f"speedup must be a number > 0, not {speedup}")
+        answer_s = 0.5 * speedup
+        return replace(
+            self,
+            silence_timeout_s=max(self.silence_timeout_s, 3.0 * speedup),
+            stream_timeout_s=max(self.stream_timeout_s, answer_s),
+            effect_timeout_s=max(self.effect_timeout_s, answer_s),
+            climb_timeout_s=max(self.climb_timeout_s, 2.0 * answer_s),
+            stall_timeout_s=max(self.stall_timeout_s, answer_s),
+            commands=replace(
+                self.commands,
+                ack_timeout_s=max(self.commands.ack_timeout_s, answer_s),
+                progress_timeout_s=max(self.commands.progress_timeout_s, 2.0 * answer_s),
+            ),
+        )

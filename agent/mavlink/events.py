@@ -1,0 +1,42 @@
+"""What the bridge hears beside orders, and what it wants done beside reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agent.vehicle import Orders, Report
+
+__all__ = ["Action", "Event", "LinkDown", "LinkUp", "Received", "Send", "Tick"]
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """Bytes came from the link."""
+
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Time has passed."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkUp:
+    """The link is open, for the first time or again."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkDown:
+    """The link is closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Send these bytes."""
+
+    data: bytes
+
+
+Event = Received | Tick | LinkUp | LinkDown | Orders
+Action = Send | Report

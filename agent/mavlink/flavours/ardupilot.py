@@ -1,0 +1,194 @@
+"""ArduPilot's copters, as ArduCopter 4.8 behaves.
+
+Leaves out: planes, rovers and submarines, whose modes have other numbers and which
+take off otherwise.
+
+Sources: https://mavlink.io/en/messages/ardupilotmega.html and
+https://ardupilot.org/dev/docs/copter-commands-in-guided-mode.html
+"""
+
+from __future__ import annotations
+
+import math
+
+from agent.mavlink.flavours.base import SpeedParameter
+from agent.mavlink.messages import (
+    AltitudeFrame,
+    Battery,
+    CommandInt,
+    CommandLong,
+    EkfStatus,
+    ExtendedState,
+    Heartbeat,
+    Inbound,
+    Landed,
+    MissionCurrent,
+    SystemStatus,
+)
+from agent.mavlink.state import VehicleState
+
+__all__ = ["ArduCopter"]
+
+_AUTOPILOT_ARDUPILOT = 3
+_COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
+"""MAV_TYPE of quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca- and decacopter."""
+
+_GUIDED = 4
+_RTL = 6
+_LAND = 9
+_SMART_RTL = 21
+_AUTO_RTL = 27
+_MODE_NAMES = {
+    0: "STABILIZE",
+    1: "ACRO",
+    2: "ALT_HOLD",
+    3: "AUTO",
+    _GUIDED: "GUIDED",
+    5: "LOITER",
+    _RTL: "RTL",
+    7: "CIRCLE",
+    _LAND: "LAND",
+    11: "DRIFT",
+    13: "SPORT",
+    14: "FLIP",
+    15: "AUTOTUNE",
+    16: "POSHOLD",
+    17: "BRAKE",
+    18: "THROW",
+    19: "AVOID_ADSB",
+    20: "GUIDED_NOGPS",
+    _SMART_RTL: "SMART_RTL",
+    22: "FLOWHOLD",
+    23: "FOLLOW",
+    24: "ZIGZAG",
+    25: "SYSTEMID",
+    26: "AUTOROTATE",
+    _AUTO_RTL: "AUTO_RTL",
+    28: "TURTLE",
+}
+
+_STATE_STANDBY = 3
+_STATE_ACTIVE = 4
+_EKF_POS_HORIZ_ABS = 16
+_EKF_CONST_POS_MODE = 128
+
+_CMD_NAV_TAKEOFF = 22
+_CMD_DO_SET_MODE = 176
+_CMD_DO_CHANGE_SPEED = 178
+_CMD_DO_REPOSITION = 192
+_CMD_COMPONENT_ARM_DISARM = 400
+_CUSTOM_MODE_ENABLED = 1.0
+_GROUND_SPEED = 1.0
+_UNCHANGED = -1.0
+
+
+class ArduCopter:
+    """The flavour of ArduPilot's copters."""
+
+    @property
+    def speed_parameters(self) -> tuple[SpeedParameter, ...]:
+        """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""
+        return (SpeedParameter("WP_SPD", 1.0), SpeedParameter("WPNAV_SPEED", 100.0))
+
+    @property
+    def streams(self) -> tuple[tuple[int, type[Inbound]], ...]:
+        """ArduPilot streams nothing unasked."""
+        return (
+            (1, SystemStatus),
+            (193, EkfStatus),
+            (245, ExtendedState),
+            (42, MissionCurrent),
+            (147, Battery),
+        )
+
+    def flies(self, heartbeat: Heartbeat) -> bool:
+        """Whether it is an ArduPilot copter."""
+        return (
+            heartbeat.autopilot == _AUTOPILOT_ARDUPILOT and heartbeat.vehicle_type in _COPTER_TYPES
+        )
+
+    def mode_name(self, custom_mode: int) -> str:
+        """The mode's name, for people."""
+        return _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")
+
+    def is_commanded(self, custom_mode: int) -> bool:
+        """GUIDED takes our targets."""
+        return custom_mode == _GUIDED
+
+    def is_returning(self, custom_mode: int) -> bool:
+        """RTL and its kin, and LAND."""
+        return custom_mode in (_RTL, _LAND, _SMART_RTL, _AUTO_RTL)
+
+    def has_booted(self, heartbeat: Heartbeat) -> bool:
+        """STANDBY or beyond; a mode set earlier is acknowledged and then overwritten."""
+        return heartbeat.system_status >= _STATE_STANDBY
+
+    def airborne(self, vehicle: VehicleState) -> bool:
+        """By EXTENDED_SYS_STATE; before it comes, by the heartbeat's ACTIVE."""
+        if vehicle.landed is not Landed.UNDEFINED:
+            return vehicle.landed is not Landed.ON_GROUND
+        return vehicle.heartbeat is not None and vehicle.heartbeat.system_status >= _STATE_ACTIVE
+
+    def unready(self, vehicle: VehicleState) -> str | None:
+        """Pre-arm checks of SYS_STATUS, then the EKF's absolute horizontal position."""
+        if not vehicle.prearm_heard:
+            return "waiting for the pre-arm checks (SYS_STATUS)"
+        if vehicle.ekf_flags is None:
+            return "waiting for the position estimate's status (EKF_STATUS_REPORT)"
+        if not vehicle.ekf_flags & _EKF_POS_HORIZ_ABS or vehicle.ekf_flags & _EKF_CONST_POS_MODE:
+            return "no position estimate yet"
+        if vehicle.prearm_ok is False:
+            return "pre-arm checks do not pass"
+        if vehicle.position is None:
+            return "waiting for a position"
+        return None
+
+    def set_commanded_mode(self) -> CommandLong:
+        """GUIDED."""
+        return _set_mode(_GUIDED)
+
+    def set_return_mode(self) -> CommandLong:
+        """RTL, which climbs, returns, lands and disarms."""
+        return _set_mode(_RTL)
+
+    def arm(self) -> CommandLong:
+        """Start the motors; in GUIDED refused without a position."""
+        return CommandLong(_CMD_COMPONENT_ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+    def disarm(self) -> CommandLong:
+        """Stop the motors; refused in the air."""
+        return CommandLong(_CMD_COMPONENT_ARM_DISARM, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+    def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
+        """ArduCopter reads the height as above home."""
+        return CommandLong(_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, alt_m - home_alt_m))
+
+    def reposition(self, lat_deg: float, lon_deg: float, alt_m: float) -> CommandInt:
+        """Fly there at once, in GUIDED only.
+
+        The altitude is given above mean sea level, like the mission's own, so that home's
+        height does not matter. The flag that would let the command change the mode is not
+        set: a pilot who just took over keeps the vehicle.
+        """
+        return CommandInt(
+            _CMD_DO_REPOSITION,
+            AltitudeFrame.MEAN_SEA_LEVEL,
+            (_UNCHANGED, 0.0, 0.0, math.nan),
+            lat_deg,
+            lon_deg,
+            alt_m,
+        )
+
+    def change_speed(self, speed_m_s: float) -> CommandLong:
+        """Ground speed; forgotten when GUIDED is entered or takeoff ends, so set it after."""
+        return CommandLong(
+            _CMD_DO_CHANGE_SPEED,
+            (_GROUND_SPEED, speed_m_s, _UNCHANGED, 0.0, 0.0, 0.0, 0.0),
+        )
+
+
+def _set_mode(custom_mode: int) -> CommandLong:
+    return CommandLong(
+        _CMD_DO_SET_MODE,
+        (_CUSTOM_MODE_ENABLED, float(custom_mode), 0.0, 0.0, 0.0, 0.0, 0.0),
+    )

@@ -1,0 +1,93 @@
+"""What the bridge asks of a firmware's flavour.
+
+Leaves out: when to do what, which is the same for every firmware (agent.mavlink.bridge).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from agent.mavlink.messages import CommandInt, CommandLong, Heartbeat, Inbound
+from agent.mavlink.state import VehicleState
+
+__all__ = ["Flavour", "SpeedParameter"]
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedParameter:
+    """A parameter that sets the cruise speed, under one of its names."""
+
+    name: str
+    units_per_m_s: float
+    """Value of the parameter at 1 m/s."""
+
+
+class Flavour(Protocol):
+    """Modes, readiness, commands and parameter names of one firmware."""
+
+    @property
+    def speed_parameters(self) -> tuple[SpeedParameter, ...]:
+        """Every name that the cruise speed has had."""
+        ...
+
+    @property
+    def streams(self) -> tuple[tuple[int, type[Inbound]], ...]:
+        """Message ids to ask for beside the position, and what each becomes."""
+        ...
+
+    def flies(self, heartbeat: Heartbeat) -> bool:
+        """Whether this flavour is the right one for that vehicle."""
+        ...
+
+    def mode_name(self, custom_mode: int) -> str:
+        """The mode's name, for people."""
+        ...
+
+    def is_commanded(self, custom_mode: int) -> bool:
+        """Whether the vehicle takes our targets in that mode."""
+        ...
+
+    def is_returning(self, custom_mode: int) -> bool:
+        """Whether the vehicle returns or lands by itself in that mode."""
+        ...
+
+    def has_booted(self, heartbeat: Heartbeat) -> bool:
+        """Whether the autopilot is past booting and calibrating."""
+        ...
+
+    def airborne(self, vehicle: VehicleState) -> bool:
+        """Whether the vehicle is off the ground, as far as it said."""
+        ...
+
+    def unready(self, vehicle: VehicleState) -> str | None:
+        """What keeps the vehicle from being armed, in words; None if nothing does."""
+        ...
+
+    def set_commanded_mode(self) -> CommandLong:
+        """Switch to the mode that takes our targets."""
+        ...
+
+    def set_return_mode(self) -> CommandLong:
+        """Return to launch and land."""
+        ...
+
+    def arm(self) -> CommandLong:
+        """Start the motors, with all checks."""
+        ...
+
+    def disarm(self) -> CommandLong:
+        """Stop the motors; refused in the air."""
+        ...
+
+    def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
+        """Climb straight up to ``alt_m``; both heights are above mean sea level [m]."""
+        ...
+
+    def reposition(self, lat_deg: float, lon_deg: float, alt_m: float) -> CommandInt:
+        """Fly to a place at once; ``alt_m`` is above mean sea level."""
+        ...
+
+    def change_speed(self, speed_m_s: float) -> CommandLong:
+        """Set the ground speed from now on."""
+        ...

@@ -1,0 +1,111 @@
+"""Link URLs and what is wrong with them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from swarm.errors import Fault, InputError
+
+__all__ = [
+    "LinkAddress",
+    "SerialAddress",
+    "TcpAddress",
+    "UdpInAddress",
+    "UdpOutAddress",
+    "parse_link",
+]
+
+_REMEDY = (
+    "give tcp:HOST:PORT, udpout:HOST:PORT, udpin:HOST:PORT or serial:DEVICE:BAUD, "
+    "such as tcp:127.0.0.1:5760"
+)
+_HOST = re.compile(r"\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9_.-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class TcpAddress:
+    """A TCP server to connect to."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"tcp:{_bracketed(self.host)}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class UdpOutAddress:
+    """A UDP peer to speak to."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"udpout:{_bracketed(self.host)}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class UdpInAddress:
+    """A local UDP address to wait at."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"udpin:{_bracketed(self.host)}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class SerialAddress:
+    """A serial device and its speed [baud]."""
+
+    device: str
+    baud: int
+
+    def __str__(self) -> str:
+        return f"serial:{self.device}:{self.baud}"
+
+
+LinkAddress = TcpAddress | UdpOutAddress | UdpInAddress | SerialAddress
+
+
+def parse_link(url: str, source: str = "--mavlink") -> LinkAddress:
+    """The address that ``url`` names.
+
+    Args:
+        url: see the module `agent.mavlink.link`.
+        source: where the URL came from, for the message.
+
+    Raises:
+        InputError: the URL is none of the four kinds.
+    """
+    scheme, _, rest = url.partition(":")
+    place, _, number = rest.rpartition(":")
+    if scheme not in ("tcp", "udpout", "udpin", "serial"):
+        raise _fault(source, url, f"{scheme!r} is no kind of link")
+    if not place:
+        raise _fault(source, url, "a part is missing")
+    if not (number.isascii() and number.isdigit() and len(number) < 9):
+        raise _fault(source, url, f"{number!r} is not a whole number")
+    value = int(number)
+    if scheme == "serial":
+        if value == 0:
+            raise _fault(source, url, "0 is no baud rate")
+        return SerialAddress(place, value)
+    if not 1 <= value <= 65_535:
+        raise _fault(source, url, f"port {value} is not within 1..65535")
+    if _HOST.fullmatch(place) is None:
+        raise _fault(source, url, f"{place!r} is no host")
+    host = place.strip("[]")
+    if scheme == "tcp":
+        return TcpAddress(host, value)
+    return UdpOutAddress(host, value) if scheme == "udpout" else UdpInAddress(host, value)
+
+
+def _fault(source: str, url: str, problem: str) -> InputError:
+    return InputError(Fault(source, url, problem, _REMEDY))
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,239 @@
+"""From a silent box to a vehicle that hovers at its start.
+
+No script: every time something is heard, the next step follows from the state *seen*,
+so an overwritten mode, an automatic disarming on the ground or a vehicle that flies
+already need no cases of their own. Every step has a limit. Leaves out: who may give
+the vehicle orders (agent.mavlink.bridge).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, result_text
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.flavours import Flavour
+from agent.mavlink.leg import Leg
+from agent.mavlink.messages import Heartbeat, Inbound, Outbound, Position
+from agent.mavlink.speed import SpeedSetting
+from agent.mavlink.state import VehicleState
+from agent.vehicle import Prepare
+from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
+
+__all__ = ["Preparation"]
+
+_CLIMB_PROGRESS_M = 0.2
+_CLIMB_TOLERANCE_FRAC = 0.05
+_PREARM_TEXT_AGE_S = 35.0
+"""ArduPilot repeats what fails before arming every 30 s."""
+_FLOWN_BY_PILOT = "its pilot flew and landed it; prepare it again to take off"
+
+
+@dataclass(slots=True)
+class _Step:
+    """One thing that is asked of the vehicle until it is seen, but not for ever."""
+
+    tag: str
+    what: str
+    limit: int
+    count: int = 0
+    next_at_s: float = -math.inf
+    refusal: str = ""
+
+
+class Preparation:
+    """Carries out one `Prepare`."""
+
+    def __init__(
+        self, order: Prepare, config: BridgeConfig, commands: Commands, flavour: Flavour
+    ) -> None:
+        self._order = order
+        self._config = config
+        self._commands = commands
+        self._flavour = flavour
+        _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
+        self._mode = _Step("mode", "setting the guided mode", config.mode_tries)
+        self._arm = _Step("arm", "arming", config.arm_tries)
+        self._takeoff = _Step("takeoff", "takeoff", config.takeoff_tries)
+        self._steps = {step.tag: step for step in (self._mode, self._arm, self._takeoff)}
+        self._highest_m = -math.inf
+        self._climbed_at_s = math.inf
+        self._climbing = False
+        self._flew = False
+        self._flown_by_pilot = False
+        self._leg: Leg | None = None
+        self._speed = SpeedSetting(order.speed_m_s, flavour, config)
+        self.waiting_for = "waiting for the autopilot"
+        """What is missing, for people."""
+        self.done = False
+        """The vehicle hovers at its start, with its cruise speed set."""
+        self.failure: str | None = None
+        """Why it will not get there; None while it may."""
+
+    @property
+    def engaged(self) -> bool:
+        """Whether the motors run, or may run, because of us."""
+        return self._arm.count > 0 or self._flew
+
+    @property
+    def took_off(self) -> bool:
+        """Whether takeoff was asked for."""
+        return self._takeoff.count > 0
+
+    def on_ended(self, ended: CommandEnded, now_s: float) -> list[Outbound]:
+        """Take a command's outcome."""
+        step = self._steps.get(ended.tag)
+        if step is not None:
+            accepted = ended.ending is Ending.ACCEPTED
+            step.refusal = "" if accepted else result_text(ended.result)
+            config = self._config
+            step.next_at_s = now_s + (config.effect_timeout_s if accepted else config.retry_delay_s)
+        if self._leg is not None:
+            self._leg.on_ended(ended)
+        return self._speed.on_ended(ended, now_s)
+
+    def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
+        """Take what matters of a message beside the vehicle's state."""
+        return self._speed.on_message(message, now_s)
+
+    def on_position(self, position: Position, now_s: float) -> list[Outbound]:
+        """Take a fresh position: climb and arrival show in it."""
+        if position.alt_m > self._highest_m + _CLIMB_PROGRESS_M:
+            self._highest_m = position.alt_m
+            self._climbed_at_s = now_s
+        if self._leg is None:
+            return []
+        place_enu_m = enu_from_wgs84(
+            self._config.origin, position.lat_deg, position.lon_deg, position.alt_m
+        )
+        told = self._leg.on_position(place_enu_m, position.velocity_enu_m_s, self._commands, now_s)
+        return [*told]
+
+    def advance(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
+        """Do what the state seen asks for next."""
+        flavour = self._flavour
+        if self.done or self.failure is not None:
+            return []
+        if not flavour.has_booted(heartbeat):
+            return self._wait("the autopilot is booting")
+        if not flavour.is_commanded(heartbeat.custom_mode):
+            if heartbeat.armed:
+                self._flown_by_pilot = True
+                mode = flavour.mode_name(heartbeat.custom_mode)
+                return self._wait(
+                    f"armed in {mode} by its pilot: land it, or switch it to the guided mode"
+                )
+            if self._flown_by_pilot:
+                return self._fail(_FLOWN_BY_PILOT)
+            return self._ask(self._mode, flavour.set_commanded_mode(), vehicle, now_s)
+        if not heartbeat.armed:
+            if self._flown_by_pilot:
+                # Somebody may be walking up to it: it does not start by itself.
+                return self._fail(_FLOWN_BY_PILOT)
+            return self._start_motors(vehicle, now_s)
+        position = vehicle.position
+        if position is None:
+            return self._wait("waiting for a position")
+        if not flavour.airborne(vehicle):
+            return self._take_off(position, vehicle, now_s)
+        self._flew = True
+        if self._climbing and not self._high_enough(position, now_s):
+            return []
+        self._climbing = False
+        return self._fly_to_start(now_s)
+
+    def _start_motors(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
+        if self._flew:
+            return self._fail("the vehicle disarmed after takeoff")
+        unready = self._flavour.unready(vehicle)
+        if unready is not None:
+            text = vehicle.recent_warning(now_s, _PREARM_TEXT_AGE_S)
+            return self._wait(f"{unready} ({text})" if text else unready)
+        if vehicle.position is not None and (fault := self._misplaced(vehicle.position)):
+            return self._fail(fault)
+        return self._ask(self._arm, self._flavour.arm(), vehicle, now_s)
+
+    def _misplaced(self, position: Position) -> str | None:
+        """Why the start cannot be reached from where the vehicle stands; None if it can."""
+        config = self._config
+        east_m, north_m, _ = enu_from_wgs84(
+            config.origin, position.lat_deg, position.lon_deg, position.alt_m
+        )
+        distance_m = math.hypot(east_m, north_m)
+        if distance_m > config.fence_radius_m:
+            return f"the vehicle stands {distance_m / 1e3:.0f} km from the mission's origin"
+        height_m = self._start_alt_m - _home_alt_m(position)
+        if height_m < config.takeoff_min_m:
+            return (
+                f"the start lies {height_m:.1f} m above the vehicle's home, "
+                f"at least {config.takeoff_min_m:g} m are needed"
+            )
+        return None
+
+    def _take_off(self, position: Position, vehicle: VehicleState, now_s: float) -> list[Outbound]:
+        self._climbing = True
+        self._climbed_at_s = now_s
+        self._highest_m = position.alt_m
+        # Also here, as a vehicle found armed on the ground comes straight to takeoff.
+        if fault := self._misplaced(position):
+            return self._fail(fault)
+        command = self._flavour.takeoff(self._start_alt_m, _home_alt_m(position))
+        return self._ask(self._takeoff, command, vehicle, now_s)
+
+    def _high_enough(self, position: Position, now_s: float) -> bool:
+        height_m = self._start_alt_m - _home_alt_m(position)
+        tolerance_m = max(self._config.acceptance_radius_m, _CLIMB_TOLERANCE_FRAC * height_m)
+        if position.alt_m >= self._start_alt_m - tolerance_m:
+            return True
+        if now_s - self._climbed_at_s > self._config.climb_timeout_s:
+            self._fail("the vehicle took off and then stopped climbing")
+        else:
+            self._wait(f"climbing to {height_m:.0f} m")
+        return False
+
+    def _fly_to_start(self, now_s: float) -> list[Outbound]:
+        out: list[Outbound] = []
+        if self._leg is None:
+            place = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
+            message = self._flavour.reposition(*place)
+            self._leg = Leg(self._order.position_enu_m, message, self._config)
+            out += self._leg.start(self._commands, now_s)
+        # ArduPilot forgets a speed set before the first target after takeoff.
+        if self._leg.accepted and not self._speed.begun:
+            out += self._speed.start(self._commands, now_s)
+        out += self._speed.on_time(now_s)
+        failure = self._leg.failure or self._speed.failure
+        if failure is not None:
+            return out + self._fail(failure)
+        self.done = self._leg.arrived and self._speed.done
+        self._wait("flying to the start")
+        return out
+
+    def _ask(
+        self, step: _Step, command: Command, vehicle: VehicleState, now_s: float
+    ) -> list[Outbound]:
+        refusal = step.refusal
+        if refusal and (text := vehicle.recent_warning(now_s)):
+            refusal = f"{refusal}: {text}"
+        self._wait(f"{step.what} refused ({refusal}), trying again" if refusal else step.what)
+        if self._commands.pending(step.tag) or now_s < step.next_at_s:
+            return []
+        if step.count >= step.limit:
+            why = f"last answer: {refusal}" if refusal else "its effect was never seen to stay"
+            return self._fail(f"{step.what} failed {step.count} times; {why}")
+        step.count += 1
+        return [*self._commands.send(step.tag, command, now_s)]
+
+    def _wait(self, reason: str) -> list[Outbound]:
+        self.waiting_for = reason
+        return []
+
+    def _fail(self, reason: str) -> list[Outbound]:
+        self.failure = reason
+        return []
+
+
+def _home_alt_m(position: Position) -> float:
+    """Home's height above mean sea level, of which the vehicle's two heights differ."""
+    return position.alt_m - position.relative_alt_m

@@ -1,0 +1,77 @@
+"""The way home: set the return mode until it is seen, then wait for the landing.
+
+Leaves out: who may order it and what a landing is (agent.mavlink.bridge).
+"""
+
+from __future__ import annotations
+
+import math
+
+from agent.mavlink.commands import CommandEnded, Commands, Ending, result_text
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.flavours import Flavour
+from agent.mavlink.messages import Heartbeat, Outbound
+from agent.vehicle import Return
+
+__all__ = ["Returning"]
+
+_TAG = "return"
+_DISARMED_LONG_S = 5.0
+"""A vehicle disarmed for that long is down, even if it does not say that it landed."""
+
+
+class Returning:
+    """Carries out one `Return`."""
+
+    def __init__(
+        self, order: Return, config: BridgeConfig, commands: Commands, flavour: Flavour
+    ) -> None:
+        self.order = order
+        self._config = config
+        self._commands = commands
+        self._flavour = flavour
+        self._tries = 0
+        self._next_at_s = -math.inf
+        self._disarmed_since_s: float | None = None
+        self._seen = False
+        self._refusal = "never seen in the heartbeat"
+        self.failure: str | None = None
+        """Why the vehicle does not return; None while it may."""
+
+    def on_ended(self, ended: CommandEnded, now_s: float) -> None:
+        """Take the outcome of setting the mode."""
+        if ended.tag != _TAG:
+            return
+        if ended.ending is Ending.ACCEPTED:
+            self._next_at_s = now_s + self._config.effect_timeout_s
+        else:
+            self._refusal = result_text(ended.result)
+            self._next_at_s = now_s + self._config.retry_delay_s
+
+    def expects(self, custom_mode: int) -> bool:
+        """Whether that mode fits the return; anything else is somebody else's doing."""
+        if self._flavour.is_returning(custom_mode):
+            self._seen = True
+            return True
+        return self._flavour.is_commanded(custom_mode) and not self._seen
+
+    def advance(self, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
+        """Set the mode as long as it is not seen and the vehicle still takes our orders."""
+        if heartbeat.armed:
+            self._disarmed_since_s = None
+        elif self._disarmed_since_s is None:
+            self._disarmed_since_s = now_s
+        if not heartbeat.armed or not self._flavour.is_commanded(heartbeat.custom_mode):
+            return []
+        if self._commands.pending(_TAG) or now_s < self._next_at_s:
+            return []
+        if self._tries >= self._config.mode_tries:
+            self.failure = f"the return mode cannot be set ({self._refusal})"
+            return []
+        self._tries += 1
+        return [*self._commands.send(_TAG, self._flavour.set_return_mode(), now_s)]
+
+    def disarmed_long(self, now_s: float) -> bool:
+        """Whether the motors have stood still for a while."""
+        since_s = self._disarmed_since_s
+        return since_s is not None and now_s - since_s >= _DISARMED_LONG_S

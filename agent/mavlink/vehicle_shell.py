@@ -1,0 +1,118 @@
+"""The bridge with a link and a clock: the only place of it where time passes.
+
+Everything happens in the loop's thread and without waiting: an order is on its way to
+the autopilot before `order` returns. Leaves out: every decision (agent.mavlink.bridge).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+
+from agent.mavlink.bridge import Bridge
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.events import Event, LinkDown, LinkUp, Received, Send, Tick
+from agent.mavlink.link import Link, open_link
+from agent.mavlink.link_address import LinkAddress
+from agent.vehicle import Orders, Report
+from swarm.clock import Clock
+
+__all__ = ["MavlinkVehicle"]
+
+_SHORTEST_WAIT_S = 0.001
+
+
+class MavlinkVehicle:
+    """A vehicle behind a MAVLink link. Close it in ``finally``.
+
+    Args:
+        address: where the autopilot is.
+        config: how to treat it.
+        clock: vehicle time; a scaled one when the vehicle is simulated faster.
+        on_report: hears every report, in order, in the loop's thread. It may give
+            orders from inside the call.
+
+    Raises:
+        InputError: this machine cannot open such a link.
+    """
+
+    def __init__(
+        self,
+        address: LinkAddress,
+        config: BridgeConfig,
+        clock: Clock,
+        on_report: Callable[[Report], None],
+    ) -> None:
+        self.bridge = Bridge(config)
+        self.link: Link = open_link(address, self)
+        self._clock = clock
+        self._on_report = on_report
+        self._events: deque[Event] = deque()
+        self._busy = False
+        self._closed = False
+        self._timer: asyncio.TimerHandle | None = None
+        self._timer_due_s = float("inf")
+
+    def start(self) -> None:
+        """Open the link and go to work, in the running loop."""
+        self.link.start()
+        self._happen(Tick())
+
+    def order(self, order: Orders) -> None:
+        """Give the vehicle an order; what comes of it is reported."""
+        self._happen(order)
+
+    async def close(self) -> None:
+        """Leave the vehicle as it is and close the link; closing twice is fine."""
+        self._closed = True
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        await self.link.close()
+
+    def link_up(self) -> None:
+        """Called by the link."""
+        self._happen(LinkUp())
+
+    def link_down(self) -> None:
+        """Called by the link."""
+        self._happen(LinkDown())
+
+    def received(self, data: bytes) -> None:
+        """Called by the link."""
+        self._happen(Received(data))
+
+    def _happen(self, event: Event) -> None:
+        """Step the bridge; events that come up meanwhile follow in order."""
+        if self._closed:
+            return
+        self._events.append(event)
+        if self._busy:
+            return
+        self._busy = True
+        try:
+            while self._events:
+                for action in self.bridge.step(self._events.popleft(), self._clock.now_s()):
+                    if isinstance(action, Send):
+                        self.link.send(action.data)
+                    else:
+                        self._on_report(action)
+        finally:
+            self._busy = False
+        self._set_timer()
+
+    def _set_timer(self) -> None:
+        loop = asyncio.get_running_loop()
+        wait_s = self._clock.wall_delay_s(self.bridge.next_deadline_s() - self._clock.now_s())
+        due_s = loop.time() + max(wait_s, _SHORTEST_WAIT_S)
+        if self._timer is not None:
+            if self._timer_due_s <= due_s:
+                return  # it will ring early enough, and look again
+            self._timer.cancel()
+        self._timer_due_s = due_s
+        self._timer = loop.call_at(due_s, self._ring)
+
+    def _ring(self) -> None:
+        self._timer = None
+        self._happen(Tick())

@@ -1,0 +1,1 @@
+"""Tests of the MAVLink bridge, in virtual time and without sockets."""
