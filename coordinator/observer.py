@@ -13,7 +13,7 @@ import numpy as np
 from swarm.allocation.objective import executed_objective
 from swarm.allocation.problem import Problem
 from swarm.config import Timing
-from swarm.events import BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen
+from swarm.events import Ask, BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Wish
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.state.board import TaskBoard, TaskState, first_done
@@ -93,9 +93,16 @@ class Observer:
         self._orphans: dict[str, str] = {}
         self._numbers: set[int] = set()
         self._ended_told = False
+        self._timing = timing
+        self._ask_at_s = 0.0
 
-    def step(self, fact: BusFact, now_s: float) -> None:
+    def start(self, now_s: float) -> list[Wish]:
+        """Ask what has happened so far."""
+        return self._ask(now_s)
+
+    def step(self, fact: BusFact, now_s: float) -> list[Wish]:
         """Take note of one fact."""
+        wishes: list[Wish] = []
         match fact:
             case Heard(message):
                 self._hear(message, now_s)
@@ -111,15 +118,21 @@ class Observer:
                 self._membership.gone(writer, now_s)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
+                wishes = self._ask(now_s) if up else []
             case _:
                 pass
+        if self.replica.brief is None and self._ask_at_s <= now_s:
+            wishes = self._ask(now_s)
         for writer in self._membership.lost(now_s):
             self._lose(writer, now_s)
         self.present = self._membership.present
+        return wishes
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
-        return self._membership.next_deadline_s()
+        doubt_s = self._membership.next_deadline_s()
+        ask_at_s = self._ask_at_s if self.replica.brief is None else None
+        return min((at_s for at_s in (doubt_s, ask_at_s) if at_s is not None), default=None)
 
     def mission_s(self, now_s: float) -> float | None:
         """Mission time; None before the start."""
@@ -177,6 +190,10 @@ class Observer:
             lost_uavs=tuple(self.lost),
             epochs=len(self._numbers),
         )
+
+    def _ask(self, now_s: float) -> list[Wish]:
+        self._ask_at_s = now_s + self._timing.ask_s
+        return [Ask()]
 
     # -- the story --------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-__all__ = ["Clock", "ScaledClock", "SystemClock"]
+__all__ = ["Clock", "ScaledClock", "SystemClock", "incarnation"]
 
 
 class Clock(Protocol):
@@ -56,3 +56,8 @@ class ScaledClock:
     def wall_delay_s(self, delay_s: float) -> float:
         """Wall seconds for ``delay_s`` seconds of this clock."""
         return delay_s / self.speedup
+
+
+def incarnation() -> int:
+    """Milliseconds of wall time: grows from one life of a process to the next."""
+    return time.time_ns() // 1_000_000

@@ -8,9 +8,10 @@ parameter::
 Names: `ScenarioArgument` (a `pathlib.Path`; give it to
 `swarm.scenario.load_scenario`), `JsonOption` (bool), `SeedOption` (int),
 `TimeLimitOption` (float or None), `LogLevelOption` and `LogFormatOption` (for
-`swarm.log.configure_logging`; defaults `LogLevel.INFO`, `LogFormat.AUTO`) and
-the hidden `LifelineOption` (int or None). Leaves out: what a single command
-alone has.
+`swarm.log.configure_logging`; defaults `LogLevel.INFO`, `LogFormat.AUTO`), the
+hidden `LifelineOption` (bool), `SpeedupOption` and `MissionOption`; `BusOption`,
+`ListenOption`, `ConnectOption` and `LeaseOption` (for `swarm.bus.config.bus_config`).
+Leaves out: what a single command alone has.
 """
 
 from __future__ import annotations
@@ -24,12 +25,18 @@ from swarm.log import LogFormat, LogLevel
 from swarm.scenario.shipped import resolve_scenario, shipped_scenarios
 
 __all__ = [
+    "BusOption",
+    "ConnectOption",
     "JsonOption",
+    "LeaseOption",
     "LifelineOption",
+    "ListenOption",
     "LogFormatOption",
     "LogLevelOption",
+    "MissionOption",
     "ScenarioArgument",
     "SeedOption",
+    "SpeedupOption",
     "TimeLimitOption",
 ]
 
@@ -96,8 +103,63 @@ LogFormatOption = Annotated[
     typer.Option("--log-format", envvar="SWARM_LOG_FORMAT", help="What a log line looks like."),
 ]
 
-LifelineOption = Annotated[
-    int | None,
-    typer.Option("--lifeline", min=0, metavar="FD", hidden=True),
+LifelineOption = Annotated[bool, typer.Option("--lifeline", hidden=True)]
+"""End when standard input does: the parent process holds its other end."""
+
+SpeedupOption = Annotated[
+    float,
+    typer.Option(
+        "--speedup",
+        min=0.01,
+        max=1000.0,
+        metavar="X",
+        help="Mission seconds per wall second; the same for every process of a mission.",
+    ),
 ]
-"""Read end of a pipe held by the parent process; the command ends when it closes."""
+
+MissionOption = Annotated[
+    str,
+    typer.Option("--mission", metavar="NAME", help="Name of the mission: its scenario's name."),
+]
+
+BusOption = Annotated[
+    str,
+    typer.Option(
+        "--bus",
+        metavar="mesh|router|FILE",
+        help="How processes reach each other: as peers, through routers, or as a Zenoh "
+        "configuration file says.",
+    ),
+]
+
+ListenOption = Annotated[
+    str,
+    typer.Option(
+        "--listen",
+        metavar="ENDPOINT",
+        help="Mesh: own endpoint, such as tcp/192.168.1.7:7448.",
+        show_default=False,
+    ),
+]
+
+ConnectOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--connect",
+        metavar="ENDPOINT",
+        help="Router to use, or with --bus mesh a peer to dial; may be repeated. "
+        "Default with --bus router: tcp/127.0.0.1:7447.",
+        show_default=False,
+    ),
+]
+
+LeaseOption = Annotated[
+    float,
+    typer.Option(
+        "--lease-s",
+        min=0.2,
+        max=60.0,
+        metavar="S",
+        help="Silence after which the others take this process for lost.",
+    ),
+]

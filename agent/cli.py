@@ -1,0 +1,127 @@
+"""The command `swarm agent`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from swarm.log import LogFormat, LogLevel
+from swarm.options import (
+    BusOption,
+    ConnectOption,
+    LeaseOption,
+    LifelineOption,
+    ListenOption,
+    LogFormatOption,
+    LogLevelOption,
+    MissionOption,
+    SpeedupOption,
+)
+
+__all__ = ["agent"]
+
+
+def agent(
+    mission: MissionOption,
+    uav: Annotated[str, typer.Option("--uav", metavar="ID", help="UAV this agent flies.")],
+    mavlink: Annotated[
+        str,
+        typer.Option(
+            "--mavlink",
+            metavar="URL",
+            help="Its autopilot: tcp:HOST:PORT, udpin:HOST:PORT, udpout:HOST:PORT or "
+            "serial:DEVICE:BAUD.",
+        ),
+    ],
+    system_id: Annotated[
+        int,
+        typer.Option(
+            "--system-id",
+            min=1,
+            max=255,
+            metavar="N",
+            help="MAVLink system id of the autopilot; no other vehicle is ever commanded.",
+        ),
+    ] = 1,
+    position_rate_hz: Annotated[
+        float,
+        typer.Option(
+            "--position-rate-hz",
+            min=0.1,
+            max=400.0,
+            metavar="HZ",
+            help="How often the autopilot is asked to report its position.",
+        ),
+    ] = 10.0,
+    acceptance_radius_m: Annotated[
+        float,
+        typer.Option(
+            "--acceptance-radius-m",
+            min=0.01,
+            max=1000.0,
+            metavar="M",
+            help="Within this distance of a task, and stopped, the UAV has arrived.",
+        ),
+    ] = 1.0,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+    connect: ConnectOption = None,
+    lease_s: LeaseOption = 1.0,
+    speedup: SpeedupOption = 1.0,
+    lifeline: LifelineOption = False,
+    log_level: LogLevelOption = LogLevel.INFO,
+    log_format: LogFormatOption = LogFormat.AUTO,
+) -> int:
+    """Fly one UAV: decide, claim and command its autopilot.
+
+    The agent learns the mission from the bus, so it needs no scenario file. Start one for
+    each UAV, with the autopilot simulated or real.
+
+    Examples:
+      swarm agent --mission table-1 --uav uav1 --mavlink tcp:127.0.0.1:5760
+
+      swarm agent --mission valley-survey --uav quad-2 --mavlink serial:/dev/ttyAMA0:921600
+      --connect tcp/192.168.1.2:7447
+    """
+    import asyncio
+    from collections.abc import Callable
+
+    from swarm.bus.zenoh_bus import open_zenoh_bus
+
+    from agent.core import AgentCore
+    from agent.mavlink.config import BridgeConfig
+    from agent.mavlink.vehicle import MavlinkVehicle
+    from agent.runner import Vehicle, run_agent
+    from agent.vehicle import Report
+    from swarm.bus.config import bus_config
+    from swarm.clock import ScaledClock, incarnation
+    from swarm.config import Timing
+    from swarm.log import configure_logging
+    from swarm.model import Origin
+    from swarm.process import stop_requests
+
+    configure_logging(log_level, log_format)
+    config = bus_config(bus, listen, connect or (), lease_s)
+
+    async def run() -> int:
+        clock = ScaledClock(speedup)
+
+        def vehicle(origin: Origin, report: Callable[[Report], None]) -> Vehicle:
+            settings = BridgeConfig(
+                system_id=system_id,
+                origin=origin,
+                acceptance_radius_m=acceptance_radius_m,
+                position_rate_hz=position_rate_hz,
+            ).for_speedup(speedup)
+            return MavlinkVehicle(settings, mavlink, clock, report)
+
+        core = AgentCore(mission, uav, incarnation(), Timing().scaled(speedup))
+        async with stop_requests(lifeline=lifeline) as stop:
+            seat = await open_zenoh_bus(config)
+            try:
+                return await run_agent(core, mission, seat, clock, vehicle, stop)
+            finally:
+                seat.close()
+
+    return asyncio.run(run())

@@ -1,0 +1,127 @@
+"""The agent's process: its core between a bus and a vehicle.
+
+Publishes ``uav/<id>/claim``, ``…/outcome/<task>`` and ``…/status``, holds
+``alive/<id>`` and answers on ``state/<id>``; subscribes to ``brief``, ``plan``,
+``board/*``, ``uav/*/claim`` and ``uav/*/outcome/*`` and watches ``alive/*``. Leaves
+out: every decision (agent.core) and flying (agent.mavlink).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Protocol
+
+from agent.core import AgentCore
+from agent.events import Action, Event, Order
+from agent.vehicle import Home, Orders, Report, Return
+from swarm.bus.port import Bus
+from swarm.clock import Clock
+from swarm.events import Stop
+from swarm.model import Origin
+from swarm.process import StopRequest
+from swarm.shell import Shell, take_seat
+
+__all__ = ["Vehicle", "run_agent"]
+
+FAREWELL_S = 2.0
+"""Wall time that a vehicle has to come home when the agent is told to stop; after that
+it returns on its own."""
+
+
+class Vehicle(Protocol):
+    """A vehicle that can be commanded and reports back in the loop's thread."""
+
+    async def start(self) -> None:
+        """Open the link."""
+        ...
+
+    def order(self, order: Orders) -> None:
+        """Command it."""
+        ...
+
+    async def close(self) -> None:
+        """Close the link; the vehicle goes on with what it does."""
+        ...
+
+
+async def run_agent(
+    core: AgentCore,
+    mission: str,
+    bus: Bus,
+    clock: Clock,
+    make_vehicle: Callable[[Origin, Callable[[Report], None]], Vehicle],
+    stop: StopRequest,
+) -> int:
+    """Fly one UAV until the mission has ended and the vehicle is home.
+
+    Args:
+        core: the agent.
+        mission: mission name.
+        bus: open; closed by the caller.
+        clock: gives the core's time.
+        make_vehicle: makes the vehicle once the mission's origin is known, with a
+            callback for its reports.
+        stop: asks to leave early: the vehicle is told to return first.
+
+    Returns:
+        Exit status.
+    """
+    loop = asyncio.get_running_loop()
+    vehicle: Vehicle | None = None
+    starting: asyncio.Task[None] | None = None
+
+    def execute(action: Action) -> None:
+        nonlocal vehicle, starting
+        if not isinstance(action, Order):
+            return
+        brief = core.replica.brief
+        if vehicle is None and brief is not None and not isinstance(action.order, Return):
+            vehicle = make_vehicle(Origin(*brief.origin), report)
+            starting = loop.create_task(vehicle.start())
+            starting.add_done_callback(failed)
+        if vehicle is not None:
+            vehicle.order(action.order)
+        elif isinstance(action.order, Return):
+            loop.call_soon(report, Home())
+
+    def report(news: Report) -> None:
+        core.dropped = shell.dropped
+        shell.step(news)
+
+    def failed(task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (fault := task.exception()):
+            shell.fail(fault)
+
+    def as_event(fact: Event) -> Event:
+        return fact
+
+    async def farewell() -> int:
+        status = await stop.wait()
+        shell.step(Stop("the agent was told to stop"))
+        await asyncio.wait((flying,), timeout=FAREWELL_S)
+        return status
+
+    shell: Shell[Event, Action] = Shell(
+        core,
+        bus,
+        clock,
+        mission=mission,
+        name=core.uav,
+        from_bus=as_event,
+        execute=execute,
+        snapshot=core.snapshot,
+    )
+    take_seat(bus, mission, core.uav, status=False)
+    flying, leaving = loop.create_task(shell.run()), loop.create_task(farewell())
+    try:
+        await asyncio.wait((flying, leaving), return_when=asyncio.FIRST_COMPLETED)
+        told = stop.exit_status
+        return flying.result() if told is None else await leaving
+    finally:
+        tasks = [task for task in (flying, leaving, starting) if task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        if vehicle is not None:
+            await vehicle.close()

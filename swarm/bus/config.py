@@ -1,0 +1,175 @@
+"""How a process reaches the others: settings, checked when made.
+
+Leaves out: what Zenoh is told in the end (swarm.bus.zenoh_session).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from swarm.errors import Fault, InputError
+
+__all__ = [
+    "BusConfig",
+    "ClientTopology",
+    "FileTopology",
+    "MeshTopology",
+    "RouterConfig",
+    "Topology",
+    "bus_config",
+]
+
+MIN_LEASE_S = 0.2
+MAX_LEASE_S = 60.0
+DEFAULT_LEASE_S = 1.0
+DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
+
+# udp is left out: over it, Zenoh's "reliable" does not retransmit.
+ENDPOINT = re.compile(
+    r"(?:tcp|tls|quic|ws)/(?:\[[0-9A-Fa-f:.%\w]+\]|[^\s:/?#\[\]]+):(\d{1,5})(?:[?#]\S*)?"
+)
+UNIX_ENDPOINT = re.compile(r"unixsock-stream/\S+")
+ENDPOINT_REMEDY = "write PROTOCOL/HOST:PORT with tcp, tls, quic or ws, as in tcp/127.0.0.1:7447"
+
+
+@dataclass(frozen=True, slots=True)
+class MeshTopology:
+    """Peers linked to each other directly; of every two, exactly one dials.
+
+    Dialing both ways left neighbours unaware of a cut for 10 s (measured), so the
+    one who starts the processes gives each the endpoints of those before it.
+    """
+
+    listen: str
+    """Own endpoint."""
+    dial: tuple[str, ...] = ()
+    """Endpoints of the peers this one calls."""
+
+    def __post_init__(self) -> None:
+        _check_endpoint(self.listen, port_zero=True)
+        _check_endpoints(self.dial)
+
+
+@dataclass(frozen=True, slots=True)
+class ClientTopology:
+    """Client of one router at a time."""
+
+    routers: tuple[str, ...]
+    """Endpoints of routers, the preferred one first."""
+
+    def __post_init__(self) -> None:
+        if not self.routers:
+            raise ValueError("a client needs the endpoint of at least one router")
+        _check_endpoints(self.routers)
+
+
+@dataclass(frozen=True, slots=True)
+class FileTopology:
+    """What a Zenoh configuration file of the user's says, and nothing else."""
+
+    path: Path
+
+
+Topology = MeshTopology | ClientTopology | FileTopology
+
+
+@dataclass(frozen=True, slots=True)
+class BusConfig:
+    """Settings of one process's seat on the bus."""
+
+    topology: Topology
+    lease_s: float = DEFAULT_LEASE_S
+    """Silence after which the other side takes this process for lost [s]; not used with a file."""
+
+    def __post_init__(self) -> None:
+        _check_lease(self.lease_s)
+
+
+@dataclass(frozen=True, slots=True)
+class RouterConfig:
+    """Settings of a router process."""
+
+    listen: tuple[str, ...] = ()
+    """Where clients reach it; port 0 means any free one."""
+    connect: tuple[str, ...] = ()
+    """Endpoints of other routers it links up with."""
+    path: Path | None = None
+    """A Zenoh configuration file; the endpoints above, if any, replace the file's."""
+    lease_s: float = DEFAULT_LEASE_S
+    """Silence after which clients take the router for lost [s]; not used with a file."""
+
+    def __post_init__(self) -> None:
+        if not self.listen and self.path is None:
+            raise ValueError("a router needs an endpoint to listen on")
+        for endpoint in self.listen:
+            _check_endpoint(endpoint, port_zero=True)
+        _check_endpoints(self.connect)
+        _check_lease(self.lease_s)
+
+
+def bus_config(
+    kind: str, listen: str, connect: Sequence[str], lease_s: float = DEFAULT_LEASE_S
+) -> BusConfig:
+    """Settings from what was given on a command line.
+
+    Args:
+        kind: ``mesh``, ``router`` or the path of a Zenoh configuration file.
+        listen: own endpoint in a mesh; empty when not given.
+        connect: routers, or peers to dial; `DEFAULT_ROUTER` when kind is router and none is given.
+        lease_s: silence after which others take this process for lost [s].
+
+    Raises:
+        InputError: the options contradict each other or an endpoint is wrong.
+    """
+    try:
+        if kind == "router":
+            if listen:
+                raise ValueError("--listen is for --bus mesh only")
+            return BusConfig(ClientTopology(tuple(connect) or (DEFAULT_ROUTER,)), lease_s)
+        if kind == "mesh":
+            if not listen:
+                raise ValueError("--bus mesh needs --listen with this process's own endpoint")
+            return BusConfig(MeshTopology(listen, tuple(connect)), lease_s)
+        if listen or connect:
+            raise ValueError("--listen and --connect are for --bus mesh or router only")
+        if not Path(kind).is_file():
+            raise ValueError(f"no such Zenoh configuration file: {kind}")
+    except ValueError as fault:
+        remedy = "see --help"
+        raise InputError(Fault("command line", "--bus", str(fault), remedy)) from None
+    return BusConfig(FileTopology(Path(kind)), lease_s)
+
+
+def config_file_fault(path: Path, problem: str) -> InputError:
+    """The error for a Zenoh configuration file that cannot be used."""
+    return InputError(
+        Fault(str(path), "", problem, "give a Zenoh configuration file in JSON5, JSON or YAML")
+    )
+
+
+def _check_endpoints(endpoints: tuple[str, ...]) -> None:
+    for endpoint in endpoints:
+        _check_endpoint(endpoint, port_zero=False)
+    if len(set(endpoints)) != len(endpoints):
+        raise ValueError(f"an endpoint is named twice in {', '.join(endpoints)}")
+
+
+def _check_endpoint(endpoint: str, *, port_zero: bool) -> None:
+    if UNIX_ENDPOINT.fullmatch(endpoint):
+        return
+    if endpoint.startswith("udp/"):
+        raise ValueError(f"{endpoint}: lost UDP packets stay lost; use tcp, tls or quic")
+    match = ENDPOINT.fullmatch(endpoint)
+    if match is None:
+        raise ValueError(f"not an endpoint: {endpoint!r}; {ENDPOINT_REMEDY}")
+    lowest = 0 if port_zero else 1
+    if not lowest <= int(match[1]) <= 0xFFFF:
+        raise ValueError(f"{endpoint}: the port must be within {lowest}..65535")
+
+
+def _check_lease(lease_s: float) -> None:
+    if not MIN_LEASE_S <= lease_s <= MAX_LEASE_S:
+        raise ValueError(f"lease_s must be within {MIN_LEASE_S}..{MAX_LEASE_S}, not {lease_s}")

@@ -1,0 +1,244 @@
+"""The asyncio shell that all processes on the bus share: it runs one pure core.
+
+It decodes what the bus brings, steps the core, publishes what the core says,
+answers queries with the core's snapshot and ticks at the core's deadlines. Leaves
+out: what only one kind of process does (agent.runner, coordinator.daemon,
+sim.launch), through `Shell.execute`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Generic, Protocol, TypeVar
+
+from swarm.bus.port import (
+    Bus,
+    BusEvent,
+    LinkDown,
+    LinkUp,
+    Query,
+    Sample,
+    TokenGone,
+    TokenSeen,
+)
+from swarm.clock import Clock
+from swarm.events import (
+    Ask,
+    BusFact,
+    Finish,
+    Heard,
+    Learned,
+    LinkChanged,
+    Note,
+    PeerGone,
+    PeerSeen,
+    Publish,
+    Tick,
+)
+from swarm.log import get_logger
+from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.keys import Keys
+from swarm.wire.messages import Snapshot, Status
+
+__all__ = ["Core", "Shell", "take_seat"]
+
+ASK_TIMEOUT_S = 1.0
+"""Wall time after which an unanswered question counts as answered by nobody."""
+
+E_contra = TypeVar("E_contra", contravariant=True)
+A_co = TypeVar("A_co", covariant=True)
+E = TypeVar("E")
+A = TypeVar("A")
+
+
+class Core(Protocol[E_contra, A_co]):
+    """What a shell asks of a core."""
+
+    def start(self, now_s: float) -> Sequence[A_co]:
+        """What to do first."""
+        ...
+
+    def step(self, event: E_contra, now_s: float) -> Sequence[A_co]:
+        """React to one event."""
+        ...
+
+    def next_deadline_s(self) -> float | None:
+        """When the core wants a tick at the latest."""
+        ...
+
+
+class Shell(Generic[E, A]):
+    """Runs one core on one bus until it finishes.
+
+    Args:
+        core: decides.
+        bus: open; closed by whoever opened it.
+        clock: gives ``now_s``.
+        mission: mission name.
+        name: writer id of this process, for the log.
+        from_bus: makes the core's event of a fact from the bus.
+        execute: carries out an action that is not common to all processes.
+        snapshot: answers a query; None for a process that answers none.
+    """
+
+    def __init__(
+        self,
+        core: Core[E, A],
+        bus: Bus,
+        clock: Clock,
+        *,
+        mission: str,
+        name: str,
+        from_bus: Callable[[BusFact], E],
+        execute: Callable[[A], None],
+        snapshot: Callable[[float], Snapshot] | None,
+    ) -> None:
+        self._core = core
+        self._bus = bus
+        self._clock = clock
+        self._keys = Keys(mission)
+        self._codec = Codec(mission)
+        self._log = get_logger(name, mission=mission)
+        self._from_bus = from_bus
+        self._execute = execute
+        self._snapshot = snapshot
+        self._loop = asyncio.get_running_loop()
+        self._done: asyncio.Future[int] = self._loop.create_future()
+        self._timer: asyncio.TimerHandle | None = None
+        self._asking: set[asyncio.Task[None]] = set()
+
+    @property
+    def dropped(self) -> int:
+        """Messages dropped so far, malformed or too many."""
+        return self._codec.dropped.total() + self._bus.inbox.dropped
+
+    async def run(self) -> int:
+        """Run the core to its end; its exit status."""
+        reader = self._loop.create_task(self._read())
+        reader.add_done_callback(self._fail)
+        try:
+            self._guard(lambda: self._core.start(self._clock.now_s()))
+            return await self._done
+        finally:
+            tasks = [reader, *self._asking]
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            if self._timer is not None:
+                self._timer.cancel()
+
+    def step(self, event: E) -> None:
+        """Step the core and carry out what it wants; call from the loop's thread."""
+        if not self._done.done():
+            self._guard(lambda: self._core.step(event, self._clock.now_s()))
+
+    def fail(self, fault: BaseException) -> None:
+        """End `run` with ``fault``."""
+        if not self._done.done():
+            self._done.set_exception(fault)
+
+    def _guard(self, act: Callable[[], Sequence[A]]) -> None:
+        """Act and reschedule; a bug ends the process rather than half of it."""
+        try:
+            for action in act():
+                self._carry_out(action)
+            self._reschedule()
+        except Exception as fault:  # noqa: BLE001 - top of the process: run() raises it
+            self.fail(fault)
+
+    def _carry_out(self, action: A) -> None:
+        match action:
+            case Publish(message):
+                reliable = not isinstance(message.body, Status)
+                self._bus.publish(key_of(message), encode(message), reliable=reliable)
+            case Ask():
+                task = self._loop.create_task(self._ask())
+                self._asking.add(task)
+                task.add_done_callback(self._asking.discard)
+                task.add_done_callback(self._fail)
+            case Note(text, fields):
+                self._log.info(text, **fields)
+            case Finish(status):
+                if not self._done.done():
+                    self._done.set_result(status)
+            case _:
+                self._execute(action)
+
+    def _reschedule(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        deadline_s = self._core.next_deadline_s()
+        if deadline_s is not None and not self._done.done():
+            delay_s = self._clock.wall_delay_s(deadline_s - self._clock.now_s())
+            tick = self._from_bus(Tick())
+            self._timer = self._loop.call_later(max(0.0, delay_s), self.step, tick)
+
+    def _fail(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (fault := task.exception()):
+            self.fail(fault)
+
+    async def _read(self) -> None:
+        while True:
+            await self._bus.inbox.wait()
+            for event in self._bus.inbox.take():
+                fact = self._fact(event)
+                if fact is not None:
+                    self.step(self._from_bus(fact))
+
+    def _fact(self, event: BusEvent) -> BusFact | None:
+        match event:
+            case Sample(key, payload):
+                message = self._codec.decode(key, payload)
+                return None if message is None else Heard(message)
+            case TokenSeen(key):
+                writer = self._keys.writer_of_token(key)
+                return None if writer is None else PeerSeen(writer)
+            case TokenGone(key):
+                writer = self._keys.writer_of_token(key)
+                return None if writer is None else PeerGone(writer)
+            case LinkUp():
+                return LinkChanged(True)
+            case LinkDown():
+                return LinkChanged(False)
+            case Query(reply=reply):
+                if self._snapshot is not None:
+                    reply(encode(self._snapshot(self._clock.now_s())))
+                return None
+
+    async def _ask(self) -> None:
+        answers = await self._bus.query(self._keys.state("*"), timeout_s=ASK_TIMEOUT_S)
+        snapshots = [self._codec.decode_snapshot(a.key, a.payload) for a in answers]
+        learned = Learned(tuple(snapshot for snapshot in snapshots if snapshot is not None))
+        self.step(self._from_bus(learned))
+
+
+def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None:
+    """Subscribe to what every process of a mission needs, and show that this one is there.
+
+    Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim`` and
+    ``uav/*/outcome/*``, watches ``alive/*``.
+
+    Args:
+        bus: an open bus.
+        mission: mission name.
+        name: writer id: declares ``alive/<name>`` and serves ``state/<name>``; None for
+            an onlooker.
+        status: subscribe to ``uav/*/status`` too, newest first.
+    """
+    keys = Keys(mission)
+    for key_expr in (
+        keys.brief,
+        keys.plan,
+        keys.board("*"),
+        keys.claim("*"),
+        keys.outcome("*", "*"),
+    ):
+        bus.subscribe(key_expr)
+    if status:
+        bus.subscribe(keys.status("*"), latest=True)
+    bus.watch_tokens(keys.alive("*"))
+    if name is not None:
+        bus.serve(keys.state(name))
+        bus.declare_token(keys.alive(name))
