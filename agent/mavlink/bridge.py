@@ -3,7 +3,7 @@
 It waits for the configured vehicle, prepares it, flies it from order to order and
 brings it home. It commands no other vehicle, does not fight a pilot and trusts what it
 sees over what was acknowledged. Leaves out: transports (agent.mavlink.link), waiting
-(agent.mavlink.vehicle_shell) and what to fly to (agent.core).
+(agent.mavlink.vehicle) and what to fly to (agent.core).
 
 The vehicle is *handed over* when a pilot or a failsafe changes its mode, when it
 disarms or reboots in flight, or when it falls silent. From then on nothing is commanded

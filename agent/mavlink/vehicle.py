@@ -14,7 +14,7 @@ from agent.mavlink.bridge import Bridge
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import Event, LinkDown, LinkUp, Received, Send, Tick
 from agent.mavlink.link import Link, open_link
-from agent.mavlink.link_address import LinkAddress
+from agent.mavlink.link_address import parse_link
 from agent.vehicle import Orders, Report
 from swarm.clock import Clock
 
@@ -27,25 +27,25 @@ class MavlinkVehicle:
     """A vehicle behind a MAVLink link. Close it in ``finally``.
 
     Args:
-        address: where the autopilot is.
         config: how to treat it.
+        url: where the autopilot is; see `agent.mavlink.link`.
         clock: vehicle time; a scaled one when the vehicle is simulated faster.
         on_report: hears every report, in order, in the loop's thread. It may give
             orders from inside the call.
 
     Raises:
-        InputError: this machine cannot open such a link.
+        InputError: the URL is wrong, or this machine cannot open such a link.
     """
 
     def __init__(
         self,
-        address: LinkAddress,
         config: BridgeConfig,
+        url: str,
         clock: Clock,
         on_report: Callable[[Report], None],
     ) -> None:
         self.bridge = Bridge(config)
-        self.link: Link = open_link(address, self)
+        self.link: Link = open_link(parse_link(url), self)
         self._clock = clock
         self._on_report = on_report
         self._events: deque[Event] = deque()
@@ -54,7 +54,7 @@ class MavlinkVehicle:
         self._timer: asyncio.TimerHandle | None = None
         self._timer_due_s = float("inf")
 
-    def start(self) -> None:
+    async def start(self) -> None:
         """Open the link and go to work, in the running loop."""
         self.link.start()
         self._happen(Tick())
