@@ -69,7 +69,6 @@ def main(
         _complain(f"swarm: {error}")
         status = _FAILED
     except (KeyboardInterrupt, typer.Abort):
-        _complain("swarm: interrupted")
         status = _INTERRUPTED
     except BrokenPipeError:
         status = _FAILED
@@ -113,7 +112,7 @@ def _run(arguments: list[str], commands: Mapping[str, EntryPoint]) -> int:
         raise InputError(_usage_fault(error, name)) from error
     except SystemExit as leaving:
         result = leaving.code
-    if not arguments:
+    if not arguments and not completing:
         raise InputError(Fault("swarm", "", "no command given", "choose one of the above"))
     if result is None:
         return _DONE
@@ -151,7 +150,8 @@ def _register(app: typer.Typer, name: str, loaded: object) -> None:
     if isinstance(loaded, typer.Typer):
         app.add_typer(loaded, name=name)
     elif callable(loaded):
-        app.command(name, help=_help_text(inspect.getdoc(loaded) or ""))(loaded)
+        text = _help_text(inspect.getdoc(loaded) or "")
+        app.command(name, help=text, short_help=text.partition("\n")[0])(loaded)
     else:
         raise TypeError(f"command {name} must be a function or a typer.Typer, not {loaded!r}")
 

@@ -103,7 +103,7 @@ def close_match(name: str, names: Collection[str]) -> str | None:
     """The one of ``names`` that ``name`` probably means; None when unsure or too costly."""
     if len(name) > 64 or len(names) > 2000:
         return None
-    matches = get_close_matches(name, names, n=1, cutoff=0.7)
+    matches = get_close_matches(name, names, n=1, cutoff=0.65)
     return matches[0] if matches else None
 
 

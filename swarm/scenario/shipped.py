@@ -12,6 +12,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from swarm.errors import Fault, InputError
+from swarm.scenario.findings import printable
 
 __all__ = ["resolve_scenario", "shipped_scenarios"]
 
@@ -39,7 +40,7 @@ def resolve_scenario(argument: str) -> Path:
     try:
         if path.is_file():
             return path
-        is_folder = path.is_dir()
+        is_folder = bool(argument) and path.is_dir()
     except (OSError, ValueError):  # a name too long, or with a null character
         is_folder = False
     shipped = shipped_scenarios()
@@ -58,4 +59,4 @@ def _not_found(argument: str, names: list[str], is_folder: bool) -> Fault:
         remedy = f"give a file or a shipped scenario: {', '.join(names)}"
     else:
         remedy = "give the path of a scenario file"
-    return Fault(argument or "SCENARIO", "", problem, remedy)
+    return Fault(printable(argument) or "SCENARIO", "", problem, remedy)

@@ -1,0 +1,107 @@
+"""Logs: on standard error only, as people or as machines want them."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Iterator
+
+import pytest
+import structlog
+
+from swarm.log import LogFormat, LogLevel, configure_logging, get_logger
+
+
+@pytest.fixture(autouse=True)
+def _restored() -> Iterator[None]:
+    handlers, level = logging.root.handlers[:], logging.root.level
+    yield
+    structlog.reset_defaults()
+    logging.root.handlers[:] = handlers
+    logging.root.setLevel(level)
+
+
+def test_json_has_one_object_per_line_with_its_context(capsys: pytest.CaptureFixture[str]) -> None:
+    configure_logging(form=LogFormat.JSON)
+    get_logger("agent.core", uav="uav1").info("claimed", task="t 3", at_s=1.5, who={1})
+    captured = capsys.readouterr()
+
+    line = json.loads(captured.err)
+    assert captured.out == ""
+    assert line.pop("timestamp").endswith("Z")
+    assert line == {
+        "level": "info",
+        "module": "agent.core",
+        "uav": "uav1",
+        "event": "claimed",
+        "task": "t 3",
+        "at_s": 1.5,
+        "who": "{1}",
+    }
+
+
+def test_lines_hold_keys_and_values(capsys: pytest.CaptureFixture[str]) -> None:
+    configure_logging(form=LogFormat.LINES)
+    get_logger("agent.core").warning("lost link", peer="uav 2")
+
+    stamp, _, rest = capsys.readouterr().err.partition(" ")
+    assert stamp.startswith("timestamp=")
+    assert rest == 'level=warning module=agent.core event="lost link" peer="uav 2"\n'
+
+
+def test_without_a_terminal_lines_are_the_default(capsys: pytest.CaptureFixture[str]) -> None:
+    configure_logging()
+    get_logger("x").info("begun")
+
+    assert "level=info module=x event=begun" in capsys.readouterr().err
+
+
+def test_console_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+    configure_logging(form=LogFormat.CONSOLE)
+    get_logger("x").info("begun", n=3)
+
+    assert "[info     ] begun" in capsys.readouterr().err
+
+
+def test_logger_made_before_configuration_follows_it(capsys: pytest.CaptureFixture[str]) -> None:
+    logger = get_logger("x")
+    configure_logging(LogLevel.ERROR, LogFormat.JSON)
+    logger.warning("quiet")
+    logger.error("loud")
+
+    assert [json.loads(line)["event"] for line in capsys.readouterr().err.splitlines()] == ["loud"]
+
+
+def test_unconfigured_process_keeps_standard_output_clean(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    structlog.reset_defaults()
+    get_logger("x").info("begun")
+    captured = capsys.readouterr()
+
+    assert captured.out == ""
+    assert "event=begun" in captured.err
+
+
+@pytest.mark.parametrize("form", LogFormat)
+def test_exception_is_logged_with_its_traceback(
+    form: LogFormat, capsys: pytest.CaptureFixture[str]
+) -> None:
+    configure_logging(form=form)
+    try:
+        raise ZeroDivisionError("a bug")
+    except ZeroDivisionError:
+        get_logger("x").exception("step failed")
+    captured = capsys.readouterr()
+
+    assert captured.out == ""
+    assert "ZeroDivisionError" in captured.err
+    assert "a bug" in captured.err
+
+
+def test_dependencies_are_heard_from_warnings_on(capsys: pytest.CaptureFixture[str]) -> None:
+    configure_logging(LogLevel.DEBUG, LogFormat.LINES)
+    logging.getLogger("asyncio").info("chatter")
+    logging.getLogger("asyncio").warning("slow callback")
+
+    assert capsys.readouterr().err == "WARNING asyncio: slow callback\n"
