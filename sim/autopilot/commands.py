@@ -1,0 +1,301 @@
+"""Carries out MAV_CMD commands and answers each with a MAV_RESULT.
+
+A COMMAND_LONG is read as the COMMAND_INT it stands for. Sources:
+https://mavlink.io/en/services/command.html; which result a refusal gets is
+ArduCopter's. Leaves out: commands for payloads, calibration, parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sim.autopilot.events import Outbox, Sender
+from sim.autopilot.geo import ABOVE_HOME_FRAMES, place_enu_m
+from sim.autopilot.modes import Mode
+from sim.autopilot.pilot import Pilot
+from sim.autopilot.streams import Streams
+from sim.autopilot.telemetry import Telemetry
+from sim.kinematics import Point
+
+__all__ = ["Command", "Commands", "command_from_message"]
+
+_FORCE_ARM = 21196.0
+_FORCE_REBOOT = 20190226.0
+
+_ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
+_DENIED = int(mavlink.MAV_RESULT_DENIED)
+_FAILED = int(mavlink.MAV_RESULT_FAILED)
+_UNSUPPORTED = int(mavlink.MAV_RESULT_UNSUPPORTED)
+
+_LONG_ABOVE_HOME = frozenset({mavlink.MAV_CMD_NAV_TAKEOFF})
+"""Commands whose height is above home when they come as COMMAND_LONG."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command with its place in integer form."""
+
+    id: int
+    params: tuple[float, float, float, float]
+    frame: int
+    lat_e7: int | None
+    """None where the place is not a number."""
+    lon_e7: int | None
+    height_m: float
+    raw: tuple[float, float, float]
+    """Parameters 5 to 7 as they came, for commands in which they are no place."""
+
+
+def command_from_message(message: mavlink.MAVLink_message) -> Command:
+    """The command in a COMMAND_LONG or COMMAND_INT."""
+    params = (message.param1, message.param2, message.param3, message.param4)
+    if message.get_msgId() == mavlink.MAVLINK_MSG_ID_COMMAND_INT:
+        raw = (float(message.x), float(message.y), message.z)
+        return Command(message.command, params, message.frame, message.x, message.y, message.z, raw)
+    raw = (message.param5, message.param6, message.param7)
+    frame = (
+        mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        if message.command in _LONG_ABOVE_HOME
+        else mavlink.MAV_FRAME_GLOBAL
+    )
+    return Command(message.command, params, frame, _e7(raw[0]), _e7(raw[1]), raw[2], raw)
+
+
+def _e7(degrees: float) -> int | None:
+    return round(degrees * 1e7) if math.isfinite(degrees) else None
+
+
+class Commands:
+    """The commands one vehicle knows."""
+
+    def __init__(
+        self, pilot: Pilot, telemetry: Telemetry, streams: Streams, outbox: Outbox
+    ) -> None:
+        self._pilot = pilot
+        self._telemetry = telemetry
+        self._streams = streams
+        self._outbox = outbox
+        self.reboot_asked = False
+        """Set by a reboot command, for the vehicle to carry out after the answer."""
+        self._handlers: dict[int, Callable[[Command, Sender, float], int]] = {
+            mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self._take_off,
+            mavlink.MAV_CMD_NAV_LAND: self._land,
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return_to_launch,
+            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+            mavlink.MAV_CMD_MISSION_START: self._mission_start,
+            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_mission_current,
+            mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
+            mavlink.MAV_CMD_GET_HOME_POSITION: self._get_home,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
+            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._capabilities,
+            mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+        }
+
+    def handle(self, command: Command, sender: Sender, now_s: float) -> None:
+        """Carry ``command`` out and acknowledge it.
+
+        The acknowledgement goes ahead of whatever the command makes the vehicle say.
+        """
+        said_before = self._outbox.take()
+        handler = self._handlers.get(command.id)
+        result = _UNSUPPORTED if handler is None else handler(command, sender, now_s)
+        said_meanwhile = self._outbox.take()
+        self._outbox.put(said_before)
+        self.acknowledge(command.id, result, sender)
+        self._outbox.put(said_meanwhile)
+
+    def acknowledge(self, command_id: int, result: int, to: Sender) -> None:
+        """Send a COMMAND_ACK."""
+        self._outbox.reply(
+            to, mavlink.MAVLink_command_ack_message(command_id, result, 0, 0, *_target(to))
+        )
+
+    def set_custom_mode(self, custom_mode: int | None, now_s: float) -> int:
+        """Change to a mode by its number; the MAV_RESULT."""
+        mode = None if custom_mode is None else self._pilot.flavour.mode_of(custom_mode)
+        if mode is None:
+            self._outbox.text(mavlink.MAV_SEVERITY_WARNING, f"No such mode {custom_mode}")
+            return _FAILED
+        return _ACCEPTED if self._pilot.set_mode(mode, now_s) else _FAILED
+
+    def _set_mode(self, command: Command, sender: Sender, now_s: float) -> int:
+        del sender
+        flags = command.params[0]
+        if not math.isfinite(flags) or not int(flags) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            return _DENIED
+        custom_mode = self._pilot.flavour.mode_commanded(command.params[1], command.params[2])
+        return self.set_custom_mode(custom_mode, now_s)
+
+    def _arm_disarm(self, command: Command, sender: Sender, now_s: float) -> int:
+        del sender
+        forced = command.params[1] == _FORCE_ARM
+        if command.params[0] == 1.0:
+            return _ACCEPTED if self._pilot.arm(now_s, forced=forced) else _FAILED
+        if command.params[0] == 0.0:
+            return _ACCEPTED if self._pilot.disarm(now_s, forced=forced) else _FAILED
+        return _UNSUPPORTED
+
+    def _take_off(self, command: Command, sender: Sender, now_s: float) -> int:
+        del sender
+        pilot = self._pilot
+        if not math.isfinite(command.height_m):
+            return _DENIED
+        up_m = command.height_m - pilot.config.origin.alt_m
+        if pilot.flavour.take_off_above_home:
+            if command.frame not in ABOVE_HOME_FRAMES:
+                return _DENIED
+            up_m = pilot.flight.home_enu_m[2] + command.height_m
+        return _ACCEPTED if pilot.take_off(up_m, now_s) else _FAILED
+
+    def _land(self, command: Command, sender: Sender, now_s: float) -> int:
+        del command, sender
+        return _ACCEPTED if self._pilot.set_mode(Mode.LAND, now_s) else _FAILED
+
+    def _return_to_launch(self, command: Command, sender: Sender, now_s: float) -> int:
+        del command, sender
+        return _ACCEPTED if self._pilot.set_mode(Mode.RTL, now_s) else _FAILED
+
+    def _reposition(self, command: Command, sender: Sender, now_s: float) -> int:
+        del sender
+        pilot = self._pilot
+        flags = command.params[1]
+        change_mode = math.isfinite(flags) and bool(
+            int(flags) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+        )
+        mode = pilot.flavour.reposition_mode
+        if pilot.mode is not mode and not change_mode:
+            return _DENIED
+        target_enu_m = self._place(command)
+        if target_enu_m is None:
+            return _DENIED
+        if not pilot.set_mode(mode, now_s):
+            return _FAILED
+        pilot.fly_guided(target_enu_m, now_s)
+        return _ACCEPTED
+
+    def _place(self, command: Command) -> Point | None:
+        if command.lat_e7 is None or command.lon_e7 is None:
+            return None
+        return place_enu_m(
+            self._pilot.config.origin,
+            command.frame,
+            command.lat_e7,
+            command.lon_e7,
+            command.height_m,
+            self._pilot.flight.home_enu_m[2],
+        )
+
+    def _change_speed(self, command: Command, sender: Sender, now_s: float) -> int:
+        del sender
+        kind, speed_m_s = command.params[:2]
+        if kind not in (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED):
+            return _FAILED
+        if not 0.0 < speed_m_s < math.inf:
+            return _FAILED
+        return _ACCEPTED if self._pilot.change_speed(speed_m_s, now_s) else _FAILED
+
+    def _mission_start(self, command: Command, sender: Sender, now_s: float) -> int:
+        del sender
+        if command.params[0] != 0.0 or command.params[1] != 0.0:
+            return _DENIED  # flying a part of the mission is not supported
+        return _ACCEPTED if self._pilot.start_mission(now_s) else _FAILED
+
+    def _set_mission_current(self, command: Command, sender: Sender, now_s: float) -> int:
+        seq = command.params[0]
+        if not math.isfinite(seq) or seq < 0.0:
+            return _DENIED
+        return _ACCEPTED if self.set_mission_current(int(seq), sender, now_s) else _FAILED
+
+    def set_mission_current(self, seq: int, sender: Sender, now_s: float) -> bool:
+        """Go to a mission item and say which one is current; False if there is no such item."""
+        if not self._pilot.run.set_current(seq, now_s):
+            return False
+        self._send(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, sender, now_s)
+        return True
+
+    def _set_home(self, command: Command, sender: Sender, now_s: float) -> int:
+        del sender
+        if command.params[0] == 1.0:
+            home_enu_m: Point | None = self._pilot.position_enu_m(now_s)
+        elif command.lat_e7 == 0 and command.lon_e7 == 0:
+            home_enu_m = None
+        else:
+            home_enu_m = self._place(command)
+        if home_enu_m is None:
+            return _DENIED
+        if not self._pilot.readiness.has_origin:
+            return _FAILED
+        self._pilot.set_home(home_enu_m, now_s, lock=True)
+        return _ACCEPTED
+
+    def _get_home(self, command: Command, sender: Sender, now_s: float) -> int:
+        del command
+        return self._send(mavlink.MAVLINK_MSG_ID_HOME_POSITION, sender, now_s)
+
+    def _capabilities(self, command: Command, sender: Sender, now_s: float) -> int:
+        del command
+        return self._send(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sender, now_s)
+
+    def _request_message(self, command: Command, sender: Sender, now_s: float) -> int:
+        message_id = command.params[0]
+        if not math.isfinite(message_id):
+            return _DENIED
+        return self._send(int(message_id), sender, now_s)
+
+    def _send(self, message_id: int, sender: Sender, now_s: float) -> int:
+        message = self._telemetry.build(message_id, now_s)
+        if message is None:
+            return _FAILED
+        self._outbox.reply(sender, message)
+        return _ACCEPTED
+
+    def _set_message_interval(self, command: Command, sender: Sender, now_s: float) -> int:
+        message_id, interval_us = command.params[:2]
+        if not math.isfinite(message_id) or int(message_id) not in self._telemetry.known:
+            return _DENIED
+        if not math.isfinite(interval_us):
+            return _DENIED
+        interval_s: float | None = interval_us / 1e6
+        if interval_us == 0.0:  # back to the firmware's own rate
+            interval_s = self._pilot.flavour.unasked_streams.get(int(message_id))
+        elif interval_us < 0.0:
+            interval_s = None
+        self._streams.set_interval(sender.channel, int(message_id), interval_s, now_s)
+        return _ACCEPTED
+
+    def _get_message_interval(self, command: Command, sender: Sender, now_s: float) -> int:
+        del now_s
+        message_id = command.params[0]
+        if not math.isfinite(message_id) or not 0 <= int(message_id) <= 0xFFFF:
+            return _DENIED
+        if int(message_id) not in self._telemetry.known:
+            interval_us = 0  # not available
+        else:
+            interval_s = self._streams.interval_s(sender.channel, int(message_id))
+            interval_us = -1 if interval_s is None else min(2**31 - 1, round(interval_s * 1e6))
+        self._outbox.reply(
+            sender, mavlink.MAVLink_message_interval_message(int(message_id), interval_us)
+        )
+        return _ACCEPTED
+
+    def _reboot(self, command: Command, sender: Sender, now_s: float) -> int:
+        del sender, now_s
+        if command.params[0] not in (1.0, 3.0):
+            return _UNSUPPORTED
+        if self._pilot.armed and command.raw[1] != _FORCE_REBOOT:
+            return _FAILED
+        self.reboot_asked = True
+        return _ACCEPTED
+
+
+def _target(to: Sender) -> tuple[int, int]:
+    return to.system, to.component

@@ -1,0 +1,169 @@
+"""The vehicle in the air: what it is doing, and what comes after that by itself.
+
+Leaves out: modes and permissions (sim.autopilot.pilot), missions
+(sim.autopilot.mission_run) and motion itself (sim.kinematics).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from sim.autopilot.config import VehicleConfig
+from sim.autopilot.params import ParameterTable, Setting
+from sim.kinematics import Motion, Point
+
+__all__ = ["Activity", "Flight", "Milestone"]
+
+_FALL_M_S = 10.0
+"""Speed of a vehicle whose motors were stopped in the air [m/s]."""
+_LEAST_SPEED_M_S = 0.01
+
+
+class Activity(Enum):
+    """What the vehicle is doing."""
+
+    GROUNDED = "on the ground"
+    TAKING_OFF = "taking off"
+    HOLDING = "holding"
+    NAVIGATING = "navigating"
+    CLIMBING = "climbing to return"
+    RETURNING = "returning"
+    WAITING = "waiting above home"
+    LANDING = "landing"
+    TOUCHED_DOWN = "touched down"
+    FALLING = "falling"
+
+
+class Milestone(Enum):
+    """What an activity ended in."""
+
+    TAKEN_OFF = "taken off"
+    REACHED = "target reached"
+    LANDED = "landed"
+    UNDERWAY = "one activity followed another"
+
+
+class Flight:
+    """One activity at a time, each with the instant at which it ends by itself."""
+
+    def __init__(self, config: VehicleConfig, parameters: ParameterTable, motion: Motion) -> None:
+        self.activity = Activity.GROUNDED
+        self.home_enu_m: Point = config.start_enu_m
+        """Where the vehicle returns to and heights are counted from [m]."""
+        self.motion = motion
+        self._ground_up_m = config.start_enu_m[2]
+        """Height of the flat ground everywhere [m]."""
+        self._touchdown_s = config.touchdown_s
+        self._parameters = parameters
+        self._cruise_override_m_s: float | None = None
+        self._timer_s: float | None = None
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the vehicle knows that it stands on the ground."""
+        return self.activity is Activity.GROUNDED
+
+    @property
+    def cruise_m_s(self) -> float:
+        """Speed of the next leg [m/s]."""
+        if self._cruise_override_m_s is not None:
+            return self._cruise_override_m_s
+        return max(_LEAST_SPEED_M_S, self._parameters.value_si(Setting.CRUISE_M_S))
+
+    def override_cruise(self, speed_m_s: float | None, now_s: float) -> None:
+        """Fly on at another speed [m/s], until None gives the parameter its say again."""
+        self._cruise_override_m_s = speed_m_s
+        if speed_m_s is not None and self.activity in (Activity.NAVIGATING, Activity.RETURNING):
+            self.motion.fly_to(self.motion.target_enu_m, speed_m_s, now_s)
+
+    def take_off(self, up_m: float, now_s: float) -> None:
+        """Rise straight to a height in the local frame [m]."""
+        east_m, north_m, _ = self.motion.position_enu_m(now_s)
+        self._leave(
+            Activity.TAKING_OFF, (east_m, north_m, up_m), self._speed(Setting.CLIMB_M_S), now_s
+        )
+
+    def navigate(self, target_enu_m: Point, now_s: float) -> None:
+        """Fly straight to a place, in place of whatever was being done."""
+        self._leave(Activity.NAVIGATING, target_enu_m, self.cruise_m_s, now_s)
+
+    def hold(self, now_s: float) -> None:
+        """Stay in the air where the vehicle is; on the ground, stay there."""
+        self.motion.stop(now_s)
+        self._timer_s = None
+        if self.activity in (Activity.GROUNDED, Activity.TOUCHED_DOWN):
+            self.activity = Activity.GROUNDED
+        else:
+            self.activity = Activity.HOLDING
+
+    def land(self, now_s: float) -> None:
+        """Descend where the vehicle is; nothing to do on the ground."""
+        if self.activity not in (Activity.GROUNDED, Activity.TOUCHED_DOWN):
+            self._descend(Activity.LANDING, self._speed(Setting.LAND_M_S), now_s)
+
+    def fall(self, now_s: float) -> None:
+        """Drop, because the motors stand still."""
+        if self.activity is Activity.TOUCHED_DOWN:
+            self.hold(now_s)
+        elif self.activity is not Activity.GROUNDED:
+            self._descend(Activity.FALLING, _FALL_M_S, now_s)
+
+    def return_home(self, now_s: float) -> None:
+        """Rise to the return height if below it, fly home, wait, land."""
+        if self.activity in (Activity.GROUNDED, Activity.TOUCHED_DOWN):
+            return
+        east_m, north_m, up_m = self.motion.position_enu_m(now_s)
+        return_up_m = self.home_enu_m[2] + self._parameters.value_si(Setting.RETURN_HEIGHT_M)
+        target_enu_m = (east_m, north_m, max(up_m, return_up_m))
+        self._leave(Activity.CLIMBING, target_enu_m, self._speed(Setting.CLIMB_M_S), now_s)
+
+    def deadline_s(self) -> float | None:
+        """When the activity ends by itself [s]; None if it lasts."""
+        if self.activity in (Activity.GROUNDED, Activity.HOLDING):
+            return None
+        return self.motion.arrives_s if self._timer_s is None else self._timer_s
+
+    def advance(self, at_s: float) -> Milestone:
+        """End the current activity at its deadline ``at_s`` and begin what follows."""
+        match self.activity:
+            case Activity.TAKING_OFF:
+                self.hold(at_s)
+                return Milestone.TAKEN_OFF
+            case Activity.NAVIGATING:
+                self.hold(at_s)
+                return Milestone.REACHED
+            case Activity.CLIMBING:
+                _, _, up_m = self.motion.position_enu_m(at_s)
+                above_home_enu_m = (*self.home_enu_m[:2], up_m)
+                self._leave(Activity.RETURNING, above_home_enu_m, self.cruise_m_s, at_s)
+            case Activity.RETURNING:
+                self.hold(at_s)
+                self.activity = Activity.WAITING
+                self._timer_s = at_s + max(0.0, self._parameters.value_si(Setting.RETURN_WAIT_S))
+            case Activity.WAITING:
+                self.land(at_s)
+            case Activity.LANDING:
+                self.motion.stop(at_s)
+                self.activity = Activity.TOUCHED_DOWN
+                self._timer_s = at_s + self._touchdown_s
+            case Activity.TOUCHED_DOWN | Activity.FALLING:
+                self.activity = Activity.TOUCHED_DOWN
+                self.hold(at_s)
+                return Milestone.LANDED
+            case Activity.GROUNDED | Activity.HOLDING:
+                pass
+        return Milestone.UNDERWAY
+
+    def _speed(self, setting: Setting) -> float:
+        return max(_LEAST_SPEED_M_S, self._parameters.value_si(setting))
+
+    def _descend(self, activity: Activity, speed_m_s: float, now_s: float) -> None:
+        east_m, north_m, _ = self.motion.position_enu_m(now_s)
+        self._leave(activity, (east_m, north_m, self._ground_up_m), speed_m_s, now_s)
+
+    def _leave(
+        self, activity: Activity, target_enu_m: Point, speed_m_s: float, now_s: float
+    ) -> None:
+        self.activity = activity
+        self._timer_s = None
+        self.motion.fly_to(target_enu_m, speed_m_s, now_s)

@@ -1,0 +1,130 @@
+"""The mission that stands on a vehicle: items, what is accepted as one, and their list.
+
+Sources: https://mavlink.io/en/services/mission.html and
+https://mavlink.io/en/messages/common.html#MAV_CMD. Leaves out: their transfer
+(sim.autopilot.mission_transfer) and their flight (sim.autopilot.mission_run);
+fences and rally points.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sim.autopilot.geo import ABOVE_HOME_FRAMES, ABOVE_SEA_FRAMES
+
+__all__ = ["MAX_ITEMS", "MissionItem", "MissionStore", "item_from_message"]
+
+MAX_ITEMS = 724
+"""Room for items, home included."""
+
+_PLACES = frozenset(
+    {
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TIME,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+    }
+)
+_DONE_AT_ONCE = frozenset({mavlink.MAV_CMD_DO_CHANGE_SPEED})
+_NAMES = {
+    mavlink.MAV_CMD_NAV_WAYPOINT: "WP",
+    mavlink.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
+    mavlink.MAV_CMD_NAV_LOITER_TIME: "LoitTime",
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
+    mavlink.MAV_CMD_NAV_LAND: "Land",
+    mavlink.MAV_CMD_NAV_TAKEOFF: "Takeoff",
+    mavlink.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItem:
+    """One step of a mission, in wire units."""
+
+    frame: int
+    """MAV_FRAME, the variant without ``_INT``."""
+    command: int
+    """MAV_CMD."""
+    params: tuple[float, float, float, float]
+    lat_e7: int
+    lon_e7: int
+    height_m: float
+    autocontinue: int = 1
+
+    @property
+    def is_place(self) -> bool:
+        """Whether latitude, longitude and height mean something."""
+        return self.command in _PLACES
+
+    @property
+    def is_navigation(self) -> bool:
+        """Whether it takes time to fly, rather than being done at once."""
+        return self.command not in _DONE_AT_ONCE
+
+    @property
+    def name(self) -> str:
+        """What the autopilot calls it when it begins."""
+        return _NAMES[self.command]
+
+
+_FRAMES_KEPT = {
+    mavlink.MAV_FRAME_GLOBAL_INT: mavlink.MAV_FRAME_GLOBAL,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+}
+
+
+def item_from_message(message: mavlink.MAVLink_message) -> MissionItem | int:
+    """The item in a MISSION_ITEM or MISSION_ITEM_INT, or the MAV_MISSION_RESULT of refusing it."""
+    if message.command not in _NAMES:
+        return int(mavlink.MAV_MISSION_UNSUPPORTED)
+    params = (message.param1, message.param2, message.param3, message.param4)
+    # Yaw is given as NaN where it doesn't matter.
+    if not all(math.isfinite(value) for value in params[:3]) or not math.isfinite(message.z):
+        return int(mavlink.MAV_MISSION_INVALID)
+    scale = 1e7 if message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM else 1
+    if not (math.isfinite(message.x) and math.isfinite(message.y)):
+        return int(mavlink.MAV_MISSION_INVALID)
+    item = MissionItem(
+        frame=_FRAMES_KEPT.get(message.frame, message.frame),
+        command=message.command,
+        params=params,
+        lat_e7=round(message.x * scale),
+        lon_e7=round(message.y * scale),
+        height_m=message.z,
+        autocontinue=message.autocontinue,
+    )
+    if item.is_place:
+        if item.frame not in ABOVE_HOME_FRAMES | ABOVE_SEA_FRAMES:
+            return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+        if abs(item.lat_e7) > 890_000_000:
+            return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
+        if abs(item.lon_e7) > 1_800_000_000:
+            return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
+    return item
+
+
+class MissionStore:
+    """The mission as it stands; replaced as a whole, never in part."""
+
+    def __init__(self) -> None:
+        self.items: tuple[MissionItem, ...] = ()
+        """As uploaded; whether the first is home is the flavour's affair."""
+
+    def replace(self, items: tuple[MissionItem, ...]) -> None:
+        """Put another mission in place of this one."""
+        self.items = items
+
+    def item(self, seq: int) -> MissionItem | None:
+        """The item of that number, if there is one."""
+        return self.items[seq] if 0 <= seq < len(self.items) else None
+
+    def next_navigation(self, seq: int) -> int | None:
+        """Number of the first item from ``seq`` on that takes time to fly."""
+        for number in range(max(0, seq), len(self.items)):
+            if self.items[number].is_navigation:
+                return number
+        return None

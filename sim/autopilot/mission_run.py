@@ -1,0 +1,228 @@
+"""Flies the mission that stands on the vehicle, item after item.
+
+Leaves out: how the vehicle flies (the `MissionPilot` does) and when it may
+(sim.autopilot.pilot).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Protocol
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sim.autopilot.events import Outbox
+from sim.autopilot.flight import Milestone
+from sim.autopilot.mission_items import MissionItem, MissionStore
+
+__all__ = ["MissionPilot", "MissionRun", "RunState"]
+
+_ITEMS_COMPARED = 3
+"""Navigation items, from the current one, whose change makes the autopilot start it anew."""
+
+
+class RunState(Enum):
+    """How far the mission has come."""
+
+    NOT_STARTED = "not started"
+    RUNNING = "running"
+    STOPPED = "stopped"
+    COMPLETE = "complete"
+
+
+class MissionPilot(Protocol):
+    """What a mission asks of the vehicle."""
+
+    def mission_take_off(self, item: MissionItem, now_s: float) -> None:
+        """Rise to the height of the item."""
+        ...
+
+    def mission_navigate(self, item: MissionItem, now_s: float) -> None:
+        """Fly to the place of the item."""
+        ...
+
+    def mission_land(self, now_s: float) -> None:
+        """Land where the vehicle is."""
+        ...
+
+    def mission_return(self, now_s: float) -> None:
+        """Return home and land."""
+        ...
+
+    def mission_change_speed(self, speed_m_s: float, now_s: float) -> None:
+        """Fly at another speed [m/s]."""
+        ...
+
+    def mission_finished(self, now_s: float) -> None:
+        """The last item is done."""
+        ...
+
+
+class MissionRun:
+    """Where in the mission the vehicle is."""
+
+    def __init__(
+        self, store: MissionStore, pilot: MissionPilot, outbox: Outbox, first_seq: int
+    ) -> None:
+        self.state = RunState.NOT_STARTED
+        self.current: int | None = None
+        """Number of the item being flown, or to be flown on resuming."""
+        self._store = store
+        self._pilot = pilot
+        self._outbox = outbox
+        self._first_seq = first_seq
+        self._hold_until_s: float | None = None
+        self._landing = False
+        """A landing item has reached its place and is descending."""
+
+    @property
+    def present(self) -> bool:
+        """Whether there is anything to fly."""
+        return self._store.next_navigation(self._first_seq) is not None
+
+    @property
+    def starts_with_take_off(self) -> bool:
+        """Whether the mission can begin on the ground."""
+        first = self._store.next_navigation(self._first_seq)
+        item = None if first is None else self._store.item(first)
+        return item is not None and item.command == mavlink.MAV_CMD_NAV_TAKEOFF
+
+    def start_or_resume(self, now_s: float) -> None:
+        """Go on with the current item; from the beginning if there is none."""
+        if self.state is RunState.STOPPED and self.current is not None:
+            self.state = RunState.RUNNING
+            self._begin_from(self.current, now_s)
+            return
+        self.state = RunState.RUNNING
+        self._begin_from(self._first_seq, now_s)
+
+    def stop(self) -> None:
+        """Leave the mission where it is; `start_or_resume` flies the current item again."""
+        if self.state is RunState.RUNNING:
+            self.state = RunState.STOPPED
+        self._hold_until_s = None
+
+    def reset(self) -> None:
+        """Forget the place in the mission, as disarming does."""
+        self.stop()
+        self.current = None
+
+    def clear(self) -> bool:
+        """Delete the mission; False while it is being flown."""
+        if self.state is RunState.RUNNING:
+            return False
+        self._store.replace(())
+        self.state = RunState.NOT_STARTED
+        self.current = None
+        return True
+
+    def set_current(self, seq: int, now_s: float) -> bool:
+        """Go to an item, at once if the mission runs; False if there is nothing from there on."""
+        first = self._store.next_navigation(max(seq, self._first_seq))
+        if seq >= len(self._store.items) or first is None:
+            return False
+        if self.state is RunState.RUNNING:
+            self._begin_from(max(seq, self._first_seq), now_s)
+        else:
+            self.current = first
+            self.state = RunState.STOPPED
+        return True
+
+    def mission_changed(self, old: tuple[MissionItem, ...], now_s: float) -> bool:
+        """Take up a mission that replaced ``old`` while this one ran; True if it made a change.
+
+        The current item is begun anew if it or one of the next two differs, as
+        ArduCopter does; otherwise the vehicle flies on.
+        """
+        if self.state is not RunState.RUNNING:
+            if not self._store.items:
+                self.state = RunState.NOT_STARTED
+            return False
+        if self.current is None or self._upcoming(old) == self._upcoming(self._store.items):
+            return False
+        self._begin_from(self.current, now_s)
+        return True
+
+    def deadline_s(self) -> float | None:
+        """When the time on the spot is over [s]."""
+        return self._hold_until_s
+
+    def advance(self, at_s: float) -> None:
+        """End the time on the spot at its deadline ``at_s``."""
+        self._hold_until_s = None
+        self._complete_current(at_s)
+
+    def on_milestone(self, milestone: Milestone, at_s: float) -> None:
+        """Hear what the flight came to while the mission runs."""
+        item = self._current_item()
+        if self.state is not RunState.RUNNING or item is None or self._hold_until_s is not None:
+            return
+        match item.command, milestone:
+            case mavlink.MAV_CMD_NAV_TAKEOFF, Milestone.TAKEN_OFF:
+                self._complete_current(at_s)
+            case (
+                mavlink.MAV_CMD_NAV_WAYPOINT | mavlink.MAV_CMD_NAV_LOITER_TIME,
+                Milestone.REACHED,
+            ):
+                self._hold(max(0.0, item.params[0]), at_s)
+            case mavlink.MAV_CMD_NAV_LAND, Milestone.REACHED if not self._landing:
+                self._land(at_s)
+            case (
+                mavlink.MAV_CMD_NAV_LAND | mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+                Milestone.LANDED,
+            ):
+                self._complete_current(at_s)
+
+    def _current_item(self) -> MissionItem | None:
+        return None if self.current is None else self._store.item(self.current)
+
+    def _upcoming(self, items: tuple[MissionItem, ...]) -> list[MissionItem]:
+        upcoming = [item for item in items[self.current or 0 :] if item.is_navigation]
+        return upcoming[:_ITEMS_COMPARED]
+
+    def _begin_from(self, seq: int, now_s: float) -> None:
+        """Do what is done at once, and begin the first item that takes time."""
+        self._hold_until_s = None
+        self._landing = False
+        while (item := self._store.item(seq)) is not None:
+            self._outbox.text(mavlink.MAV_SEVERITY_INFO, f"Mission: {seq} {item.name}")
+            if item.is_navigation:
+                self.current = seq
+                self._begin(item, now_s)
+                return
+            if item.params[1] > 0.0:
+                self._pilot.mission_change_speed(item.params[1], now_s)
+            self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
+            seq += 1
+        self.state = RunState.COMPLETE
+        self._pilot.mission_finished(now_s)
+
+    def _begin(self, item: MissionItem, now_s: float) -> None:
+        match item.command:
+            case mavlink.MAV_CMD_NAV_TAKEOFF:
+                self._pilot.mission_take_off(item, now_s)
+            case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+                self._pilot.mission_return(now_s)
+            case mavlink.MAV_CMD_NAV_LAND if item.lat_e7 == 0 and item.lon_e7 == 0:
+                self._land(now_s)
+            case _:
+                self._pilot.mission_navigate(item, now_s)
+
+    def _land(self, now_s: float) -> None:
+        self._landing = True
+        self._pilot.mission_land(now_s)
+
+    def _hold(self, duration_s: float, now_s: float) -> None:
+        if duration_s > 0.0:
+            self._hold_until_s = now_s + duration_s
+        else:
+            self._complete_current(now_s)
+
+    def _complete_current(self, at_s: float) -> None:
+        if self.current is None or (item := self._store.item(self.current)) is None:
+            return
+        seq = self.current
+        self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
+        if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
+            self._outbox.text(mavlink.MAV_SEVERITY_INFO, f"Reached command #{seq}")
+        self._begin_from(seq + 1, at_s)

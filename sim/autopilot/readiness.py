@@ -1,0 +1,82 @@
+"""What a vehicle still lacks before it may fly, as a function of the time since boot.
+
+Leaves out: saying it (sim.autopilot.pilot, sim.autopilot.telemetry).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from sim.autopilot.config import Delays
+from sim.autopilot.modes import Mode
+
+__all__ = ["Readiness", "Stage"]
+
+
+class Stage(Enum):
+    """Something that has just become ready."""
+
+    BOOTED = "booted"
+    SENSORS = "sensors"
+    ORIGIN = "origin"
+    POSITION = "position"
+
+
+class Readiness:
+    """Power-up as a sequence of stages with fixed delays.
+
+    States follow from the stages that were passed, not from the clock, so that
+    what is reported changes exactly when the change is announced.
+    """
+
+    def __init__(self, delays: Delays, boot_s: float) -> None:
+        self.boot_s = boot_s
+        """When power came on [s]."""
+        self._ahead: list[tuple[float, Stage]] = [
+            (boot_s + delays.boot_s, Stage.BOOTED),
+            (boot_s + delays.sensors_s, Stage.SENSORS),
+            (boot_s + delays.origin_s, Stage.ORIGIN),
+            (boot_s + delays.position_s, Stage.POSITION),
+        ]
+        self._passed: set[Stage] = set()
+
+    @property
+    def booted(self) -> bool:
+        """Whether the autopilot is initialised."""
+        return Stage.BOOTED in self._passed
+
+    @property
+    def has_origin(self) -> bool:
+        """Whether GPS has a fix, so that the vehicle tells where it is."""
+        return Stage.ORIGIN in self._passed
+
+    @property
+    def has_position(self) -> bool:
+        """Whether the position estimate is good enough to navigate by."""
+        return Stage.POSITION in self._passed
+
+    def deadline_s(self) -> float | None:
+        """When the next stage is due [s]; None once all are passed."""
+        return self._ahead[0][0] if self._ahead else None
+
+    def advance(self) -> Stage:
+        """Pass the next stage.
+
+        Raises:
+            ValueError: all stages are passed.
+        """
+        if not self._ahead:
+            raise ValueError("no stage is left to pass")
+        _, stage = self._ahead.pop(0)
+        self._passed.add(stage)
+        return stage
+
+    def obstacle(self, mode: Mode) -> str | None:
+        """Why ``mode`` can't be armed, in the autopilot's words; None when it can."""
+        if not self.booted:
+            return "System not initialised"
+        if Stage.SENSORS not in self._passed:
+            return "Accels inconsistent"
+        if mode.needs_position and not self.has_position:
+            return "Need Position Estimate"
+        return None

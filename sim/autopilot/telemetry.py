@@ -1,0 +1,317 @@
+"""What a vehicle reports about itself, message by message.
+
+Sources: https://mavlink.io/en/messages/common.html and the recordings of
+ArduCopter 4.8, from which the sensor bits are taken. Leaves out: attitude other
+than heading, raw sensors, RC channels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sim.autopilot.flight import Activity
+from sim.autopilot.geo import place_wgs84_e7
+from sim.autopilot.messages import home_position, origin_position
+from sim.autopilot.mission_run import RunState
+from sim.autopilot.modes import Mode
+from sim.autopilot.pilot import Pilot
+
+__all__ = ["DATA_STREAMS", "Telemetry"]
+
+_PRESENT = 0x5371FC0F
+_ENABLED = 0x53419C0F
+_HEALTHY = 0x47519C0F
+_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+_AHRS = mavlink.MAV_SYS_STATUS_AHRS
+_PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_POSITION_CONTROL = (
+    mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+)
+
+_EKF_ALIGNED = (
+    mavlink.EKF_ATTITUDE
+    | mavlink.EKF_VELOCITY_HORIZ
+    | mavlink.EKF_VELOCITY_VERT
+    | mavlink.EKF_POS_VERT_ABS
+)
+_EKF_WITHOUT_POSITION = _EKF_ALIGNED | mavlink.EKF_CONST_POS_MODE
+_EKF_WITH_POSITION = (
+    _EKF_ALIGNED
+    | mavlink.EKF_POS_HORIZ_REL
+    | mavlink.EKF_POS_HORIZ_ABS
+    | mavlink.EKF_PRED_POS_HORIZ_REL
+    | mavlink.EKF_PRED_POS_HORIZ_ABS
+)
+
+_BATTERY_MV = 12600
+_HOVER_CA = 3000
+"""Current drawn while armed [10 mA]."""
+_UTC_AT_BOOT_US = 1_735_689_600_000_000
+"""Simulated GPS time at boot: 2025-01-01 UTC. The core knows no wall clock."""
+_INT16_MAX = 32767
+
+DATA_STREAMS: dict[int, tuple[int, ...]] = {
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+        mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+    ),
+    mavlink.MAV_DATA_STREAM_POSITION: (
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    ),
+    mavlink.MAV_DATA_STREAM_EXTRA1: (mavlink.MAVLINK_MSG_ID_ATTITUDE,),
+    mavlink.MAV_DATA_STREAM_EXTRA2: (mavlink.MAVLINK_MSG_ID_VFR_HUD,),
+    mavlink.MAV_DATA_STREAM_EXTRA3: (
+        mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+    ),
+}
+"""The older way to ask for streams, MAV_DATA_STREAM -> message ids."""
+
+
+class Telemetry:
+    """Builds reports from the state of one pilot."""
+
+    def __init__(self, pilot: Pilot) -> None:
+        self._pilot = pilot
+        self._heading_deg = 0.0
+        self._builders: dict[int, Callable[[float], mavlink.MAVLink_message]] = {
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
+            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
+            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self._gps_raw,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
+            mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+            mavlink.MAVLINK_MSG_ID_VFR_HUD: self._vfr_hud,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self._battery,
+            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._version,
+            mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: self._ekf_status,
+            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_state,
+            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._origin,
+            mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home,
+        }
+
+    @property
+    def known(self) -> frozenset[int]:
+        """Message ids that can be asked for."""
+        return frozenset(self._builders)
+
+    def build(self, message_id: int, now_s: float) -> mavlink.MAVLink_message | None:
+        """The message as of now; None if there is none of that id, or nothing to say yet."""
+        if message_id not in self._builders:
+            return None
+        if not self._pilot.readiness.has_origin and message_id in (
+            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+            mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+        ):
+            return None
+        return self._builders[message_id](now_s)
+
+    def _boot_s(self, now_s: float) -> float:
+        return max(0.0, now_s - self._pilot.readiness.boot_s)
+
+    def _boot_ms(self, now_s: float) -> int:
+        return int(self._boot_s(now_s) * 1e3) & 0xFFFFFFFF
+
+    def _heartbeat(self, now_s: float) -> mavlink.MAVLink_message:
+        del now_s
+        pilot = self._pilot
+        on_ground = pilot.flight.on_ground
+        booted = pilot.readiness.booted
+        if not booted:
+            status = mavlink.MAV_STATE_BOOT
+        else:
+            status = mavlink.MAV_STATE_STANDBY if on_ground else mavlink.MAV_STATE_ACTIVE
+        return mavlink.MAVLink_heartbeat_message(
+            mavlink.MAV_TYPE_QUADROTOR,
+            pilot.flavour.autopilot,
+            pilot.flavour.base_mode(
+                pilot.mode, armed=pilot.armed, on_ground=on_ground, booted=booted
+            ),
+            pilot.flavour.custom_mode(pilot.mode),
+            status,
+            3,
+        )
+
+    def _sys_status(self, now_s: float) -> mavlink.MAVLink_message:
+        pilot = self._pilot
+        seen = _GPS if pilot.readiness.has_origin else 0
+        running = _AHRS if pilot.readiness.has_origin else 0
+        if pilot.mode.controls_position:
+            running |= _POSITION_CONTROL
+        prearm = _PREARM if pilot.readiness.obstacle(pilot.mode) is None else 0
+        return mavlink.MAVLink_sys_status_message(
+            _PRESENT | seen,
+            _ENABLED | seen | running,
+            _HEALTHY | seen | running | prearm,
+            0,
+            _BATTERY_MV,
+            self._current_ca(),
+            self._battery_percent(now_s),
+            *(0, 0, 0, 0, 0, 0),
+        )
+
+    def _current_ca(self) -> int:
+        return _HOVER_CA if self._pilot.armed and not self._pilot.flight.on_ground else 0
+
+    def _battery_percent(self, now_s: float) -> int:
+        return math.ceil(self._pilot.battery_frac(now_s) * 100.0)
+
+    def _battery(self, now_s: float) -> mavlink.MAVLink_message:
+        unknown_mv = [65535] * 9
+        return mavlink.MAVLink_battery_status_message(
+            0,
+            mavlink.MAV_BATTERY_FUNCTION_ALL,
+            mavlink.MAV_BATTERY_TYPE_LIPO,
+            _INT16_MAX,
+            [_BATTERY_MV, *unknown_mv],
+            self._current_ca(),
+            -1,
+            -1,
+            self._battery_percent(now_s),
+        )
+
+    def _system_time(self, now_s: float) -> mavlink.MAVLink_message:
+        utc_us = 0
+        if self._pilot.readiness.has_origin:
+            utc_us = _UTC_AT_BOOT_US + int(self._boot_s(now_s) * 1e6)
+        return mavlink.MAVLink_system_time_message(utc_us, self._boot_ms(now_s))
+
+    def _gps_raw(self, now_s: float) -> mavlink.MAVLink_message:
+        fixed = self._pilot.readiness.has_origin
+        lat_e7, lon_e7, alt_mm = self._place(now_s)
+        return mavlink.MAVLink_gps_raw_int_message(
+            int(self._boot_s(now_s) * 1e6),
+            mavlink.GPS_FIX_TYPE_RTK_FIXED if fixed else mavlink.GPS_FIX_TYPE_NO_FIX,
+            *(lat_e7, lon_e7, alt_mm),
+            *(100, 100) if fixed else (65535, 65535),
+            min(65535, round(self._ground_speed_m_s(now_s) * 100.0)),
+            self._heading_cdeg(now_s),
+            10 if fixed else 0,
+        )
+
+    def _place(self, now_s: float) -> tuple[int, int, int]:
+        if not self._pilot.readiness.has_origin:
+            return 0, 0, 0
+        return place_wgs84_e7(self._pilot.config.origin, self._pilot.position_enu_m(now_s))
+
+    def _velocity_ned_m_s(self, now_s: float) -> tuple[float, float, float]:
+        east_m_s, north_m_s, up_m_s = self._pilot.flight.motion.velocity_enu_m_s(now_s)
+        return north_m_s, east_m_s, 0.0 - up_m_s
+
+    def _ground_speed_m_s(self, now_s: float) -> float:
+        north_m_s, east_m_s, _ = self._velocity_ned_m_s(now_s)
+        return math.hypot(north_m_s, east_m_s)
+
+    def _heading_cdeg(self, now_s: float) -> int:
+        """Heading 0..35999 [0.01 deg]: along the way flown last."""
+        north_m_s, east_m_s, _ = self._velocity_ned_m_s(now_s)
+        if north_m_s or east_m_s:
+            self._heading_deg = math.degrees(math.atan2(east_m_s, north_m_s))
+        return round(self._heading_deg * 100.0) % 36000
+
+    def _attitude(self, now_s: float) -> mavlink.MAVLink_message:
+        heading_cdeg = self._heading_cdeg(now_s)
+        yaw_rad = math.radians((heading_cdeg / 100.0 + 180.0) % 360.0 - 180.0)
+        return mavlink.MAVLink_attitude_message(
+            self._boot_ms(now_s), 0.0, 0.0, yaw_rad, 0.0, 0.0, 0.0
+        )
+
+    def _local_position(self, now_s: float) -> mavlink.MAVLink_message:
+        east_m, north_m, up_m = self._pilot.position_enu_m(now_s)
+        return mavlink.MAVLink_local_position_ned_message(
+            self._boot_ms(now_s), north_m, east_m, 0.0 - up_m, *self._velocity_ned_m_s(now_s)
+        )
+
+    def _global_position(self, now_s: float) -> mavlink.MAVLink_message:
+        up_m = self._pilot.position_enu_m(now_s)[2]
+        relative_mm = round((up_m - self._pilot.flight.home_enu_m[2]) * 1e3)
+        return mavlink.MAVLink_global_position_int_message(
+            self._boot_ms(now_s),
+            *self._place(now_s),
+            relative_mm if self._pilot.readiness.has_origin else 0,
+            *(
+                max(-_INT16_MAX, min(_INT16_MAX, round(speed_m_s * 100.0)))
+                for speed_m_s in self._velocity_ned_m_s(now_s)
+            ),
+            self._heading_cdeg(now_s),
+        )
+
+    def _vfr_hud(self, now_s: float) -> mavlink.MAVLink_message:
+        ground_speed_m_s = self._ground_speed_m_s(now_s)
+        return mavlink.MAVLink_vfr_hud_message(
+            ground_speed_m_s,
+            ground_speed_m_s,
+            self._heading_cdeg(now_s) // 100,
+            0 if self._pilot.flight.on_ground else 50,
+            self._place(now_s)[2] / 1e3,
+            -self._velocity_ned_m_s(now_s)[2],
+        )
+
+    def _mission_current(self, now_s: float) -> mavlink.MAVLink_message:
+        del now_s
+        pilot = self._pilot
+        run = pilot.run
+        states = {
+            RunState.NOT_STARTED: mavlink.MISSION_STATE_NOT_STARTED,
+            RunState.RUNNING: mavlink.MISSION_STATE_ACTIVE,
+            RunState.STOPPED: mavlink.MISSION_STATE_PAUSED,
+            RunState.COMPLETE: mavlink.MISSION_STATE_COMPLETE,
+        }
+        return mavlink.MAVLink_mission_current_message(
+            run.current or 0,
+            max(0, len(pilot.store.items) - pilot.flavour.first_item),
+            states[run.state] if run.present else mavlink.MISSION_STATE_NO_MISSION,
+            1 if pilot.mode is Mode.AUTO else 0,
+        )
+
+    def _version(self, now_s: float) -> mavlink.MAVLink_message:
+        del now_s
+        flavour = self._pilot.flavour
+        no_hash = [0] * 8
+        return mavlink.MAVLink_autopilot_version_message(
+            flavour.capabilities,
+            *(flavour.version, 0, 0, 0),
+            *(no_hash, no_hash, no_hash),
+            *(0, 0, self._pilot.config.system_id),
+        )
+
+    def _ekf_status(self, now_s: float) -> mavlink.MAVLink_message:
+        del now_s
+        readiness = self._pilot.readiness
+        if not readiness.booted:
+            flags = mavlink.EKF_UNINITIALIZED
+        else:
+            flags = _EKF_WITH_POSITION if readiness.has_position else _EKF_WITHOUT_POSITION
+        return mavlink.MAVLink_ekf_status_report_message(flags, *(0.0, 0.0, 0.0, 0.0, 0.0))
+
+    def _extended_state(self, now_s: float) -> mavlink.MAVLink_message:
+        del now_s
+        landed = {
+            Activity.GROUNDED: mavlink.MAV_LANDED_STATE_ON_GROUND,
+            Activity.TAKING_OFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
+            Activity.LANDING: mavlink.MAV_LANDED_STATE_LANDING,
+            Activity.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
+        }
+        return mavlink.MAVLink_extended_sys_state_message(
+            mavlink.MAV_VTOL_STATE_MC,
+            landed.get(self._pilot.flight.activity, mavlink.MAV_LANDED_STATE_IN_AIR),
+        )
+
+    def _origin(self, now_s: float) -> mavlink.MAVLink_message:
+        return origin_position(self._pilot.config.origin, int(self._boot_s(now_s) * 1e6))
+
+    def _home(self, now_s: float) -> mavlink.MAVLink_message:
+        return home_position(
+            self._pilot.config.origin,
+            self._pilot.flight.home_enu_m,
+            int(self._boot_s(now_s) * 1e6),
+        )

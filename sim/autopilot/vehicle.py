@@ -1,0 +1,280 @@
+"""One simulated vehicle: MAVLink messages in, MAVLink messages out, no I/O.
+
+`Vehicle.step` takes an event and the time and returns what is to be sent, in
+order; `Vehicle.next_deadline_s` says when to call again with a `Tick`. Messages
+understood: HEARTBEAT, COMMAND_LONG, COMMAND_INT, SET_MODE,
+SET_POSITION_TARGET_GLOBAL_INT, REQUEST_DATA_STREAM, the PARAM and MISSION families,
+TIMESYNC, PING. Leaves out: bytes (sim.autopilot.codec), sockets
+(sim.autopilot.server), velocity and attitude targets, RC override.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sim.autopilot.commands import Commands, command_from_message
+from sim.autopilot.config import VehicleConfig
+from sim.autopilot.events import (
+    Connected,
+    Disconnected,
+    Event,
+    Outbox,
+    Reboot,
+    Received,
+    Send,
+    Sender,
+    Tick,
+)
+from sim.autopilot.flavours.base import Flavour
+from sim.autopilot.geo import place_enu_m
+from sim.autopilot.mission_items import MissionStore
+from sim.autopilot.mission_transfer import MissionTransfer
+from sim.autopilot.modes import Mode
+from sim.autopilot.params import ParameterTable
+from sim.autopilot.pilot import Pilot
+from sim.autopilot.streams import Streams
+from sim.autopilot.telemetry import DATA_STREAMS, Telemetry
+
+__all__ = ["COMPONENT_ID", "Vehicle"]
+
+COMPONENT_ID = 1
+_HEARTBEAT_S = 1.0
+_POSITION_IGNORED = 0b111
+"""Bits of a position target's type mask that say that no position is meant."""
+_NANO = 1e9
+
+_Handler = Callable[[mavlink.MAVLink_message, Sender, float], None]
+
+
+class Vehicle:
+    """The machine of one vehicle.
+
+    Args:
+        config: what it is.
+        flavour: whose firmware it runs.
+        start_s: when it is powered up [s].
+    """
+
+    def __init__(self, config: VehicleConfig, flavour: Flavour, start_s: float) -> None:
+        self.config = config
+        self.foreign = 0
+        """Messages dropped because they were for somebody else."""
+        self.unknown = 0
+        """Messages dropped because this vehicle doesn't know them."""
+        self._flavour = flavour
+        self._outbox = Outbox()
+        self._streams = Streams()
+        self._parameters = ParameterTable(flavour.parameters(config))
+        self._store = MissionStore()
+        self._now_s = start_s
+        self._power_up(config, start_s)
+
+    def _power_up(self, config: VehicleConfig, now_s: float) -> None:
+        self._pilot = Pilot(
+            config, self._flavour, self._parameters, self._store, self._outbox, now_s
+        )
+        self._telemetry = Telemetry(self._pilot)
+        self._commands = Commands(self._pilot, self._telemetry, self._streams, self._outbox)
+        self._transfer = MissionTransfer(
+            self._store,
+            self._outbox,
+            asks_for_int=self._flavour.uploads_by_int,
+            home_item=self._pilot.home_item if self._flavour.first_item > 0 else None,
+            uploaded=self._pilot.mission_uploaded,
+            clear=self._pilot.run.clear,
+        )
+        self._heartbeat_s = now_s
+        self._handlers: dict[int, _Handler] = {
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: lambda _message, _sender, _now_s: None,
+            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._on_command,
+            mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._on_command,
+            mavlink.MAVLINK_MSG_ID_SET_MODE: self._on_set_mode,
+            mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._on_position_target,
+            mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._on_data_stream,
+            mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._on_param_read,
+            mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._on_param_list,
+            mavlink.MAVLINK_MSG_ID_PARAM_SET: self._on_param_set,
+            mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._on_mission_set_current,
+            mavlink.MAVLINK_MSG_ID_TIMESYNC: self._on_timesync,
+            mavlink.MAVLINK_MSG_ID_PING: self._on_ping,
+            **dict.fromkeys(
+                (
+                    mavlink.MAVLINK_MSG_ID_MISSION_COUNT,
+                    mavlink.MAVLINK_MSG_ID_MISSION_ITEM,
+                    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+                    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+                    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST,
+                    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+                    mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+                    mavlink.MAVLINK_MSG_ID_MISSION_ACK,
+                ),
+                self._transfer.handle,
+            ),
+        }
+
+    @property
+    def pilot(self) -> Pilot:
+        """The autopilot inside, to look at."""
+        return self._pilot
+
+    def step(self, event: Event, now_s: float) -> list[Send]:
+        """Take an event at ``now_s``; time going back is taken as standing still.
+
+        Returns:
+            What is to be sent, in order.
+        """
+        now_s = self._now_s = max(now_s, self._now_s)
+        self._advance(now_s)
+        match event:
+            case Received(channel, message):
+                self._receive(channel, message, now_s)
+            case Connected(channel):
+                self._streams.open(channel, self._flavour.unasked_streams, now_s)
+                self._say(mavlink.MAVLINK_MSG_ID_HEARTBEAT, channel, now_s)
+            case Disconnected(channel):
+                self._streams.close(channel)
+                self._transfer.forget(channel)
+            case Reboot():
+                self._reboot(now_s)
+            case Tick():
+                pass
+        self._advance(now_s)
+        self._report(now_s)
+        return self._outbox.take()
+
+    def next_deadline_s(self) -> float:
+        """When `step` should be called at the latest [s]."""
+        deadline_s = min(self._heartbeat_s, self._pilot.deadline_s(), self._streams.deadline_s())
+        transfer_s = self._transfer.deadline_s()
+        return deadline_s if transfer_s is None else min(deadline_s, transfer_s)
+
+    def _advance(self, now_s: float) -> None:
+        """Let everything happen that is due, each at its own instant."""
+        while (due_s := self._transfer.deadline_s()) is not None and due_s <= now_s:
+            self._pilot.advance(due_s)
+            self._transfer.advance(due_s)
+        self._pilot.advance(now_s)
+
+    def _report(self, now_s: float) -> None:
+        """Send the telemetry that is due, as of now."""
+        if self._heartbeat_s <= now_s or self._pilot.mode_changed:
+            self._pilot.mode_changed = False
+            for channel in self._streams.channels:
+                self._say(mavlink.MAVLINK_MSG_ID_HEARTBEAT, channel, now_s)
+            if self._heartbeat_s <= now_s:
+                next_s = self._heartbeat_s + _HEARTBEAT_S
+                self._heartbeat_s = next_s if next_s > now_s else now_s + _HEARTBEAT_S
+        for channel, message_id in self._streams.take_due(now_s):
+            self._say(message_id, channel, now_s)
+
+    def _say(self, message_id: int, channel: int, now_s: float) -> None:
+        message = self._telemetry.build(message_id, now_s)
+        if message is not None:
+            self._outbox.on_channel(channel, message)
+
+    def _reboot(self, now_s: float) -> None:
+        """Begin again from power-up, with parameters and mission as they stand.
+
+        In the air the vehicle drops to the ground at once: nothing flies it.
+        """
+        east_m, north_m, _ = self._pilot.position_enu_m(now_s)
+        ground_up_m = self.config.start_enu_m[2]
+        here = dataclasses.replace(self.config, start_enu_m=(east_m, north_m, ground_up_m))
+        for channel in self._streams.channels:
+            self._streams.close(channel)
+            self._streams.open(channel, self._flavour.unasked_streams, now_s)
+        self._outbox.take()
+        self._power_up(here, now_s)
+
+    def _receive(self, channel: int, message: mavlink.MAVLink_message, now_s: float) -> None:
+        if getattr(message, "target_system", 0) not in (0, self.config.system_id) or getattr(
+            message, "target_component", 0
+        ) not in (0, COMPONENT_ID):
+            self.foreign += 1
+            return
+        handler = self._handlers.get(message.get_msgId())
+        if handler is None:
+            self.unknown += 1
+            return
+        sender = Sender(channel, message.get_srcSystem(), message.get_srcComponent())
+        handler(message, sender, now_s)
+        if self._commands.reboot_asked:
+            said = self._outbox.take()
+            self._reboot(now_s)
+            self._outbox.put(said)
+
+    def _on_command(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
+        self._commands.handle(command_from_message(message), sender, now_s)
+
+    def _on_set_mode(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
+        result = int(mavlink.MAV_RESULT_DENIED)
+        if message.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            result = self._commands.set_custom_mode(message.custom_mode, now_s)
+        self._commands.acknowledge(mavlink.MAVLINK_MSG_ID_SET_MODE, result, sender)
+
+    def _on_position_target(
+        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
+    ) -> None:
+        del sender
+        if self._pilot.mode is not Mode.GUIDED or message.type_mask & _POSITION_IGNORED:
+            return
+        target_enu_m = place_enu_m(
+            self.config.origin,
+            message.coordinate_frame,
+            message.lat_int,
+            message.lon_int,
+            message.alt,
+            self._pilot.flight.home_enu_m[2],
+        )
+        if target_enu_m is not None:
+            self._pilot.fly_guided(target_enu_m, now_s)
+
+    def _on_data_stream(
+        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
+    ) -> None:
+        everything = message.req_stream_id == mavlink.MAV_DATA_STREAM_ALL
+        wanted = message.start_stop == 1 and message.req_message_rate > 0
+        interval_s = 1.0 / message.req_message_rate if wanted else None
+        for stream, message_ids in DATA_STREAMS.items():
+            if everything or stream == message.req_stream_id:
+                for message_id in message_ids:
+                    self._streams.set_interval(sender.channel, message_id, interval_s, now_s)
+
+    def _on_param_read(
+        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
+    ) -> None:
+        del now_s
+        self._pilot.parameter_server.read(message, sender)
+
+    def _on_param_list(
+        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
+    ) -> None:
+        del message, now_s
+        self._pilot.parameter_server.list_all(sender)
+
+    def _on_param_set(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
+        del now_s
+        self._pilot.parameter_server.write(message, sender)
+
+    def _on_mission_set_current(
+        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
+    ) -> None:
+        self._commands.set_mission_current(message.seq, sender, now_s)
+
+    def _on_timesync(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
+        if message.tc1 == 0:
+            boot_ns = round((now_s - self._pilot.readiness.boot_s) * _NANO)
+            self._outbox.reply(sender, mavlink.MAVLink_timesync_message(boot_ns, message.ts1))
+
+    def _on_ping(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
+        del now_s
+        if message.target_system == 0 and message.target_component == 0:
+            self._outbox.reply(
+                sender,
+                mavlink.MAVLink_ping_message(
+                    message.time_usec, message.seq, sender.system, sender.component
+                ),
+            )
