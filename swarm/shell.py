@@ -9,6 +9,7 @@ sim.launch), through `Shell.execute`.
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Generic, Protocol, TypeVar
 
@@ -107,6 +108,8 @@ class Shell(Generic[E, A]):
         self._done: asyncio.Future[int] = self._loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
         self._asking: set[asyncio.Task[None]] = set()
+        self._events: deque[E] = deque()
+        self._busy = False
 
     @property
     def dropped(self) -> int:
@@ -118,7 +121,7 @@ class Shell(Generic[E, A]):
         reader = self._loop.create_task(self._read())
         reader.add_done_callback(self._fail)
         try:
-            self._guard(lambda: self._core.start(self._clock.now_s()))
+            self._guard(self._start)
             return await self._done
         finally:
             tasks = [reader, *self._asking]
@@ -129,23 +132,39 @@ class Shell(Generic[E, A]):
                 self._timer.cancel()
 
     def step(self, event: E) -> None:
-        """Step the core and carry out what it wants; call from the loop's thread."""
-        if not self._done.done():
-            self._guard(lambda: self._core.step(event, self._clock.now_s()))
+        """Step the core and carry out what it wants; call from the loop's thread.
+
+        An event that comes up while another is being dealt with follows it.
+        """
+        self._events.append(event)
+        if not self._busy:
+            self._guard(self._step_all)
+
+    def _step_all(self) -> None:
+        while self._events and not self._done.done():
+            for action in self._core.step(self._events.popleft(), self._clock.now_s()):
+                self._carry_out(action)
 
     def fail(self, fault: BaseException) -> None:
         """End `run` with ``fault``."""
         if not self._done.done():
             self._done.set_exception(fault)
 
-    def _guard(self, act: Callable[[], Sequence[A]]) -> None:
+    def _start(self) -> None:
+        for action in self._core.start(self._clock.now_s()):
+            self._carry_out(action)
+        self._step_all()
+
+    def _guard(self, act: Callable[[], None]) -> None:
         """Act and reschedule; a bug ends the process rather than half of it."""
+        self._busy = True
         try:
-            for action in act():
-                self._carry_out(action)
+            act()
             self._reschedule()
         except Exception as fault:  # noqa: BLE001 - top of the process: run() raises it
             self.fail(fault)
+        finally:
+            self._busy = False
 
     def _carry_out(self, action: A) -> None:
         match action:

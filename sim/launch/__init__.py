@@ -1,0 +1,1 @@
+"""`swarm run`: all processes of one mission on this machine."""

@@ -1,0 +1,185 @@
+"""One child process: started with a lifeline, watched, and always ended.
+
+A child runs in a session of its own, so that Ctrl-C reaches only its parent, which
+then ends it in order. Its standard input is a pipe that nobody writes to: however
+the parent dies, the child sees the end of it and leaves. Leaves out: which
+children there are (sim.launch.fleet).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import signal
+import sys
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from swarm.errors import SwarmError
+
+__all__ = ["Child", "ChildFailedError"]
+
+READY_TIMEOUT_S = 30.0
+"""Wall time a child may take to say that it is ready."""
+TERMINATE_TIMEOUT_S = 4.0
+"""Wall time a child may take to leave after SIGTERM; then it is killed."""
+KEPT_LINES = 200
+"""Lines of a child's log that are kept to explain its end."""
+LINE_LIMIT_BYTES = 4 * 1024 * 1024
+"""Longest line a child may write: a plan of a large mission on one line."""
+
+
+class ChildFailedError(SwarmError):
+    """A child ended, or stayed silent, before it was ready."""
+
+
+class Child:
+    """One `swarm` command as a process.
+
+    Args:
+        name: what people call it.
+        arguments: of the `swarm` command; ``--lifeline`` is added.
+        on_line: called with every JSON object the child prints on standard output.
+        on_log: called with every line of its standard error.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        arguments: Sequence[str],
+        *,
+        on_line: Callable[[dict[str, Any]], None] | None = None,
+        on_log: Callable[[str, str], None] | None = None,
+    ) -> None:
+        self.name = name
+        self.arguments = tuple(arguments)
+        self.log: deque[str] = deque(maxlen=KEPT_LINES)
+        """Newest lines of its standard error."""
+        self.stopped = False
+        """Whether we ended it ourselves."""
+        self._on_line = on_line
+        self._on_log = on_log
+        self._process: asyncio.subprocess.Process | None = None
+        self._readers: list[asyncio.Task[None]] = []
+        self._lines: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._started.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """Exit status, negative for a signal; None while it runs."""
+        return self._started.returncode
+
+    @property
+    def fate(self) -> str:
+        """How it ended, in words."""
+        code = self.returncode
+        if code is None:
+            return "runs"
+        if code >= 0:
+            return f"ended with exit status {code}"
+        with contextlib.suppress(ValueError):
+            return f"killed by {signal.Signals(-code).name}"
+        return f"killed by signal {-code}"
+
+    async def start(self) -> None:
+        """Start it; returns at once."""
+        self._process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "swarm",
+            *self.arguments,
+            "--lifeline",
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            start_new_session=True,
+            limit=LINE_LIMIT_BYTES,
+        )
+        loop = asyncio.get_running_loop()
+        self._readers = [loop.create_task(self._read_out()), loop.create_task(self._read_err())]
+
+    async def ready(self, count: int = 1) -> list[dict[str, Any]]:
+        """The first ``count`` JSON objects it prints.
+
+        Raises:
+            ChildFailedError: it ended or said nothing in time.
+        """
+        said: list[dict[str, Any]] = []
+        ended = asyncio.ensure_future(self.ended())
+        try:
+            async with asyncio.timeout(READY_TIMEOUT_S):
+                while len(said) < count:
+                    line = asyncio.ensure_future(self._lines.get())
+                    await asyncio.wait((line, ended), return_when=asyncio.FIRST_COMPLETED)
+                    if not line.done():
+                        line.cancel()
+                        raise ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
+                    said.append(line.result())
+        except TimeoutError:
+            raise ChildFailedError(
+                f"{self.name} was not ready within {READY_TIMEOUT_S:g} s: {self.last_words()}"
+            ) from None
+        finally:
+            ended.cancel()
+        return said
+
+    async def ended(self) -> int:
+        """Wait for its end and for all it had to say; its exit status."""
+        code = await self._started.wait()
+        await asyncio.gather(*self._readers, return_exceptions=True)
+        return code
+
+    async def stop(self) -> None:
+        """End it: SIGTERM, and SIGKILL if it does not listen. Its log is complete then."""
+        if self._process is None:
+            return
+        if self.returncode is None:
+            self.stopped = True
+            with contextlib.suppress(ProcessLookupError):
+                self._process.terminate()
+            try:
+                async with asyncio.timeout(TERMINATE_TIMEOUT_S):
+                    await self._process.wait()
+            except TimeoutError:
+                with contextlib.suppress(ProcessLookupError):
+                    self._process.kill()
+                await self._process.wait()
+        await asyncio.gather(*self._readers, return_exceptions=True)
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+
+    def last_words(self) -> str:
+        """The last line of its log."""
+        return self.log[-1] if self.log else "it left no message"
+
+    @property
+    def _started(self) -> asyncio.subprocess.Process:
+        if self._process is None:
+            raise ValueError(f"{self.name} has not been started")
+        return self._process
+
+    async def _read_out(self) -> None:
+        stream = self._started.stdout
+        while stream is not None and (line := await stream.readline()):
+            try:
+                said = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(said, dict):
+                self._lines.put_nowait(said)
+                if self._on_line is not None:
+                    self._on_line(said)
+
+    async def _read_err(self) -> None:
+        stream = self._started.stderr
+        while stream is not None and (line := await stream.readline()):
+            text = line.decode(errors="replace").rstrip()
+            self.log.append(text)
+            if self._on_log is not None:
+                self._on_log(self.name, text)
