@@ -1,4 +1,4 @@
-"""Run one daemon until it is done or told to stop, and say with which exit status.
+"""Run one daemon until it is done or told to stop, and end the process for good.
 
 Leaves out: starting and watching other processes (sim.launch).
 """
@@ -7,13 +7,27 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import signal
-from collections.abc import AsyncIterator, Coroutine
-from typing import Any
+import sys
+import threading
+from collections.abc import AsyncIterator, Callable, Coroutine
+from concurrent.futures import Future
+from typing import Any, NoReturn, TypeVar
 
 from swarm.lifeline import parent_gone
 
-__all__ = ["EXIT_INTERRUPTED", "EXIT_STOPPED", "StopRequest", "run_until_stopped", "stop_requests"]
+__all__ = [
+    "EXIT_INTERRUPTED",
+    "EXIT_STOPPED",
+    "StopRequest",
+    "call_in_background",
+    "leave",
+    "run_until_stopped",
+    "stop_requests",
+]
+
+T = TypeVar("T")
 
 EXIT_STOPPED = 0
 """Status after SIGTERM or the end of the lifeline: the daemon did what it was told."""
@@ -114,3 +128,44 @@ async def run_until_stopped(work: Coroutine[Any, Any, int], *, lifeline: bool = 
             for task in (running, told):
                 task.cancel()
             await asyncio.gather(running, told, return_exceptions=True)
+
+
+_background: set[threading.Thread] = set()
+
+
+def call_in_background(call: Callable[[], T], name: str) -> Future[T]:
+    """Make a call that may hang, on a thread of its own for which the exit does not wait.
+
+    Whoever starts such calls ends the process by `leave`.
+    """
+    outcome: Future[T] = Future()
+    outcome.set_running_or_notify_cancel()
+
+    def run() -> None:
+        try:
+            result = call()
+        except BaseException as fault:  # noqa: BLE001 - whoever waits for the outcome raises it
+            outcome.set_exception(fault)
+        else:
+            outcome.set_result(result)
+        finally:
+            _background.discard(threading.current_thread())
+
+    thread = threading.Thread(target=run, name=name, daemon=True)
+    _background.add(thread)
+    thread.start()
+    return outcome
+
+
+def leave(exit_status: int) -> NoReturn:
+    """End the process; with `call_in_background` calls still hanging, without tidying up.
+
+    A thread that comes back from native code while the interpreter takes itself
+    apart aborts the process, and its exit status with it (measured: status 134).
+    """
+    if any(thread.is_alive() for thread in list(_background)):
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(exit_status)
+    sys.exit(exit_status)

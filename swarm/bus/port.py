@@ -29,9 +29,10 @@ __all__ = [
     "Sample",
     "TokenGone",
     "TokenSeen",
+    "check_payload",
 ]
 
-MAX_PAYLOAD_BYTES = 1 << 20
+MAX_PAYLOAD_BYTES = 4 << 20
 """Longest payload of a sample or an answer [bytes]."""
 
 
@@ -181,6 +182,19 @@ class Inbox:
                 self._events.popleft()
             self.dropped += 1
         self._events.append(event)
+
+
+def check_payload(payload: bytes) -> bytes:
+    """Return ``payload``.
+
+    Raises:
+        ValueError: it is longer than `MAX_PAYLOAD_BYTES`.
+    """
+    if len(payload) > MAX_PAYLOAD_BYTES:
+        raise ValueError(
+            f"{len(payload)} bytes are more than the {MAX_PAYLOAD_BYTES} a bus carries"
+        )
+    return payload
 
 
 class Bus(Protocol):

@@ -1,0 +1,96 @@
+"""The command ``swarm router``.
+
+Leaves out: the router itself (swarm.bus.router).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json as json_format
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from swarm.bus.config import RouterConfig
+
+__all__ = ["router"]
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def router(
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help="Where clients reach it; repeatable; port 0 means any free one. "
+            f"[default: {DEFAULT_ENDPOINT}]",
+            show_default=False,
+        ),
+    ] = None,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help="Another router to link up with; repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Zenoh configuration file, for security and such.",
+            show_default=False,
+        ),
+    ] = None,
+    lease_s: Annotated[
+        float,
+        typer.Option(metavar="S", help="Silence after which clients take the router for lost."),
+    ] = 1.0,
+    json: Annotated[
+        bool, typer.Option("--json", help="Say nothing but the JSON line on standard output.")
+    ] = False,
+    lifeline: Annotated[
+        bool, typer.Option("--lifeline", hidden=True, help="Stop when standard input ends.")
+    ] = False,
+) -> int:
+    """Serve a fleet whose agents and coordinator are clients of one place.
+
+    Prints one JSON line with the endpoints it really listens on, then serves until
+    SIGTERM (exit status 0) or Ctrl-C (130).
+
+    Examples:
+        swarm router
+        swarm router --listen tcp/0.0.0.0:7447 --connect tcp/192.168.1.2:7447
+    """
+    from swarm.bus.config import RouterConfig
+    from swarm.errors import Fault, InputError
+    from swarm.process import run_until_stopped
+
+    listens = tuple(listen or (() if config else (DEFAULT_ENDPOINT,)))
+    try:
+        settings = RouterConfig(listens, tuple(connect or ()), config, lease_s)
+    except ValueError as fault:
+        problem, _, remedy = str(fault).partition("; ")
+        raise InputError(
+            Fault("swarm router", "", problem, remedy or "see 'swarm router --help'")
+        ) from None
+    return asyncio.run(run_until_stopped(_serve(settings, quiet=json), lifeline=lifeline))
+
+
+async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
+    from swarm.bus.router import open_router
+
+    serving = await open_router(settings)
+    try:
+        print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
+        if not quiet:
+            print(f"router ready at {', '.join(serving.endpoints)}", file=sys.stderr, flush=True)
+        await asyncio.Event().wait()
+        return 0
+    finally:
+        serving.close()

@@ -1,0 +1,265 @@
+"""A bus inside one asyncio loop, for tests: what is sent has arrived.
+
+Leaves out: delay, loss and partitions of many (sim.network). It behaves as clients
+of one router do: a seat has its link as soon as it joins, `MemoryNetwork.cut` takes
+it away. Call everything from the loop's thread; only replies may come from others.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from swarm.bus.keyexpr import check_key, check_key_expr, intersects
+from swarm.bus.port import (
+    Answer,
+    Inbox,
+    LinkDown,
+    LinkUp,
+    Query,
+    Sample,
+    TokenGone,
+    TokenSeen,
+    check_payload,
+)
+from swarm.errors import BusError
+
+__all__ = ["MemoryBus", "MemoryNetwork"]
+
+
+@dataclass(slots=True, eq=False)
+class _Seat:
+    """What the network knows of one who joined."""
+
+    inbox: Inbox
+    linked: bool = True
+    subscribed: dict[str, bool] = field(default_factory=dict)
+    """Key expression to whether only the newest samples are kept."""
+    watched: set[str] = field(default_factory=set)
+    tokens: set[str] = field(default_factory=set)
+    served: set[str] = field(default_factory=set)
+
+
+@dataclass(slots=True, eq=False)
+class _Question:
+    """A query under way."""
+
+    loop: asyncio.AbstractEventLoop
+    asker: _Seat
+    missing: list[tuple[_Seat, str]] = field(default_factory=list)
+    """Seats and their served keys that have not answered yet."""
+    answers: list[Answer] = field(default_factory=list)
+    complete: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def query_to(self, seat: _Seat, key: str) -> Query:
+        """The event by which ``seat`` is asked; its reply comes back to here."""
+
+        def reply(payload: bytes) -> None:
+            check_payload(payload)
+            if not self.loop.is_closed():
+                self.loop.call_soon_threadsafe(self._arrive, seat, Answer(key, bytes(payload)))
+
+        return Query(key, reply)
+
+    def forget(self, seat: _Seat) -> None:
+        """Wait no longer for a seat that left."""
+        self.missing = [(other, key) for other, key in self.missing if other is not seat]
+        if not self.missing:
+            self.complete.set()
+
+    def _arrive(self, seat: _Seat, answer: Answer) -> None:
+        place = (seat, answer.key)
+        if place in self.missing and seat.linked and self.asker.linked:
+            self.answers.append(answer)
+            self.missing.remove(place)
+            if not self.missing:
+                self.complete.set()
+
+
+class _Hub:
+    """Where all seats meet."""
+
+    def __init__(self) -> None:
+        self._seats: list[_Seat] = []
+        self._questions: list[_Question] = []
+
+    def enter(self, seat: _Seat) -> None:
+        self._seats.append(seat)
+        seat.inbox.offer(LinkUp())
+
+    def leave(self, seat: _Seat) -> None:
+        self._seats.remove(seat)
+        self._lose_sight_of(seat)
+
+    def cut(self, seat: _Seat) -> None:
+        unseen = self._tokens_of(self._reached_from(seat))
+        self._lose_sight_of(seat)
+        seat.inbox.offer(LinkDown())
+        _tell([seat], TokenGone, unseen)
+
+    def heal(self, seat: _Seat) -> None:
+        if seat not in self._seats:
+            return  # closed meanwhile
+        seat.linked = True
+        seat.inbox.offer(LinkUp())
+        others = self._reached_from(seat)
+        there = self._tokens_of(others)
+        _tell([seat], TokenSeen, there)
+        _tell(others, TokenSeen, seat.tokens - there)
+
+    def publish(self, seat: _Seat, sample: Sample) -> None:
+        for other in self._reached_from(seat):
+            lanes = [
+                latest
+                for key_expr, latest in other.subscribed.items()
+                if intersects(key_expr, sample.key)
+            ]
+            for latest in lanes:
+                other.inbox.offer(sample, latest)
+
+    def declare_token(self, seat: _Seat, key: str) -> None:
+        others = self._reached_from(seat)
+        is_new = key not in self._tokens_of(others) | seat.tokens
+        seat.tokens.add(key)
+        if is_new:
+            _tell(others, TokenSeen, {key})
+
+    def watch_tokens(self, seat: _Seat, key_expr: str) -> None:
+        there = self._tokens_of(self._reached_from(seat)) - seat.tokens
+        seat.watched.add(key_expr)
+        for key in sorted(there):
+            if intersects(key_expr, key):
+                seat.inbox.offer(TokenSeen(key))
+
+    def ask(self, seat: _Seat, key_expr: str, loop: asyncio.AbstractEventLoop) -> _Question:
+        question = _Question(loop, seat)
+        question.missing = [
+            (other, key)
+            for other in self._reached_from(seat)
+            for key in sorted(other.served)
+            if intersects(key_expr, key)
+        ]
+        for other, key in question.missing:
+            other.inbox.offer(question.query_to(other, key))
+        self._questions.append(question)
+        question.forget(seat)  # complete at once if there is nobody to ask
+        return question
+
+    def drop(self, question: _Question) -> None:
+        question.missing.clear()
+        self._questions.remove(question)
+
+    def _lose_sight_of(self, seat: _Seat) -> None:
+        others = self._reached_from(seat)
+        seat.linked = False
+        _tell(others, TokenGone, seat.tokens - self._tokens_of(others))
+        for question in self._questions:
+            question.forget(seat)
+
+    def _reached_from(self, seat: _Seat) -> list[_Seat]:
+        others = [other for other in self._seats if other is not seat and other.linked]
+        return others if seat.linked else []
+
+    @staticmethod
+    def _tokens_of(seats: Iterable[_Seat]) -> set[str]:
+        return {key for seat in seats for key in seat.tokens}
+
+
+def _tell(seats: Iterable[_Seat], change: type[TokenSeen | TokenGone], keys: Iterable[str]) -> None:
+    for seat in seats:
+        for key in sorted(keys):
+            if key not in seat.tokens and any(intersects(watch, key) for watch in seat.watched):
+                seat.inbox.offer(change(key))
+
+
+class MemoryNetwork:
+    """What joins the seats; each is known by a name."""
+
+    def __init__(self) -> None:
+        self._hub = _Hub()
+        self._seats: dict[str, _Seat] = {}
+
+    def join(self, name: str, *, inbox_capacity: int = 4096) -> MemoryBus:
+        """Take a seat in the running loop, under a ``name`` never used here before."""
+        if name in self._seats:
+            raise ValueError(f"{name} has a seat already")
+        loop = asyncio.get_running_loop()
+        seat = _Seat(Inbox(loop, inbox_capacity))
+        self._seats[name] = seat
+        self._hub.enter(seat)
+        return MemoryBus(self._hub, seat, loop)
+
+    def cut(self, name: str) -> None:
+        """Take the link of ``name`` away: it and the others lose sight of each other."""
+        if self._seats[name].linked:
+            self._hub.cut(self._seats[name])
+
+    def heal(self, name: str) -> None:
+        """Give the link of ``name`` back."""
+        if not self._seats[name].linked:
+            self._hub.heal(self._seats[name])
+
+
+class MemoryBus:
+    """One seat on a `MemoryNetwork`; see `swarm.bus.port.Bus`."""
+
+    def __init__(self, hub: _Hub, seat: _Seat, loop: asyncio.AbstractEventLoop) -> None:
+        self._hub = hub
+        self._seat = seat
+        self._loop = loop
+        self._closed = False
+
+    @property
+    def inbox(self) -> Inbox:
+        """Where everything arrives."""
+        return self._seat.inbox
+
+    def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:  # noqa: ARG002 - nothing is ever dropped here
+        """Send ``payload`` on ``key``."""
+        self._check_open()
+        check_payload(payload)
+        self._hub.publish(self._seat, Sample(check_key(key), bytes(payload)))
+
+    def subscribe(self, key_expr: str, *, latest: bool = False) -> None:
+        """Receive a `Sample` for everything others publish on ``key_expr``."""
+        self._check_open()
+        self._seat.subscribed[check_key_expr(key_expr)] = latest
+
+    def declare_token(self, key: str) -> None:
+        """Hold a liveliness token on ``key``."""
+        self._check_open()
+        self._hub.declare_token(self._seat, check_key(key))
+
+    def watch_tokens(self, key_expr: str) -> None:
+        """Receive `TokenSeen` and `TokenGone`."""
+        self._check_open()
+        self._hub.watch_tokens(self._seat, check_key_expr(key_expr))
+
+    def serve(self, key: str) -> None:
+        """Receive a `Query` whenever somebody else asks on ``key``."""
+        self._check_open()
+        self._seat.served.add(check_key(key))
+
+    async def query(self, key_expr: str, *, timeout_s: float) -> Sequence[Answer]:
+        """Ask all others who serve a key matching ``key_expr``."""
+        self._check_open()
+        question = self._hub.ask(self._seat, check_key_expr(key_expr), self._loop)
+        try:
+            async with asyncio.timeout(timeout_s):
+                await question.complete.wait()
+        except TimeoutError:
+            pass  # what has come until now is the answer
+        finally:
+            self._hub.drop(question)
+        return tuple(question.answers)
+
+    def close(self) -> None:
+        """Leave; the others see the tokens go."""
+        if not self._closed:
+            self._closed = True
+            self._hub.leave(self._seat)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise BusError("the bus is closed")

@@ -1,0 +1,346 @@
+"""The bus on Eclipse Zenoh: a seat in a mesh of peers or at a router.
+
+All calls into Zenoh are made by one writer thread, since a congested or dead network
+makes them wait for half a second per link; all that comes back arrives on Zenoh's
+threads and goes straight to the inbox. Callbacks are direct: an indirect one has a
+Python thread of its own that keeps the process from exiting while a session hangs,
+and is no faster into asyncio (measured). Leaves out: the session's configuration
+(swarm.bus.zenoh_session).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import threading
+import weakref
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import zenoh
+from zenoh.handlers import Callback
+
+from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology
+from swarm.bus.keyexpr import check_key, check_key_expr
+from swarm.bus.port import (
+    Answer,
+    Inbox,
+    LinkDown,
+    LinkUp,
+    Query,
+    Sample,
+    TokenGone,
+    TokenSeen,
+    check_payload,
+)
+from swarm.bus.writer import Writer
+from swarm.bus.zenoh_session import (
+    close_session,
+    open_session,
+    plain_error,
+    session_config,
+    session_config_file,
+)
+from swarm.errors import BusError
+from swarm.log import get_logger
+
+__all__ = ["ZenohBus", "open_zenoh_bus"]
+
+REPLY_WITHIN_S = 10.0
+"""A query nobody has answered for this long is given up: who asked waits no longer."""
+FLUSH_LIMIT_S = 0.7
+"""How long closing waits for what is published; a blocked link gives up after 0.5 s."""
+CLOSE_LIMIT_S = 1.2
+"""How long closing waits for the session to say goodbye."""
+
+
+async def open_zenoh_bus(
+    config: BusConfig, *, timeout_s: float = 10.0, inbox_capacity: int = 4096
+) -> ZenohBus:
+    """Take a seat on the bus, for the running loop.
+
+    A peer does not wait for the others: `LinkUp` tells. A client waits for one of its
+    routers, which may start later than itself.
+
+    Args:
+        config: how to reach the others.
+        timeout_s: how long to try.
+        inbox_capacity: events kept for a slow reader.
+
+    Raises:
+        BusError: the bus cannot be reached in time, or the own endpoint is taken.
+        InputError: the user's configuration file is wrong.
+    """
+    session = await open_session(_zenoh_config(config), timeout_s=timeout_s)
+    return ZenohBus(session, Inbox(asyncio.get_running_loop(), inbox_capacity))
+
+
+def _zenoh_config(config: BusConfig) -> zenoh.Config:
+    match config.topology:
+        case MeshTopology(listen, dial):
+            return session_config("peer", listen=[listen], connect=dial, lease_s=config.lease_s)
+        case ClientTopology(routers):
+            return session_config("client", listen=[], connect=routers, lease_s=config.lease_s)
+        case FileTopology(path):
+            return session_config_file(path)
+
+
+class _LinkWatch:
+    """Tells the first and the last transport from the others; used on Zenoh's threads."""
+
+    def __init__(self, session: zenoh.Session, inbox: Inbox) -> None:
+        self._session = session
+        self._inbox = inbox
+        self._lock = threading.Lock()
+        self._others: set[str] = set()
+        self._linked = False
+        self._changes = 0
+
+    def on_event(self, event: zenoh.TransportEvent) -> None:
+        """A transport to one of the others came or went."""
+        other = str(event.transport.zid)
+        with self._lock:
+            self._changes += 1
+            if event.kind == zenoh.SampleKind.PUT:
+                self._others.add(other)
+            else:
+                self._others.discard(other)
+            self._set(bool(self._others))
+
+    def look(self) -> None:
+        """Notice a lost link before its event: tokens go a little earlier than transports."""
+        with self._lock:
+            changes = self._changes
+            if not self._linked:
+                return
+        if self._session.info.links():  # not under the lock: it may wait for Zenoh's
+            return
+        with self._lock:
+            if changes == self._changes:
+                self._set(False)
+
+    def _set(self, linked: bool) -> None:
+        if linked != self._linked:
+            self._linked = linked
+            self._inbox.offer_threadsafe(LinkUp() if linked else LinkDown())
+
+
+class _Reply:
+    """The way back to one who asked; given up when it is called, dropped or forgotten."""
+
+    def __init__(self, query: zenoh.Query, key: str, writer: Writer) -> None:
+        self._query: zenoh.Query | None = query
+        self._key = key
+        self._writer = writer
+        self._lock = threading.Lock()
+
+    def __call__(self, payload: bytes) -> None:
+        """Answer; every call but the first goes nowhere."""
+        check_payload(payload)
+        query = self._release()
+        if query is not None:
+            send = partial(self._send, query, bytes(payload))
+            self._writer.submit(send, size_bytes=len(payload))
+
+    def drop(self) -> None:
+        """Give up without an answer."""
+        query = self._release()
+        if query is not None:
+            query.drop()
+
+    def _release(self) -> zenoh.Query | None:
+        with self._lock:
+            query, self._query = self._query, None
+        return query
+
+    def _send(self, query: zenoh.Query, payload: bytes) -> None:
+        with contextlib.suppress(zenoh.ZError):  # who asked has gone
+            query.reply(self._key, payload)
+        query.drop()
+
+
+class ZenohBus:
+    """One session on the bus; see `swarm.bus.port.Bus`. Made by `open_zenoh_bus`."""
+
+    def __init__(self, session: zenoh.Session, inbox: Inbox) -> None:
+        self._session = session
+        self._inbox = inbox
+        self._loop = asyncio.get_running_loop()
+        self._log = get_logger("swarm.bus")
+        self._writer = Writer("zenoh writer")
+        self._closed = False
+        self._subscribed: dict[str, bool] = {}
+        self._watched: set[str] = set()
+        self._served: set[str] = set()
+        self._tokens: dict[str, zenoh.LivelinessToken | None] = {}
+        self._replies: weakref.WeakSet[_Reply] = weakref.WeakSet()
+        self._links = _LinkWatch(session, inbox)
+        self._call(
+            lambda: session.info.declare_transport_events_listener(
+                _direct(self._links.on_event), history=True
+            )
+        )
+
+    @property
+    def inbox(self) -> Inbox:
+        """Where everything arrives."""
+        return self._inbox
+
+    @property
+    def unsent(self) -> int:
+        """Samples and answers thrown away because the network took none."""
+        return self._writer.dropped
+
+    def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:
+        """Send ``payload`` on ``key``; see `swarm.bus.port.Bus.publish`."""
+        self._check_open()
+        check_key(key)
+        check_payload(payload)
+        how = zenoh.CongestionControl.BLOCK if reliable else zenoh.CongestionControl.DROP
+        put = partial(
+            self._session.put,
+            key,
+            bytes(payload),
+            congestion_control=how,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+        self._writer.submit(partial(self._try, put), size_bytes=len(payload), spare=not reliable)
+
+    def subscribe(self, key_expr: str, *, latest: bool = False) -> None:
+        """Receive a `Sample` for everything others publish on ``key_expr``."""
+        self._check_open()
+        check_key_expr(key_expr)
+        if key_expr not in self._subscribed:
+            on_sample = _direct(partial(self._on_sample, key_expr))
+            declare = self._session.declare_subscriber
+            remote = zenoh.Locality.REMOTE
+            self._call(lambda: declare(key_expr, on_sample, allowed_origin=remote))
+        self._subscribed[key_expr] = latest
+
+    def declare_token(self, key: str) -> None:
+        """Hold a liveliness token on ``key``."""
+        self._check_open()
+        check_key(key)
+        if key not in self._tokens:
+            self._tokens[key] = None
+            self._call(partial(self._declare_token, key))
+
+    def watch_tokens(self, key_expr: str) -> None:
+        """Receive `TokenSeen` and `TokenGone`."""
+        self._check_open()
+        check_key_expr(key_expr)
+        if key_expr not in self._watched:
+            self._watched.add(key_expr)
+            watch = self._session.liveliness().declare_subscriber
+            on_token = _direct(self._on_token)
+            self._call(lambda: watch(key_expr, on_token, history=True))
+
+    def serve(self, key: str) -> None:
+        """Receive a `Query` whenever somebody else asks on ``key``."""
+        self._check_open()
+        check_key(key)
+        if key not in self._served:
+            self._served.add(key)
+            on_query = _direct(partial(self._on_query, key))
+            declare = self._session.declare_queryable
+            remote = zenoh.Locality.REMOTE
+            self._call(lambda: declare(key, on_query, allowed_origin=remote))
+
+    async def query(self, key_expr: str, *, timeout_s: float) -> Sequence[Answer]:
+        """Ask all others who serve a key matching ``key_expr``."""
+        self._check_open()
+        check_key_expr(key_expr)
+        if not 0.0 < timeout_s < math.inf:
+            raise ValueError(f"timeout_s must be positive and finite, not {timeout_s}")
+        answers: list[Answer] = []
+        complete = asyncio.Event()
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answer = Answer(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+                self._hand_over(lambda: answers.append(answer))
+
+        get = partial(
+            self._session.get,
+            key_expr,
+            Callback(on_reply, lambda: self._hand_over(complete.set), indirect=False),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            allowed_destination=zenoh.Locality.REMOTE,
+            timeout=timeout_s,
+        )
+        self._writer.submit(partial(self._try, get))
+        with contextlib.suppress(TimeoutError):  # what has come until then is the answer
+            async with asyncio.timeout(timeout_s):
+                await complete.wait()
+        return tuple(answers)
+
+    def close(self) -> None:
+        """Send what is published, undeclare everything and leave, within 2 s."""
+        if self._closed:
+            return
+        self._closed = True
+        if not self._writer.close(FLUSH_LIMIT_S):
+            self._log.warning("the network is stuck; not all that was published went out")
+        for reply in list(self._replies):
+            reply.drop()
+        close_session(self._session, limit_s=CLOSE_LIMIT_S)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise BusError("the bus is closed")
+
+    def _call(self, declare: Callable[[], object]) -> None:
+        self._writer.submit(partial(self._try, declare), must_run=True)
+
+    def _try(self, call: Callable[[], object]) -> None:
+        """Make a call on the writer thread."""
+        try:
+            call()
+        except zenoh.ZError as fault:
+            self._log.warning("the bus refused a call", problem=plain_error(fault))
+
+    def _declare_token(self, key: str) -> None:
+        # Kept, or it would be undeclared when it is collected.
+        self._tokens[key] = self._session.liveliness().declare_token(key)
+
+    # Zenoh's threads call what follows.
+
+    def _on_sample(self, key_expr: str, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.PUT and not self._closed:
+            event = Sample(str(sample.key_expr), sample.payload.to_bytes())
+            self._inbox.offer_threadsafe(event, latest=self._subscribed[key_expr])
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        key = str(sample.key_expr)
+        if key in self._tokens or self._closed:
+            return
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._inbox.offer_threadsafe(TokenSeen(key))
+        else:
+            self._links.look()
+            self._inbox.offer_threadsafe(TokenGone(key))
+
+    def _on_query(self, key: str, query: zenoh.Query) -> None:
+        reply = _Reply(query, key, self._writer)
+        given_up = weakref.WeakMethod(reply.drop)
+        self._hand_over(lambda: self._loop.call_later(REPLY_WITHIN_S, _call_if_alive, given_up))
+        self._hand_over(partial(self._replies.add, reply))
+        self._inbox.offer_threadsafe(Query(key, reply))
+
+    def _hand_over(self, call: Callable[[], object]) -> None:
+        """Make a call on the loop's thread; an ended loop needs it no more."""
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(call)
+
+
+def _direct(on_event: Callable[..., None]) -> Callback[object]:
+    return Callback(on_event, indirect=False)
+
+
+def _call_if_alive(method: weakref.WeakMethod[Callable[[], None]]) -> None:
+    call = method()
+    if call is not None:
+        call()

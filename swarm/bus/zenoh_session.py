@@ -1,0 +1,153 @@
+"""Zenoh sessions: configured as measured, opened in time and closed in time.
+
+Leaves out: what is done with a session (swarm.bus.zenoh_bus, swarm.bus.router).
+Zenoh's own log is never initialised: it could only go to standard output, and as
+long as nobody initialises it nothing is printed, whatever RUST_LOG says.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from collections.abc import Sequence
+from concurrent.futures import Future
+from pathlib import Path
+
+import zenoh
+
+from swarm.bus.config import config_file_fault
+from swarm.bus.port import MAX_PAYLOAD_BYTES
+from swarm.errors import BusError
+from swarm.log import get_logger
+from swarm.process import call_in_background
+
+__all__ = ["close_session", "open_session", "plain_error", "session_config", "session_config_file"]
+
+OPEN_TIMEOUT_S = 2.0
+"""How long an endpoint that does not answer delays the next one; a bad link needs about 1 s."""
+KEEP_ALIVES_PER_LEASE = 4
+RECONNECT_FIRST_S = 0.1
+RECONNECT_SLOWEST_S = 0.5
+BLOCKED_CLOSE_S = 0.5
+"""A link whose queue does not move for this long is closed, so that one hung reader holds
+the others up no longer."""
+HEADERS_BYTES = 64 << 10
+
+
+def session_config(
+    mode: str, *, listen: Sequence[str], connect: Sequence[str], lease_s: float
+) -> zenoh.Config:
+    """A configuration that finds nobody but those named.
+
+    Args:
+        mode: ``peer``, ``client`` or ``router``.
+        listen: own endpoints.
+        connect: endpoints of others; a client uses the first that answers.
+        lease_s: silence after which others take this session for lost [s].
+    """
+    retry = {
+        "period_init_ms": _ms(RECONNECT_FIRST_S),
+        "period_max_ms": _ms(RECONNECT_SLOWEST_S),
+        "period_increase_factor": 2,
+    }
+    blocked = round(BLOCKED_CLOSE_S * 1e6)
+    settings: dict[str, object] = {
+        "mode": mode,
+        "listen/endpoints": list(listen),
+        "connect/endpoints": list(connect),
+        "connect/retry": retry,
+        "scouting/multicast/enabled": False,
+        # Gossip dials in both directions, and mutual dialing hides cuts for 10 s.
+        "scouting/gossip/enabled": False,
+        "scouting/delay": 1,
+        # Saves a thread and its memory; only payloads of 3 kB and more would gain.
+        "transport/shared_memory/enabled": False,
+        "transport/link/tx/lease": _ms(lease_s),
+        "transport/link/tx/keep_alive": KEEP_ALIVES_PER_LEASE,
+        "transport/link/tx/queue/congestion_control/block/wait_before_close": blocked,
+        "transport/link/rx/max_message_size": MAX_PAYLOAD_BYTES + HEADERS_BYTES,
+        "transport/unicast/open_timeout": _ms(OPEN_TIMEOUT_S),
+        "transport/unicast/accept_timeout": _ms(OPEN_TIMEOUT_S),
+    }
+    config = zenoh.Config()
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def session_config_file(path: Path) -> zenoh.Config:
+    """A configuration file of the user's, as it is.
+
+    Raises:
+        InputError: it cannot be read or is none.
+    """
+    if not path.is_file():
+        raise config_file_fault(path, "there is no such file")
+    try:
+        return zenoh.Config.from_file(path)
+    except zenoh.ZError as fault:
+        raise config_file_fault(path, plain_error(fault)) from fault
+
+
+async def open_session(config: zenoh.Config, *, timeout_s: float) -> zenoh.Session:
+    """Open a session; a client waits until one of its routers is there.
+
+    Raises:
+        BusError: it could not be opened within ``timeout_s``, or at all.
+    """
+    waits = json.loads(config.get_json("mode") or '""') == "client"
+    problem = "no answer"
+    try:
+        async with asyncio.timeout(timeout_s):
+            pause_s = RECONNECT_FIRST_S
+            while True:
+                opening = call_in_background(lambda: zenoh.open(config), "zenoh open")
+                try:
+                    return await asyncio.wrap_future(opening)
+                except asyncio.CancelledError:
+                    opening.add_done_callback(_close_unwanted)
+                    raise
+                except zenoh.ZError as fault:
+                    problem = plain_error(fault)
+                    if not waits:
+                        raise BusError(f"cannot open the bus: {problem}") from fault
+                await asyncio.sleep(pause_s)
+                pause_s = min(2 * pause_s, RECONNECT_SLOWEST_S)
+    except TimeoutError:
+        raise BusError(f"cannot reach the bus within {timeout_s:g} s: {problem}") from None
+
+
+def close_session(session: zenoh.Session, *, limit_s: float) -> bool:
+    """Close ``session``, waiting at most ``limit_s``; whether it closed in that time.
+
+    Into a dead network closing takes 10 s. Then it goes on in the background, and
+    `swarm.process.leave` does not wait for it.
+    """
+    log = get_logger("swarm.bus")
+    try:
+        call_in_background(session.close, "zenoh close").result(limit_s)
+    except TimeoutError:
+        log.warning("the network does not answer; left without saying goodbye")
+        return False
+    except zenoh.ZError as fault:
+        log.warning("closing the bus failed", problem=plain_error(fault))
+    return True
+
+
+def plain_error(fault: zenoh.ZError) -> str:
+    """What went wrong, without the places in Zenoh's sources."""
+    return re.sub(r"\s+at /\S+?\.rs:\d+\.?", "", str(fault)).strip()
+
+
+def _close_unwanted(opening: Future[zenoh.Session]) -> None:
+    """Close a session that opened after nobody waited for it any more; runs on its thread."""
+    if opening.exception() is None:
+        try:
+            opening.result().close()
+        except zenoh.ZError:
+            return  # nobody is interested
+
+
+def _ms(duration_s: float) -> int:
+    return round(duration_s * 1000)
