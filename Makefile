@@ -1,0 +1,45 @@
+# Everything sets itself up: all that is needed is python3 (3.11 or newer), a C++ compiler and make.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test lint format clean help
+
+help:
+	@echo "make demo    fly the paper's mission with real processes on this machine"
+	@echo "make test    checks and the whole test suite"
+	@echo "make lint    the checks alone: ruff, mypy, import-linter"
+	@echo "make format  put the sources into shape"
+	@echo "make clean   remove what was built and installed here"
+
+demo: $(VENV)/.installed
+	$(BIN)/swarm run table-1 --method greedy
+
+test: lint
+	$(BIN)/python -m pytest -n 2 tests/unit tests/contract tests/faults
+	$(BIN)/python -m pytest tests/process tests/sitl
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(VENV)/.installed-dev
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: pyproject.toml swarm/__init__.py | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml swarm/__init__.py | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@ $(VENV)/.installed
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
