@@ -29,9 +29,9 @@ def after_evaluations(limit: int) -> ShouldStop:
 
 
 def after_time(clock: Clock, limit_s: float) -> ShouldStop:
-    """Stop ``limit_s`` (> 0) seconds of ``clock`` from now."""
-    if not limit_s > 0.0:
-        raise ValueError(f"limit_s must be > 0 s, not {limit_s}")
+    """Stop ``limit_s`` (>= 0) seconds of ``clock`` from now."""
+    if not limit_s >= 0.0:
+        raise ValueError(f"limit_s must be >= 0 s, not {limit_s}")
     end_s = clock.now_s() + limit_s
     return lambda _: clock.now_s() >= end_s
 
