@@ -12,9 +12,23 @@ from typing import Annotated
 import typer
 
 from swarm.errors import Fault, InputError
-from swarm.options import JsonOption, ScenarioArgument, SeedOption, TimeLimitOption
+from swarm.log import LogFormat, LogLevel
+from swarm.options import (
+    BusOption,
+    ConnectOption,
+    JsonOption,
+    LeaseOption,
+    LifelineOption,
+    ListenOption,
+    LogFormatOption,
+    LogLevelOption,
+    ScenarioArgument,
+    SeedOption,
+    SpeedupOption,
+    TimeLimitOption,
+)
 
-__all__ = ["plan"]
+__all__ = ["coordinator", "plan"]
 
 
 def plan(
@@ -82,6 +96,105 @@ def plan(
 
         Console(highlight=False).print(plan_table(mission, result))
     return 0
+
+
+def coordinator(
+    scenario: ScenarioArgument,
+    method: Annotated[
+        str,
+        typer.Option("--method", metavar="METHOD", help="Decision rule: greedy or lookahead."),
+    ] = "greedy",
+    seed: SeedOption = 0,
+    start_timeout_s: Annotated[
+        float,
+        typer.Option(
+            "--start-timeout-s",
+            min=1.0,
+            metavar="S",
+            help="UAVs that are not airborne by then, in mission seconds, are given up.",
+        ),
+    ] = 120.0,
+    lowest_layer_m: Annotated[
+        float,
+        typer.Option(
+            "--lowest-layer-m",
+            min=1.0,
+            metavar="M",
+            help="Height above the tasks at which the first UAV flies.",
+        ),
+    ] = 10.0,
+    layer_spacing_m: Annotated[
+        float,
+        typer.Option(
+            "--layer-spacing-m",
+            min=0.0,
+            metavar="M",
+            help="Every further UAV flies this much higher than the one before.",
+        ),
+    ] = 3.0,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+    connect: ConnectOption = None,
+    lease_s: LeaseOption = 1.0,
+    speedup: SpeedupOption = 1.0,
+    json: JsonOption = False,
+    lifeline: LifelineOption = False,
+    log_level: LogLevelOption = LogLevel.INFO,
+    log_format: LogFormatOption = LogFormat.AUTO,
+) -> int:
+    """Plan a mission, brief the agents, start them together and tell them when it is over.
+
+    Once it has started, the fleet finishes without the coordinator. With --json the plan is
+    printed as `swarm plan --json` prints it. Exit status 0: every task was done.
+
+    Examples:
+        swarm coordinator table-1
+        swarm coordinator valley-survey --connect tcp/192.168.1.2:7447
+    """
+    import asyncio
+    from json import dumps
+
+    from coordinator.core import CoordinatorCore, FlightLayers
+    from coordinator.daemon import run_coordinator
+    from coordinator.plan_report import plan_as_json
+    from coordinator.planner.plan import check_online_method, make_plan
+    from swarm.bus.config import bus_config
+    from swarm.bus.zenoh_bus import open_zenoh_bus
+    from swarm.clock import ScaledClock, SystemClock, incarnation
+    from swarm.config import Timing
+    from swarm.log import configure_logging
+    from swarm.model import Mission, Plan
+    from swarm.process import run_until_stopped
+    from swarm.scenario import load_scenario
+
+    configure_logging(log_level, log_format)
+    check_online_method(method)
+    config = bus_config(bus, listen, connect or (), lease_s)
+    mission = load_scenario(scenario)
+
+    def planner(what: Mission, how: str, planner_seed: int) -> Plan:
+        made = make_plan(what, how, clock=SystemClock(), seed=planner_seed)
+        if json:
+            print(dumps(plan_as_json(made), allow_nan=False), flush=True)
+        return made
+
+    async def work() -> int:
+        core = CoordinatorCore(
+            mission,
+            method=method,
+            seed=seed,
+            incarnation=incarnation(),
+            timing=Timing().scaled(speedup),
+            start_timeout_s=start_timeout_s,
+            layers=FlightLayers(lowest_layer_m, layer_spacing_m),
+        )
+        seat = await open_zenoh_bus(config)
+        try:
+            return await run_coordinator(core, mission, seat, ScaledClock(speedup), planner)
+        finally:
+            seat.close()
+
+    return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
 
 
 def _check_plan_options(method: str, plot: Path | None) -> None:

@@ -5,15 +5,18 @@ Leaves out: making the plan (coordinator.planner) and drawing it (coordinator.pl
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from swarm.model import Mission, Plan, TaskId
+from swarm.model import Mission, Plan, TaskId, UavId
 
 _LATE = "bold red"
 
-__all__ = ["late_tasks", "plan_as_json", "plan_table"]
+__all__ = ["late_tasks", "plan_as_json", "plan_from_json", "plan_table"]
 
 
 def plan_as_json(plan: Plan) -> dict[str, object]:
@@ -34,6 +37,23 @@ def plan_as_json(plan: Plan) -> dict[str, object]:
         "elapsed_s": plan.elapsed_s,
         "seed": plan.seed,
     }
+
+
+def plan_from_json(said: Mapping[str, Any]) -> Plan:
+    """The plan that `plan_as_json` wrote; inverse of it but for the derived gap."""
+    sequence = said["sequence"]
+    return Plan(
+        scenario=said["scenario"],
+        method=said["method"],
+        routes={UavId(uav): tuple(tasks) for uav, tasks in said["routes"].items()},
+        objective=said["objective"],
+        completion_s=dict(said["completion_s"]),
+        sequence=None if sequence is None else tuple(sequence),
+        optimum=said["optimum"],
+        evaluations=said["evaluations"],
+        elapsed_s=said["elapsed_s"],
+        seed=said["seed"],
+    )
 
 
 def late_tasks(mission: Mission, plan: Plan) -> list[TaskId]:

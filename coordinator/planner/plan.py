@@ -16,11 +16,14 @@ from coordinator.planner.stop import ShouldStop, never
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.allocation.rules import EXACT_TASKS
 from swarm.clock import Clock
+from swarm.errors import Fault, InputError
 from swarm.model import Mission, Plan
 
-__all__ = ["METHODS", "make_plan"]
+__all__ = ["METHODS", "ONLINE_METHODS", "check_online_method", "make_plan"]
 
 METHODS = ("greedy", "lookahead", "exact")
+ONLINE_METHODS = ("greedy", "lookahead")
+"""Those whose rule agents can follow by themselves."""
 
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""
@@ -101,6 +104,18 @@ def make_plan(
         elapsed_s=clock.now_s() - begin_s,
         seed=seed,
     )
+
+
+def check_online_method(method: str) -> None:
+    """Refuse a method whose rule agents cannot follow by themselves.
+
+    Raises:
+        InputError: `exact`, which has no rule, or no method at all.
+    """
+    if method not in ONLINE_METHODS:
+        problem = "has no decision rule to fly by" if method in METHODS else "no such method"
+        remedy = f"choose one of {', '.join(ONLINE_METHODS)}"
+        raise InputError(Fault("--method", method, problem, remedy))
 
 
 def _limits(problem: Problem, method: str, *, stopped: bool) -> SearchLimits:
