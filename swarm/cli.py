@@ -15,6 +15,7 @@ its traceback and 1. Leaves out: every subcommand.
 
 from __future__ import annotations
 
+import errno
 import inspect
 import os
 import re
@@ -61,7 +62,6 @@ def main(
     stdout = sys.stdout
     try:
         status = _run(arguments, found)
-        stdout.flush()
     except InputError as error:
         _complain(str(error))
         status = _WRONG_USAGE
@@ -72,17 +72,25 @@ def main(
         status = _INTERRUPTED
     except BrokenPipeError:
         status = _FAILED
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        _complain(f"swarm: output cannot be written: {error.strerror}")
+        status = _FAILED
     finally:
         sys.stdout = stdout  # typer swaps it when a pipe breaks
     return status
 
 
 def console_main() -> int:
-    """Entry point of the console script; also quiet when nobody reads its output any more."""
+    """Entry point of the console script; says so when its output could not be written."""
     status = main()
     try:
-        sys.stdout.flush()
-    except BrokenPipeError:
+        if sys.stdout is not None:  # None when the caller has closed it
+            sys.stdout.flush()
+    except OSError as error:
+        if not isinstance(error, BrokenPipeError):  # a reader that has seen enough is no mishap
+            _complain(f"swarm: output cannot be written: {error.strerror}")
         # What is still buffered can reach nobody; the interpreter must not try again at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = _FAILED
@@ -197,6 +205,8 @@ def _usage_fault(error: typer.TyperException, name: str | None) -> Fault:
     path = f"swarm {name}" if name else "swarm"
     if context is not None:
         path = context.command_path  # also names the member of a family: swarm task add
+    if type(error).__name__ == "NoArgsIsHelpError":  # its message is the whole help
+        return Fault(path, "", "missing command", f"see '{path} --help'")
     problem = " ".join(error.format_message().split()).rstrip(".").replace("Value error, ", "")
     return Fault(path, "", problem[:1].lower() + problem[1:], f"see '{path} --help'")
 

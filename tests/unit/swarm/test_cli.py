@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Annotated
+from typing import IO, Annotated
 
 import pytest
 import typer
@@ -67,7 +67,7 @@ def end(how: Annotated[str, typer.Option("--how", help="In what way.")] = "done"
     return 0
 
 
-family = typer.Typer(help="Talk about tasks.", no_args_is_help=False)
+family = typer.Typer(help="Talk about tasks.", no_args_is_help=True)
 
 
 @family.command()
@@ -156,6 +156,7 @@ def test_command_that_returns_no_status_is_a_bug() -> None:
          "shipped scenario: table-1, valley-popups, valley-survey")),
         (["plan", "table1"], ("table1: no such scenario file; did you mean 'table-1'? Shipped "
          "scenarios: table-1, valley-popups, valley-survey")),
+        (["task"], "swarm task: missing command; SEE"),
         (["task", "ad"], "swarm task: no such command 'ad'. Did you mean 'add'?; SEE"),
         (["task", "add"], "swarm task add: missing argument 'name'; SEE"),
     ],
@@ -238,12 +239,11 @@ def test_scenario_completes_to_shipped_names_and_files(
     assert capsys.readouterr().out.split() == ["table-1", "table-of-mine.toml", "tables/"]
 
 
-def swarm_process(*argv: str, **options: object) -> subprocess.Popen[str]:
+def swarm_process(*argv: str, stdout: IO[str] | int = subprocess.PIPE) -> subprocess.Popen[str]:
+    start = "import sys; from swarm.cli import console_main; sys.exit(console_main())"
     return subprocess.Popen(
-        [sys.executable, "-c", ("import sys; from swarm.cli import console_main;"
-         " sys.exit(console_main())"), *argv],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        [sys.executable, "-c", start, *argv], stdout=stdout, stderr=subprocess.PIPE, text=True
+    )
 
 
 @pytest.mark.process
@@ -264,6 +264,17 @@ def test_reader_that_leaves_early_is_no_traceback() -> None:
     assert process.stderr.read() == ""
     process.stderr.close()
     assert process.wait(timeout=30) == 1
+
+
+@pytest.mark.process
+def test_full_disk_takes_one_line() -> None:
+    with Path("/dev/full").open("w") as full:
+        process = swarm_process("--version", stdout=full)
+
+    assert process.communicate(timeout=30)[1] == (
+        "swarm: output cannot be written: No space left on device\n"
+    )
+    assert process.returncode == 1
 
 
 @pytest.mark.process
