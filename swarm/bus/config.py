@@ -49,8 +49,7 @@ class MeshTopology:
     """Endpoints of the peers this one calls."""
 
     def __post_init__(self) -> None:
-        _check_endpoint(self.listen, port_zero=True)
-        _check_endpoints(self.dial)
+        _check_endpoints((self.listen,), self.dial)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +62,7 @@ class ClientTopology:
     def __post_init__(self) -> None:
         if not self.routers:
             raise ValueError("a client needs the endpoint of at least one router")
-        _check_endpoints(self.routers)
+        _check_endpoints((), self.routers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +103,7 @@ class RouterConfig:
     def __post_init__(self) -> None:
         if not self.listen and self.path is None:
             raise ValueError("a router needs an endpoint to listen on")
-        for endpoint in self.listen:
-            _check_endpoint(endpoint, port_zero=True)
-        _check_endpoints(self.connect)
+        _check_endpoints(self.listen, self.connect)
         _check_lease(self.lease_s)
 
 
@@ -150,11 +147,15 @@ def config_file_fault(path: Path, problem: str) -> InputError:
     )
 
 
-def _check_endpoints(endpoints: tuple[str, ...]) -> None:
-    for endpoint in endpoints:
+def _check_endpoints(listen: tuple[str, ...], dial: tuple[str, ...]) -> None:
+    for endpoint in listen:
+        _check_endpoint(endpoint, port_zero=True)
+    for endpoint in dial:
         _check_endpoint(endpoint, port_zero=False)
-    if len(set(endpoints)) != len(endpoints):
-        raise ValueError(f"an endpoint is named twice in {', '.join(endpoints)}")
+        if endpoint in listen:
+            raise ValueError(f"{endpoint} is the own endpoint; dial the others")
+    if len(set(dial)) != len(dial):
+        raise ValueError(f"an endpoint is named twice in {', '.join(dial)}")
 
 
 def _check_endpoint(endpoint: str, *, port_zero: bool) -> None:
