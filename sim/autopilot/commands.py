@@ -101,25 +101,35 @@ class Commands:
         }
 
     def handle(self, command: Command, sender: Sender, now_s: float) -> None:
-        """Carry ``command`` out and acknowledge it.
-
-        The acknowledgement goes ahead of whatever the command makes the vehicle say.
-        """
-        said_before = self._outbox.take()
+        """Carry ``command`` out and acknowledge it."""
         handler = self._handlers.get(command.id)
-        result = _UNSUPPORTED if handler is None else handler(command, sender, now_s)
-        said_meanwhile = self._outbox.take()
-        self._outbox.put(said_before)
-        self.acknowledge(command.id, result, sender)
-        self._outbox.put(said_meanwhile)
+        if handler is None:
+            self._answer(command.id, lambda: _UNSUPPORTED, sender)
+        else:
+            self._answer(command.id, lambda: handler(command, sender, now_s), sender)
 
-    def acknowledge(self, command_id: int, result: int, to: Sender) -> None:
-        """Send a COMMAND_ACK."""
-        self._outbox.reply(
-            to, mavlink.MAVLink_command_ack_message(command_id, result, 0, 0, *_target(to))
+    def handle_set_mode(self, base_mode: int, mode: int, sender: Sender, now_s: float) -> None:
+        """Obey the older message SET_MODE; acknowledged like a command of its message id."""
+        custom = base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        self._answer(
+            mavlink.MAVLINK_MSG_ID_SET_MODE,
+            lambda: self._set_custom_mode(mode, now_s) if custom else _DENIED,
+            sender,
         )
 
-    def set_custom_mode(self, custom_mode: int | None, now_s: float) -> int:
+    def _answer(self, command_id: int, act: Callable[[], int], to: Sender) -> None:
+        """Act, but let the acknowledgement go ahead of whatever that makes the vehicle say."""
+        said_before = self._outbox.take()
+        result = act()
+        said_meanwhile = self._outbox.take()
+        self._outbox.put(said_before)
+        self._outbox.reply(
+            to,
+            mavlink.MAVLink_command_ack_message(command_id, result, 0, 0, to.system, to.component),
+        )
+        self._outbox.put(said_meanwhile)
+
+    def _set_custom_mode(self, custom_mode: int | None, now_s: float) -> int:
         """Change to a mode by its number; the MAV_RESULT."""
         mode = None if custom_mode is None else self._pilot.flavour.mode_of(custom_mode)
         if mode is None:
@@ -133,7 +143,7 @@ class Commands:
         if not math.isfinite(flags) or not int(flags) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return _DENIED
         custom_mode = self._pilot.flavour.mode_commanded(command.params[1], command.params[2])
-        return self.set_custom_mode(custom_mode, now_s)
+        return self._set_custom_mode(custom_mode, now_s)
 
     def _arm_disarm(self, command: Command, sender: Sender, now_s: float) -> int:
         del sender
@@ -295,7 +305,3 @@ class Commands:
             return _FAILED
         self.reboot_asked = True
         return _ACCEPTED
-
-
-def _target(to: Sender) -> tuple[int, int]:
-    return to.system, to.component

@@ -41,6 +41,7 @@ class Pilot:
         store: the mission on the vehicle; outlasts a reboot.
         outbox: takes what it says.
         boot_s: when it is powered up [s].
+        mode_changed: called with the time [s] as soon as the mode is another one.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class Pilot:
         store: MissionStore,
         outbox: Outbox,
         boot_s: float,
+        mode_changed: Callable[[float], None],
     ) -> None:
         self.config = config
         self.flavour = flavour
@@ -65,8 +67,7 @@ class Pilot:
         self.run = MissionRun(self.store, self, outbox, flavour.first_item)
         self.mode = flavour.boot_mode
         self.armed = False
-        self.mode_changed = False
-        """A heartbeat is due at once; whoever sends it clears this."""
+        self._mode_changed = mode_changed
         self._home_locked = False
         self._auto_armed = False
         """The vehicle may leave the ground in AUTO."""
@@ -112,7 +113,7 @@ class Pilot:
             case Stage.BOOTED:
                 # A mode that was set meanwhile was acknowledged, and is lost here.
                 self.mode = self.flavour.boot_mode
-                self.mode_changed = True
+                self._mode_changed(at_s)
                 self.outbox.text(info, "ArduPilot Ready")
             case Stage.SENSORS:
                 pass
@@ -185,7 +186,7 @@ class Pilot:
         if self.mode is Mode.AUTO:
             self.run.stop()
         self.mode = mode
-        self.mode_changed = True
+        self._mode_changed(now_s)
         self._position_control = False
         self.flight.override_cruise(None, now_s)
         if not self.armed:

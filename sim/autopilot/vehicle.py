@@ -74,7 +74,13 @@ class Vehicle:
 
     def _power_up(self, config: VehicleConfig, now_s: float) -> None:
         self._pilot = Pilot(
-            config, self._flavour, self._parameters, self._store, self._outbox, now_s
+            config,
+            self._flavour,
+            self._parameters,
+            self._store,
+            self._outbox,
+            now_s,
+            mode_changed=self._say_heartbeat,
         )
         self._telemetry = Telemetry(self._pilot)
         self._commands = Commands(self._pilot, self._telemetry, self._streams, self._outbox)
@@ -133,7 +139,8 @@ class Vehicle:
                 self._receive(channel, message, now_s)
             case Connected(channel):
                 self._streams.open(channel, self._flavour.unasked_streams, now_s)
-                self._say(mavlink.MAVLINK_MSG_ID_HEARTBEAT, channel, now_s)
+                if self._heartbeat_s > now_s:  # otherwise it comes below
+                    self._say(mavlink.MAVLINK_MSG_ID_HEARTBEAT, channel, now_s)
             case Disconnected(channel):
                 self._streams.close(channel)
                 self._transfer.forget(channel)
@@ -160,15 +167,16 @@ class Vehicle:
 
     def _report(self, now_s: float) -> None:
         """Send the telemetry that is due, as of now."""
-        if self._heartbeat_s <= now_s or self._pilot.mode_changed:
-            self._pilot.mode_changed = False
-            for channel in self._streams.channels:
-                self._say(mavlink.MAVLINK_MSG_ID_HEARTBEAT, channel, now_s)
-            if self._heartbeat_s <= now_s:
-                next_s = self._heartbeat_s + _HEARTBEAT_S
-                self._heartbeat_s = next_s if next_s > now_s else now_s + _HEARTBEAT_S
+        if self._heartbeat_s <= now_s:
+            self._say_heartbeat(now_s)
+            next_s = self._heartbeat_s + _HEARTBEAT_S
+            self._heartbeat_s = next_s if next_s > now_s else now_s + _HEARTBEAT_S
         for channel, message_id in self._streams.take_due(now_s):
             self._say(message_id, channel, now_s)
+
+    def _say_heartbeat(self, now_s: float) -> None:
+        for channel in self._streams.channels:
+            self._say(mavlink.MAVLINK_MSG_ID_HEARTBEAT, channel, now_s)
 
     def _say(self, message_id: int, channel: int, now_s: float) -> None:
         message = self._telemetry.build(message_id, now_s)
@@ -210,10 +218,7 @@ class Vehicle:
         self._commands.handle(command_from_message(message), sender, now_s)
 
     def _on_set_mode(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
-        result = int(mavlink.MAV_RESULT_DENIED)
-        if message.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-            result = self._commands.set_custom_mode(message.custom_mode, now_s)
-        self._commands.acknowledge(mavlink.MAVLINK_MSG_ID_SET_MODE, result, sender)
+        self._commands.handle_set_mode(message.base_mode, message.custom_mode, sender, now_s)
 
     def _on_position_target(
         self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
