@@ -293,18 +293,21 @@ class Bridge:
         took_off = self.phase in (Phase.HOVERING, Phase.FLYING) or (
             self._preparation is not None and self._preparation.took_off
         )
+        motors_asked_for = self._preparation is not None and self._preparation.engaged
         flavour, heartbeat = self._flavour, self._vehicle.heartbeat
         self._drop_work()
         self.phase = Phase.IDLE
-        if flavour is None or heartbeat is None or not heartbeat.armed:
-            self._actions.append(Home())
-            return
-        if not took_off and not flavour.airborne(self._vehicle):
-            if flavour.is_commanded(heartbeat.custom_mode):
-                self._say(*self._commands.send("disarm", flavour.disarm(), self._now_s))
+        if flavour is None or heartbeat is None:
             self._actions.append(Home())
             return
         commanded = flavour.is_commanded(heartbeat.custom_mode)
+        aloft = heartbeat.armed and (took_off or flavour.airborne(self._vehicle))
+        if not aloft:
+            # That it was armed may not have been heard yet.
+            if commanded and (heartbeat.armed or motors_asked_for):
+                self._say(*self._commands.send("disarm", flavour.disarm(), self._now_s))
+            self._actions.append(Home())
+            return
         if self._silent():
             self._refuse_return(order, "the autopilot is silent")
         elif not (commanded or flavour.is_returning(heartbeat.custom_mode)):

@@ -92,7 +92,7 @@ class MissionTransfer:
         self._deadline_s = math.inf
         self._tries = 0
         self._last: list[Outbound] = []
-        self._last_seq: int | None = None
+        self._furthest_seq = -1
         self._touched = False
         self._second_reading = False
         self._failure: str | None = None
@@ -144,7 +144,7 @@ class MissionTransfer:
             return []
         if self._tries < self._policy.tries:
             return self._say(self._last, now_s, again=True)
-        if self._phase is _Phase.SENDING and self._last_seq == len(self._items) - 1:
+        if self._phase is _Phase.SENDING and self._furthest_seq == len(self._items) - 1:
             # Every item was asked for, so perhaps only the acknowledgement got lost.
             return self._ask_count(now_s)
         return self._fail(f"no answer while {self._phase.value}", now_s)
@@ -162,7 +162,7 @@ class MissionTransfer:
     def _announce(self, items: tuple[MissionItem, ...], now_s: float) -> list[Outbound]:
         self._items = items
         self._phase = _Phase.ANNOUNCING
-        self._last_seq = None
+        self._furthest_seq = -1
         self._second_reading = False
         return self._say([MissionCount(len(items))], now_s)
 
@@ -171,15 +171,17 @@ class MissionTransfer:
             return []
         self._touched = True
         self._phase = _Phase.SENDING
-        # The vehicle asks again for what it did not get: only a new number is progress.
-        again = seq == self._last_seq
-        self._last_seq = seq
+        # The vehicle asks again for what it did not get: only a higher number is progress.
+        again = seq <= self._furthest_seq
+        if again and self._tries >= self._policy.tries:
+            return self._fail(f"item {seq} does not get through", now_s)
+        self._furthest_seq = max(self._furthest_seq, seq)
         return self._say([self._items[seq]], now_s, again=again)
 
     def _on_upload_ack(self, result: int, now_s: float) -> list[Outbound]:
         if result != _ACCEPTED:
             return self._fail(f"the vehicle refused the mission (result {result})", now_s)
-        if self._last_seq != len(self._items) - 1:
+        if self._furthest_seq != len(self._items) - 1:
             return []  # an older transfer's: this one is not through yet
         return self._ask_count(now_s)
 

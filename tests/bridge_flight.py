@@ -1,0 +1,113 @@
+"""Joins a bridge and a fake vehicle in virtual time, over a link that tests may spoil."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from agent.mavlink.bridge import Bridge
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.events import Event, LinkUp, Received, Send, Tick
+from agent.vehicle import GoTo, NotReady, Orders, Prepare, Report, Telemetry, VehicleReady
+from swarm.model.frames import Origin
+from tests.fake_copter import FakeCopter
+
+ORIGIN = Origin(47.397742, 8.545594, 488.0)
+START = Prepare((5.0, 0.0, 10.0), 4.0)
+STEP_S = 0.02
+
+Spoil = Callable[[bytes], list[bytes]]
+
+
+def untouched(data: bytes) -> list[bytes]:
+    return [data]
+
+
+class BridgeFlight:
+    """A bridge, its vehicle and the time between them."""
+
+    def __init__(
+        self,
+        copter: FakeCopter | None = None,
+        config: BridgeConfig | None = None,
+        *,
+        to_vehicle: Spoil = untouched,
+        to_bridge: Spoil = untouched,
+    ) -> None:
+        self.copter = copter or FakeCopter(ORIGIN)
+        self.bridge = Bridge(config or BridgeConfig(1, ORIGIN, position_rate_hz=50.0))
+        self.to_vehicle = to_vehicle
+        self.to_bridge = to_bridge
+        if self.copter.now_s == 0.0:
+            self.copter.now_s = 100.0  # the bridge's clock has another zero than the vehicle's
+            self.copter.power_on(100.0)
+        self.now_s = self.copter.now_s
+        self.reports: list[Report] = []
+        """All but telemetry, in order."""
+        self._read = 0
+        self.telemetry: list[Telemetry] = []
+        self.happen(LinkUp())
+
+    def happen(self, event: Event) -> list[Report]:
+        """Step the bridge and carry what it says; gives the reports of this very step."""
+        reports: list[Report] = []
+        answers: list[bytes] = []
+        for action in self.bridge.step(event, self.now_s):
+            if isinstance(action, Send):
+                for data in self.to_vehicle(action.data):
+                    answers += self.copter.receive(data, self.now_s)
+            else:
+                reports.append(action)
+        self.telemetry += [r for r in reports if isinstance(r, Telemetry)]
+        self.reports += [r for r in reports if not isinstance(r, Telemetry)]
+        self._carry(answers)
+        return reports
+
+    def order(self, order: Orders) -> list[Report]:
+        return self.happen(order)
+
+    def _carry(self, answers: list[bytes]) -> None:
+        for answer in answers:
+            for data in self.to_bridge(answer):
+                self.happen(Received(data))
+
+    def step(self) -> None:
+        """One small step of time."""
+        self.now_s += STEP_S
+        self._carry(self.copter.advance(self.now_s))
+        if self.now_s >= self.bridge.next_deadline_s():
+            self.happen(Tick())
+
+    def run(self, duration_s: float) -> None:
+        for _ in range(round(duration_s / STEP_S)):
+            self.step()
+
+    def run_until(self, *wanted: Report | type, limit_s: float = 60.0) -> Report:
+        """Fly until an unread report of that value or type comes; gives it."""
+        for _ in range(round(limit_s / STEP_S)):
+            while self._read < len(self.reports):
+                report = self.reports[self._read]
+                self._read += 1
+                for w in wanted:
+                    if report == w or (isinstance(w, type) and isinstance(report, w)):
+                        return report
+            self.step()
+        raise AssertionError(f"no {wanted} within {limit_s} s, only {self.reports}")
+
+    def prepared(self) -> BridgeFlight:
+        """The same, hovering at its start."""
+        self.order(START)
+        self.run_until(VehicleReady())
+        self.reports.clear()
+        self._read = 0
+        return self
+
+    def flying(self, leg: int = 1, east_m: float = 100.0) -> BridgeFlight:
+        """The same, a second on its way to a far place."""
+        self.prepared()
+        self.order(GoTo(leg, (east_m, 0.0, 10.0)))
+        self.run(1.0)
+        return self
+
+    def reasons(self) -> list[str]:
+        """What the vehicle was waited for."""
+        return [r.reason for r in self.reports if isinstance(r, NotReady)]

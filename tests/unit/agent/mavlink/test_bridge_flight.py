@@ -1,0 +1,418 @@
+"""From order to order in the air, and home."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from agent.mavlink.bridge import Phase
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.events import LinkDown, LinkUp
+from agent.vehicle import Arrived, GoTo, HandedOver, Home, Refused, Return, VehicleReady
+from tests.bridge_flight import ORIGIN, START, BridgeFlight
+from tests.fake_copter import (
+    ACCEPTED,
+    BUSY,
+    DENIED,
+    FAILED,
+    GUIDED,
+    INTERVAL,
+    LAND,
+    LOITER,
+    REPOSITION,
+    RTL,
+    SET_MODE,
+)
+
+HERE = (5.0, 0.0, 10.0)
+NORTH = (5.0, 40.0, 12.0)
+SOUTH = (5.0, -40.0, 12.0)
+
+
+def last_target_enu_m(flight: BridgeFlight) -> tuple[float, float, float]:
+    target_m = flight.copter.target_m
+    assert target_m is not None
+    return target_m
+
+
+def test_target_is_sent_in_the_step_of_its_order() -> None:
+    flight = BridgeFlight().prepared()
+    flight.copter.heard.clear()
+    flight.order(GoTo(1, NORTH))
+
+    [sent] = flight.copter.commands(REPOSITION)
+    assert (sent.get_type(), sent.frame, sent.param1) == ("COMMAND_INT", 5, -1.0)
+    assert sent.z == pytest.approx(ORIGIN.alt_m + 12.0)
+    assert not int(sent.param2) & 1, "a pilot's mode must not be overruled"
+    assert last_target_enu_m(flight) == pytest.approx(NORTH, abs=0.02)
+
+
+def test_vehicle_arrives_once_and_stands_at_the_target() -> None:
+    flight = BridgeFlight().prepared()
+    before_s = flight.now_s
+    flight.order(GoTo(1, NORTH))
+    flight.run_until(Arrived(1))
+
+    assert math.dist(flight.copter.position_m, NORTH) < 1.0
+    assert flight.now_s - before_s == pytest.approx(math.dist(HERE, NORTH) / 4.0, abs=0.1)
+    flight.run(10.0)
+    assert flight.reports == [Arrived(1)]
+
+
+def test_legs_follow_each_other_without_mixing_up_arrivals() -> None:
+    flight = BridgeFlight().prepared()
+    for leg, target in enumerate((NORTH, SOUTH, NORTH, HERE), start=1):
+        flight.order(GoTo(leg, target))
+        flight.run_until(Arrived(leg))
+    assert flight.reports == [Arrived(1), Arrived(2), Arrived(3), Arrived(4)]
+
+
+def test_target_at_the_present_place_is_arrived_at_too() -> None:
+    flight = BridgeFlight().prepared()
+    flight.order(GoTo(1, HERE))
+    flight.run_until(Arrived(1), limit_s=1.0)
+    flight.order(GoTo(2, HERE))
+    flight.run_until(Arrived(2), limit_s=1.0)
+
+
+def test_retarget_in_mid_flight_leads_to_the_new_target_only() -> None:
+    flight = BridgeFlight().prepared()
+    flight.order(GoTo(1, NORTH))
+    flight.run(3.0)
+    flight.order(GoTo(2, SOUTH))
+    flight.run_until(Arrived(2))
+    assert flight.reports == [Arrived(2)]
+    assert math.dist(flight.copter.position_m, SOUTH) < 1.0
+
+
+def test_passing_by_the_target_is_no_arrival() -> None:
+    config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, acceptance_radius_m=5.0)
+    flight = BridgeFlight(config=config).prepared()
+    flight.order(GoTo(1, (5.0, 60.0, 10.0)))
+    flight.run(6.0)
+    # The vehicle is told a place ahead; near it, but still moving, it has not arrived.
+    flight.order(GoTo(2, (5.0, 30.0, 10.0)))
+    while flight.copter.position_m[1] < 29.5:
+        flight.step()
+        assert not flight.reports
+    flight.run_until(Arrived(2))
+
+
+def test_target_that_was_not_taken_yet_is_not_arrived_at() -> None:
+    flight = BridgeFlight().prepared()
+    flight.copter.verdicts[REPOSITION] = [None]
+    flight.order(GoTo(1, HERE))  # the vehicle stands there, but does not know
+    flight.run(0.9)
+    assert not flight.reports
+    flight.run_until(Arrived(1))
+
+
+def test_acknowledgement_of_the_old_target_is_not_taken_for_the_new_one() -> None:
+    flight = BridgeFlight().prepared()
+    copter = flight.copter
+    copter.verdicts[REPOSITION] = [None, None, ACCEPTED]  # both lost, then a third answered
+    flight.order(GoTo(1, NORTH))
+    flight.order(GoTo(2, HERE))
+    copter.ack(REPOSITION, ACCEPTED)  # a late answer to the first
+    flight.run(0.5)
+    assert not flight.reports
+    flight.run_until(Arrived(2))
+
+
+def test_lost_target_is_sent_again() -> None:
+    flight = BridgeFlight().prepared()
+    flight.copter.verdicts[REPOSITION] = [None, None, BUSY, BUSY]
+    flight.order(GoTo(1, NORTH))
+    flight.run_until(Arrived(1))
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "words"),
+    [
+        ([DENIED], "denied"),
+        ([FAILED], "failed"),
+        ([None] * 5, "no answer"),
+        ([BUSY] * 99, "reject"),
+    ],
+)
+def test_target_that_is_refused_for_good_is_reported(
+    verdicts: list[int | None], words: str
+) -> None:
+    flight = BridgeFlight().prepared()
+    flight.copter.verdicts[REPOSITION] = list(verdicts)
+    order = GoTo(1, NORTH)
+    flight.order(order)
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert refused.order == order
+    assert words in refused.reason
+    assert flight.bridge.phase is Phase.HOVERING
+
+    flight.copter.verdicts.clear()
+    flight.order(GoTo(2, SOUTH))  # and the vehicle is still ours
+    flight.run_until(Arrived(2))
+
+
+def test_vehicle_that_stands_still_elsewhere_is_told_again_and_then_given_up() -> None:
+    flight = BridgeFlight().prepared()
+    flight.copter.stuck = True
+    flight.copter.heard.clear()
+    flight.order(GoTo(1, NORTH))
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert "stands still 40.0 m from the target" in refused.reason
+    assert len(flight.copter.commands(REPOSITION)) == 4
+
+
+def test_vehicle_that_forgot_its_target_gets_there_after_all() -> None:
+    flight = BridgeFlight().prepared()
+    flight.order(GoTo(1, NORTH))
+    flight.run(2.0)
+    flight.copter.target_m = None
+    flight.run_until(Arrived(1))
+
+
+@pytest.mark.parametrize(
+    "target",
+    [(math.nan, 0.0, 10.0), (0.0, math.inf, 10.0), (25_000.0, 0.0, 10.0), (0.0, 0.0, -1_500.0)],
+)
+def test_target_outside_the_fence_is_never_sent(target: tuple[float, float, float]) -> None:
+    flight = BridgeFlight().prepared()
+    flight.order(GoTo(1, NORTH))
+    flight.copter.heard.clear()
+    [refused] = flight.order(GoTo(2, target))
+    assert isinstance(refused, Refused)
+    assert not flight.copter.commands(REPOSITION)
+    flight.run_until(Arrived(1))  # what was flown to before still is
+
+
+def test_order_before_the_vehicle_is_prepared_is_refused() -> None:
+    flight = BridgeFlight()
+    order = GoTo(1, NORTH)
+    assert flight.order(order) == [Refused(order, "the vehicle is idle")]
+    flight.order(START)
+    assert flight.order(order) == [Refused(order, "the vehicle is preparing")]
+
+
+def test_doubled_and_late_positions_change_nothing() -> None:
+    flight = BridgeFlight().prepared()
+    flight.order(GoTo(1, NORTH))
+    flight.run_until(Arrived(1))
+    flight.order(GoTo(2, SOUTH))
+    flight.run(2.0)
+    boot_ms = round((flight.now_s - flight.copter.on_at_s) * 1e3)
+    told = len(flight.telemetry)
+    place_m, flight.copter.position_m = flight.copter.position_m, SOUTH
+    for late_ms in (0, 40, 500, 1_000, 5_000, 9_000, 9_000):
+        flight.copter.position(boot_ms - late_ms)
+    flight.copter.position_m = place_m
+    flight.step()
+    assert len(flight.telemetry) - told <= 2
+    assert not [r for r in flight.reports if r != Arrived(1)]
+    assert flight.bridge.stale_positions >= 5
+    flight.run_until(Arrived(2))
+
+
+def test_telemetry_is_in_the_missions_frame() -> None:
+    flight = BridgeFlight().prepared()
+    flight.order(GoTo(1, NORTH))
+    flight.run(4.0)
+    newest = flight.telemetry[-1]
+    assert newest.position_enu_m == pytest.approx(flight.copter.position_m, abs=0.2)
+    assert newest.velocity_enu_m_s == pytest.approx(flight.copter.velocity_m_s, abs=0.02)
+    assert newest.battery_frac == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize(("mode", "name"), [(LOITER, "LOITER"), (LAND, "LAND"), (RTL, "RTL")])
+def test_pilot_who_takes_over_keeps_the_vehicle(mode: int, name: str) -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.text(2, "Radio Failsafe")
+    flight.copter.set_mode(mode)
+    flight.copter.heard.clear()
+    handed = flight.run_until(HandedOver)
+    assert handed == HandedOver(f"its pilot or a failsafe switched it to {name} (Radio Failsafe)")
+    order = GoTo(2, NORTH)
+    assert flight.order(order) == [Refused(order, "the vehicle is handed over")]
+    flight.run(20.0)
+    assert set(flight.copter.count()) <= {INTERVAL}
+    assert len([r for r in flight.reports if isinstance(r, HandedOver)]) == 1
+
+
+def test_target_sent_before_the_take_over_is_seen_does_not_pull_the_vehicle_back() -> None:
+    flight = BridgeFlight().prepared()
+    flight.copter.mode = LOITER  # no heartbeat has said so yet
+    flight.order(GoTo(1, NORTH))
+    flight.run_until(HandedOver)
+    assert flight.copter.mode == LOITER
+    assert flight.copter.target_m is None or flight.copter.target_m[1] < 1.0
+
+
+def test_return_is_refused_while_a_pilot_flies() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.set_mode(LOITER)
+    flight.run_until(HandedOver)
+    flight.copter.heard.clear()
+    order = Return("mission ended")
+    assert flight.order(order) == [Refused(order, "its pilot flies it in LOITER")]
+    flight.run(5.0)
+    assert not flight.copter.commands(SET_MODE)
+
+
+def test_return_of_a_vehicle_that_returns_by_failsafe_waits_for_the_landing() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.set_mode(RTL)
+    flight.run_until(HandedOver)
+    flight.copter.heard.clear()
+    flight.order(Return("mission ended"))
+    flight.run_until(Home())
+    assert not flight.copter.armed
+    assert not flight.copter.commands(SET_MODE)
+
+
+def test_vehicle_that_a_pilot_gives_back_returns() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.set_mode(LOITER)
+    flight.run_until(HandedOver)
+    flight.copter.set_mode(GUIDED)
+    flight.run(1.0)
+    flight.order(Return("mission ended"))
+    flight.run_until(Home())
+
+
+def test_reboot_in_flight_hands_over() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.boot_s = 0.0  # its heartbeat does not give it away
+    flight.copter.power_on(flight.now_s)
+    flight.copter.mode, flight.copter.armed = GUIDED, True
+    flight.copter._intervals_s = {33: 0.1}
+    flight.copter._due_s = {33: flight.now_s}
+    flight.copter.heard.clear()
+    assert flight.run_until(HandedOver) == HandedOver("the autopilot rebooted")
+    flight.run(10.0)
+    assert set(flight.copter.count()) == {INTERVAL}
+
+
+def test_reboot_is_seen_in_the_heartbeat_too() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.power_on(flight.now_s)
+    flight.run_until(HandedOver("the autopilot rebooted"), limit_s=2.0)
+
+
+def test_vehicle_that_disarms_in_flight_is_handed_over() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.armed = False
+    flight.run_until(HandedOver("the vehicle disarmed by itself"))
+
+
+def test_silent_vehicle_is_handed_over_and_can_be_prepared_again() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.silent = True
+    before_s = flight.now_s
+    assert flight.run_until(HandedOver) == HandedOver("no heartbeat for 5 s")
+    assert 4.0 <= flight.now_s - before_s <= 6.0
+    order = Return("mission ended")
+    assert flight.order(order) == [Refused(order, "the autopilot is silent")]
+
+    flight.copter.silent = False
+    flight.run(3.0)
+    flight.copter.heard.clear()
+    flight.order(START)
+    flight.run_until(VehicleReady())
+    assert not flight.copter.commands(SET_MODE)
+
+
+def test_silent_vehicle_that_speaks_again_can_be_called_home() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.silent = True
+    flight.run_until(HandedOver)
+    flight.copter.silent = False
+    flight.run(2.0)
+    flight.order(Return("mission ended"))
+    flight.run_until(Home())
+
+
+def test_short_loss_of_the_link_is_ridden_out() -> None:
+    flight = BridgeFlight().prepared()
+    flight.order(GoTo(1, NORTH))
+    flight.happen(LinkDown())
+    flight.copter.silent = True
+    flight.run(3.0)
+    flight.copter.silent = False
+    flight.copter.heard.clear()
+    flight.happen(LinkUp())
+    flight.run_until(Arrived(1))
+    assert len(flight.copter.commands(INTERVAL)) >= 6
+    assert flight.reports == [Arrived(1)]
+
+
+def test_position_stream_that_stops_in_flight_is_asked_for_again() -> None:
+    flight = BridgeFlight().flying(east_m=40.0)
+    del flight.copter._intervals_s[33]
+    flight.run_until(Arrived(1))
+
+
+def test_vehicle_returns_lands_and_disarms() -> None:
+    flight = BridgeFlight().flying()
+    flight.order(Return("mission ended"))
+    flight.run(2.0)
+    assert flight.copter.mode == RTL
+    assert not flight.reports
+    flight.order(Return("again"))
+    flight.run_until(Home())
+    assert not flight.copter.armed
+    assert flight.reports == [Home()]
+    assert len(flight.copter.commands(SET_MODE)) == 2
+    assert flight.order(Return("again")) == [Home()]
+
+
+def test_return_mode_that_is_refused_is_set_again_and_then_reported() -> None:
+    flight = BridgeFlight().prepared()
+    flight.copter.verdicts[SET_MODE] = [FAILED] * 99
+    order = Return("mission ended")
+    flight.order(order)
+    refused = flight.run_until(Refused)
+    assert refused == Refused(order, "the return mode cannot be set (failed)")
+
+
+def test_pilot_who_stops_the_return_keeps_the_vehicle() -> None:
+    for mode in (LOITER, GUIDED):
+        flight = BridgeFlight().flying()
+        flight.order(Return("mission ended"))
+        flight.run(2.0)
+        flight.copter.set_mode(mode)
+        flight.run_until(HandedOver)
+        flight.copter.heard.clear()
+        flight.run(5.0)
+        assert not flight.copter.commands(SET_MODE)
+
+
+def test_return_of_a_vehicle_never_heard_is_home_at_once() -> None:
+    assert BridgeFlight().order(Return("abort")) == [Home()]
+
+
+def test_second_mission_follows_the_first() -> None:
+    flight = BridgeFlight().flying()
+    flight.order(Return("mission ended"))
+    flight.run_until(Home())
+    flight.order(START)
+    flight.run_until(VehicleReady())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_lossy_doubling_link_delays_but_does_not_break_a_flight(seed: int) -> None:
+    chance = np.random.default_rng(seed)
+
+    def spoil(data: bytes) -> list[bytes]:
+        return [data] * int(chance.choice([0, 1, 2], p=[0.2, 0.7, 0.1]))
+
+    flight = BridgeFlight(to_vehicle=spoil, to_bridge=spoil)
+    flight.order(START)
+    flight.run_until(VehicleReady(), limit_s=120.0)
+    for leg, target in enumerate((NORTH, SOUTH, HERE), start=1):
+        flight.order(GoTo(leg, target))
+        flight.run_until(Arrived(leg), limit_s=120.0)
+        assert math.dist(flight.copter.position_m, target) < 1.0
+    flight.order(Return("mission ended"))
+    flight.run_until(Home(), limit_s=120.0)

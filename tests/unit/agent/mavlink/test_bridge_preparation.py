@@ -1,0 +1,385 @@
+"""From power-up to hovering at the start."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import pytest
+
+from agent.mavlink.bridge import Phase
+from agent.mavlink.config import BridgeConfig
+from agent.vehicle import HandedOver, Home, NotReady, Prepare, Refused, Return, VehicleReady
+from tests.bridge_flight import ORIGIN, START, BridgeFlight
+from tests.fake_copter import (
+    ARM,
+    BUSY,
+    DENIED,
+    FAILED,
+    GUIDED,
+    INTERVAL,
+    LOITER,
+    REPOSITION,
+    SET_MODE,
+    SPEED,
+    STABILIZE,
+    TAKEOFF,
+    UNSUPPORTED,
+    FakeCopter,
+)
+
+
+def test_vehicle_is_prepared_step_by_step_and_hovers_at_its_start() -> None:
+    flight = BridgeFlight()
+    flight.order(START)
+    flight.run_until(VehicleReady())
+
+    assert math.dist(flight.copter.position_m, START.position_enu_m) < 1.0
+    assert flight.copter.speed_m_s == START.speed_m_s
+    order = [m.command for m in flight.copter.heard if hasattr(m, "command")]
+    steps = [c for c in order if c != INTERVAL]
+    assert steps == [SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED]
+    assert flight.bridge.phase is Phase.HOVERING
+
+
+def test_reasons_for_waiting_change_as_the_vehicle_gets_ready() -> None:
+    flight = BridgeFlight()
+    flight.order(START)
+    flight.run_until(VehicleReady())
+
+    reasons = flight.reasons()
+    assert reasons[0] == "waiting for a heartbeat of system id 1"
+    for words in ("booting", "guided mode", "position estimate", "arming", "climbing", "start"):
+        assert any(words in reason for reason in reasons), (words, reasons)
+    assert all(a != b for a, b in itertools.pairwise(reasons))
+
+
+def test_mode_is_not_set_before_boot_has_ended() -> None:
+    flight = BridgeFlight(FakeCopter(ORIGIN, boot_s=5.0, ready_s=6.0))
+    flight.order(START)
+    flight.run(4.5)
+    assert not flight.copter.commands(SET_MODE)
+
+    flight.run_until(VehicleReady())
+
+
+def test_ground_station_heartbeat_comes_every_second() -> None:
+    flight = BridgeFlight()
+    flight.run(10.0)
+    beats = [m for m in flight.copter.heard if m.get_type() == "HEARTBEAT"]
+    assert 10 <= len(beats) <= 11
+    assert {(m.type, m.get_srcSystem(), m.get_srcComponent()) for m in beats} == {(6, 255, 190)}
+
+
+def test_refused_arming_is_tried_again_and_the_reason_is_told() -> None:
+    flight = BridgeFlight()
+    flight.copter.verdicts[ARM] = [FAILED, FAILED]
+    flight.order(START)
+    flight.run_until(VehicleReady())
+
+    assert len(flight.copter.commands(ARM)) == 3
+    assert any("arming refused (failed)" in reason for reason in flight.reasons())
+
+
+def test_arming_that_is_refused_for_ever_ends_the_preparation() -> None:
+    flight = BridgeFlight()
+    flight.copter.verdicts[ARM] = [FAILED] * 1000
+    flight.order(START)
+    refused = flight.run_until(Refused, limit_s=120.0)
+
+    assert refused == Refused(START, "arming failed 15 times; last answer: failed")
+    assert flight.bridge.phase is Phase.IDLE
+    heard = len(flight.copter.heard)
+    flight.run(10.0)
+    assert not [m for m in flight.copter.heard[heard:] if getattr(m, "command", None) == ARM]
+
+
+def test_text_of_the_autopilot_explains_a_failing_check() -> None:
+    copter = FakeCopter(ORIGIN)
+    copter.prearm_ok = False
+    flight = BridgeFlight(copter)
+    flight.order(START)
+    flight.run(8.0)
+    copter.text(2, "PreArm: Battery 1 low")
+    flight.run(1.0)
+
+    assert flight.reasons()[-1] == "pre-arm checks do not pass (PreArm: Battery 1 low)"
+    assert not copter.commands(ARM)
+
+
+def test_takeoff_that_is_refused_briefly_is_asked_again() -> None:
+    flight = BridgeFlight()
+    flight.copter.verdicts[TAKEOFF] = [BUSY, FAILED, DENIED]
+    flight.order(START)
+    flight.run_until(VehicleReady())
+    assert len(flight.copter.commands(TAKEOFF)) == 4
+
+
+def test_vehicle_that_disarms_itself_on_the_ground_is_armed_again() -> None:
+    flight = BridgeFlight()
+    flight.copter.verdicts[TAKEOFF] = [None] * 12  # silent for longer than it stays armed
+    flight.order(START)
+    flight.run_until(VehicleReady())
+    assert len(flight.copter.commands(ARM)) == 2
+
+
+@pytest.mark.parametrize("command", [SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, INTERVAL])
+def test_lost_acknowledgement_is_made_good_by_sending_again(command: int) -> None:
+    flight = BridgeFlight()
+    flight.copter.verdicts[command] = [None, None]
+    flight.order(START)
+    flight.run_until(VehicleReady())
+
+    again = flight.copter.commands(command)
+    assert len(again) >= 3
+    if again[0].get_type() == "COMMAND_LONG":
+        assert [m.confirmation for m in again[:3]] == [0, 1, 2]
+
+
+def test_acknowledgement_lost_after_the_deed_does_no_harm() -> None:
+    lost: list[bytes] = []
+
+    def lose_first_acks(data: bytes) -> list[bytes]:
+        if data[7] == 77 and len(lost) < 12:
+            lost.append(data)
+            return []
+        return [data]
+
+    flight = BridgeFlight(to_bridge=lose_first_acks)
+    flight.order(START)
+    flight.run_until(VehicleReady())
+    assert len(lost) == 12
+
+
+def test_wrong_system_id_is_never_commanded_and_named() -> None:
+    flight = BridgeFlight(FakeCopter(ORIGIN, system_id=7))
+    flight.order(START)
+    flight.run(10.0)
+
+    assert flight.reasons()[-1] == "heard the vehicle with system id 7, not 1"
+    assert flight.bridge.foreign[7] >= 9
+    assert {m.get_type() for m in flight.copter.heard} == {"HEARTBEAT"}
+
+
+def test_other_component_of_the_right_system_is_not_the_autopilot() -> None:
+    copter = FakeCopter(ORIGIN)
+    copter.component_id = 154
+    flight = BridgeFlight(copter)
+    flight.order(START)
+    flight.run(5.0)
+    assert {m.get_type() for m in copter.heard} == {"HEARTBEAT"}
+
+
+@pytest.mark.parametrize(("mav_type", "autopilot"), [(1, 3), (2, 12)])
+def test_unsupported_vehicle_is_named_and_left_alone(mav_type: int, autopilot: int) -> None:
+    copter = FakeCopter(ORIGIN)
+    copter.mav_type, copter.autopilot = mav_type, autopilot
+    flight = BridgeFlight(copter)
+    flight.order(START)
+    flight.run(5.0)
+    assert "is not supported" in flight.reasons()[-1]
+    assert not copter.count()
+
+
+def test_stream_that_does_not_come_is_asked_for_again() -> None:
+    flight = BridgeFlight()
+    flight.copter.deaf_to = {193}
+    flight.order(START)
+    flight.run(15.0)
+    asked = [m for m in flight.copter.commands(INTERVAL) if m.param1 == 193]
+    assert len(asked) >= 3
+    assert "EKF_STATUS_REPORT" in flight.reasons()[-1]
+
+    flight.copter.deaf_to = set()
+    flight.run_until(VehicleReady())
+
+
+def test_streams_are_asked_for_at_the_configured_rates() -> None:
+    flight = BridgeFlight(config=BridgeConfig(1, ORIGIN, position_rate_hz=10.0))
+    flight.run(3.0)
+    asked = {int(m.param1): m.param2 for m in flight.copter.commands(INTERVAL)}
+    assert asked[33] == 100_000.0
+    assert set(asked) == {33, 1, 193, 245, 42, 147}
+
+
+def test_speed_goes_by_parameter_if_the_command_is_refused() -> None:
+    copter = FakeCopter(ORIGIN)
+    copter.verdicts[SPEED] = [UNSUPPORTED] * 99
+    copter.parameters = {"WPNAV_SPEED": 1000.0}
+    flight = BridgeFlight(copter)
+    flight.order(START)
+    flight.run_until(VehicleReady())
+
+    assert copter.parameters == {"WPNAV_SPEED": 400.0}
+    asked = {m.param_id for m in copter.heard if m.get_type() == "PARAM_REQUEST_READ"}
+    assert asked == {"WP_SPD", "WPNAV_SPEED"}
+
+
+def test_speed_that_cannot_be_set_at_all_is_said() -> None:
+    copter = FakeCopter(ORIGIN)
+    copter.verdicts[SPEED] = [FAILED] * 99
+    copter.parameters = {}
+    flight = BridgeFlight(copter)
+    flight.order(START)
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert "WP_SPD or WPNAV_SPEED" in refused.reason
+
+
+def test_height_of_takeoff_follows_from_home_not_from_the_origin() -> None:
+    flight = BridgeFlight(FakeCopter(ORIGIN, ground_m=-20.0))
+    flight.order(START)
+    flight.run_until(VehicleReady())
+    [takeoff] = flight.copter.commands(TAKEOFF)
+    assert takeoff.param7 == pytest.approx(30.0, abs=0.01)
+    assert flight.copter.position_m[2] == pytest.approx(10.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("ground_m", "words"), [(9.8, "0.2 m above"), (50.0, "-40.0 m above the vehicle's home")]
+)
+def test_start_at_or_below_the_ground_is_refused_before_arming(ground_m: float, words: str) -> None:
+    flight = BridgeFlight(FakeCopter(ORIGIN, ground_m=ground_m))
+    flight.order(START)
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert words in refused.reason
+    assert not flight.copter.commands(ARM)
+
+
+def test_vehicle_at_the_other_end_of_the_world_is_refused() -> None:
+    elsewhere = replace(ORIGIN, lat_deg=-35.0, lon_deg=149.0)
+    flight = BridgeFlight(FakeCopter(elsewhere))
+    flight.order(START)
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert "km from the mission's origin" in refused.reason
+    assert not flight.copter.commands(ARM)
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        Prepare((math.nan, 0.0, 10.0), 4.0),
+        Prepare((0.0, 0.0, 10.0), 0.0),
+        Prepare((0.0, 0.0, 10.0), math.inf),
+        Prepare((30_000.0, 0.0, 10.0), 4.0),
+        Prepare((0.0, 0.0, 2_000.0), 4.0),
+    ],
+)
+def test_impossible_start_is_refused_at_once(order: Prepare) -> None:
+    flight = BridgeFlight()
+    [refused] = flight.order(order)
+    assert isinstance(refused, Refused)
+    assert flight.bridge.phase is Phase.IDLE
+
+
+def test_vehicle_that_flies_already_does_not_take_off_again() -> None:
+    flight = BridgeFlight().flying()
+    again = BridgeFlight(flight.copter)  # the agent was restarted, its autopilot flew on
+    flight.copter.heard.clear()
+    again.order(Prepare((60.0, 0.0, 12.0), 5.0))
+    again.run_until(VehicleReady())
+
+    heard = again.copter.count()
+    assert heard[TAKEOFF] == heard[ARM] == heard[SET_MODE] == 0
+    assert math.dist(again.copter.position_m, (60.0, 0.0, 12.0)) < 1.0
+    assert again.copter.speed_m_s == 5.0
+
+
+def test_vehicle_flown_by_its_pilot_is_waited_for_and_not_touched() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.set_mode(LOITER)
+    again = BridgeFlight(flight.copter)
+    flight.copter.heard.clear()
+    again.order(START)
+    again.run(5.0)
+    assert again.reasons()[-1].startswith("armed in LOITER by its pilot")
+    assert set(again.copter.count()) == {INTERVAL}
+
+    flight.copter.set_mode(GUIDED)  # the pilot hands it to us
+    again.run_until(VehicleReady())
+
+
+def test_vehicle_landed_by_its_pilot_does_not_start_by_itself() -> None:
+    copter = FakeCopter(ORIGIN, ready_s=1.0)
+    flight = BridgeFlight(copter)
+    flight.run(3.0)
+    copter.armed, copter.armed_at_s = True, copter.now_s
+    flight.run(1.5)
+    flight.order(START)
+    flight.run(3.0)
+    copter.armed = False
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert "its pilot flew and landed it" in refused.reason
+    assert not copter.commands(ARM)
+
+
+def test_pilot_who_takes_over_during_takeoff_keeps_the_vehicle() -> None:
+    flight = BridgeFlight()
+    flight.order(START)
+    while not flight.copter.airborne:
+        flight.step()
+    flight.run(1.0)
+    flight.copter.set_mode(STABILIZE)
+    handed = flight.run_until(HandedOver)
+    assert handed == HandedOver("its pilot or a failsafe switched it to STABILIZE")
+    flight.copter.heard.clear()
+    flight.run(10.0)
+    assert set(flight.copter.count()) <= {INTERVAL}
+
+
+def test_reboot_before_arming_begins_the_preparation_anew() -> None:
+    copter = FakeCopter(ORIGIN, ready_s=20.0)
+    flight = BridgeFlight(copter)
+    flight.order(START)
+    flight.run(10.0)
+    copter.ready_s = 3.0
+    copter.power_on(flight.now_s)
+    flight.run_until(VehicleReady())
+    assert not [r for r in flight.reports if isinstance(r, HandedOver)]
+
+
+def test_silence_before_arming_is_waited_out() -> None:
+    copter = FakeCopter(ORIGIN, ready_s=20.0)
+    flight = BridgeFlight(copter)
+    flight.order(START)
+    flight.run(5.0)
+    copter.silent = True
+    flight.run(10.0)
+    assert flight.reports[-1] == NotReady("waiting for a heartbeat of system id 1")
+    copter.silent = False
+    flight.run_until(VehicleReady())
+
+
+def test_return_during_preparation_on_the_ground_is_home_at_once() -> None:
+    flight = BridgeFlight()
+    flight.order(START)
+    flight.run(2.0)
+    assert flight.order(Return("abort")) == [Home()]
+    flight.copter.heard.clear()
+    flight.run(10.0)
+    assert set(flight.copter.count()) <= {INTERVAL}
+
+
+def test_return_of_an_armed_vehicle_on_the_ground_disarms_it() -> None:
+    flight = BridgeFlight()
+    flight.copter.verdicts[TAKEOFF] = [None] * 99
+    flight.order(START)
+    while not flight.copter.armed:
+        flight.step()
+    assert flight.order(Return("abort")) == [Home()]
+    flight.run(2.0)
+    assert not flight.copter.armed
+
+
+def test_climb_that_stops_ends_the_preparation() -> None:
+    flight = BridgeFlight()
+    flight.order(START)
+    while flight.copter.position_m[2] < 4.0:
+        flight.step()
+    flight.copter.target_m = None
+    refused = flight.run_until(Refused)
+    assert refused == Refused(START, "the vehicle took off and then stopped climbing")
