@@ -16,7 +16,7 @@ from swarm.config import Timing
 from swarm.events import Ask, BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Wish
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.state.board import TaskBoard, TaskState, first_done
+from swarm.state.board import TaskBoard, TaskState
 from swarm.state.claims import holders
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
@@ -95,6 +95,7 @@ class Observer:
         self._ended_told = False
         self._timing = timing
         self._ask_at_s = 0.0
+        self._problem = Problem.from_mission(mission)
 
     def start(self, now_s: float) -> list[Wish]:
         """Ask what has happened so far."""
@@ -153,31 +154,32 @@ class Observer:
 
     def result(self) -> MissionResult:
         """What has been executed so far."""
-        problem = Problem.from_mission(self.mission)
+        problem = self._problem
         index = {task: number for number, task in enumerate(problem.task_ids)}
-        routes: dict[UavId, tuple[TaskId, ...]] = {}
-        for uav in problem.uav_ids:
-            visits = sorted(
-                (outcome.completed_s, TaskId(task))
-                for (who, task), outcome in self.replica.outcomes.items()
-                if who == uav and outcome.result is Result.DONE and task in index
-            )
-            routes[uav] = tuple(task for _, task in visits)
-        first = {task: first_done(self.replica, task) for task in problem.task_ids}
-        completion_s = {
-            task: visit[1].completed_s for task, visit in first.items() if visit is not None
-        }
-        times_s = np.array([completion_s.get(task, np.nan) for task in problem.task_ids])
-        by = np.array(
-            [-1 if v is None else problem.uav_ids.index(UavId(v[0])) for v in first.values()],
-            dtype=np.int64,
+        uav_index = {uav: number for number, uav in enumerate(problem.uav_ids)}
+        visits = sorted(
+            (outcome.completed_s, UavId(uav), TaskId(task))
+            for (uav, task), outcome in self.replica.outcomes.items()
+            if outcome.result is Result.DONE and task in index and uav in uav_index
         )
-        lists = [[index[task] for task in route] for route in routes.values()]
+        lists: dict[UavId, list[TaskId]] = {uav: [] for uav in problem.uav_ids}
+        times_s = np.full(problem.n_task, np.nan)
+        by = np.full(problem.n_task, -1, dtype=np.int64)
+        for completed_s, uav, task in visits:
+            lists[uav].append(task)
+            if by[index[task]] < 0:
+                times_s[index[task]], by[index[task]] = completed_s, uav_index[uav]
+        completion_s = {
+            task: float(time_s)
+            for task, time_s, who in zip(problem.task_ids, times_s, by, strict=True)
+            if who >= 0
+        }
+        indices = [[index[task] for task in route] for route in lists.values()]
         states = self.board.states
         return MissionResult(
-            executed_routes=routes,
+            executed_routes={uav: tuple(route) for uav, route in lists.items()},
             executed_completion_s=completion_s,
-            executed_objective=executed_objective(problem, lists, times_s, by),
+            executed_objective=executed_objective(problem, indices, times_s, by),
             done=tuple(completion_s),
             failed=tuple(t for t in problem.task_ids if states.get(t) is TaskState.FAILED),
             open=tuple(
@@ -185,7 +187,7 @@ class Observer:
                 for t in problem.task_ids
                 if states.get(t, TaskState.OPEN) is TaskState.OPEN and t not in completion_s
             ),
-            duplicate_visits=sum(len(route) for route in routes.values()) - len(completion_s),
+            duplicate_visits=len(visits) - len(completion_s),
             makespan_s=max(completion_s.values(), default=0.0),
             lost_uavs=tuple(self.lost),
             epochs=len(self._numbers),
