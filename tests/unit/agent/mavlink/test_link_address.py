@@ -1,0 +1,57 @@
+"""Link URLs."""
+
+from __future__ import annotations
+
+import pytest
+
+from agent.mavlink.link_address import (
+    LinkAddress,
+    SerialAddress,
+    TcpAddress,
+    UdpInAddress,
+    UdpOutAddress,
+    parse_link,
+)
+from swarm.errors import InputError
+
+
+@pytest.mark.parametrize(
+    ("url", "address"),
+    [
+        ("tcp:127.0.0.1:5760", TcpAddress("127.0.0.1", 5760)),
+        ("tcp:[::1]:5760", TcpAddress("::1", 5760)),
+        ("udpout:sitl-3.local:14550", UdpOutAddress("sitl-3.local", 14550)),
+        ("udpin:0.0.0.0:14550", UdpInAddress("0.0.0.0", 14550)),
+        ("serial:/dev/ttyACM0:115200", SerialAddress("/dev/ttyACM0", 115200)),
+    ],
+)
+def test_every_kind_of_link_is_read_and_written(url: str, address: LinkAddress) -> None:
+    assert parse_link(url) == address
+    assert str(address) == url
+
+
+@pytest.mark.parametrize(
+    ("url", "problem"),
+    [
+        ("", "'' is no kind of link"),
+        ("127.0.0.1:5760", "'127.0.0.1' is no kind of link"),
+        ("tcp://127.0.0.1:5760", "'//127.0.0.1' is no host"),
+        ("tcp:5760", "a part is missing"),
+        ("tcp::5760", "a part is missing"),
+        ("tcp:localhost:", "'' is not a whole number"),
+        ("udpin:localhost:http", "'http' is not a whole number"),
+        ("udpin:localhost:٣", "'٣' is not a whole number"),
+        ("udpout:localhost:0", "port 0 is not within 1..65535"),
+        ("udpout:localhost:65536", "port 65536 is not within 1..65535"),
+        ("tcp:a b:1", "'a b' is no host"),
+        ("serial:/dev/ttyACM0", "a part is missing"),
+        ("serial:/dev/ttyACM0:0", "0 is no baud rate"),
+    ],
+)
+def test_wrong_url_is_one_clear_line(url: str, problem: str) -> None:
+    with pytest.raises(InputError) as raised:
+        parse_link(url, "--mavlink")
+    line = str(raised.value)
+    assert problem in line
+    assert "\n" not in line
+    assert line.endswith("such as tcp:127.0.0.1:5760")
