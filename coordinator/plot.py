@@ -75,7 +75,7 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     figure = Figure(figsize=_size_inches(mission), layout="constrained")
     axes = figure.add_subplot()
     looks = {
-        uav: _Look(_COLOURS[i % len(_COLOURS)], _STYLES[(i + i // len(_COLOURS)) % len(_STYLES)])
+        uav: _Look(_COLOURS[i % len(_COLOURS)], _STYLES[i % len(_STYLES)])
         for i, uav in enumerate(plan.routes)
     }
     diameters = _diameters_points(mission)
@@ -213,7 +213,7 @@ def _draw_starts(axes: Axes, mission: Mission, looks: Mapping[UavId, _Look]) -> 
 
 def _start_groups(mission: Mission) -> list[list[Uav]]:
     """UAVs whose starts are too close to be told apart on the map, drawn as one."""
-    close_m = 0.02 * float(np.ptp(np.array(_places_m(mission)), axis=0).max())
+    close_m = 0.03 * float(np.ptp(np.array(_places_m(mission)), axis=0).max())
     groups: list[list[Uav]] = []
     for uav in mission.uavs:
         east_m, north_m = uav.position_enu_m[:2]

@@ -1,0 +1,204 @@
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordinator.planner.sequence import SearchLimits, best_sequence
+from coordinator.planner.stop import after_evaluations
+from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
+from swarm.allocation.problem import FloatArray
+from tests.problems import any_problem, random_problem, table_1
+
+SEEDS = st.integers(0, 2**32 - 1)
+NO_LISTING = SearchLimits(first_rounds=0, first_rounds_large_fleet=0)
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+def objective_of(problem: Problem, sequence: tuple[int, ...], rule: str) -> float:
+    routes, _ = run(problem, TeamState.at_start(problem), rank_of(sequence), rule_by_name(rule))
+    return evaluate(problem, routes)[0]
+
+
+def best_of_all(problem: Problem, rule: str) -> float:
+    sequences = permutations(range(problem.n_uav))
+    return max(objective_of(problem, sequence, rule) for sequence in sequences)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=SEEDS,
+    n_uav=st.integers(1, 4),
+    n_task=st.integers(0, 8),
+    rule=st.sampled_from(["greedy", "lookahead"]),
+)
+def test_small_fleets_get_the_best_of_all_sequences(
+    seed: int, n_uav: int, n_task: int, rule: str
+) -> None:
+    problem = any_problem(seed, n_uav, n_task)
+
+    found = best_sequence(problem, rule_by_name(rule), rng())
+
+    assert found.exhaustive
+    assert found.objective == pytest.approx(best_of_all(problem, rule), abs=1e-9)
+    assert objective_of(problem, found.sequence, rule) == pytest.approx(found.objective, abs=1e-9)
+
+
+def grid_problem(seed: int, n_uav: int, n_task: int) -> Problem:
+    """Few distinct speeds, places and values, so that UAVs equal each other and become free at
+    the same times."""
+    random = np.random.default_rng(seed)
+
+    def few(*shape: int) -> FloatArray:
+        return random.integers(0, 3, shape).astype(float)
+
+    template = random_problem(random, n_uav, n_task)
+    return Problem(
+        uav_ids=template.uav_ids,
+        task_ids=template.task_ids,
+        start_enu_m=few(n_uav, 3) * [1.0, 0.0, 0.0],
+        task_enu_m=few(n_task, 3) * [1.0, 1.0, 0.0],
+        speed_m_s=random.choice([1.0, 2.0], n_uav),
+        value=random.choice([1.0, 2.0, 3.0], n_task),
+        service_s=random.choice([0.0, 1.0], n_task),
+        success=np.full((n_uav, n_task), 0.5),
+        survival=np.ones((n_uav, n_task)),
+        horizon_s=9.0,
+    )
+
+
+@settings(deadline=None, max_examples=80)
+@given(seed=SEEDS, n_uav=st.integers(1, 4), n_task=st.integers(1, 8))
+def test_ties_and_equal_uavs_hide_no_better_sequence(seed: int, n_uav: int, n_task: int) -> None:
+    problem = grid_problem(seed, n_uav, n_task)
+
+    found = best_sequence(problem, rule_by_name("greedy"), rng())
+
+    assert found.exhaustive
+    assert found.objective == pytest.approx(best_of_all(problem, "greedy"))
+
+
+def test_each_distinct_first_round_is_evaluated_once() -> None:
+    found = best_sequence(table_1(), rule_by_name("greedy"), rng())
+
+    assert found.evaluations == 4  # of six sequences, two pairs of which begin alike
+
+
+def test_equal_objectives_go_to_the_first_sequence_in_scenario_order() -> None:
+    assert best_sequence(table_1(), rule_by_name("greedy"), rng()).sequence == (0, 2, 1)
+
+
+def test_equal_uavs_need_one_evaluation() -> None:
+    problem = random_problem(np.random.default_rng(0), 7, 20)
+    equal = Problem(
+        uav_ids=problem.uav_ids,
+        task_ids=problem.task_ids,
+        start_enu_m=np.zeros((7, 3)),
+        task_enu_m=problem.task_enu_m,
+        speed_m_s=np.full(7, 3.0),
+        value=problem.value,
+        service_s=problem.service_s,
+        success=np.ones((7, 20)),
+        survival=np.ones((7, 20)),
+        horizon_s=30.0,
+    )
+
+    found = best_sequence(equal, rule_by_name("greedy"), rng())
+
+    assert found.exhaustive
+    assert (found.sequence, found.evaluations) == (tuple(range(7)), 1)
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_state_on_the_way_is_searched_exhaustively_too(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    problem = random_problem(random, 4, 9, lowest_survival=0.5)
+    state = TeamState.at_start(problem)
+    state.free_s[:] = random.choice([1.0, 2.0], 4)
+    state.survived[:] = random.uniform(0.2, 1.0, 4)
+    state.open[:2] = False
+    state.active[int(random.integers(4))] = False
+    rule = rule_by_name("greedy")
+
+    found = best_sequence(problem, rule, rng(), state=state)
+
+    values = []
+    for sequence in permutations(range(4)):
+        routes, completion_s = run(problem, state, rank_of(sequence), rule)
+        value = 0.0
+        for uav, route in enumerate(routes):
+            survived = float(state.survived[uav])
+            for task in route:
+                left_s = problem.horizon_s - float(completion_s[task])
+                value += survived * float(problem.weight[uav, task]) * left_s
+                survived *= float(problem.survival[uav, task])
+        values.append(value)
+    assert found.exhaustive
+    assert found.objective == pytest.approx(max(values), abs=1e-9)
+    assert not state.active[found.sequence[-1]]
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_local_search_finds_the_best_of_a_small_fleet(seed: int) -> None:
+    problem = random_problem(np.random.default_rng(seed), 4, 10)
+
+    found = best_sequence(problem, rule_by_name("greedy"), rng(), limits=NO_LISTING)
+
+    assert not found.exhaustive
+    assert found.objective == pytest.approx(best_of_all(problem, "greedy"))
+
+
+def test_local_search_is_repeatable_and_keeps_to_its_evaluations() -> None:
+    problem = random_problem(np.random.default_rng(11), 14, 40)
+
+    first, second = (
+        best_sequence(
+            problem, rule_by_name("greedy"), rng(), after_evaluations(60), limits=NO_LISTING
+        )
+        for _ in range(2)
+    )
+
+    assert first == second
+    assert 1 <= first.evaluations <= 60
+
+
+def test_more_work_never_makes_it_worse() -> None:
+    problem = random_problem(np.random.default_rng(12), 14, 40)
+
+    values = [
+        best_sequence(
+            problem, rule_by_name("greedy"), rng(), after_evaluations(limit), limits=NO_LISTING
+        ).objective
+        for limit in (1, 20, 100, 300)
+    ]
+
+    assert values == sorted(values)
+
+
+@pytest.mark.parametrize("n_uav", [3, 12])
+def test_stopped_at_once_still_gives_a_sequence(n_uav: int) -> None:
+    problem = random_problem(np.random.default_rng(1), n_uav, 15)
+
+    found = best_sequence(problem, rule_by_name("greedy"), rng(), lambda _: True)
+
+    assert sorted(found.sequence) == list(range(n_uav))
+    assert found.evaluations == 1
+    assert not found.exhaustive
+
+
+def test_no_uav_and_no_task_are_searched_without_complaint() -> None:
+    for n_uav, n_task in ((0, 3), (3, 0), (10, 0)):
+        problem = random_problem(np.random.default_rng(1), n_uav, n_task)
+
+        found = best_sequence(problem, rule_by_name("greedy"), rng())
+
+        assert found.sequence == tuple(range(n_uav))
+        assert found.objective == 0.0

@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm.allocation import Problem
+from swarm.model import Task, TaskId
+from tests.problems import random_problem, table_1, table_1_mission
+
+
+def arguments() -> dict[str, Any]:
+    problem = random_problem(np.random.default_rng(0), 2, 3)
+    names = ("uav_ids", "task_ids", "start_enu_m", "task_enu_m", "speed_m_s", "value")
+    return {
+        name: getattr(problem, name)
+        for name in (*names, "service_s", "success", "survival", "horizon_s")
+    }
+
+
+def test_mission_becomes_arrays_in_scenario_order() -> None:
+    problem = table_1()
+
+    assert problem.uav_ids == ("uav1", "uav2", "uav3")
+    assert problem.task_ids == ("t1", "t2", "t3", "t4", "t5", "t6", "t7", "t8")
+    assert problem.start_enu_m.tolist() == [[5.0, 0.0, 0.0]] * 3
+    assert problem.task_enu_m[1].tolist() == [2.0, 2.0, 0.0]
+    assert problem.success[0].tolist() == [0.9, 0.9, 0.9, 0.7, 0.7, 0.7, 0.7, 0.7]
+    assert problem.weight[1, 7] == 0.9 * 4.5
+    assert problem.capable.all()
+
+
+def test_rows_and_columns_may_be_chosen() -> None:
+    mission = table_1_mission()
+    extra = Task(TaskId("extra"), (1.0, 2.0, 3.0), 2.0, service_s=4.0)
+
+    problem = Problem.from_mission(mission, uavs=mission.uavs[1:2], tasks=[extra, mission.tasks[6]])
+
+    assert problem.uav_ids == ("uav2",)
+    assert problem.task_ids == ("extra", "t7")
+    assert problem.success.tolist() == [[0.7, 0.9]]
+    assert problem.service_s.tolist() == [4.0, 0.0]
+
+
+def test_empty_fleet_and_empty_task_list_keep_their_shapes() -> None:
+    problem = Problem.from_mission(table_1_mission(), uavs=[], tasks=[])
+
+    assert problem.success.shape == (0, 0)
+    assert problem.start_enu_m.shape == (0, 3)
+
+
+def test_pop_ups_are_columns_unless_left_out_by_the_caller() -> None:
+    mission = table_1_mission()
+    late = replace(mission.tasks[0], appears_s=1.0)
+    mission = replace(mission, tasks=(late, *mission.tasks[1:]))
+
+    assert Problem.from_mission(mission).n_task == 8
+    assert Problem.from_mission(mission.known_at_start()).n_task == 7
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("start_enu_m", np.zeros((2, 2))),
+        ("task_enu_m", np.zeros((2, 3))),
+        ("speed_m_s", np.zeros(2)),
+        ("speed_m_s", np.array([1.0, -1.0])),
+        ("speed_m_s", np.array([1.0, np.inf])),
+        ("value", np.array([1.0, 2.0, -1.0])),
+        ("value", np.array([1.0, 2.0, np.nan])),
+        ("service_s", np.array([0.0, -0.1, 0.0])),
+        ("success", np.full((2, 3), 1.1)),
+        ("success", np.full((3, 2), 0.5)),
+        ("survival", np.full((2, 3), -0.1)),
+        ("horizon_s", 0.0),
+        ("horizon_s", float("nan")),
+        ("uav_ids", ("a", "a")),
+        ("task_ids", ("a", "b", "a")),
+    ],
+)
+def test_wrong_argument_is_refused_by_name(name: str, value: object) -> None:
+    with pytest.raises(ValueError, match=name):
+        Problem(**{**arguments(), name: value})
+
+
+def test_arrays_are_copies_that_cannot_be_written() -> None:
+    given = arguments()
+    problem = Problem(**given)
+
+    with pytest.raises(ValueError, match="read-only"):
+        problem.value[0] = 1.0
+    assert problem.value is not given["value"]
+
+
+def test_travel_time_is_the_distance_in_three_dimensions_over_the_speed() -> None:
+    problem = table_1()
+
+    travel_s = problem.travel_s(1, np.array([1.0, 10.0, 12.0]))
+
+    assert travel_s[0] == 12.0 / 5.0
+    assert travel_s[1] == pytest.approx(np.sqrt(1.0 + 64.0 + 144.0) / 5.0)
