@@ -126,17 +126,18 @@ class AgentCore:
         return self._drain()
 
     def next_deadline_s(self) -> float:
-        """When `step` wants a `Tick` at the latest."""
-        deadlines = (
-            self._membership.next_deadline_s(),
-            self._held_at_s,
-            self._served_at_s,
-            self._retry_at_s,
-            self._settled_at_s,
-            self._ask_at_s,
-            self._announce_at_s,
-            self._status_at_s,
-        )
+        """When `step` wants a `Tick` at the latest.
+
+        Only what the present phase acts upon counts: a deadline that nobody heeds
+        would be past for ever.
+        """
+        deadlines = [self._membership.next_deadline_s(), self._announce_at_s, self._status_at_s]
+        if self.phase is StatusPhase.LEARNING:
+            deadlines.append(self._ask_at_s)
+        if self._airborne:
+            deadlines.append(self._settled_at_s)
+            if self._running:
+                deadlines += [self._held_at_s, self._served_at_s, self._retry_at_s]
         return min(deadline for deadline in deadlines if deadline is not None)
 
     def snapshot(self, now_s: float) -> Snapshot:
@@ -273,7 +274,9 @@ class AgentCore:
 
     def _advance(self, now_s: float) -> None:
         for writer in self._membership.lost(now_s):
-            self._actions.append(Note("lost", {"writer": writer}))
+            claim = self.replica.claims.get(writer)
+            left = claim is not None and claim.phase is ClaimPhase.OUT
+            self._actions.append(Note("left" if left else "lost", {"writer": writer}))
             self._awake(now_s)
         if self.phase is StatusPhase.LEARNING:
             self._prepare(now_s)
@@ -288,7 +291,6 @@ class AgentCore:
     def _prepare(self, now_s: float) -> None:
         me = self._me()
         if self._learned and me is not None:
-            self._ask_at_s = None
             self.phase = StatusPhase.PREPARING
             self._actions.append(
                 Order(Prepare(self._in_layer(me.position_enu_m), me.speed_m_s)),

@@ -182,7 +182,9 @@ class CoordinatorCore:
 
     def _advance(self, now_s: float) -> None:
         for writer in self._membership.lost(now_s):
-            self._actions.append(Note("lost", {"writer": writer}))
+            claim = self.replica.claims.get(writer)
+            left = claim is not None and claim.phase is ClaimPhase.OUT
+            self._actions.append(Note("left" if left else "lost", {"writer": writer}))
         if self._ended:
             self._leave_when_empty(now_s)
         elif self._zero_s is None:
