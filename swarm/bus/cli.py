@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm.bus.config import DEFAULT_LEASE_S, DEFAULT_ROUTER
+from swarm.options import JsonOption, LeaseOption, LifelineOption
+
 if TYPE_CHECKING:
     from swarm.bus.config import RouterConfig
 
 __all__ = ["router"]
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
 def router(
@@ -26,8 +27,8 @@ def router(
         list[str] | None,
         typer.Option(
             metavar="ENDPOINT",
-            help="Where clients reach it; repeatable; port 0 means any free one. "
-            f"[default: {DEFAULT_ENDPOINT}]",
+            help="Where clients reach it; may be repeated; port 0 means any free one. "
+            f"Default: {DEFAULT_ROUTER}.",
             show_default=False,
         ),
     ] = None,
@@ -35,7 +36,7 @@ def router(
         list[str] | None,
         typer.Option(
             metavar="ENDPOINT",
-            help="Another router to link up with; repeatable.",
+            help="Another router to link up with; may be repeated.",
             show_default=False,
         ),
     ] = None,
@@ -47,16 +48,9 @@ def router(
             show_default=False,
         ),
     ] = None,
-    lease_s: Annotated[
-        float,
-        typer.Option(metavar="S", help="Silence after which clients take the router for lost."),
-    ] = 1.0,
-    json: Annotated[
-        bool, typer.Option("--json", help="Say nothing but the JSON line on standard output.")
-    ] = False,
-    lifeline: Annotated[
-        bool, typer.Option("--lifeline", hidden=True, help="Stop when standard input ends.")
-    ] = False,
+    lease_s: LeaseOption = DEFAULT_LEASE_S,
+    json: JsonOption = False,
+    lifeline: LifelineOption = False,
 ) -> int:
     """Serve a fleet whose agents and coordinator are clients of one place.
 
@@ -71,7 +65,7 @@ def router(
     from swarm.errors import Fault, InputError
     from swarm.process import run_until_stopped
 
-    listens = tuple(listen or (() if config else (DEFAULT_ENDPOINT,)))
+    listens = tuple(listen or (() if config else (DEFAULT_ROUTER,)))
     try:
         settings = RouterConfig(listens, tuple(connect or ()), config, lease_s)
     except ValueError as fault:

@@ -53,6 +53,8 @@ def intersects(one: str, other: str) -> bool:
 def _fault(key_expr: str) -> str | None:
     if not key_expr:
         return "it is empty"
+    if not key_expr.isascii() and any("\ud800" <= sign <= "\udfff" for sign in key_expr):
+        return "half a surrogate pair is no text"
     before = None
     for chunk in key_expr.split("/"):
         if not chunk:

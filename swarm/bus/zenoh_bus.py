@@ -167,7 +167,6 @@ class ZenohBus:
         self._session = session
         self._inbox = inbox
         self._loop = asyncio.get_running_loop()
-        self._log = get_logger("swarm.bus")
         self._writer = Writer("zenoh writer")
         self._closed = False
         self._subscribed: dict[str, bool] = {}
@@ -283,7 +282,9 @@ class ZenohBus:
             return
         self._closed = True
         if not self._writer.close(FLUSH_LIMIT_S):
-            self._log.warning("the network is stuck; not all that was published went out")
+            get_logger("swarm.bus").warning(
+                "the network is stuck; not all that was published went out"
+            )
         for reply in list(self._replies):
             reply.drop()
         close_session(self._session, limit_s=CLOSE_LIMIT_S)
@@ -300,7 +301,7 @@ class ZenohBus:
         try:
             call()
         except zenoh.ZError as fault:
-            self._log.warning("the bus refused a call", problem=plain_error(fault))
+            get_logger("swarm.bus").warning("the bus refused a call", problem=plain_error(fault))
 
     def _declare_token(self, key: str) -> None:
         # Kept, or it would be undeclared when it is collected.

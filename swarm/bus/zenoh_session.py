@@ -124,14 +124,13 @@ def close_session(session: zenoh.Session, *, limit_s: float) -> bool:
     Into a dead network closing takes 10 s. Then it goes on in the background, and
     `swarm.process.leave` does not wait for it.
     """
-    log = get_logger("swarm.bus")
     try:
         call_in_background(session.close, "zenoh close").result(limit_s)
     except TimeoutError:
-        log.warning("the network does not answer; left without saying goodbye")
+        get_logger("swarm.bus").warning("the network does not answer; left without saying goodbye")
         return False
     except zenoh.ZError as fault:
-        log.warning("closing the bus failed", problem=plain_error(fault))
+        get_logger("swarm.bus").warning("closing the bus failed", problem=plain_error(fault))
     return True
 
 

@@ -128,3 +128,35 @@ def test_second_interrupt_kills_a_daemon_that_hangs_in_its_clean_up() -> None:
         assert daemon.wait(LIMIT_S) == -signal.SIGINT
     finally:
         finish(daemon)
+
+
+LEAVE = """
+import threading
+from swarm.process import call_in_background, leave
+
+print("said")
+outcome = call_in_background({call}, "maybe hanging")
+{then}
+leave(5)
+"""
+
+
+@pytest.mark.parametrize(
+    ("call", "then"),
+    [
+        ("threading.Event().wait", ""),
+        ("lambda: 42", "assert outcome.result() == 42"),
+        ("lambda: 1 / 0", "assert isinstance(outcome.exception(), ZeroDivisionError)"),
+    ],
+    ids=["hangs", "returns", "raises"],
+)
+def test_leaving_keeps_status_and_output_whatever_hangs(call: str, then: str) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", LEAVE.format(call=call, then=then)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+    )
+
+    assert (ended.returncode, ended.stdout, ended.stderr) == (5, "said\n", "")

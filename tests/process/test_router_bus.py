@@ -12,10 +12,10 @@ import pytest
 
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology
 from swarm.bus.endpoints import free_loopback_endpoints
-from swarm.bus.port import LinkDown, LinkUp, TokenGone, TokenSeen
+from swarm.bus.port import LinkDown, LinkUp, Query, TokenGone, TokenSeen
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.errors import BusError, InputError
-from tests.contract.bus_fleet import Join, Reader, client_seats, run
+from tests.contract.bus_fleet import Join, Reader, client_seats, run, settle
 from tests.process.router_processes import finish, router, started, token_holder
 
 pytestmark = pytest.mark.process
@@ -162,6 +162,39 @@ def test_clients_of_linked_routers_see_each_other() -> None:
         router("--listen", "tcp/127.0.0.1:0", "--connect", one) as (_, other),
     ):
         run(client_seats(one), scenario)
+
+
+def test_held_query_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("swarm.bus.zenoh_bus.REPLY_WITHIN_S", 0.2)
+
+    async def scenario(join: Join) -> None:
+        asker, server = [Reader(await join()) for _ in range(2)]
+        server.bus.serve("state/s")
+        await settle(asker, server)
+
+        asking = asyncio.create_task(asker.bus.query("state/*", timeout_s=20.0))
+        query = await server.next_of(Query)
+        async with asyncio.timeout(5.0):
+            assert await asking == ()
+        query.reply(b"too late")
+
+    with router("--listen", "tcp/127.0.0.1:0") as (_, endpoint):
+        run(client_seats(endpoint), scenario)
+
+
+def test_query_thrown_away_unanswered_keeps_nobody_waiting() -> None:
+    async def scenario(join: Join) -> None:
+        asker, server = [Reader(await join()) for _ in range(2)]
+        server.bus.serve("state/s")
+        await settle(asker, server)
+
+        asking = asyncio.create_task(asker.bus.query("state/*", timeout_s=20.0))
+        await server.next_of(Query)
+        async with asyncio.timeout(5.0):
+            assert await asking == ()
+
+    with router("--listen", "tcp/127.0.0.1:0") as (_, endpoint):
+        run(client_seats(endpoint), scenario)
 
 
 CLIENT_FILE = """{

@@ -7,7 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from swarm.bus.config import BusConfig, ClientTopology, MeshTopology, RouterConfig
+from swarm.bus.config import (
+    DEFAULT_ROUTER,
+    BusConfig,
+    ClientTopology,
+    FileTopology,
+    MeshTopology,
+    RouterConfig,
+    bus_config,
+)
+from swarm.errors import InputError
 
 A = "tcp/127.0.0.1:7447"
 B = "tcp/127.0.0.1:7448"
@@ -59,3 +68,30 @@ def test_peers_and_routers_may_listen_on_any_port() -> None:
     assert MeshTopology("tcp/127.0.0.1:0", (A,)).dial == (A,)
     assert RouterConfig(("tcp/127.0.0.1:0",)).lease_s == 1.0
     assert RouterConfig(path=Path("router.json5")).listen == ()
+
+
+def test_command_line_names_a_topology(tmp_path: Path) -> None:
+    file = tmp_path / "zenoh.json5"
+    file.touch()
+
+    assert bus_config("mesh", A, [B], 2.0) == BusConfig(MeshTopology(A, (B,)), 2.0)
+    assert bus_config("router", "", [B, A]) == BusConfig(ClientTopology((B, A)))
+    assert bus_config("router", "", []) == BusConfig(ClientTopology((DEFAULT_ROUTER,)))
+    assert bus_config(str(file), "", []) == BusConfig(FileTopology(file))
+
+
+@pytest.mark.parametrize(
+    ("kind", "listen", "connect", "says"),
+    [
+        ("mesh", "", [A], "needs --listen"),
+        ("mesh", A, ["nowhere"], "not an endpoint: 'nowhere'"),
+        ("router", A, [], "--listen is for --bus mesh only"),
+        ("no/such/file", "", [], "no such Zenoh configuration file"),
+        ("no/such/file", "", [A], "for --bus mesh or router only"),
+    ],
+)
+def test_command_line_that_contradicts_itself_is_refused(
+    kind: str, listen: str, connect: list[str], says: str
+) -> None:
+    with pytest.raises(InputError, match=says):
+        bus_config(kind, listen, connect)

@@ -53,7 +53,9 @@ def test_expression_meets_the_keys_it_includes(expression: str, key: str) -> Non
     assert intersects(expression, key) == zenoh.KeyExpr(expression).includes(key)
 
 
-@pytest.mark.parametrize("text", ["", "/a", "a/", "a//b", "a?b", "a#", "$*", "a*", "**/**", "**/*"])
+@pytest.mark.parametrize(
+    "text", ["", "/a", "a/", "a//b", "a?b", "a#", "$*", "a*", "**/**", "**/*", "\udc80"]
+)
 def test_says_what_is_wrong(text: str) -> None:
     with pytest.raises(ValueError, match="not a key expression: "):
         check_key_expr(text)
