@@ -59,7 +59,10 @@ class Pilot:
         self.outbox = outbox
         self.parameters = parameters
         self.parameter_server = ParameterServer(
-            self.parameters, outbox, reports_errors=flavour.reports_parameter_errors
+            self.parameters,
+            outbox,
+            reports_errors=flavour.reports_parameter_errors,
+            unanswered=flavour.unanswered_parameters,
         )
         self.readiness = Readiness(config.delays, boot_s)
         self.flight = Flight(config, self.parameters, IdealMotion(config.start_enu_m))

@@ -66,6 +66,8 @@ class ArduCopter:
     take_off_above_home: bool = True
     uploads_by_int: bool = False
     first_item: int = 1
+    unanswered_parameters: frozenset[str] = frozenset({"SYSID_THISMAV"})
+    """As recorded: the old name of a renamed parameter got neither value nor error."""
     unasked_streams: Mapping[int, float] = MappingProxyType({})
 
     def __init__(self, *, old_names: bool = False) -> None:

@@ -36,6 +36,8 @@ class Flavour(Protocol):
     """Number of the first mission item that is flown: 1 where item 0 is home."""
     reports_parameter_errors: bool
     """Whether an unknown parameter is answered by PARAM_ERROR; otherwise by nothing."""
+    unanswered_parameters: frozenset[str]
+    """Unknown parameters that are answered by nothing all the same."""
     unasked_streams: Mapping[int, float]
     """Messages and intervals [s] streamed on a new channel; heartbeats go without saying."""
 
