@@ -39,7 +39,7 @@ UNDERSTOOD = [
     "heartbeat",
 ]
 COMMANDS = [16, 20, 21, 22, 176, 178, 179, 183, 192, 224, 246, 300, 400, 410, 510, 511, 512, 520]
-NUMBERS = {
+NUMBERS: dict[str, st.SearchStrategy[Any]] = {
     "float": st.one_of(
         st.floats(width=32),
         st.sampled_from([0.0, 1.0, 4.0, 3.0, math.nan, math.inf, 21196.0, 20190226.0, 1e30]),
@@ -67,7 +67,7 @@ NUMBERS = {
 def messages(draw: st.DrawFn) -> Any:
     """A message the vehicle understands, with arbitrary contents, mostly for this vehicle."""
     message_type = getattr(mavlink, f"MAVLink_{draw(st.sampled_from(UNDERSTOOD))}_message")
-    values = {}
+    values: dict[str, Any] = {}
     for field, kind in zip(message_type.fieldnames, message_type.fieldtypes, strict=True):
         if field in ("target_system", "target_component"):
             values[field] = draw(st.sampled_from([1, 1, 1, 0, 7]))

@@ -55,8 +55,8 @@ class VehicleTime:
 
     def __init__(self, messages: list[dict[str, Any]], speedup: float) -> None:
         reports = [each for each in messages if each["msg"] == "GLOBAL_POSITION_INT"]
-        self._wall_s = [each["t_s"] for each in reports]
-        self._boot_s = [each["time_boot_ms"] / 1e3 for each in reports]
+        self._wall_s: list[float] = [each["t_s"] for each in reports]
+        self._boot_s: list[float] = [each["time_boot_ms"] / 1e3 for each in reports]
         self._speedup = speedup
 
     def __call__(self, wall_s: float) -> float:
@@ -68,7 +68,7 @@ class VehicleTime:
         (wall_0, wall_1), (boot_0, boot_1) = (
             pair[place - 1 : place + 1] for pair in (self._wall_s, self._boot_s)
         )
-        return float(boot_0 + (boot_1 - boot_0) * (wall_s - wall_0) / (wall_1 - wall_0))
+        return boot_0 + (boot_1 - boot_0) * (wall_s - wall_0) / (wall_1 - wall_0)
 
 
 def what_matters(messages: list[dict[str, Any]], asked: set[str]) -> Iterator[Key]:
