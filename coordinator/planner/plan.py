@@ -31,8 +31,8 @@ _EXHAUSTIVE_DECISIONS = 600_000
 """Decisions all first rounds together may take to be tried one by one: some 10 s."""
 _LOCAL_DECISIONS = 120_000
 """The same for the local search: some 2 s."""
-_LONG_LOOKAHEAD_EVALUATIONS = 6
-"""One of them takes about a second at 60 tasks, so a few must do."""
+_LONG_LOOKAHEAD_EVALUATIONS = 8
+"""One of them takes about half a second at 60 tasks, so a few must do."""
 
 
 def make_plan(

@@ -15,7 +15,9 @@ from swarm.allocation.problem import FloatArray, IntArray
 __all__ = ["BEAM_WIDTH", "good_tours", "tour_values"]
 
 BEAM_WIDTH = 64
-_SWEEPS = 4
+_SWEEPS = 6
+_REACH = 12
+"""How many places away a task may be moved; a longer way would hardly ever pay."""
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -81,15 +83,18 @@ def _beam(
     leg_s: FloatArray,
     horizon_s: float,
 ) -> IntArray:
-    """Grow many tours task by task; keep those whose bound is best.
+    """Grow many tours task by task; keep the most promising.
 
-    The bound is what is earned plus what the open tasks would earn if all were done at once,
-    so that a detour costs its time × all the weight still waiting.
+    What is earned, plus what the waiting tasks would earn if all were done at once by a UAV whose
+    chance to be there wears off as usual: a detour costs its time × all the weight still waiting.
     """
     n = len(weight)
     left_s = horizon_s - completion_s
-    bound = left_s * (weight + survival * (weight.sum() - weight))
-    tours = np.argsort(-bound, kind="stable")[:BEAM_WIDTH, None]
+    typical = float(survival.mean())
+    # chance to be there for a waiting task, on average over all of them, by how many wait
+    there = np.concatenate([[1.0], np.cumsum(typical ** np.arange(n)) / np.arange(1, n + 1)])
+    promise = left_s * (weight + there[n - 1] * survival * (weight.sum() - weight))
+    tours = np.argsort(-promise, kind="stable")[:BEAM_WIDTH, None]
     last = tours[:, 0]
     open_ = np.ones((len(tours), n), dtype=np.bool_)
     open_[np.arange(len(tours)), last] = False
@@ -101,13 +106,14 @@ def _beam(
     mark ^= mark >> np.uint64(29)
     mark *= _GOLDEN  # sums of marks tell sets apart
     visited = mark[last]
-    for _ in range(n - 1):
+    for left in range(n - 1, 0, -1):
         times_s = free_s[:, None] + leg_s[last]
         left_s = horizon_s - times_s
         gain = survived[:, None] * weight * left_s
         after = (waiting[:, None] - weight) * (survived[:, None] * survival) * left_s
-        bound = np.where(open_, earned[:, None] + gain + after, -np.inf).reshape(-1)
-        chosen = _best_distinct(bound, (visited[:, None] + mark).reshape(-1), n)
+        after *= there[left - 1]
+        promise = np.where(open_, earned[:, None] + gain + after, -np.inf).reshape(-1)
+        chosen = _best_distinct(promise, (visited[:, None] + mark).reshape(-1), n)
         row, task = np.divmod(chosen, n)
         visited = visited[row] + mark[task]
         tours = np.concatenate([tours[row], task[:, None]], axis=1)
@@ -119,15 +125,15 @@ def _beam(
     return tours
 
 
-def _best_distinct(bound: FloatArray, visited: npt.NDArray[np.uint64], n: int) -> IntArray:
-    """Up to `BEAM_WIDTH` flat (row, task) places with the best bounds.
+def _best_distinct(promise: FloatArray, visited: npt.NDArray[np.uint64], n: int) -> IntArray:
+    """Up to `BEAM_WIDTH` flat (row, task) places with the best promises.
 
     Of those that have visited the same set and end at the same task, only the best stays.
     """
-    head = min(2 * BEAM_WIDTH, len(bound))
-    chosen = np.argpartition(-bound, head - 1)[:head]
-    chosen = chosen[bound[chosen] > -np.inf]
-    chosen = chosen[np.lexsort((chosen, -bound[chosen]))]
+    head = min(2 * BEAM_WIDTH, len(promise))
+    chosen = np.argpartition(-promise, head - 1)[:head]
+    chosen = chosen[promise[chosen] > -np.inf]
+    chosen = chosen[np.lexsort((chosen, -promise[chosen]))]
     key = visited[chosen] * np.uint64(n) + (chosen % n).astype(np.uint64)
     _, first = np.unique(key, return_index=True)
     first.sort()
@@ -137,16 +143,16 @@ def _best_distinct(bound: FloatArray, visited: npt.NDArray[np.uint64], n: int) -
 
 @lru_cache(maxsize=64)
 def _moves(n: int) -> IntArray:
-    """(k, n) permutations of places: every reversal, and every move of one or two tasks."""
+    """(k, n) permutations of places: reversals, and moves of one or two tasks, over some way."""
     here = list(range(n))
     moves: dict[tuple[int, ...], None] = {}
     for low in range(n):
-        for high in range(low + 1, n):
+        for high in range(low + 1, min(n, low + 1 + _REACH)):
             moves[(*here[:low], *here[low : high + 1][::-1], *here[high + 1 :])] = None
     for size in (1, 2):
         for low in range(n - size + 1):
             rest = here[:low] + here[low + size :]
-            for to in range(len(rest) + 1):
+            for to in range(max(0, low - _REACH), min(len(rest), low + _REACH) + 1):
                 if to != low:
                     moves[(*rest[:to], *here[low : low + size], *rest[to:])] = None
     return np.array(list(moves), dtype=np.int64)

@@ -105,9 +105,8 @@ def _arrive(
 ) -> tuple[float, list[float]]:
     """Completion time [s] and place after flying to ``task`` and serving it."""
     there = [float(c) for c in problem.task_enu_m[task]]
-    distance_m = math.sqrt(
-        (there[0] - place[0]) ** 2 + (there[1] - place[1]) ** 2 + (there[2] - place[2]) ** 2
-    )
+    east_m, north_m, up_m = (there[axis] - place[axis] for axis in range(3))
+    distance_m = math.sqrt(east_m * east_m + north_m * north_m + up_m * up_m)
     travel_s = distance_m / float(problem.speed_m_s[uav])
     return free_s + travel_s + float(problem.service_s[task]), there
 
