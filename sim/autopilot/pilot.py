@@ -204,8 +204,8 @@ class Pilot:
         else:
             # In manual modes too: a pilot who takes over is taken to hold the place.
             self.flight.hold(now_s)
-            if self.flight.on_ground and self._disarm_s is None:
-                self._arm_delay(now_s)
+        if self.flight.on_ground and self.run.state is not RunState.RUNNING:
+            self._stay_on_ground(now_s)
 
     def arm(self, now_s: float, *, forced: bool) -> bool:
         """Start the motors; False, with a text, while the vehicle isn't ready."""
@@ -250,6 +250,12 @@ class Pilot:
         self.flight.fall(now_s)
         self.outbox.text(mavlink.MAV_SEVERITY_INFO, "Disarming motors")
 
+    def _stay_on_ground(self, now_s: float) -> None:
+        """Give up a take-off that has not begun to rise; the motors stop after the usual delay."""
+        self.flight.hold(now_s)
+        if self._disarm_s is None:
+            self._arm_delay(now_s)
+
     def _arm_delay(self, now_s: float) -> None:
         delay_s = self.parameters.value_si(Setting.DISARM_DELAY_S)
         self._disarm_s = now_s + delay_s if delay_s > 0.0 else None
@@ -271,8 +277,15 @@ class Pilot:
         self.flight.take_off(up_m, now_s)
 
     def fly_guided(self, target_enu_m: Point, now_s: float) -> None:
-        """Fly to a place at once, in GUIDED; on the ground the target is taken and not flown."""
-        if not self.armed or self.flight.on_ground:
+        """Fly to a place at once, in GUIDED.
+
+        On the ground the target is taken and not flown; worse, it takes the place
+        of a take-off that has not left the ground yet, as on ArduCopter.
+        """
+        if not self.armed:
+            return
+        if self.flight.on_ground:
+            self._stay_on_ground(now_s)
             return
         if not self._position_control:
             # ArduCopter gives the speed parameter its say again when its position
@@ -339,7 +352,9 @@ class Pilot:
 
     def mission_navigate(self, item: MissionItem, now_s: float) -> None:
         """Fly to the place of the item; not from the ground."""
-        if not self.flight.on_ground:
+        if self.flight.on_ground:
+            self._stay_on_ground(now_s)
+        else:
             self.flight.navigate(self._place(item, now_s), now_s)
 
     def mission_land(self, now_s: float) -> None:

@@ -311,6 +311,7 @@ class Telemetry:
         del now_s
         landed = {
             Activity.GROUNDED: mavlink.MAV_LANDED_STATE_ON_GROUND,
+            Activity.SPOOLING_UP: mavlink.MAV_LANDED_STATE_ON_GROUND,
             Activity.TAKING_OFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
             Activity.LANDING: mavlink.MAV_LANDED_STATE_LANDING,
             Activity.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,

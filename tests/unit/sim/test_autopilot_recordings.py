@@ -157,6 +157,7 @@ def arducopter(delays: Delays) -> Vehicle:
         system_id=1,
         origin=Origin(47.3977, 8.5456, 488.1),
         delays=delays,
+        spool_up_s=3.0,
         land_m_s=0.6,  # the recorded vehicle slows down to 0.5 m/s near the ground
     )
     return Vehicle(config, ArduCopter(), 0.0)
@@ -187,6 +188,7 @@ def test_vehicle_goes_through_the_recorded_states(
     # States that last less than a heartbeat may be missed on either side.
     fields = ("HEARTBEAT", "custom_mode", "base_mode", "system_status")
     assert set(states(simulated, *fields)) <= set(states(real, *fields))
+    assert (4, 217, 3) in states(simulated, *fields)  # armed and spooling up
     last = states(real, "SYS_STATUS", "onboard_control_sensors_health")[-1]
     assert states(simulated, "SYS_STATUS", "onboard_control_sensors_health")[-1] == last
     assert states(simulated, "EKF_STATUS_REPORT", "flags") == [(167,), (831,)]
