@@ -9,7 +9,7 @@ out: every decision (agent.core) and flying (agent.mavlink).
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Protocol
 
 from agent.core import AgentCore
@@ -17,12 +17,13 @@ from agent.events import Action, Event, Order
 from agent.vehicle import Home, Orders, Report, Return
 from swarm.bus.port import Bus
 from swarm.clock import Clock
+from swarm.errors import BusError
 from swarm.events import Stop
 from swarm.model import Origin
 from swarm.process import StopRequest
 from swarm.shell import Shell, take_seat
 
-__all__ = ["Vehicle", "run_agent"]
+__all__ = ["Vehicle", "run_agent", "seat_or_stop"]
 
 FAREWELL_S = 2.0
 """Wall time that a vehicle has to come home when the agent is told to stop; after that
@@ -43,6 +44,34 @@ class Vehicle(Protocol):
     async def close(self) -> None:
         """Close the link; the vehicle goes on with what it does."""
         ...
+
+
+async def seat_or_stop(
+    open_bus: Callable[[], Awaitable[Bus]], stop: StopRequest, on_wait: Callable[[str], None]
+) -> Bus | None:
+    """A seat on the bus, tried for until there is one; None when told to stop first.
+
+    Args:
+        open_bus: tries once, for a bounded time.
+        stop: asks to give up.
+        on_wait: called with the reason whenever a try has failed.
+    """
+    loop = asyncio.get_running_loop()
+    stopped = loop.create_task(stop.wait())
+    try:
+        while True:
+            trying = asyncio.ensure_future(open_bus())
+            await asyncio.wait((trying, stopped), return_when=asyncio.FIRST_COMPLETED)
+            if not trying.done():
+                trying.cancel()
+                await asyncio.gather(trying, return_exceptions=True)
+                return None
+            try:
+                return trying.result()
+            except BusError as fault:
+                on_wait(str(fault))
+    finally:
+        stopped.cancel()
 
 
 async def run_agent(
