@@ -32,6 +32,7 @@ FirstRound = tuple[int, ...]
 _NO_TASK = -1
 _UNDECIDED = -2
 _CLIMBS_IN_VAIN = 20
+_MANY = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +82,8 @@ def best_sequence(
 
     Args:
         problem: the mission.
-        rule: how UAVs decide.
-        rng: moves of the local search; small fleets draw nothing from it.
+        rule: how UAVs decide; a rule that looks at the ranks is none of those this can search.
+        rng: moves of the climbs; fleets with few first rounds draw nothing from it.
         should_stop: asked before every evaluation after the first.
         state: where the team stands; at its start when None.
         limits: when to prefer the local search.
@@ -91,11 +92,11 @@ def best_sequence(
     search = _Search(problem, rule, state, should_stop)
     limits = SearchLimits() if limits is None else limits
     small = len(search.uavs) <= EXHAUSTIVE_UAVS
-    if search.has_plain_first_round():
+    if search.plain:
         most = limits.first_rounds if small else limits.first_rounds_large_fleet
         first_rounds = search.list_first_rounds(most, limits)
         if first_rounds is not None:
-            return search.result(exhaustive=search.try_first_rounds(first_rounds))
+            return search.result(exhaustive=search.try_first_rounds(first_rounds, rng))
     elif small:
         return search.result(exhaustive=search.try_each(permutations(search.uavs)))
     search.local_search(rng, limits.local_evaluations)
@@ -120,24 +121,15 @@ class _Search:
         self._twins = _twins(problem, state, self.uavs)
         self._place = {uav: place for place, uav in enumerate(self.uavs)}
         self._rank = rank_of(self.uavs + self._inactive)
-        self._plain = self.has_plain_first_round()
-        self._values: dict[Sequence, float] = {}
+        self.plain = self._has_plain_first_round()
+        """Priority alone orders the first round: all are free at once, and nobody twice."""
+        self._valued: dict[Sequence, tuple[float, bool]] = {}
+        self._representatives: dict[FirstRound, Sequence] = {}
         self._best: tuple[float, Sequence] = (-np.inf, self.uavs)
 
     def result(self, *, exhaustive: bool) -> SequenceSearch:
         objective, sequence = self._best
         return SequenceSearch(sequence + self._inactive, objective, self._evaluations, exhaustive)
-
-    def has_plain_first_round(self) -> bool:
-        """Whether priority alone orders the first round: all are free at once, nobody twice."""
-        if len({float(self._state.free_s[uav]) for uav in self.uavs}) > 1:
-            return False
-        for uav in self.uavs:
-            tasks = self._state.open & self._problem.capable[uav]
-            travel_s = self._problem.travel_s(uav, self._state.place_enu_m[uav])
-            if ((travel_s + self._problem.service_s)[tasks] <= 0.0).any():
-                return False
-        return True
 
     def try_each(self, sequences: Iterable[Sequence]) -> bool:
         """Evaluate all; whether it came to the end."""
@@ -172,13 +164,21 @@ class _Search:
             rounds = longer
         return rounds if len(rounds) <= most else None
 
-    def try_first_rounds(self, rounds: dict[FirstRound, Sequence]) -> bool:
-        """Evaluate each, and all its sequences where a later tie lets them differ."""
+    def try_first_rounds(
+        self, rounds: dict[FirstRound, Sequence], rng: np.random.Generator
+    ) -> bool:
+        """Evaluate each, and all its sequences where a later tie lets them differ.
+
+        Of many, those on one climb come first, so that being stopped early does less harm.
+        """
+        self._representatives = rounds
+        if len(rounds) > _MANY:
+            self._climb(self._constructed(), rng)
         tied: list[FirstRound] = []
         for first_round, sequence in sorted(rounds.items(), key=lambda item: item[1]):
             if self._stopped():
                 return False
-            if self._evaluate(sequence)[1]:
+            if self._value(first_round, sequence)[1]:
                 tied.append(first_round)
         for first_round in tied:
             others = (s for s in self._sequences_of(first_round, ()) if s != rounds[first_round])
@@ -189,38 +189,44 @@ class _Search:
     def local_search(self, rng: np.random.Generator, most_evaluations: int | None) -> None:
         """Climb by swaps and insertions, from constructed and then from disturbed sequences."""
         self._most_evaluations = np.inf if most_evaluations is None else most_evaluations
-        inside = set(self.uavs)
-        constructed = single_stage(self._problem, self._state).sequence
-        starts: list[Sequence] = [tuple(u for u in constructed if u in inside), self.uavs]
+        starts = [self._constructed(), self.uavs]
         climbs_in_vain = 0
         while climbs_in_vain < _CLIMBS_IN_VAIN and not self._stopped():
             before = self._evaluations
-            if starts:
-                self._climb(starts.pop(0), rng)
-            else:
-                self._climb(_disturbed(self._best[1], rng), rng)
+            start = starts.pop(0) if starts else _disturbed(self._best[1], rng)
+            self._climb(start, rng)
             climbs_in_vain = 0 if self._evaluations > before else climbs_in_vain + 1
 
+    def _constructed(self) -> Sequence:
+        sequence = single_stage(self._problem, self._state).sequence
+        return sequence[: len(self.uavs)]  # inactive UAVs come last
+
     def _climb(self, sequence: Sequence, rng: np.random.Generator) -> None:
-        value = self._value(sequence)
+        value = self._value_of(sequence)
         improved = True
         while improved:
             improved = False
             for neighbour in _neighbours(sequence, rng):
                 if self._stopped():
                     return
-                neighbour_value = self._value(neighbour)
+                neighbour_value = self._value_of(neighbour)
                 if neighbour_value > value:
                     sequence, value, improved = neighbour, neighbour_value, True
                     break
 
-    def _value(self, sequence: Sequence) -> float:
+    def _value_of(self, sequence: Sequence) -> float:
         """J, evaluated once per first round; that later ties may tell sequences apart is left."""
         sequence = self._in_twin_order(sequence)
-        key = self._first_round(sequence) if self._plain else sequence
-        if key not in self._values:
-            self._values[key] = self._evaluate(sequence)[0]
-        return self._values[key]
+        if not self.plain:
+            return self._value(sequence, sequence)[0]
+        first_round = self._first_round(sequence)
+        sequence = self._representatives.get(first_round, sequence)
+        return self._value(first_round, sequence)[0]
+
+    def _value(self, key: Sequence, sequence: Sequence) -> tuple[float, bool]:
+        if key not in self._valued:
+            self._valued[key] = self._evaluate(sequence)
+        return self._valued[key]
 
     def _evaluate(self, sequence: Sequence) -> tuple[float, bool]:
         """J of one lower-level run, and whether priority mattered again after the first round."""
@@ -243,6 +249,16 @@ class _Search:
         if value > best_value or (value == best_value and sequence < best_sequence_):
             self._best = (value, sequence)
         return value, tie
+
+    def _has_plain_first_round(self) -> bool:
+        if len({float(self._state.free_s[uav]) for uav in self.uavs}) > 1:
+            return False
+        for uav in self.uavs:
+            tasks = self._state.open & self._problem.capable[uav]
+            travel_s = self._problem.travel_s(uav, self._state.place_enu_m[uav])
+            if ((travel_s + self._problem.service_s)[tasks] <= 0.0).any():
+                return False
+        return True
 
     def _twin_waits(self, uav: int, sequence: Sequence) -> bool:
         """Whether ``uav`` would pass an equal UAV of smaller index, which changes only names."""
