@@ -148,7 +148,9 @@ class GroundStation:
 
 def ground_station(**config: Any) -> GroundStation:
     """A ground station connected to a vehicle that has just been powered up."""
-    vehicle = Vehicle(VehicleConfig(**{"system_id": 1, "spool_up_s": 0.0, **config}), ArduCopter(), 0.0)
+    vehicle = Vehicle(
+        VehicleConfig(**{"system_id": 1, "spool_up_s": 0.0, **config}), ArduCopter(), 0.0
+    )
     return GroundStation(vehicle)
 
 
