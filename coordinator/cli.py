@@ -111,7 +111,8 @@ def coordinator(
             "--start-timeout-s",
             min=1.0,
             metavar="S",
-            help="UAVs that are not airborne by then, in mission seconds, are given up.",
+            help="UAVs that are not airborne by then are given up; mission seconds, or wall "
+            "seconds where the mission runs faster.",
         ),
     ] = 120.0,
     lowest_layer_m: Annotated[
@@ -185,7 +186,7 @@ def coordinator(
             seed=seed,
             incarnation=incarnation(),
             timing=Timing().scaled(speedup),
-            start_timeout_s=start_timeout_s,
+            start_timeout_s=start_timeout_s * max(1.0, speedup),
             layers=FlightLayers(lowest_layer_m, layer_spacing_m),
         )
         seat = await open_zenoh_bus(config)

@@ -36,7 +36,7 @@ ROUTER = "router"
 PATIENCE = 4.0
 """A mission may take this many times its planned time..."""
 PATIENCE_S = 60.0
-"""...and this much longer [vehicle s], before it is given up."""
+"""...and this much longer, before it is given up [s of mission or wall, whichever is slower]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,18 +134,17 @@ class _Launch:
         router = self.child(ROUTER)
         if router is not None and router.returncode is not None:
             return f"the router {router.fate}"
-        limit_s = self._limit_s()
-        if limit_s is not None and self.clock.now_s() > limit_s:
+        if self.clock.now_s() > self._limit_s():
             return "it took far longer than planned"
         return None
 
-    def _limit_s(self) -> float | None:
-        plan, observer = self.observer.plan, self.observer
+    def _limit_s(self) -> float:
+        plan, fast = self.observer.plan, max(1.0, self.options.speedup)
+        patience_s = PATIENCE_S * fast
         if self.zero_s is None or plan is None:
-            return self.options.start_timeout_s + PATIENCE_S * self.options.speedup
-        latest_s = max((task.appears_s for task in observer.mission.tasks), default=0.0)
+            return self.options.start_timeout_s * fast + patience_s
+        latest_s = max((task.appears_s for task in self.mission.tasks), default=0.0)
         planned_s = max(plan.completion_s.values(), default=0.0)
-        patience_s = PATIENCE_S * max(1.0, self.options.speedup)
         return self.zero_s + latest_s + PATIENCE * planned_s + patience_s
 
 
