@@ -7,6 +7,7 @@ ASCII can be shown. Leaves out: what is drawn (sim.view.map_panel).
 from __future__ import annotations
 
 from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 from rich.text import Text
@@ -87,10 +88,17 @@ class Canvas:
         return not any(self._signs[row][x] for x in around if (x, row) != owner)
 
     def _line(self, row: int) -> Text:
+        signs = [
+            sign or self._dotted(dots)
+            for sign, dots in zip(self._signs[row], self._dots[row], strict=True)
+        ]
+        styles = self._styles[row].copy()
+        for column in range(1, self.width):  # blanks take any style: the fewer runs the faster
+            if signs[column] == " ":
+                styles[column] = styles[column - 1]
         text = Text(no_wrap=True, end="")
-        cells = zip(self._styles[row], self._signs[row], self._dots[row], strict=True)
-        for style, run in groupby(cells, key=lambda cell: cell[0]):
-            text.append("".join(sign or self._dotted(dots) for _, sign, dots in run), style)
+        for style, run in groupby(zip(styles, signs, strict=True), key=itemgetter(0)):
+            text.append("".join(sign for _, sign in run), style)
         return text
 
     def _dotted(self, dots: int) -> str:

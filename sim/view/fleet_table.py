@@ -100,18 +100,26 @@ def lists(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]:
     for uav in scene.uavs:
         ahead = [task for task in uav.planned if task != uav.task]
         current = [] if uav.task is None else [uav.task]
+        colour = f"bold {uav_colour(uav.number)}"
         parts = [
-            *((signs.done, task, f"bold {uav_colour(uav.number)}") for task in uav.flown),
-            *((signs.taken, task, f"bold {uav_colour(uav.number)}") for task in current),
-            *((signs.open, task, "dim") for task in ahead),
+            *((f"{signs.done}{task}", colour) for task in uav.flown),
+            *((f"{signs.taken}{task}", colour) for task in current),
+            *((f"{signs.open}{task}", "dim") for task in ahead),
         ]
-        line = Text(f"  {fit(uav.id, columns.id, signs)}", "dim" if uav.troubled else "")
-        for number, (sign, task, style) in enumerate(parts):
+        line = Text().append(f"  {fit(uav.id, columns.id, signs)}", "dim" if uav.troubled else "")
+        # What is long past makes room for what is next.
+        past = len(uav.flown)
+        while past > 1 and sum(len(part) + 1 for part, _ in parts) + line.cell_len + 4 > width:
+            del parts[0]
+            past -= 1
+        if past < len(uav.flown):
+            line.append(f" {signs.cut}", "dim")
+        for number, (part, style) in enumerate(parts):
             left = 2 if number < len(parts) - 1 else 0
-            if line.cell_len + 2 + len(task) + left > width:
+            if line.cell_len + 1 + len(part) + left > width:
                 line.append(f" {signs.cut}", "dim")
                 break
-            line.append(f" {sign}{task}", style)
+            line.append(f" {part}", style)
         lines.append(line)
     return lines
 
@@ -138,7 +146,7 @@ def _heading(columns: _Columns, width: int, signs: Signs) -> Text:
 def _row(uav: UavView, columns: _Columns, width: int, signs: Signs) -> Text:
     sign = signs.uav_lost if uav.troubled else signs.uav
     colour = BAD if uav.troubled else f"bold {uav_colour(uav.number)}"
-    row = Text(f"{sign} {fit(uav.id, columns.id, signs)} ", colour)
+    row = Text().append(f"{sign} {fit(uav.id, columns.id, signs)} ", colour)
     does = uav.does.upper() if uav.troubled else uav.does
     row.append(fit(does, _DOES_CELLS, signs) + " ", BAD if uav.troubled else "")
     ascii_only = not signs.braille

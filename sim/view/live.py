@@ -183,7 +183,7 @@ def _beside(left: list[Text], right: list[Text]) -> list[Text]:
 
 
 def _title(scene: Scene, width: int, speedup: float, signs: Signs) -> Text:
-    title = Text(clean(scene.mission.name), "bold")
+    title = Text().append(clean(scene.mission.name), "bold")
     between = f" {signs.dot} "
     title.append(between)
     title.append(scene.phase.upper(), _PHASE_STYLE[scene.phase])
@@ -212,11 +212,11 @@ def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
         parts.append((signs.failed, f"{failed} failed", BAD))
     if withdrawn := len(scene.tasks) - n_task:
         parts.append((" ", f"{withdrawn} withdrawn", "dim"))
-    counts = Text("tasks  ", "bold")
+    counts = Text().append("tasks  ", "bold")
     for sign, text, style in parts:
         counts.append(f"{sign} ", f"bold {style}")
         counts.append(f"{text}  ", style)
-    value = Text("J      ", "bold")
+    value = Text().append("J      ", "bold")
     value.append(shown_value(scene.objective), "bold")
     if scene.plan is not None:
         value.append(f" of {shown_value(scene.plan.objective)} planned")
@@ -256,8 +256,8 @@ def _story(observer: Observer, width: int, height: int, signs: Signs) -> list[Te
     """The newest lines of the story under a headline."""
     if height < 2:
         return [Text()] * max(0, height)
-    lines = [Text(fit(f"{signs.horizontal * 2} story ", 10, signs), "dim")]
-    lines[0].append(signs.horizontal * max(0, width - 10))
+    headline = f"{signs.horizontal * 2} story "
+    lines = [Text(headline + signs.horizontal * max(0, width - len(headline)), "dim")]
     for happening in observer.story[-(height - 1) :]:
         line = story_line(happening, ascii_only=not signs.braille)
         lines.append(Text(fit(line, width, signs).rstrip(), story_style(happening)))

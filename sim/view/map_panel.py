@@ -48,7 +48,7 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
     view = _View(scene, columns, rows)
     room = columns * rows / max(1, len(scene.tasks))
     _draw_paths(canvas, view, scene, room)
-    for task in scene.tasks:
+    for task in sorted(scene.tasks, key=_weight):
         if task.state is not TaskState.WITHDRAWN:
             canvas.put(view.spot(task.position_enu_m), *_task_look(task, signs))
     # Names of UAVs come first, and the UAVs themselves over everything.
@@ -124,6 +124,13 @@ def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
 
 def _faint(uav: UavView) -> str:
     return f"dim {uav_colour(uav.number)}"
+
+
+def _weight(task: TaskView) -> int:
+    """Where tasks share a cell, the one with the most to tell is seen."""
+    if task.state is TaskState.DONE:
+        return 0
+    return 2 if task.taken or task.state is TaskState.FAILED else 1
 
 
 def _task_look(task: TaskView, signs: Signs) -> tuple[str, str]:
