@@ -232,7 +232,8 @@ class Observer:
             self._tell(f"mission ends: {epoch.reason}", now_s)
 
     def _hear_claim(self, uav: str, claim: Claim, before: Claim | None, now_s: float) -> None:
-        if claim.phase is ClaimPhase.OUT and self.phase is EpochPhase.RUNNING:
+        unfinished = TaskState.OPEN in self.board.states.values()
+        if claim.phase is ClaimPhase.OUT and self.phase is EpochPhase.RUNNING and unfinished:
             self._tell(f"{uav} takes no further part", now_s)
         if claim.task is None or (before is not None and before.task == claim.task):
             return

@@ -116,7 +116,8 @@ class _Launch:
             failed = child.returncode not in (None, 0) and not child.stopped
             told = any(fate.startswith(f"{child.name}:") for fate in self.fates)
             if failed and not told:
-                self.fates.append(f"{child.name}: {child.fate}")
+                words = f" ({child.last_words()})" if (child.returncode or 0) > 0 else ""
+                self.fates.append(f"{child.name}: {child.fate}{words}")
 
     @property
     def over(self) -> str | None:
