@@ -23,7 +23,7 @@ _DOES_CELLS = len(StatusPhase.PREPARING)
 _ETA_CELLS = 7
 _DONE_CELLS = 5
 _BATTERY_CELLS = 5
-_LONGEST_ID = 14
+_LONGEST_ID = 12
 _SHORTEST_NOTE = 10
 _GAP = 2
 """Columns between two tables side by side."""

@@ -6,6 +6,7 @@ Off a terminal, only new lines of the story are printed. Leaves out: what is kno
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -13,12 +14,12 @@ from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.text import Text
 
-from coordinator.observer import Observer
+from coordinator.observer import Happening, Observer
 from sim.view.fleet_table import fit, fleet_table, lists, table_width
 from sim.view.map_panel import ideal_width, map_panel
 from sim.view.scene import Scene, scene_of
 from sim.view.signs import BAD, Signs, signs_for
-from sim.view.story import clean, shown_value, story_line, story_style
+from sim.view.story import clean, is_trouble, shown_value, story_line, story_style
 from swarm.state.board import TaskState
 from swarm.wire.messages import EpochPhase
 
@@ -89,7 +90,13 @@ class LiveView:
 
     def __enter__(self) -> Self:
         if self._console.is_terminal and not self._console.is_dumb_terminal:
-            self._live = Live(console=self._console, auto_refresh=False)
+            self._live = Live(
+                console=self._console,
+                auto_refresh=False,
+                # Standard output is for results; what goes to standard error meanwhile, such
+                # as logs, appears above the picture.
+                redirect_stdout=False,
+            )
             self._live.start()
         return self
 
@@ -140,7 +147,7 @@ def _narrow(observer: Observer, scene: Scene, width: int, height: int, signs: Si
     worth = _worth(scene, width, signs)
     above = max(0, height - len(worth) - n_story)
     lines = []
-    map_width = min(ideal_width(scene, above), width - table_width(scene) - 2)
+    map_width = min(max(_NARROWEST_MAP, ideal_width(scene, above)), width - table_width(scene) - 2)
     if map_width >= _NARROWEST_MAP and above >= 5:
         rest = width - map_width - 1
         table = fleet_table(scene, rest, above, signs)
@@ -155,7 +162,7 @@ def _narrow(observer: Observer, scene: Scene, width: int, height: int, signs: Si
 def _wide(observer: Observer, scene: Scene, width: int, height: int, signs: Signs) -> list[Text]:
     """The map as large as can be; fleet, counts and story in a column beside it."""
     column = max(_COLUMN, table_width(scene))
-    map_width = min(ideal_width(scene, height), width - column - 2)
+    map_width = min(max(_NARROWEST_MAP, ideal_width(scene, height)), width - column - 2)
     rest = width - map_width - 1
     worth = _worth(scene, rest, signs)
     least_story = max(4, height // 5)
@@ -258,7 +265,14 @@ def _story(observer: Observer, width: int, height: int, signs: Signs) -> list[Te
         return [Text()] * max(0, height)
     headline = f"{signs.horizontal * 2} story "
     lines = [Text(headline + signs.horizontal * max(0, width - len(headline)), "dim")]
-    for happening in observer.story[-(height - 1) :]:
+    for happening in _newest(observer.story, height - 1):
         line = story_line(happening, ascii_only=not signs.braille)
         lines.append(Text(fit(line, width, signs).rstrip(), story_style(happening)))
     return lines + [Text()] * (height - len(lines))
+
+
+def _newest(story: Sequence[Happening], count: int) -> list[Happening]:
+    """The newest lines; the last things that went wrong stay among them."""
+    newest = list(story[-count:])
+    pinned = [line for line in story[:-count] if is_trouble(line)][-max(1, count // 4) :]
+    return [*pinned, *newest[len(pinned) :]]

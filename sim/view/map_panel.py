@@ -48,18 +48,18 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
     view = _View(scene, columns, rows)
     room = columns * rows / max(1, len(scene.tasks))
     _draw_paths(canvas, view, scene, room)
-    for task in sorted(scene.tasks, key=_weight):
-        if task.state is not TaskState.WITHDRAWN:
-            canvas.put(view.spot(task.position_enu_m), *_task_look(task, signs))
+    tasks = [task for task in scene.tasks if task.state is not TaskState.WITHDRAWN]
+    for task in sorted(tasks, key=_weight):
+        canvas.put(view.spot(task.position_enu_m), *_task_look(task, signs))
     # Names of UAVs come first, and the UAVs themselves over everything.
     for uav in scene.uavs:
         canvas.put(view.spot(uav.position_enu_m), *_uav_look(uav, signs))
     for uav in _by_urgency(scene):
         style = _uav_look(uav, signs)[1]
         canvas.name(view.spot(uav.position_enu_m), (uav.id, uav.short), style)
-    longest = max((len(task.id) for task in scene.tasks), default=0)
+    longest = max((len(task.id) for task in tasks), default=0)
     if room >= _ROOM_PER_LETTER * (longest + 2):
-        for task in scene.tasks:
+        for task in tasks:
             canvas.name(view.spot(task.position_enu_m), (task.id,), "dim")
     return _framed(canvas.lines(), columns, view.m_per_column, signs)
 
@@ -173,7 +173,8 @@ def _scale_bar(columns: int, m_per_column: float, signs: Signs) -> str:
     """A round distance and the length it has on the map."""
     longest_m = m_per_column * max(1, columns // 4)
     power = 10.0 ** math.floor(math.log10(longest_m))
-    round_m = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest_m)
+    fitting = (step * power for step in (1.0, 2.0, 5.0) if step * power <= longest_m)
+    round_m = max(fitting, default=power)
     cells = max(2, round(round_m / m_per_column))
     left, right = signs.scale
     text = f" {round_m:g} m {left}{signs.horizontal * (cells - 2)}{right} "

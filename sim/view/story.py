@@ -13,6 +13,7 @@ from sim.view.signs import BAD
 __all__ = [
     "clean",
     "is_routine",
+    "is_trouble",
     "notable",
     "shown_s",
     "shown_value",
@@ -59,12 +60,18 @@ def is_routine(happening: Happening) -> bool:
     return happening.text.endswith(": done")
 
 
-def story_style(happening: Happening) -> str:
-    """Style that makes losses and failures stand out."""
+def is_trouble(happening: Happening) -> bool:
+    """Whether something went wrong."""
     text = happening.text
-    if " lost" in text or text.endswith(": failed"):
+    lost = text.endswith(" lost") or " lost;" in text
+    return lost or text.endswith(": failed")
+
+
+def story_style(happening: Happening) -> str:
+    """Style that makes trouble stand out."""
+    if is_trouble(happening):
         return BAD
-    if "took over" in text or "takes no further part" in text or " appeared" in text:
+    if "took over" in happening.text or happening.text.endswith((" appeared", "no further part")):
         return "yellow"
     return "" if is_routine(happening) else "bold"
 
