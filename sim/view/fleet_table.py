@@ -93,7 +93,8 @@ def fleet_table(scene: Scene, width: int, height: int, signs: Signs) -> list[Tex
 
 def lists(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]:
     """Every UAV's list, flown and ahead, under a blank line; nothing if not all have room."""
-    if height < len(scene.uavs) + 3:
+    nothing = not any(uav.planned or uav.flown or uav.task for uav in scene.uavs)
+    if nothing or height < len(scene.uavs) + 3:
         return []
     columns = _columns(scene)
     lines = [Text(), Text(fit("  lists: flown, current and planned", width, signs), "dim")]

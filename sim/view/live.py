@@ -199,7 +199,7 @@ def _title(scene: Scene, width: int, speedup: float, signs: Signs) -> Text:
         title.append(f"{between}mission time {scene.mission_s:.1f} s")
         title.append(f" (D = {horizon_s:g} s)", BAD if scene.mission_s > horizon_s else "dim")
     if speedup != 1.0:
-        title.append(f"{between}{signs.times}{speedup:g}")
+        title.append(f"{between}{signs.times}{speedup:.3g}")
     if scene.rule is not None:
         order = " > ".join(scene.sequence)
         text = f"{between}{scene.rule}" + (f": {order}" if order else "")

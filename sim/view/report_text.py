@@ -55,7 +55,7 @@ def report_text(
     )
     parts: list[RenderableType] = [headline]
     if plan is not None:
-        order = "" if plan.sequence is None else f": {' > '.join(plan.sequence)}"
+        order = "" if plan.sequence is None else f": {_order(plan.sequence, signs)}"
         parts.append(Text(f"planned by {plan.method}{order}", "dim"))
     parts += ["", _lists(compare_lists(mission, plan, result), plan is not None, signs)]
     parts += ["", _worth_table(plan, result, signs)]
@@ -67,6 +67,11 @@ def report_text(
     if hint:
         parts += ["", Text(hint, "dim")]
     return Group(*parts)
+
+
+def _order(sequence: Sequence[str], signs: Signs) -> str:
+    shown = " > ".join(sequence[:_IDS])
+    return shown if len(sequence) <= _IDS else f"{shown} > {signs.cut}"
 
 
 def _lists(compared: Sequence[Compared], planned: bool, signs: Signs) -> RenderableType:
