@@ -39,7 +39,7 @@ from swarm.events import (
     Tick,
 )
 from swarm.model.ids import COORDINATOR
-from swarm.state.board import TaskBoard, TaskState
+from swarm.state.board import TaskBoard, TaskState, doable
 from swarm.state.claims import winner
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
@@ -134,10 +134,10 @@ class AgentCore:
         deadlines = [self._membership.next_deadline_s(), self._announce_at_s, self._status_at_s]
         if self.phase is StatusPhase.LEARNING:
             deadlines.append(self._ask_at_s)
-        if self._airborne:
+        if self._airborne or self.phase is StatusPhase.OUT:
             deadlines.append(self._settled_at_s)
-            if self._running:
-                deadlines += [self._held_at_s, self._served_at_s, self._retry_at_s]
+        if self._airborne and self._running:
+            deadlines += [self._held_at_s, self._served_at_s, self._retry_at_s]
         return min(deadline for deadline in deadlines if deadline is not None)
 
     def snapshot(self, now_s: float) -> Snapshot:
@@ -254,11 +254,16 @@ class AgentCore:
             if task is not None:
                 self._excluded.add(task.task)
                 self._release(f"vehicle refused: {reason}", now_s)
-        elif isinstance(order, Prepare):
+        elif isinstance(order, Prepare | Return):
             self._hand_over(reason, now_s)
 
     def _hand_over(self, reason: str, now_s: float) -> None:
-        if self.phase in (StatusPhase.RETURNING, StatusPhase.HOME):
+        if self.phase is StatusPhase.HOME:
+            return
+        if self.phase is StatusPhase.RETURNING:
+            # It was told to come home; nobody here can see whether it does.
+            self.phase = StatusPhase.HOME
+            self._actions += [Note("not seen landing", {"reason": reason}), Finish(1)]
             return
         self._say_out(now_s)
         self.phase, self._note = StatusPhase.OUT, reason[:200]
@@ -300,7 +305,7 @@ class AgentCore:
             self._ask(now_s)
 
     def _finish_if_over(self, now_s: float) -> None:
-        if self.phase in (StatusPhase.RETURNING, StatusPhase.HOME, StatusPhase.OUT):
+        if self.phase in (StatusPhase.RETURNING, StatusPhase.HOME):
             return
         epoch = self.replica.epoch
         if epoch is not None and epoch.phase is EpochPhase.ENDED and self._learned:
@@ -309,10 +314,9 @@ class AgentCore:
             self._go_home("nothing left to do and no coordinator", now_s)
 
     def _settled(self, now_s: float) -> bool:
-        """Without a coordinator: whether nothing has been open or claimed for long enough."""
+        """Without a coordinator: whether there has been nothing left to do for long enough."""
         orphaned = COORDINATOR not in self._membership.present and self._running
-        states = self._board.states.values()
-        if not orphaned or not states or TaskState.OPEN in states:
+        if not orphaned or doable(self._board, self._membership.present | {self.uav}):
             self._settled_at_s = None
             return False
         if self._settled_at_s is None:

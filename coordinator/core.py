@@ -28,7 +28,7 @@ from swarm.events import (
 from swarm.model import Mission, Origin, Plan, Task, UavId
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.model.ids import COORDINATOR
-from swarm.state.board import TaskBoard, TaskState
+from swarm.state.board import TaskBoard, TaskState, doable
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
@@ -219,17 +219,12 @@ class CoordinatorCore:
         return claim is not None and claim.phase is ClaimPhase.IDLE
 
     def _end_if_over(self, now_s: float) -> None:
-        problem = self._board.problem
-        if problem is None:
+        present = self._membership.present
+        anybody = any(self._takes_part(uav.id) for uav in self._mission.uavs)
+        if doable(self._board, present) or (self._unposted() and anybody):
             return
-        unfinished = [task for task, state in self._board.states.items() if state is TaskState.OPEN]
-        able = [index for index, uav in enumerate(problem.uav_ids) if self._takes_part(uav)]
-        doable = [
-            task for task in unfinished if problem.capable[able, problem.task_ids.index(task)].any()
-        ]
-        if doable or (self._unposted() and able):
-            return
-        reason = "every task has ended" if not unfinished else "nobody is left who could go on"
+        left = TaskState.OPEN in self._board.states.values() or self._unposted()
+        reason = "nobody is left who could go on" if left else "every task has ended"
         self._end(reason, now_s)
 
     def _takes_part(self, uav: str) -> bool:

@@ -5,14 +5,15 @@ Leaves out: claims (swarm.state.claims).
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from enum import StrEnum
 
 from swarm.allocation.problem import Problem
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.state.registers import Replica
-from swarm.wire.messages import Board, Brief, Outcome, Result
+from swarm.wire.messages import Board, Brief, ClaimPhase, Outcome, Result
 
-__all__ = ["TaskBoard", "TaskState", "attempts", "first_done", "mission_of"]
+__all__ = ["TaskBoard", "TaskState", "attempts", "doable", "first_done", "mission_of"]
 
 
 class TaskState(StrEnum):
@@ -22,6 +23,26 @@ class TaskState(StrEnum):
     DONE = "done"
     FAILED = "failed"
     WITHDRAWN = "withdrawn"
+
+
+def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
+    """Open tasks that some UAV taking part in the mission is capable of, in board order.
+
+    Args:
+        board: of the mission.
+        present: writers believed alive; the lost take no part.
+    """
+    problem = board.problem
+    if problem is None:
+        return []
+    claims = board.replica.claims
+    able = [
+        index
+        for index, uav in enumerate(problem.uav_ids)
+        if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
+    ]
+    can = dict(zip(problem.task_ids, problem.capable[able].any(axis=0), strict=True))
+    return [t for t, state in board.states.items() if state is TaskState.OPEN and can[TaskId(t)]]
 
 
 def attempts(replica: Replica, task: str) -> list[tuple[str, Outcome]]:

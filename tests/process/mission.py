@@ -113,10 +113,14 @@ class SwarmRun:
         self.seen.update(found)
         return found
 
-    def child(self, beginning: str) -> int:
-        """Pid of the one living child whose arguments contain ``beginning``."""
-        matches = [pid for words, pid in self.children().items() if beginning in words]
-        assert len(matches) == 1, f"{beginning}: {matches}"
+    def child(self, role: str, uav: str = "") -> int:
+        """Pid of the one living child of that role, and of that UAV."""
+        matches = [
+            pid
+            for words, pid in self.children().items()
+            if words.startswith(f"{role} ") and (not uav or f"--uav {uav} " in words)
+        ]
+        assert len(matches) == 1, f"{role} {uav}: {matches} of {self.children()}"
         return matches[0]
 
     def wait_for_line(self, text: str, timeout_s: float = 60.0, count: int = 1) -> None:

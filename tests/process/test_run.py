@@ -12,7 +12,7 @@ from tests.process.mission import SwarmRun, alive, wait_until
 
 pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
 
-LARGE = ["valley-survey", "--speedup", "20"]
+LARGE = ["valley-survey", "--speedup", "30"]
 
 
 def kill(pid: int) -> None:
@@ -40,7 +40,7 @@ def test_paper_mission_flies_the_offline_plan(tmp_path: Path, bus: str) -> None:
 def test_killed_agents_tasks_are_done_by_the_others(tmp_path: Path) -> None:
     with SwarmRun(LARGE, tmp_path) as run:
         run.wait_for_line(" ended ", count=5)
-        kill(run.child("--uav uav07 "))
+        kill(run.child("agent", "uav07"))
         status, told = run.result()
 
         assert status == 0, run.story()
@@ -54,7 +54,7 @@ def test_killed_agents_tasks_are_done_by_the_others(tmp_path: Path) -> None:
 def test_fleet_finishes_without_its_coordinator(tmp_path: Path) -> None:
     with SwarmRun(LARGE, tmp_path) as run:
         run.wait_for_line("epoch 1")
-        kill(run.child("coordinator "))
+        kill(run.child("coordinator"))
         status, told = run.result()
 
         assert status == 0, run.story()
@@ -67,7 +67,7 @@ def test_fleet_finishes_without_its_coordinator(tmp_path: Path) -> None:
 def test_dead_autopilot_costs_its_uav_and_no_task(tmp_path: Path) -> None:
     with SwarmRun(LARGE, tmp_path) as run:
         run.wait_for_line(" ended ", count=3)
-        kill(run.child("autopilot valley-survey --uav uav03 "))
+        kill(run.child("autopilot", "uav03"))
         status, told = run.result()
 
         assert status == 0, run.story()
@@ -79,12 +79,12 @@ def test_dead_autopilot_costs_its_uav_and_no_task(tmp_path: Path) -> None:
 def test_dead_router_ends_the_run_and_leaves_nothing(tmp_path: Path) -> None:
     with SwarmRun(["valley-survey", "--bus", "router"], tmp_path) as run:
         run.wait_for_line("epoch 1")
-        kill(run.child("router "))
+        kill(run.child("router"))
         status, told = run.result()
 
         assert status == 1
         assert told["open"]
-        assert any("router" in line for line in run.lines)
+        assert any("router: killed by SIGKILL" in line for line in told["processes"])
         run.assert_nothing_left()
 
 
@@ -107,7 +107,7 @@ def test_ctrl_c_before_the_start_ends_every_process(tmp_path: Path) -> None:
 def test_killed_launcher_takes_every_process_along(tmp_path: Path) -> None:
     with SwarmRun(["table-1"], tmp_path) as run:
         wait_until(lambda: len(run.children()) == 7, 30, "all children")
-        agent = run.child("--uav uav2 --mavlink")
+        agent = run.child("agent", "uav2")
 
         assert run.end(signal.SIGKILL) == -signal.SIGKILL
         run.assert_nothing_left()
