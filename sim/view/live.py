@@ -197,7 +197,8 @@ def _title(scene: Scene, width: int, speedup: float, signs: Signs) -> Text:
     if scene.mission_s is not None:
         horizon_s = scene.mission.horizon_s
         title.append(f"{between}mission time {scene.mission_s:.1f} s")
-        title.append(f" (D = {horizon_s:g} s)", BAD if scene.mission_s > horizon_s else "dim")
+        late = scene.phase is EpochPhase.RUNNING and scene.mission_s > horizon_s
+        title.append(f" (D = {horizon_s:g} s)", BAD if late else "dim")
     if speedup != 1.0:
         title.append(f"{between}{signs.times}{speedup:.3g}")
     if scene.rule is not None:
