@@ -101,7 +101,7 @@ class AgentCore:
         self._held_at_s: float | None = None
         self._served_at_s: float | None = None
         self._retry_at_s: float | None = None
-        self._settled_at_s: float | None = None
+        self._forsaken_since_s: float | None = None
         self._ask_at_s: float | None = None
         self._announce_at_s: float | None = None
         self._status_at_s = 0.0
@@ -135,7 +135,7 @@ class AgentCore:
         if self.phase is StatusPhase.LEARNING:
             deadlines.append(self._ask_at_s)
         if self._airborne or self.phase is StatusPhase.OUT:
-            deadlines.append(self._settled_at_s)
+            deadlines.append(self._forsaken_until_s)
         if self._airborne and self._running:
             deadlines += [self._held_at_s, self._served_at_s, self._retry_at_s]
         return min(deadline for deadline in deadlines if deadline is not None)
@@ -310,18 +310,27 @@ class AgentCore:
         epoch = self.replica.epoch
         if epoch is not None and epoch.phase is EpochPhase.ENDED and self._learned:
             self._go_home(epoch.reason, now_s)
-        elif self._settled(now_s):
-            self._go_home("nothing left to do and no coordinator", now_s)
+        elif self._forsaken(now_s):
+            self._go_home("no coordinator and nothing left to do", now_s)
 
-    def _settled(self, now_s: float) -> bool:
-        """Without a coordinator: whether there has been nothing left to do for long enough."""
-        orphaned = COORDINATOR not in self._membership.present and self._running
-        if not orphaned or doable(self._board, self._membership.present | {self.uav}):
-            self._settled_at_s = None
+    def _forsaken(self, now_s: float) -> bool:
+        """Whether there has been neither a coordinator nor anything to do for long enough."""
+        present = self._membership.present
+        waiting = self.phase is StatusPhase.IDLE and not self._running
+        finished = self._running and not doable(self._board, present | {self.uav})
+        if COORDINATOR in present or not (waiting or finished):
+            self._forsaken_since_s = None
             return False
-        if self._settled_at_s is None:
-            self._settled_at_s = now_s + self._timing.linger_s
-        return self._settled_at_s <= now_s
+        if self._forsaken_since_s is None:
+            self._forsaken_since_s = now_s
+        return self._forsaken_until_s is not None and self._forsaken_until_s <= now_s
+
+    @property
+    def _forsaken_until_s(self) -> float | None:
+        if self._forsaken_since_s is None:
+            return None
+        patience_s = self._timing.linger_s if self._running else self._timing.abandon_s
+        return self._forsaken_since_s + patience_s
 
     def _serve(self, now_s: float) -> None:
         task = self._task()
