@@ -235,10 +235,10 @@ def _tell(told: MissionReport, *, json: bool, report: Path | None) -> int:
 
     from sim.view.report import mission_ok, write_report
 
-    if report is not None:
-        write_report(told, report)
     if json:
         print(dumps(told.as_json(), allow_nan=False))
     else:
         told.render(Console(highlight=False))
+    if report is not None:  # last: a full disk must not hide the result
+        write_report(told, report)
     return 0 if mission_ok(told.result) else 1

@@ -96,6 +96,7 @@ class World:
         self._latency_s = latency_s
         self._queue = EventQueue()
         self._wakes: dict[str, float] = {}
+        self._observer_wakes_s: float | None = None
         self._coordinator = CoordinatorCore(
             mission,
             method=method,
@@ -232,6 +233,10 @@ class World:
 
     def _observe(self, fact: BusFact) -> None:
         self.observer.step(fact, self._queue.now_s())
+        deadline_s = self.observer.next_deadline_s()
+        if deadline_s is not None and self._alive and self._observer_wakes_s != deadline_s:
+            self._observer_wakes_s = deadline_s
+            self._queue.at(deadline_s, lambda: self._observe(Tick()))
 
     def _later(self, delay_s: float, callback: Callable[[], None]) -> None:
         self._queue.at(self._queue.now_s() + delay_s, callback)

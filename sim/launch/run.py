@@ -172,6 +172,7 @@ async def fly(
         BusError: the bus could not be opened.
     """
     launch = _Launch(mission, options, on_log)
+    on_frame(launch.observer, launch.clock.now_s())
     try:
         layout = await launch.start()
         async with _watching(launch, layout):

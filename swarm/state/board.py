@@ -11,9 +11,9 @@ from enum import StrEnum
 from swarm.allocation.problem import Problem
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.state.registers import Replica
-from swarm.wire.messages import Board, Brief, ClaimPhase, Outcome, Result
+from swarm.wire.messages import Board, Brief, ClaimPhase, Result
 
-__all__ = ["TaskBoard", "TaskState", "attempts", "doable", "first_done", "mission_of"]
+__all__ = ["TaskBoard", "TaskState", "doable", "mission_of"]
 
 
 class TaskState(StrEnum):
@@ -43,18 +43,6 @@ def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
     ]
     can = dict(zip(problem.task_ids, problem.capable[able].any(axis=0), strict=True))
     return [t for t, state in board.states.items() if state is TaskState.OPEN and can[TaskId(t)]]
-
-
-def attempts(replica: Replica, task: str) -> list[tuple[str, Outcome]]:
-    """(UAV id, outcome) of every ended attempt at ``task``, earliest first."""
-    found = [(uav, outcome) for (uav, name), outcome in replica.outcomes.items() if name == task]
-    return sorted(found, key=lambda item: (item[1].completed_s, item[0]))
-
-
-def first_done(replica: Replica, task: str) -> tuple[str, Outcome] | None:
-    """The visit that counts: the earliest that succeeded."""
-    done = (item for item in attempts(replica, task) if item[1].result is Result.DONE)
-    return next(done, None)
 
 
 class TaskBoard:
