@@ -41,7 +41,7 @@ def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
         for index, uav in enumerate(problem.uav_ids)
         if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
     ]
-    can = dict(zip(problem.task_ids, problem.capable[able].any(axis=0), strict=True))
+    can = dict(zip(problem.task_ids, problem.capable[able, :].any(axis=0).tolist(), strict=True))
     return [t for t, state in board.states.items() if state is TaskState.OPEN and can[TaskId(t)]]
 
 
