@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from enum import StrEnum
 
-from swarm.allocation.problem import Problem
+import numpy as np
+
+from swarm.allocation.problem import BoolArray, Problem
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.state.registers import Replica
 from swarm.wire.messages import Board, Brief, ClaimPhase, Result
@@ -41,8 +43,9 @@ def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
         for index, uav in enumerate(problem.uav_ids)
         if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
     ]
-    can = dict(zip(problem.task_ids, problem.capable[able, :].any(axis=0).tolist(), strict=True))
-    return [t for t, state in board.states.items() if state is TaskState.OPEN and can[TaskId(t)]]
+    can: BoolArray = np.any(problem.capable[able, :], axis=0)
+    open_tasks = [t for t, state in board.states.items() if state is TaskState.OPEN]
+    return [task for task in open_tasks if can[problem.task_ids.index(TaskId(task))]]
 
 
 class TaskBoard:
