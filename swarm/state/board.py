@@ -44,8 +44,12 @@ def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
         if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
     ]
     can: BoolArray = np.any(problem.capable[able, :], axis=0)
-    open_tasks = [t for t, state in board.states.items() if state is TaskState.OPEN]
-    return [task for task in open_tasks if can[problem.task_ids.index(TaskId(task))]]
+    states = board.states  # in board order, as the problem's tasks are
+    return [
+        task
+        for (task, state), somebody_can in zip(states.items(), can, strict=True)
+        if state is TaskState.OPEN and somebody_can
+    ]
 
 
 class TaskBoard:
