@@ -49,15 +49,17 @@ def run(
         ),
     ] = "auto",
     position_rate_hz: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--position-rate-hz",
             min=1.0,
             max=200.0,
             metavar="HZ",
-            help="Position reports of each autopilot per wall second.",
+            help="Position reports of each autopilot per wall second. Default: 100, less for "
+            "more than 20 UAVs.",
+            show_default=False,
         ),
-    ] = 50.0,
+    ] = None,
     acceptance_radius_m: Annotated[
         float,
         typer.Option(
@@ -100,7 +102,7 @@ def run(
     from rich.console import Console
 
     from coordinator.planner.plan import check_online_method
-    from sim.launch.fleet import LaunchOptions
+    from sim.launch.fleet import LaunchOptions, default_position_rate_hz
     from sim.launch.run import fly
     from sim.view.live import LiveView
     from sim.view.report import MissionReport, check_report_path
@@ -118,7 +120,7 @@ def run(
         seed=seed,
         speedup=speedup,
         bus=_bus_kind(bus),
-        position_rate_hz=position_rate_hz,
+        position_rate_hz=position_rate_hz or default_position_rate_hz(len(mission.uavs)),
         acceptance_radius_m=acceptance_radius_m,
         start_timeout_s=start_timeout_s,
     )

@@ -138,6 +138,15 @@ class Layout:
         return self._endpoints[name], tuple(self._endpoints[each] for each in before)
 
 
+def default_position_rate_hz(n_uav: int) -> float:
+    """Wall rate of each UAV's position reports.
+
+    An arrival is seen at the next report, so legs grow by half an interval; a machine
+    handles some 2000 reports a second beside everything else.
+    """
+    return min(100.0, 2000.0 / max(1, n_uav))
+
+
 def autopilot_groups(uavs: Sequence[str]) -> list[list[str]]:
     """UAVs whose simulated autopilots share a process."""
     size = 1 if len(uavs) <= OWN_AUTOPILOT_LIMIT else VEHICLES_PER_PROCESS
