@@ -14,7 +14,9 @@ from typing import Annotated, ClassVar
 from annotated_types import Ge, Gt, Le, Len, Predicate
 from pydantic import Strict
 
+from swarm.allocation.rules import RULE_NAMES
 from swarm.model import Origin, valid_id
+from swarm.model.ids import COORDINATOR
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -94,8 +96,8 @@ class Brief:
 
     def __post_init__(self) -> None:
         Origin(*self.origin)
-        if len({uav.id for uav in self.uavs}) != len(self.uavs):
-            raise ValueError("UAV ids must differ")
+        if len({COORDINATOR, *(uav.id for uav in self.uavs)}) != 1 + len(self.uavs):
+            raise ValueError("UAV ids must differ, from each other and from the coordinator's")
 
 
 class EpochPhase(StrEnum):
@@ -114,7 +116,8 @@ class Epoch:
 
     number: Count
     phase: EpochPhase
-    rule: Id
+    rule: Annotated[str, Strict(), Predicate(RULE_NAMES.__contains__)]
+    """Name of the decision rule; one this process cannot follow makes no epoch for it."""
     sequence: tuple[Id, ...]
     """Best rank first."""
     mission_s: Number
@@ -185,7 +188,7 @@ class Outcome:
 
     task: Id
     result: Result
-    attempt: Annotated[int, Strict(), Ge(1)]
+    attempt: Annotated[int, Strict(), Ge(1), Le(2**63 - 1)]
     completed_s: Number
     """Mission time [s]."""
 
