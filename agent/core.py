@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agent.deciding import Turn, decide, ranks
+from agent.deciding import Turn, decide, ranks, rule_of
 from agent.events import Action, Event, Order
 from agent.vehicle import (
     Arrived,
@@ -24,6 +24,7 @@ from agent.vehicle import (
     Telemetry,
     VehicleReady,
 )
+from swarm.allocation.lower_level import Rule
 from swarm.config import Timing
 from swarm.events import (
     Ask,
@@ -87,6 +88,8 @@ class AgentCore:
         self._actions: list[Action] = []
         self._board = TaskBoard(self.replica, mission)
         self._learned = False
+        self._rule: Rule | None = None
+        self._rule_epoch: int | None = None
         self._zero_s: float | None = None
         self._free_since_s = 0.0
         self._telemetry: Telemetry | None = None
@@ -363,6 +366,9 @@ class AgentCore:
         epoch, problem, place = self.replica.epoch, self._board.problem, self._place_enu_m
         if epoch is None or problem is None or place is None or self.uav not in problem.uav_ids:
             return
+        rule = self._rule_of(epoch)
+        if rule is None:
+            return
         turn = Turn(
             uav=self.uav,
             now_s=self._mission_s(now_s),
@@ -372,7 +378,7 @@ class AgentCore:
             awaited=self._awaited(now_s),
             excluded=self._excluded,
         )
-        decision = decide(problem, self._board, epoch.rule, turn)
+        decision = decide(problem, self._board, rule, turn)
         if decision is None:
             self._stay_idle(now_s)
             return
@@ -399,6 +405,14 @@ class AgentCore:
                 },
             )
         )
+
+    def _rule_of(self, epoch: Epoch) -> Rule | None:
+        if self._rule_epoch != epoch.number:
+            self._rule, self._rule_epoch = rule_of(epoch), epoch.number
+            if self._rule is None:
+                self._note = f"cannot decide by rule {epoch.rule}"
+                self._actions.append(Note("unknown rule", {"rule": epoch.rule}))
+        return self._rule
 
     def _stay_idle(self, now_s: float) -> None:
         claim = self.claim

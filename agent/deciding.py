@@ -15,14 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarm.allocation.lower_level import Decision, TeamState, decisions
+from swarm.allocation.lower_level import Decision, Rule, TeamState, decisions
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import rule_by_name
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.claims import claim_strength
-from swarm.wire.messages import Claim, ClaimPhase
+from swarm.wire.messages import Claim, ClaimPhase, Epoch
 
-__all__ = ["Turn", "decide", "ranks"]
+__all__ = ["Turn", "decide", "ranks", "rule_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,19 +44,30 @@ class Turn:
     """Tasks this UAV cannot take, whatever their value."""
 
 
+def rule_of(epoch: Epoch) -> Rule | None:
+    """The decision rule of an epoch, one instance for all its decisions; None if unknown here.
+
+    Rules keep what they worked out for one decision to be quicker at the next.
+    """
+    try:
+        return rule_by_name(epoch.rule)
+    except ValueError:
+        return None
+
+
 def ranks(sequence: Sequence[str], uavs: Sequence[str]) -> dict[str, int]:
     """Rank of every UAV: place in the sequence; those not in it follow by id."""
     listed = [uav for uav in sequence if uav in uavs]
     return {uav: rank for rank, uav in enumerate([*listed, *sorted(set(uavs) - set(listed))])}
 
 
-def decide(problem: Problem, board: TaskBoard, rule: str, turn: Turn) -> Decision | None:
+def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decision | None:
     """The decision of ``turn.uav``; None when there is no task it could take.
 
     Args:
         problem: every UAV and every task on the board.
         board: the registers and what they say about tasks.
-        rule: name of the decision rule.
+        rule: how UAVs choose in the epoch in force; see `rule_of`.
         turn: who decides, when and where.
     """
     replica, epoch = board.replica, board.replica.epoch
@@ -94,7 +105,7 @@ def decide(problem: Problem, board: TaskBoard, rule: str, turn: Turn) -> Decisio
         else:
             state.active[index] = False
     order = np.array([rank[uav] for uav in problem.uav_ids])
-    process = decisions(problem, state, order, rule_by_name(rule))
+    process = decisions(problem, state, order, rule)
     return next((decision for decision in process if decision.uav == mine), None)
 
 
