@@ -292,7 +292,11 @@ class CoordinatorCore:
     def _say_epoch(self, number: int, phase: EpochPhase, reason: str, now_s: float) -> None:
         sequence = () if self.plan is None else self.plan.sequence or ()
         mission_s = 0.0 if self._zero_s is None else now_s - self._zero_s
-        self._say(Epoch(number, phase, self._method, tuple(sequence), mission_s, reason[:200]))
+        plan = {} if self.plan is None else self.plan.routes
+        routes = {str(uav): tuple(map(str, tasks)) for uav, tasks in plan.items()}
+        self._say(
+            Epoch(number, phase, self._method, tuple(sequence), mission_s, reason[:200], routes)
+        )
 
     def _announce(self, now_s: float) -> None:
         """Repeat the epoch with the mission time of now, the brief and some of the board.

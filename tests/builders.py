@@ -91,7 +91,7 @@ def epoch(
     rule: str = "greedy",
     reason: str = "",
 ) -> Epoch:
-    return Epoch(number, phase, rule, sequence, mission_s, reason)
+    return Epoch(number, phase, rule, sequence, mission_s, reason, {})
 
 
 def proposed(name: str, decided_s: float, rank: int = 0, completion_s: float = 1000.0) -> Claim:

@@ -115,7 +115,7 @@ class Teller:
 
     def epoch(self, phase: EpochPhase, now_s: float = 0.0, number: int = 1) -> None:
         sequence = tuple(uav.id for uav in self._mission.uavs)
-        epoch = Epoch(number, phase, "greedy", sequence, now_s, "as told")
+        epoch = Epoch(number, phase, "greedy", sequence, now_s, "as told", {})
         self.say(COORDINATOR, epoch, now_s)
 
     def claim(self, uav: str, task: str, completion_s: float, now_s: float = 0.0) -> None:

@@ -124,6 +124,8 @@ class Epoch:
     """Mission time at which this statement was made [s]."""
     reason: Annotated[str, Strict(), Len(0, 200)]
     """Why this epoch, in words."""
+    routes: Mapping[Id, tuple[Id, ...]]
+    """Planned task lists by UAV; what rules make of them is theirs."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -355,7 +355,7 @@ def test_small_kinds_end_at_the_small_limit() -> None:
 
 def test_large_kinds_end_at_the_large_limit() -> None:
     names = [f"{n:064d}" for n in range(LARGE_LIMIT_BYTES // 60)]
-    said = message(COORDINATOR, Epoch(1, EpochPhase.RUNNING, "greedy", tuple(names), 0.0, ""))
+    said = message(COORDINATOR, Epoch(1, EpochPhase.RUNNING, "greedy", tuple(names), 0.0, "", {}))
 
     assert drop_reason(key_of(said), encode(said)) == "too large"
 
