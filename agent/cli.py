@@ -103,6 +103,7 @@ def agent(
 
     configure_logging(log_level, log_format)
     config = bus_config(bus, listen, connect or (), lease_s)
+    _check_ids(mission, uav)
     parse_link(mavlink)
     log = get_logger(uav, mission=mission)
 
@@ -133,3 +134,18 @@ def agent(
                 seat.close()
 
     return asyncio.run(run())
+
+
+def _check_ids(mission: str, uav: str) -> None:
+    from swarm.errors import Fault, InputError
+    from swarm.model.ids import COORDINATOR, ID_RULE, valid_id
+
+    faults = [
+        Fault(option, "", f"{text!r} is no id", f"give {ID_RULE}")
+        for option, text in (("--mission", mission), ("--uav", uav))
+        if not valid_id(text)
+    ]
+    if uav == COORDINATOR:
+        faults.append(Fault("--uav", "", f"{uav!r} is the coordinator's name", "give a UAV's id"))
+    if faults:
+        raise InputError(*faults)

@@ -304,7 +304,11 @@ class AgentCore:
                 Order(Prepare(self._in_layer(me.position_enu_m), me.speed_m_s)),
             )
         elif self._ask_at_s is not None and self._ask_at_s <= now_s:
-            self._note = "waiting for the coordinator's brief"
+            missing = self.replica.brief is None
+            waits = "waiting for the coordinator's brief" if missing else "not in the brief"
+            if self._note != waits:
+                self._note = waits
+                self._actions.append(Note(waits, {"uav": self.uav}))
             self._ask(now_s)
 
     def _finish_if_over(self, now_s: float) -> None:

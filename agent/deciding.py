@@ -95,8 +95,9 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decisi
             state.free_s[index] = turn.now_s
             state.place_enu_m[index] = turn.place_enu_m
         elif claim is not None and claim.task in places:
-            late = claim.completion_s < turn.now_s
-            state.free_s[index] = math.inf if late else claim.completion_s
+            # One that is late has not come free, and nobody knows when it will.
+            state.active[index] = claim.completion_s >= turn.now_s
+            state.free_s[index] = claim.completion_s
             state.place_enu_m[index] = places[claim.task]
         elif uav in turn.awaited:
             state.free_s[index] = turn.now_s
