@@ -132,10 +132,14 @@ def run(
         print(f"{name}: {line}", file=sys.stderr)
 
     async def work() -> int:
-        with LiveView(console, speedup=speedup) as view:
-            flight = await fly(
-                mission, options, on_frame=view.update, on_log=log if verbose else None
-            )
+        try:
+            with LiveView(console, speedup=speedup) as view:
+                flight = await fly(
+                    mission, options, on_frame=view.update, on_log=log if verbose else None
+                )
+        except asyncio.CancelledError:
+            console.print("interrupted: the mission was given up and every process ended")
+            raise
         told = MissionReport(
             mission=mission,
             plan=flight.plan,
