@@ -36,10 +36,12 @@ class Turn:
     """Mission time at which this UAV became free [s]; orders claims made at the same time."""
     place_enu_m: tuple[float, float, float]
     """Where it is now [m; mission origin], without the height layer."""
-    present: Collection[str]
-    """Writers believed alive."""
+    credible: Collection[str]
+    """Others whose claims count."""
     awaited: Collection[str]
     """Free UAVs that may be expected to decide in their turn."""
+    patience_s: float
+    """How late a UAV may be at its task and still be expected to decide in its turn."""
     excluded: Collection[str]
     """Tasks this UAV cannot take, whatever their value."""
 
@@ -80,29 +82,30 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decisi
         state.open[index] = board.states.get(task) is TaskState.OPEN and task not in taken
     if not state.open.any():
         return None
-    places = dict(zip(problem.task_ids, problem.task_enu_m, strict=True))
+    columns = {str(task): index for index, task in enumerate(problem.task_ids)}
     for index, uav in enumerate(problem.uav_ids):
         ended = sorted(
             (outcome.completed_s, task)
             for (who, task), outcome in replica.outcomes.items()
-            if who == uav and task in places
+            if who == uav and task in columns
         )
-        survived = [problem.survival[index, problem.task_ids.index(task)] for _, task in ended]
+        survived = [problem.survival[index, columns[task]] for _, task in ended]
         state.survived[index] = math.prod(survived)
         claim = stronger.get(uav)
         state.active[index] = True
         if uav == turn.uav:
             state.free_s[index] = turn.now_s
             state.place_enu_m[index] = turn.place_enu_m
-        elif claim is not None and claim.task in places:
-            # One that is late has not come free, and nobody knows when it will.
-            state.active[index] = claim.completion_s >= turn.now_s
+        elif claim is not None and claim.task in columns:
             state.free_s[index] = claim.completion_s
-            state.place_enu_m[index] = places[claim.task]
+            state.place_enu_m[index] = problem.task_enu_m[columns[claim.task]]
+            state.survived[index] *= problem.survival[index, columns[claim.task]]
+            # Who is a little late is about to decide, or its word is on its way.
+            state.active[index] = turn.now_s < claim.completion_s + turn.patience_s
         elif uav in turn.awaited:
             state.free_s[index] = turn.now_s
             if ended:
-                state.place_enu_m[index] = places[ended[-1][1]]
+                state.place_enu_m[index] = problem.task_enu_m[columns[ended[-1][1]]]
         else:
             state.active[index] = False
     order = np.array([rank[uav] for uav in problem.uav_ids])
@@ -111,14 +114,11 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decisi
 
 
 def _stronger_claims(claims: Mapping[str, Claim], rank: int, turn: Turn) -> dict[str, Claim]:
-    """Claims of present others that would beat a claim this UAV makes now."""
+    """Claims of credible others that would beat a claim this UAV makes now."""
     proposal = Claim(ClaimPhase.PROPOSED, "-", turn.decided_s, rank, turn.now_s)
     own = claim_strength(turn.uav, proposal)
     return {
         uav: claim
         for uav, claim in claims.items()
-        if uav != turn.uav
-        and uav in turn.present
-        and claim.task is not None
-        and claim_strength(uav, claim) < own
+        if uav in turn.credible and claim.task is not None and claim_strength(uav, claim) < own
     }

@@ -54,6 +54,7 @@ epochs = st.builds(
     st.lists(uav_ids, unique=True).map(tuple),
     numbers,
     notes,
+    st.dictionaries(uav_ids, st.lists(task_ids, unique=True, max_size=3).map(tuple), max_size=3),
 )
 boards = st.builds(
     Board,

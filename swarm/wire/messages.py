@@ -14,7 +14,6 @@ from typing import Annotated, ClassVar
 from annotated_types import Ge, Gt, Le, Len, Predicate
 from pydantic import Strict
 
-from swarm.allocation.rules import RULE_NAMES
 from swarm.model import Origin, valid_id
 from swarm.model.ids import COORDINATOR
 
@@ -116,8 +115,7 @@ class Epoch:
 
     number: Count
     phase: EpochPhase
-    rule: Annotated[str, Strict(), Predicate(RULE_NAMES.__contains__)]
-    """Name of the decision rule; one this process cannot follow makes no epoch for it."""
+    rule: Id
     sequence: tuple[Id, ...]
     """Best rank first."""
     mission_s: Number

@@ -269,7 +269,7 @@ def test_task_ids_that_are_none_are_malformed(said: Message, text: object) -> No
         (BRIEF, "uavs", "u0"),
         (EPOCH, "number", -1),
         (EPOCH, "phase", "paused"),
-        (EPOCH, "rule", "no-such-rule"),
+        (EPOCH, "rule", "no such rule"),
         (EPOCH, "sequence", ["u0", 1]),
         (EPOCH, "reason", "x" * 201),
         (BOARD, "value", -1.0),
