@@ -83,6 +83,24 @@ def entry(name: str, east_m: float = 0.0, number: int = 0, **more: object) -> Bo
     return replace(posted, **more)  # type: ignore[arg-type]  # each test names real fields
 
 
+def brief_of(flown: Mission) -> Brief:
+    """What the coordinator of that mission says of it, without height layers."""
+    return replace(
+        brief(*flown.uavs, reattempt_failed=flown.reattempt_failed, layer_m=0.0),
+        horizon_s=flown.horizon_s,
+        success_default=flown.success_default,
+        survival_default=flown.survival_default,
+    )
+
+
+def entries_of(flown: Mission) -> list[Board]:
+    """The mission's tasks as its board has them, pop-ups included."""
+    return [
+        Board(t.id, number, t.position_enu_m, t.value, t.service_s, t.kind, False)
+        for number, t in enumerate(flown.tasks)
+    ]
+
+
 def epoch(
     *sequence: str,
     phase: EpochPhase = EpochPhase.RUNNING,
