@@ -25,6 +25,8 @@ from swarm.shell import Shell, take_seat
 
 __all__ = ["Vehicle", "run_agent", "seat_or_stop"]
 
+RETRY_S = 0.5
+"""Wall time between a failed try for a seat on the bus and the next."""
 FAREWELL_S = 2.0
 """Wall time that a vehicle has to come home when the agent is told to stop; after that
 it returns on its own."""
@@ -57,21 +59,24 @@ async def seat_or_stop(
         on_wait: called with the reason whenever a try has failed.
     """
     loop = asyncio.get_running_loop()
-    stopped = loop.create_task(stop.wait())
+    trying, stopped = loop.create_task(_seat(open_bus, on_wait)), loop.create_task(stop.wait())
     try:
-        while True:
-            trying = asyncio.ensure_future(open_bus())
-            await asyncio.wait((trying, stopped), return_when=asyncio.FIRST_COMPLETED)
-            if not trying.done():
-                trying.cancel()
-                await asyncio.gather(trying, return_exceptions=True)
-                return None
-            try:
-                return trying.result()
-            except BusError as fault:
-                on_wait(str(fault))
+        await asyncio.wait((trying, stopped), return_when=asyncio.FIRST_COMPLETED)
+        return trying.result() if trying.done() else None
     finally:
-        stopped.cancel()
+        for task in (trying, stopped):
+            task.cancel()
+        await asyncio.gather(trying, stopped, return_exceptions=True)
+
+
+async def _seat(open_bus: Callable[[], Awaitable[Bus]], on_wait: Callable[[str], None]) -> Bus:
+    while True:
+        try:
+            return await open_bus()
+        except BusError as fault:
+            on_wait(str(fault))
+        # A try may fail at once, such as when the endpoint to listen on is taken.
+        await asyncio.sleep(RETRY_S)
 
 
 async def run_agent(
@@ -145,8 +150,12 @@ async def run_agent(
     flying, leaving = loop.create_task(shell.run()), loop.create_task(farewell())
     try:
         await asyncio.wait((flying, leaving), return_when=asyncio.FIRST_COMPLETED)
-        told = stop.exit_status
-        return flying.result() if told is None else await leaving
+        if stop.exit_status is None:
+            return flying.result()
+        told = await leaving
+        if flying.done():
+            flying.result()  # raises what went wrong while leaving
+        return told
     finally:
         tasks = [task for task in (flying, leaving, starting) if task is not None]
         for task in tasks:
