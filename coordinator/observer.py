@@ -244,18 +244,22 @@ class Observer:
             self._tell(f"{uav} takes no further part", now_s)
         if claim.task is None or (before is not None and before.task == claim.task):
             return
-        if (former := self._orphans.pop(claim.task, None)) is not None:
+        former = self._orphans.pop(claim.task, uav)
+        if former != uav:
             self._tell(f"{uav} took over {claim.task} from {former}", now_s)
 
     def _lose(self, writer: str, now_s: float) -> None:
         if writer == COORDINATOR:
-            if self.phase is not EpochPhase.ENDED:
+            if self.phase is EpochPhase.RUNNING:
                 self._tell("coordinator lost; the fleet goes on with the last epoch", now_s)
+            elif self.phase is EpochPhase.PREPARING:
+                self._tell("coordinator lost before the mission began", now_s)
             return
         claim = self.replica.claims.get(writer)
         if claim is None or claim.phase is ClaimPhase.OUT:
             return
-        self.lost.append(UavId(writer))
+        if writer not in self.lost:
+            self.lost.append(UavId(writer))
         opened = self.board.states.get(claim.task or "") is TaskState.OPEN
         if claim.task is not None and opened:
             self._orphans[claim.task] = writer
