@@ -9,6 +9,7 @@ import numpy as np
 from agent.vehicle import Report
 from coordinator.events import PlanMade
 from coordinator.planner.plan import make_plan
+from coordinator.planner.stop import after_evaluations
 from sim.world import QUIET, Faults, World
 from swarm.clock import SystemClock
 from swarm.config import Timing
@@ -69,8 +70,9 @@ def _point(rng: np.random.Generator, size_m: float) -> tuple[float, float, float
 
 
 def plan_for(mission: Mission, method: str, seed: int) -> Plan:
-    """The offline plan of what is known of ``mission`` at the start."""
-    return make_plan(mission.known_at_start(), method, clock=SystemClock(), seed=seed)
+    """An offline plan of what is known of ``mission`` at the start; a good one is not needed."""
+    stop = after_evaluations(200)
+    return make_plan(mission.known_at_start(), method, clock=SystemClock(), seed=seed, stop=stop)
 
 
 def able_uavs(mission: Mission, task: Task, uavs: Collection[str]) -> list[str]:
@@ -111,6 +113,10 @@ class WatchedWorld(World):
     def alive(self) -> set[str]:
         """Processes that neither ended nor were lost."""
         return self._alive
+
+    def lose_at(self, time_s: float, name: str) -> None:
+        """Let a process disappear at that virtual time, also before the mission starts."""
+        self._queue.at(time_s, lambda: self._lose(name))
 
     def _step(self, name: str, event: BusFact | Report | PlanMade) -> None:
         super()._step(name, event)
