@@ -1,0 +1,3 @@
+"""
+Compiled kernels; call them through the typed functions of swarm.kernels.
+"""

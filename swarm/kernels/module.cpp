@@ -1,0 +1,8 @@
+// The extension module `swarm.kernels._kernels`: one list of all kernels.
+#include "bindings.hpp"
+
+NB_MODULE(_kernels, module) {
+    module.doc() = "Compiled kernels; call them through the typed functions of swarm.kernels.";
+    peckorder::bind_rollout(module);
+    peckorder::bind_routes(module);
+}
