@@ -60,6 +60,8 @@ class Instance {
   }
 
   // Other tasks, nearest first; as many for each task.
+  const double* place_m(int task) const { return &task_m_[3 * static_cast<std::size_t>(task)]; }
+
   int n_near() const { return n_near_; }
   const std::int32_t* near(int task) const {
     return &near_[static_cast<std::size_t>(task) * n_near_];
