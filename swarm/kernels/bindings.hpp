@@ -5,7 +5,12 @@
 
 namespace peckorder {
 
+void bind_exact(nanobind::module_& module);
+void bind_long_tours(nanobind::module_& module);
+void bind_lower_level(nanobind::module_& module);
+void bind_problem(nanobind::module_& module);
 void bind_rollout(nanobind::module_& module);
 void bind_routes(nanobind::module_& module);
+void bind_tours(nanobind::module_& module);
 
 }  // namespace peckorder
