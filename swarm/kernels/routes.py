@@ -26,6 +26,7 @@ __all__ = [
     "TeamArrays",
     "flat_lists",
     "improve_routes",
+    "open_lists",
     "optimise_routes",
 ]
 
@@ -202,7 +203,7 @@ def optimise_routes(
     search = _kernels.RouteSearch(
         team.mission.kernel,
         *team.arguments(),
-        *_open_lists(team, lists),
+        *open_lists(team, lists),
         np.asarray(team.open),
         seed,
     )
@@ -232,10 +233,8 @@ def optimise_routes(
 
 def improve_routes(team: TeamArrays, lists: Sequence[Sequence[int]]) -> Routes:
     """Lists after local search, in which no move gains any more; tasks stay those on the lists."""
-    arrays = _open_lists(team, lists)
-    return _routes(
-        *_kernels.improve_routes(team.mission.kernel, *team.arguments(), *arrays)
-    )
+    arrays = open_lists(team, lists)
+    return _routes(*_kernels.improve_routes(team.mission.kernel, *team.arguments(), *arrays))
 
 
 def flat_lists(
@@ -258,7 +257,7 @@ def flat_lists(
     return flat, offsets
 
 
-def _open_lists(
+def open_lists(
     team: TeamArrays, lists: Sequence[Sequence[int]] | None
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """The lists without what is closed, beyond the UAV or on the list of an inactive UAV."""
