@@ -58,7 +58,9 @@ struct Team {  // as Python passes it
         require_shape("open", open, {static_cast<Size>(problem.n_task)});
         require_shape("active", active, {n_uav});
         for (Size i = 0; i < n_uav; ++i) {
-            if (free_s.data()[i] != free_s.data()[i]) refuse("free_s must not be NaN");
+            if (!(free_s.data()[i] > -HUGE_VAL)) {
+                refuse("free_s must be times, not NaN or -infinity");
+            }
             require_within("survived", survived.data()[i], 0.0, 1.0, "within 0..1");
         }
         require_finite("place_enu_m", place_enu_m.data(), 3 * n_uav);
@@ -82,7 +84,8 @@ std::optional<Fields> decide(const Problem& problem, In<double, 1> free_s,
     require_shape("open", open, {static_cast<Size>(problem.n_task)});
     const TeamView team{free_s.data(), place_enu_m.data(), survived.data(), bytes_of(open), nullptr};
     const Decider decider = team.decider(uav);
-    require_finite("free_s", &decider.free_s, 1);
+    if (!(decider.free_s > -HUGE_VAL)) refuse("free_s must be a time, not NaN or -infinity");
+    if (decider.free_s == HUGE_VAL) return std::nullopt;
     require_finite("place_enu_m", decider.place_m, 3);
     require_within("survived", decider.survived, 0.0, 1.0, "within 0..1");
     Choice choice;

@@ -8,6 +8,12 @@
 
 #include "long_tours.hpp"
 
+#if defined(_MSC_VER)
+#define PECKORDER_RESTRICT __restrict
+#else
+#define PECKORDER_RESTRICT __restrict__
+#endif
+
 namespace peckorder {
 
 namespace {
@@ -18,23 +24,54 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr Size kTableBytes = 16u << 20;  // tour tables a workspace keeps
 constexpr Size kLongestTour = 512;       // tasks lookahead tours beyond kExactTasks
 
-// The first of the largest; four running maxima, so that the processor need not wait for one.
+// The first of the largest. Four running maxima, so that the processor need not wait for one, and
+// block by block, so that the place is sought in one block only.
 Size argmax(const std::vector<double>& values, Size n) {
-    double most[4] = {-kInfinity, -kInfinity, -kInfinity, -kInfinity};
-    Size i = 0;
-    for (; i + 4 <= n; i += 4) {
-        for (Size lane = 0; lane < 4; ++lane) {
-            most[lane] = values[i + lane] > most[lane] ? values[i + lane] : most[lane];
+    constexpr Size kBlock = 64;
+    const double* v = values.data();
+    double best = -kInfinity;
+    Size best_block = 0;
+    for (Size block = 0; block < n; block += kBlock) {
+        const Size end = std::min(n, block + kBlock);
+        double m0 = -kInfinity, m1 = m0, m2 = m0, m3 = m0;
+        Size i = block;
+        for (; i + 4 <= end; i += 4) {
+            m0 = v[i] > m0 ? v[i] : m0;
+            m1 = v[i + 1] > m1 ? v[i + 1] : m1;
+            m2 = v[i + 2] > m2 ? v[i + 2] : m2;
+            m3 = v[i + 3] > m3 ? v[i + 3] : m3;
+        }
+        for (; i < end; ++i) m0 = v[i] > m0 ? v[i] : m0;
+        const double most = std::max(std::max(m0, m1), std::max(m2, m3));
+        if (most > best) {
+            best = most;
+            best_block = block;
         }
     }
-    for (; i < n; ++i) most[0] = values[i] > most[0] ? values[i] : most[0];
-    const double best = std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
-    for (i = 0; i < n; ++i) {
-        if (values[i] == best) return i;
+    for (Size i = best_block; i < std::min(n, best_block + kBlock); ++i) {
+        if (v[i] == best) return i;
     }
     return 0;
 }
 
+// Told that no two arrays overlap, compilers do two tasks or more at once.
+void score_all(Size n, const double* PECKORDER_RESTRICT x_m, const double* PECKORDER_RESTRICT y_m,
+               const double* PECKORDER_RESTRICT z_m, const double* PECKORDER_RESTRICT service_s,
+               const double* PECKORDER_RESTRICT weight, const Decider& decider, double speed_m_s,
+               double horizon_s, double* PECKORDER_RESTRICT completion_s,
+               double* PECKORDER_RESTRICT score) {
+    const double x = decider.place_m[0], y = decider.place_m[1], z = decider.place_m[2];
+    const double free_s = decider.free_s, survived = decider.survived;
+    for (Size i = 0; i < n; ++i) {
+        const double dx = x_m[i] - x, dy = y_m[i] - y, dz = z_m[i] - z;
+        const double travel_s = std::sqrt((dx * dx + dy * dy) + dz * dz) / speed_m_s;
+        const double time_s = (free_s + travel_s) + service_s[i];
+        completion_s[i] = time_s;
+        score[i] = (horizon_s - time_s) * (survived * weight[i]);
+    }
+}
+
+// -infinity if there is no other.
 double largest_but(const std::vector<double>& values, Size n, Size left_out) {
     double most = -kInfinity;
     for (Size i = 0; i < n; ++i) {
@@ -124,25 +161,10 @@ void Workspace::look_out(const Problem& problem, const Decider& decider) {
     score_.resize(n);
     weight_.resize(n);
     const double* row = problem.weight.data() + problem.cell(decider.uav, 0);
-    const std::int32_t* index = tasks.task.data();
-    double* weight = weight_.data();
-    for (Size i = 0; i < n; ++i) weight[i] = row[index[i]];
-    const double* x_m = tasks.x_m.data();
-    const double* y_m = tasks.y_m.data();
-    const double* z_m = tasks.z_m.data();
-    const double* service_s = tasks.service_s.data();
-    double* completion_s = completion_s_.data();
-    double* score = score_.data();
-    const double x = decider.place_m[0], y = decider.place_m[1], z = decider.place_m[2];
-    const double speed = problem.speed_m_s[static_cast<Size>(decider.uav)];
-    const double free_s = decider.free_s, survived = decider.survived, horizon = problem.horizon_s;
-    for (Size i = 0; i < n; ++i) {
-        const double dx = x_m[i] - x, dy = y_m[i] - y, dz = z_m[i] - z;
-        const double travel_s = std::sqrt((dx * dx + dy * dy) + dz * dz) / speed;
-        const double time_s = (free_s + travel_s) + service_s[i];
-        completion_s[i] = time_s;
-        score[i] = (horizon - time_s) * (survived * weight[i]);
-    }
+    for (Size i = 0; i < n; ++i) weight_[i] = row[tasks.task[i]];
+    score_all(n, tasks.x_m.data(), tasks.y_m.data(), tasks.z_m.data(), tasks.service_s.data(),
+              weight_.data(), decider, problem.speed_m_s[static_cast<Size>(decider.uav)],
+              problem.horizon_s, completion_s_.data(), score_.data());
 }
 
 Choice Workspace::decide_greedily(const Problem& problem, const Decider& decider, bool brief) {
