@@ -91,7 +91,7 @@ class GuidedRule:
         if self._problem is not problem or self._arrays is None:
             self._arrays = route_arrays(problem)
             self._problem = problem
-            index = {task: i for i, task in enumerate(problem.task_ids)}
+            index: dict[str, int] = {task: i for i, task in enumerate(problem.task_ids)}
             self._routes = [
                 [index[task] for task in self._lists.get(uav, ()) if task in index]
                 for uav in problem.uav_ids

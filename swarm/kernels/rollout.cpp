@@ -81,16 +81,16 @@ std::vector<int> near_uavs(const Solution& solution, int uav) {
 }
 
 void reconsider(Solution& solution, int uav, long iterations) {
-  improve(solution);
-  Search search(solution.instance(), solution.start(), kSeed);
   const std::vector<int> uavs = near_uavs(solution, uav);
+  improve(solution, uavs);
+  Search search(solution.instance(), solution.start(), kSeed);
   search.load(solution.routes(), uavs);
   const double hottest = kHeat * solution.mean_delay();
   constexpr int kSteps = 10;
   for (int step = 0; step < kSteps; ++step)
     search.run(iterations / kSteps, hottest * (kSteps - step) / kSteps);
   for (const int other : uavs) solution.set_route(other, search.best_route(other));
-  improve(solution);
+  improve(solution, uavs);
 }
 
 }  // namespace

@@ -10,9 +10,11 @@ are the caller's; proofs of quality (`coordinator.planner.bound`).
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +23,8 @@ from swarm.kernels import _kernels
 
 __all__ = [
     "FloatArray",
-    "Routes",
     "RouteArrays",
+    "Routes",
     "TeamArrays",
     "flat_lists",
     "improve_routes",
@@ -35,8 +37,16 @@ Routes = list[list[int]]
 """Task indices per UAV in order of execution."""
 
 _MAX_SEED = 2**64 - 1
-_SLICE_ITERATIONS = 1000
-_SLICE_LIST_LENGTH = 100
+_SLICES = 64
+"""At least so many steps of cooling, if that leaves each some iterations."""
+_MOST_IN_SLICE = 1000
+_FEWEST_IN_SLICE = 20
+_LONG_LIST = 100
+"""Tasks; the time of an iteration grows with the lists, so slices of longer ones are smaller."""
+_COOL_START = 0.3
+"""Heat while it is unknown how long the search will be."""
+_ITERATIONS_FOR_FULL_HEAT = 1600.0
+"""Per task; the annealing of a shorter search begins cooler, by the fourth root."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,8 +182,8 @@ def optimise_routes(
     With ``iterations`` the result follows from the arguments alone, on every machine and with
     any number of threads. With ``spent_frac`` it depends on how many slices fit into what is
     spent, but for that number of slices and the fractions told it is again the same.
-    The search works in slices of some 10 to 20 ms; an exception raised by a callable, such as
-    KeyboardInterrupt, leaves it, so return 1 from ``spent_frac`` to stop with the best lists.
+    The search works in slices of at most some 10 to 20 ms. An exception raised by a callable, such
+    as KeyboardInterrupt, ends it without a result; to stop with the best lists, say 1.
 
     Args:
         team: mission and state.
@@ -209,26 +219,36 @@ def optimise_routes(
     )
     search.polish()
     lanes = search.n_lane()
+    n_open = int(np.sum(team.open))
     length = team.mission.n_task / max(1, int(np.sum(team.active)))
-    slice_ = max(20, int(_SLICE_ITERATIONS * min(1.0, _SLICE_LIST_LENGTH / max(1.0, length))))
+    most = int(_MOST_IN_SLICE * min(1.0, _LONG_LIST / max(1.0, length)))
     done = 0
     while True:
-        if iterations is not None:
-            spent = done / iterations if iterations else 1.0
-        else:
-            assert spent_frac is not None
+        if spent_frac is not None:
             spent = float(spent_frac(done))
+        else:
+            spent = done / iterations if iterations else 1.0
         if not spent < 1.0:
             break
-        now = slice_
+        total = iterations if iterations is not None else done / spent if spent > 0.0 else 0.0
+        now = max(_FEWEST_IN_SLICE, min(most, int(total / lanes / _SLICES)))
         if iterations is not None:
-            now = min(slice_, -(-(iterations - done) // lanes))
-        search.round(now, 1.0 - max(0.0, spent), kernel_threads)
+            now = min(now, -(-(iterations - done) // lanes))
+        search.round(now, _heat(max(0.0, spent), total, n_open), kernel_threads)
         done += now * lanes
         if progress is not None:
             progress(done, search.best_value())
     search.polish()
     return _routes(*search.best()), search.best_value()
+
+
+def _heat(spent_frac: float, total: float, n_task: int) -> float:
+    """Cool along what is spent, from a heat that a run of ``total`` iterations can afford."""
+    if total == 0.0:
+        return _COOL_START
+    # two square roots, not a power: their floats are the same everywhere
+    share = total / max(1, n_task) / _ITERATIONS_FOR_FULL_HEAT
+    return min(1.0, math.sqrt(math.sqrt(share))) * (1.0 - spent_frac)
 
 
 def improve_routes(team: TeamArrays, lists: Sequence[Sequence[int]]) -> Routes:
@@ -248,7 +268,7 @@ def flat_lists(
     if len(lists) != n_uav:
         raise ValueError(f"lists must hold {n_uav} lists, not {len(lists)}")
     flat = np.array([task for route in lists for task in route], dtype=np.int64)
-    if len(flat) and not (0 <= flat.min() and flat.max() < n_task):
+    if len(flat) and (flat.min() < 0 or flat.max() >= n_task):
         raise ValueError(f"lists name a task outside 0..{n_task - 1}")
     if len(np.unique(flat)) != len(flat):
         raise ValueError("lists name a task twice")
@@ -274,7 +294,7 @@ def open_lists(
 
 def _routes(flat: npt.NDArray[np.int64], offsets: npt.NDArray[np.int64]) -> Routes:
     tasks, ends = flat.tolist(), offsets.tolist()
-    return [tasks[begin:end] for begin, end in zip(ends, ends[1:], strict=False)]
+    return [tasks[begin:end] for begin, end in pairwise(ends)]
 
 
 def _floats(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...]) -> FloatArray:

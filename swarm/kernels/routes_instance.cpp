@@ -17,6 +17,7 @@ Instance::Instance(const MissionArrays& arrays)
       horizon_s_(arrays.horizon_s),
       certain_(true),
       task_m_(arrays.task_m, arrays.task_m + 3 * static_cast<std::size_t>(arrays.n_task)),
+      value_(arrays.value, arrays.value + arrays.n_task),
       service_s_(arrays.service_s, arrays.service_s + arrays.n_task) {
   const std::size_t cells = static_cast<std::size_t>(n_uav_) * n_task_;
   weight_.resize(cells);
@@ -42,8 +43,11 @@ Instance::Instance(const MissionArrays& arrays)
       std::copy(row.begin(), row.end(), &distance_m_[static_cast<std::size_t>(task) * n_task_]);
     std::iota(order.begin(), order.end(), 0);
     order.erase(order.begin() + task);
-    std::partial_sort(order.begin(), order.begin() + n_near_, order.end(),
-                      [&](int a, int b) { return row[a] < row[b] || (row[a] == row[b] && a < b); });
+    const auto nearer = [&](int a, int b) {
+      return row[a] < row[b] || (row[a] == row[b] && a < b);
+    };
+    std::nth_element(order.begin(), order.begin() + n_near_, order.end(), nearer);
+    std::sort(order.begin(), order.begin() + n_near_, nearer);
     std::copy_n(order.begin(), n_near_, near_.begin() + static_cast<std::size_t>(task) * n_near_);
     order.resize(n_task_);
   }

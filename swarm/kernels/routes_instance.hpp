@@ -33,6 +33,7 @@ class Instance {
   double horizon_s() const { return horizon_s_; }
   bool certain() const { return certain_; }  // every survival probability is 1
   double pace(int uav) const { return pace_[uav]; }  // seconds per metre
+  double value(int task) const { return value_[task]; }
   double service_s(int task) const { return service_s_[task]; }
   double weight(int uav, int task) const { return weight_[at(uav, task)]; }
   double survival(int uav, int task) const { return survival_[at(uav, task)]; }
@@ -60,7 +61,9 @@ class Instance {
   }
 
   // Other tasks, nearest first; as many for each task.
-  const double* place_m(int task) const { return &task_m_[3 * static_cast<std::size_t>(task)]; }
+  const double* place_m(int task) const {
+    return &task_m_[3 * static_cast<std::size_t>(task)];
+  }
 
   int n_near() const { return n_near_; }
   const std::int32_t* near(int task) const {
@@ -75,7 +78,7 @@ class Instance {
   int n_uav_, n_task_, n_near_;
   double horizon_s_;
   bool certain_;
-  std::vector<double> task_m_, pace_, service_s_, weight_, survival_, distance_m_;
+  std::vector<double> task_m_, pace_, value_, service_s_, weight_, survival_, distance_m_;
   std::vector<std::uint8_t> capable_;
   std::vector<std::int32_t> near_;
 };

@@ -21,9 +21,11 @@ struct Change {
 
 class LocalSearch {
  public:
-  explicit LocalSearch(Solution& solution)
-      : solution_(solution), instance_(solution.instance()), dirty_(instance_.n_uav(), 1) {
-    const std::vector<int>& uavs = solution.allowed();
+  LocalSearch(Solution& solution, const std::vector<int>& uavs)
+      : solution_(solution),
+        instance_(solution.instance()),
+        uavs_(uavs),
+        dirty_(instance_.n_uav(), 1) {
     if (!uavs.empty()) {
       double sum = 0.0;
       for (const int uav : uavs) sum += std::abs(solution.route_value(uav));
@@ -32,15 +34,14 @@ class LocalSearch {
   }
 
   void run() {
-    const std::vector<int>& uavs = solution_.allowed();
     for (bool again = true; again;) {
       again = false;
-      for (const int uav : uavs)
+      for (const int uav : uavs_)
         if (dirty_[uav])
           while (improve_one(uav)) again = true;
       const std::vector<std::uint8_t> was_dirty = dirty_;
       std::fill(dirty_.begin(), dirty_.end(), std::uint8_t{0});
-      for (const int a : uavs) {
+      for (const int a : uavs_) {
         for (const int b : beside(a, was_dirty)) {
           while (improve_two(a, b)) again = true;
         }
@@ -61,7 +62,7 @@ class LocalSearch {
       }
     }
     std::vector<int> uavs;
-    for (const int b : solution_.allowed()) {
+    for (const int b : uavs_) {
       if (b == a || !(found[b] || idle || solution_.route(b).empty())) continue;
       if (was_dirty[a] || was_dirty[b] || dirty_[a] || dirty_[b]) uavs.push_back(b);
     }
@@ -268,6 +269,7 @@ class LocalSearch {
 
   Solution& solution_;
   const Instance& instance_;
+  const std::vector<int> uavs_;
   std::vector<std::uint8_t> dirty_;
   double least_ = 0.0;
   int kind_ = 0;
@@ -299,6 +301,8 @@ double worth_from(const Solution& solution, int uav, int place, const Segment& m
   return survived * worth;
 }
 
-void improve(Solution& solution) { LocalSearch(solution).run(); }
+void improve(Solution& solution, const std::vector<int>& uavs) {
+  LocalSearch(solution, uavs).run();
+}
 
 }  // namespace peckorder

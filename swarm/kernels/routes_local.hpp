@@ -10,8 +10,11 @@
 
 namespace peckorder {
 
-// Apply the best move of a list or of a pair of lists until none gains; deterministic.
-void improve(Solution& solution);
+// Apply the best move of a list or of a pair of lists until none gains; deterministic. Only the
+// lists of `uavs`, ascending, change.
+void improve(Solution& solution, const std::vector<int>& uavs);
+
+inline void improve(Solution& solution) { improve(solution, solution.allowed()); }
 
 // Worth, for `uav`, of flying `middle` from `place` on and then its own list from `next` on.
 double worth_from(const Solution& solution, int uav, int place, const Segment& middle, int next);

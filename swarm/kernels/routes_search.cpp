@@ -5,7 +5,7 @@
 namespace peckorder {
 
 namespace {
-constexpr double kMeanTorn = 10.0;
+constexpr double kMeanTorn = 15.0;
 constexpr double kLongestString = 10.0;
 constexpr double kSplitShare = 0.5;
 constexpr double kSplitDepth = 0.01;
@@ -108,7 +108,7 @@ void Search::recreate() {
     if (kind < 4) {
       key = random_.uniform();
     } else if (kind < 8) {
-      key = -instance.weight(current_.allowed()[0], task);
+      key = -instance.value(task);
     } else {
       key = current_.completion_s(task) * (kind == 8 ? 1.0 : -1.0);
     }

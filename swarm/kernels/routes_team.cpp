@@ -10,7 +10,8 @@
 namespace peckorder {
 
 namespace {
-constexpr int kLanes = 2;
+constexpr int kFewestLanes = 2, kMostLanes = 8;
+constexpr int kUavsPerLane = 12;
 constexpr int kUavsToDivide = 10;   // fewer are not divided
 constexpr double kHottest = 1.5;    // of the mean delay; about the cost of a clumsy insertion
 constexpr int kHeatSteps = 64;
@@ -37,8 +38,10 @@ TeamSearch::TeamSearch(const Instance& instance, const Start& start, std::vector
   best_value_ = solution.total();
   hottest_ = kHottest * solution.mean_delay();
   divided_ = static_cast<int>(uavs_.size()) >= kUavsToDivide;
-  lanes_.reserve(kLanes);
-  for (int lane = 0; lane < kLanes; ++lane) {
+  const int lanes = std::min(
+      kMostLanes, std::max(kFewestLanes, static_cast<int>(uavs_.size()) / kUavsPerLane));
+  lanes_.reserve(lanes);
+  for (int lane = 0; lane < lanes; ++lane) {
     lanes_.emplace_back(instance, start, random_.bits());
     if (!divided_) lanes_.back().load(current_, uavs_);
   }
@@ -68,7 +71,7 @@ void TeamSearch::polish() {
   best_value_ = solution.total();
 }
 
-// Halves on both sides of a line in a random direction through the middles of the lists.
+// As many UAVs to each lane, by the middles of their lists along a random direction.
 void TeamSearch::divide() {
   const double east = random_.uniform() - 0.5, north = random_.uniform() - 0.5;
   std::vector<std::pair<double, int>> order;
