@@ -1,7 +1,7 @@
-"""Random missions of any size for benchmarks and studies.
+"""Random missions for benchmarks and studies: of any size, and those the paper draws.
 
-UAVs and tasks uniform over a square whose side grows with the root of the number of tasks, so
-that tasks stand equally dense at every size. Leaves out: faults and pop-ups.
+Of any size: UAVs and tasks uniform over a square whose side grows with the root of the number of
+tasks, so that tasks stand equally dense at every size. Leaves out: faults and pop-ups.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ import numpy as np
 from swarm.allocation.problem import Problem
 from swarm.model import TaskId, UavId
 
-__all__ = ["random_mission"]
+__all__ = ["random_mission", "random_table_problem"]
 
+_TABLE_SIDE_M = 10.0
+"""Of the paper's square of targets."""
 _SIDE_M = 5000.0
 """Of the square with `_TASKS_ON_IT` tasks."""
 _TASKS_ON_IT = 500
@@ -59,4 +61,34 @@ def random_mission(
         success=rng.uniform(0.6, 1.0, (n_uav, n_task)),
         survival=rng.uniform(lowest_survival, 1.0, (n_uav, n_task)),
         horizon_s=float(horizon_s),
+    )
+
+
+def random_table_problem(table: Problem, seed: int, index: int) -> Problem:
+    """One of the paper's random problems: targets uniform in 10 × 10, all UAVs at one (x, 0).
+
+    x is uniform within 0..10; everything else is as in ``table``. Each index is drawn by itself,
+    so that the first problems are the same however many follow.
+
+    Args:
+        table: Table I.
+        seed: of all problems; >= 0.
+        index: which of them; >= 0.
+    """
+    rng = np.random.default_rng([seed, index])
+    start_enu_m = np.zeros((table.n_uav, 3))
+    start_enu_m[:, 0] = rng.uniform(0.0, _TABLE_SIDE_M)
+    task_enu_m = np.zeros((table.n_task, 3))
+    task_enu_m[:, :2] = rng.uniform(0.0, _TABLE_SIDE_M, (table.n_task, 2))
+    return Problem(
+        uav_ids=table.uav_ids,
+        task_ids=table.task_ids,
+        start_enu_m=start_enu_m,
+        task_enu_m=task_enu_m,
+        speed_m_s=table.speed_m_s,
+        value=table.value,
+        service_s=table.service_s,
+        success=table.success,
+        survival=table.survival,
+        horizon_s=table.horizon_s,
     )
