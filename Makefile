@@ -3,13 +3,17 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint format clean help
+KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
+
+.PHONY: demo test lint format kernels sanitize clean help
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
 	@echo "make test    checks and the whole test suite"
 	@echo "make lint    the checks alone: ruff, mypy, import-linter"
 	@echo "make format  put the sources into shape"
+	@echo "make kernels build the C++ kernels again and write their type stub"
+	@echo "make sanitize  test the kernels under the address and undefined-behaviour sanitizers"
 	@echo "make clean   remove what was built and installed here"
 
 demo: $(VENV)/.installed
@@ -33,11 +37,35 @@ $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.installed: pyproject.toml swarm/__init__.py | $(VENV)/bin/python
+# The build tools are installed beside the project, so that a change in one kernel compiles one file.
+kernels: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps \
+		--no-build-isolation --editable .
+	$(BIN)/python -m nanobind.stubgen --quiet --module swarm.kernels._kernels \
+		--include-private --output-file swarm/kernels/_kernels.pyi
+	$(BIN)/ruff format --quiet swarm/kernels/_kernels.pyi
+
+# A copy of the tree with kernels of its own. Python starts without `site` (-S), which would point it
+# at the installed kernels, and with the sanitizer's library before all others.
+SANITIZED := build/sanitize
+sanitize: $(VENV)/.installed-dev
+	$(BIN)/cmake -G Ninja -S swarm/kernels -B $(SANITIZED)/cmake -DPECKORDER_SANITIZE=ON \
+		-DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(BIN)/ninja -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python
+	$(BIN)/cmake --build $(SANITIZED)/cmake
+	rm -rf $(SANITIZED)/tree && mkdir -p $(SANITIZED)/tree
+	cp -R swarm coordinator agent sim tests pyproject.toml $(SANITIZED)/tree
+	cp $(SANITIZED)/cmake/_kernels*.so $(SANITIZED)/tree/swarm/kernels
+	cd $(SANITIZED)/tree && \
+		LD_PRELOAD="$$(c++ -print-file-name=libasan.so) $$(c++ -print-file-name=libstdc++.so)" \
+		ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 PYTHONMALLOC=malloc \
+		PYTHONPATH="$$($(CURDIR)/$(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')" \
+		$(CURDIR)/$(BIN)/python -S -m pytest -q --capture sys --timeout 600 tests/unit/swarm/kernels
+
+$(VENV)/.installed: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@touch $@
 
-$(VENV)/.installed-dev: pyproject.toml swarm/__init__.py | $(VENV)/bin/python
+$(VENV)/.installed-dev: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@ $(VENV)/.installed
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coordinator.planner.exact import estimated_s, optimum
+from coordinator.planner.routes import Progress, guided_plan
 from coordinator.planner.sequence import EXHAUSTIVE_UAVS, SearchLimits, best_sequence
 from coordinator.planner.stop import ShouldStop, never
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
@@ -21,7 +22,7 @@ from swarm.model import Mission, Plan
 
 __all__ = ["METHODS", "ONLINE_METHODS", "check_online_method", "make_plan"]
 
-METHODS = ("greedy", "lookahead", "exact")
+METHODS = ("greedy", "lookahead", "guided", "exact")
 ONLINE_METHODS = ("greedy", "lookahead")
 """Those whose rule agents can follow by themselves."""
 
@@ -42,6 +43,7 @@ def make_plan(
     clock: Clock,
     seed: int = 0,
     stop: ShouldStop | None = None,
+    progress: Progress | None = None,
 ) -> Plan:
     """Plan a mission.
 
@@ -51,8 +53,10 @@ def make_plan(
         mission: what to plan; its pop-ups are left out.
         method: one of `METHODS`.
         clock: measures the elapsed time; nothing is decided by it.
-        seed: of the local search, which only large fleets need.
-        stop: ends the search for a sequence; None means after a few seconds' worth of work.
+        seed: of ``guided`` and of the local search, which only large fleets need.
+        stop: ends the search for a sequence or for lists; None means after a few seconds' worth of
+            work.
+        progress: told the iterations and the best J so far by method ``guided``.
 
     Returns:
         The plan. Its sequence is None for ``exact``, which has none.
@@ -72,6 +76,11 @@ def make_plan(
     if method == "exact":
         routes = optimum(problem).routes
         proven = evaluate(problem, routes)[0]
+    elif method == "guided":
+        guided = guided_plan(problem, seed=seed, stop=stop, progress=progress)
+        routes, sequence, evaluations = guided.routes, guided.sequence, guided.iterations
+        if estimated_s(problem) <= _PROOF_S:
+            proven = evaluate(problem, optimum(problem).routes)[0]
     else:
         search = best_sequence(
             problem,

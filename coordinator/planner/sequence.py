@@ -4,35 +4,52 @@ Sequences that lead to the same first round lead to the same lists, unless UAVs 
 at the very same time later; each distinct first round is therefore evaluated once, by its
 lexicographically first sequence, and again only after such a tie. All of them are tried
 where that is cheap, else a seeded local search runs until it is stopped. Equal UAVs keep their
-order, since exchanging them changes only names. Leaves out: limits
+order, since exchanging them changes only names. Evaluations go to a kernel many at a time, on
+every processor; results do not depend on how many there are. Leaves out: limits
 (`coordinator.planner.stop`) and lists that no sequence gives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import islice, permutations
 
 import numpy as np
 
 from coordinator.planner.assignment import single_stage
+from coordinator.planner.sequence_space import (
+    Sequence,
+    disturbed,
+    has_plain_first_round,
+    neighbours,
+    twins,
+)
 from coordinator.planner.stop import ShouldStop, never
-from swarm.allocation.lower_level import Rule, TeamState, decisions, next_decision, rank_of
-from swarm.allocation.problem import Problem
+from swarm.allocation.lower_level import CompiledRule, TeamState, next_decision, rank_of
+from swarm.allocation.problem import IntArray, Problem
+from swarm.allocation.rules import EXACT_TASKS
+from swarm.kernels import lower_level as kernel
 
-__all__ = ["EXHAUSTIVE_UAVS", "SearchLimits", "SequenceSearch", "best_sequence"]
+__all__ = ["EXHAUSTIVE_UAVS", "Progress", "SearchLimits", "SequenceSearch", "best_sequence"]
 
 EXHAUSTIVE_UAVS = 8
 """Up to this many active UAVs every distinct first round is tried."""
 
-Sequence = tuple[int, ...]
 FirstRound = tuple[int, ...]
 """Per active UAV in scenario order, the task it takes first, `_NO_TASK` or `_UNDECIDED`."""
+Progress = Callable[[int, float], None]
+"""Told the evaluations spent so far and the best J found by them [value·s]."""
 _NO_TASK = -1
 _UNDECIDED = -2
 _CLIMBS_IN_VAIN = 20
-_MANY = 200
+_RANDOM_STARTS = 12
+_NEIGHBOURS = 32
+"""Neighbours looked at together; the best of them is moved to if it is better."""
+_CHUNK_LOOKS = 10_000_000
+"""Tasks looked at between two questions whether to stop: some 50 ms."""
+_LOOKAHEAD_LOOKS = 1_000_000
+"""A decision by lookahead over more tasks than it can solve exactly, in the same currency."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,17 +81,22 @@ class SequenceSearch:
     """Lower-level runs spent."""
     exhaustive: bool
     """No sequence gives a better objective."""
+    interrupted: bool = False
+    """Ctrl-C ended the search before its limits did."""
 
 
 def best_sequence(
     problem: Problem,
-    rule: Rule,
+    rule: CompiledRule,
     rng: np.random.Generator,
     should_stop: ShouldStop = never,
     state: TeamState | None = None,
     limits: SearchLimits | None = None,
+    *,
+    progress: Progress | None = None,
+    threads: int | None = None,
 ) -> SequenceSearch:
-    """Search until all first rounds are tried, or until stopped.
+    """Search until all first rounds are tried, or until stopped, by Ctrl-C too.
 
     Equal objectives: the sequence first in lexicographic order of UAV indices among those tried.
     At least one sequence is always evaluated. With a large fleet the search ends by itself only
@@ -82,62 +104,82 @@ def best_sequence(
 
     Args:
         problem: the mission.
-        rule: how UAVs decide; a rule that looks at the ranks is none of those this can search.
-        rng: moves of the climbs; fleets with few first rounds draw nothing from it.
-        should_stop: asked before every evaluation after the first.
+        rule: how UAVs decide.
+        rng: moves of the local search; small fleets draw nothing from it.
+        should_stop: asked again and again, also whether to stop after evaluations that are not
+            spent yet, so as to spend no more than it allows.
         state: where the team stands; at its start when None.
         limits: when to prefer the local search.
+        progress: told after every batch of evaluations.
+        threads: how many evaluate; as many as there are processors when None. Changes nothing
+            but speed.
     """
     state = TeamState.at_start(problem) if state is None else state
-    search = _Search(problem, rule, state, should_stop)
-    limits = SearchLimits() if limits is None else limits
+    search = _Search(problem, rule, state, should_stop, progress, threads)
+    try:
+        exhaustive = _searched_all(search, rng, SearchLimits() if limits is None else limits)
+    except KeyboardInterrupt:
+        if not search.evaluations:
+            raise
+        return search.result(exhaustive=False, interrupted=True)
+    return search.result(exhaustive=exhaustive, interrupted=False)
+
+
+def _searched_all(search: _Search, rng: np.random.Generator, limits: SearchLimits) -> bool:
     small = len(search.uavs) <= EXHAUSTIVE_UAVS
     if search.plain:
         most = limits.first_rounds if small else limits.first_rounds_large_fleet
         first_rounds = search.list_first_rounds(most, limits)
         if first_rounds is not None:
-            return search.result(exhaustive=search.try_first_rounds(first_rounds, rng))
+            return search.try_first_rounds(first_rounds)
     elif small:
-        return search.result(exhaustive=search.try_each(permutations(search.uavs)))
+        return search.try_each(permutations(search.uavs))
     search.local_search(rng, limits.local_evaluations)
-    return search.result(exhaustive=False)
+    return False
 
 
 class _Search:
     """The state of one search: what has been decided, evaluated and found best."""
 
     def __init__(
-        self, problem: Problem, rule: Rule, state: TeamState, should_stop: ShouldStop
+        self,
+        problem: Problem,
+        rule: CompiledRule,
+        state: TeamState,
+        should_stop: ShouldStop,
+        progress: Progress | None,
+        threads: int | None,
     ) -> None:
         self.uavs: Sequence = tuple(int(u) for u in np.flatnonzero(state.active))
+        self.evaluations = 0
+        self.plain = has_plain_first_round(problem, state, self.uavs)
         self._problem = problem
         self._rule = rule
         self._state = state
         self._should_stop = should_stop
+        self._progress = progress
+        self._threads = kernel.default_threads() if threads is None else threads
         self._inactive: Sequence = tuple(int(u) for u in np.flatnonzero(~state.active))
         self._most_evaluations = np.inf
-        self._evaluations = 0
+        self._looked_up = 0
         self._first_decisions: dict[tuple[int, int], int] = {}
-        self._twins = _twins(problem, state, self.uavs)
-        self._place = {uav: place for place, uav in enumerate(self.uavs)}
+        self._twins = twins(problem, state, self.uavs)
         self._rank = rank_of(self.uavs + self._inactive)
-        self.plain = self._has_plain_first_round()
-        """Priority alone orders the first round: all are free at once, and nobody twice."""
-        self._valued: dict[Sequence, tuple[float, bool]] = {}
-        self._representatives: dict[FirstRound, Sequence] = {}
+        self._values: dict[bytes, float] = {}
         self._best: tuple[float, Sequence] = (-np.inf, self.uavs)
 
-    def result(self, *, exhaustive: bool) -> SequenceSearch:
+    def result(self, *, exhaustive: bool, interrupted: bool) -> SequenceSearch:
         objective, sequence = self._best
-        return SequenceSearch(sequence + self._inactive, objective, self._evaluations, exhaustive)
+        return SequenceSearch(
+            sequence + self._inactive, objective, self.evaluations, exhaustive, interrupted
+        )
 
     def try_each(self, sequences: Iterable[Sequence]) -> bool:
         """Evaluate all; whether it came to the end."""
-        for sequence in sequences:
-            if self._stopped():
+        ordered = (s for s in sequences if s == self._in_twin_order(s))
+        while batch := list(islice(ordered, self._chunk())):
+            if len(self._evaluate(batch)) < len(batch):
                 return False
-            if sequence == self._in_twin_order(sequence):
-                self._evaluate(sequence)
         return True
 
     def list_first_rounds(
@@ -164,22 +206,13 @@ class _Search:
             rounds = longer
         return rounds if len(rounds) <= most else None
 
-    def try_first_rounds(
-        self, rounds: dict[FirstRound, Sequence], rng: np.random.Generator
-    ) -> bool:
-        """Evaluate each, and all its sequences where a later tie lets them differ.
-
-        Of many, those on one climb come first, so that being stopped early does less harm.
-        """
-        self._representatives = rounds
-        if len(rounds) > _MANY:
-            self._climb(self._constructed(), rng)
-        tied: list[FirstRound] = []
-        for first_round, sequence in sorted(rounds.items(), key=lambda item: item[1]):
-            if self._stopped():
-                return False
-            if self._value(first_round, sequence)[1]:
-                tied.append(first_round)
+    def try_first_rounds(self, rounds: dict[FirstRound, Sequence]) -> bool:
+        """Evaluate each, and all its sequences where a later tie lets them differ."""
+        ordered = sorted(rounds.items(), key=lambda item: item[1])
+        found = self._evaluate([sequence for _, sequence in ordered])
+        if len(found) < len(ordered):
+            return False
+        tied = [first for (first, _), (_, tie) in zip(ordered, found, strict=True) if tie]
         for first_round in tied:
             others = (s for s in self._sequences_of(first_round, ()) if s != rounds[first_round])
             if not self.try_each(others):
@@ -189,76 +222,144 @@ class _Search:
     def local_search(self, rng: np.random.Generator, most_evaluations: int | None) -> None:
         """Climb by swaps and insertions, from constructed and then from disturbed sequences."""
         self._most_evaluations = np.inf if most_evaluations is None else most_evaluations
-        starts = [self._constructed(), self.uavs]
+        starts = self._starts(rng)
+        values = self._values_of(starts)
+        if values is None:
+            return
+        best_first = sorted(range(len(starts)), key=lambda i: -values[i])
+        waiting = [starts[i] for i in best_first[:2]]
         climbs_in_vain = 0
         while climbs_in_vain < _CLIMBS_IN_VAIN and not self._stopped():
-            before = self._evaluations
-            start = starts.pop(0) if starts else _disturbed(self._best[1], rng)
-            self._climb(start, rng)
-            climbs_in_vain = 0 if self._evaluations > before else climbs_in_vain + 1
+            before = self.evaluations
+            self._climb(waiting.pop(0) if waiting else disturbed(self._best[1], rng), rng)
+            climbs_in_vain = 0 if self.evaluations > before else climbs_in_vain + 1
 
-    def _constructed(self) -> Sequence:
-        sequence = single_stage(self._problem, self._state).sequence
-        return sequence[: len(self.uavs)]  # inactive UAVs come last
+    def _starts(self, rng: np.random.Generator) -> list[Sequence]:
+        """Sequences to begin with: constructed ones, greedy orders, and a few by chance."""
+        inside = set(self.uavs)
+        constructed = single_stage(self._problem, self._state).sequence
+        speed_m_s = self._problem.speed_m_s
+        ability = self._problem.weight @ self._state.open
+        return [
+            tuple(uav for uav in constructed if uav in inside),
+            self.uavs,
+            tuple(sorted(self.uavs, key=lambda uav: (-speed_m_s[uav], uav))),
+            tuple(sorted(self.uavs, key=lambda uav: (speed_m_s[uav], uav))),
+            tuple(sorted(self.uavs, key=lambda uav: (-ability[uav], uav))),
+            *(tuple(int(uav) for uav in rng.permutation(self.uavs)) for _ in range(_RANDOM_STARTS)),
+        ]
 
     def _climb(self, sequence: Sequence, rng: np.random.Generator) -> None:
-        value = self._value_of(sequence)
+        values = self._values_of([sequence])
+        if values is None:
+            return
+        value = values[0]
         improved = True
         while improved:
             improved = False
-            for neighbour in _neighbours(sequence, rng):
-                if self._stopped():
+            around = neighbours(sequence, rng)
+            while not improved and (near := list(islice(around, _NEIGHBOURS))):
+                values = self._values_of(near)
+                if values is None:
                     return
-                neighbour_value = self._value_of(neighbour)
-                if neighbour_value > value:
-                    sequence, value, improved = neighbour, neighbour_value, True
-                    break
+                best = max(range(len(near)), key=values.__getitem__)
+                if values[best] > value:
+                    sequence, value, improved = near[best], values[best], True
 
-    def _value_of(self, sequence: Sequence) -> float:
-        """J, evaluated once per first round; that later ties may tell sequences apart is left."""
-        sequence = self._in_twin_order(sequence)
+    def _values_of(self, sequences: list[Sequence]) -> list[float] | None:
+        """J of each; None if stopped before the end.
+
+        Evaluated once per first round; that later ties may tell sequences apart is left.
+        """
+        if self._stopped():
+            return None
+        sequences = [self._in_twin_order(sequence) for sequence in sequences]
+        keys = self._first_round_keys(sequences)
+        unknown = {
+            key: sequence
+            for key, sequence in zip(reversed(keys), reversed(sequences), strict=True)
+            if key not in self._values
+        }
+        fresh = list(reversed(unknown.items()))
+        found = self._evaluate([sequence for _, sequence in fresh])
+        self._values.update(
+            (key, value) for (key, _), (value, _) in zip(fresh, found, strict=False)
+        )
+        return [self._values[key] for key in keys] if len(found) == len(fresh) else None
+
+    def _first_round_keys(self, sequences: list[Sequence]) -> list[bytes]:
+        """What tells apart sequences that may lead to different lists."""
+        ranks = self._ranks(sequences)
         if not self.plain:
-            return self._value(sequence, sequence)[0]
-        first_round = self._first_round(sequence)
-        sequence = self._representatives.get(first_round, sequence)
-        return self._value(first_round, sequence)[0]
+            return [row.tobytes() for row in ranks]
+        self._looked_up += len(sequences) * min(len(self.uavs), self._problem.n_task)
+        tasks = kernel.first_rounds(
+            self._problem.kernel, self._state, ranks, self._rule.code, self._threads
+        )
+        return [row.tobytes() for row in tasks]
 
-    def _value(self, key: Sequence, sequence: Sequence) -> tuple[float, bool]:
-        if key not in self._valued:
-            self._valued[key] = self._evaluate(sequence)
-        return self._valued[key]
+    def _ranks(self, sequences: list[Sequence]) -> IntArray:
+        """(k, n_uav) place of every UAV in each of the sequences."""
+        order = np.array([sequence + self._inactive for sequence in sequences], dtype=np.int64)
+        order = order.reshape(len(sequences), self._problem.n_uav)
+        ranks = np.empty_like(order)
+        np.put_along_axis(ranks, order, np.arange(self._problem.n_uav)[None, :], axis=1)
+        return ranks
 
-    def _evaluate(self, sequence: Sequence) -> tuple[float, bool]:
-        """J of one lower-level run, and whether priority mattered again after the first round."""
-        problem = self._problem
-        free_s, survived = self._state.free_s.tolist(), self._state.survived.tolist()
-        decided = [False] * problem.n_uav
-        tie = False
-        value = 0.0
-        rank = rank_of(sequence + self._inactive)
-        for decision in decisions(problem, self._state, rank, self._rule):
-            uav, task = decision.uav, decision.task
-            tie = tie or (decided[uav] and free_s.count(decision.decided_s) > 1)
-            decided[uav] = True
-            free_s[uav] = decision.completion_s
-            left_s = problem.horizon_s - decision.completion_s
-            value += survived[uav] * float(problem.weight[uav, task]) * left_s
-            survived[uav] *= float(problem.survival[uav, task])
-        self._evaluations += 1
-        best_value, best_sequence_ = self._best
-        if value > best_value or (value == best_value and sequence < best_sequence_):
-            self._best = (value, sequence)
-        return value, tie
+    def _evaluate(self, sequences: list[Sequence]) -> list[tuple[float, bool]]:
+        """J of each and whether priority mattered again after the first round.
 
-    def _has_plain_first_round(self) -> bool:
-        if len({float(self._state.free_s[uav]) for uav in self.uavs}) > 1:
-            return False
-        for uav in self.uavs:
-            tasks = self._state.open & self._problem.capable[uav]
-            travel_s = self._problem.travel_s(uav, self._state.place_enu_m[uav])
-            if ((travel_s + self._problem.service_s)[tasks] <= 0.0).any():
-                return False
-        return True
+        Shorter than ``sequences`` if stopped before their end.
+        """
+        results: list[tuple[float, bool]] = []
+        while len(results) < len(sequences):
+            begin = len(results)
+            count = self._allowed(min(self._chunk(), len(sequences) - begin))
+            if not count:
+                break
+            batch = sequences[begin : begin + count]
+            objectives, tied = kernel.evaluate_sequences(
+                self._problem.kernel,
+                self._state,
+                self._ranks(batch),
+                self._rule.code,
+                self._threads,
+            )
+            self.evaluations += count
+            for sequence, value in zip(batch, objectives.tolist(), strict=True):
+                best_value, best_sequence_ = self._best
+                if value > best_value or (value == best_value and sequence < best_sequence_):
+                    self._best = (value, sequence)
+            results += zip(objectives.tolist(), tied.tolist(), strict=True)
+            if self._progress is not None:
+                self._progress(self.evaluations, self._best[0])
+        return results
+
+    def _chunk(self) -> int:
+        """Evaluations to do between two questions whether to stop."""
+        n_open = int(np.count_nonzero(self._state.open))
+        looks = n_open * (n_open / 2 + 100.0) + 1.0
+        if self._rule.code == kernel.LOOKAHEAD and n_open > EXACT_TASKS:
+            looks += n_open * _LOOKAHEAD_LOOKS
+        return int(min(max(_CHUNK_LOOKS / looks, 1.0), 512.0)) * self._threads
+
+    def _allowed(self, count: int) -> int:
+        """How many of the next ``count`` evaluations may be spent; the first one always."""
+        least = 0 if self.evaluations else 1
+        while count > least and self._stops_at(self._work() + count - 1):
+            count //= 2
+        return max(count, least)
+
+    def _stops_at(self, work: float) -> bool:
+        return work >= self._most_evaluations or self._should_stop(work)
+
+    def _stopped(self) -> bool:
+        return self.evaluations > 0 and self._stops_at(self._work())
+
+    def _work(self) -> float:
+        """Evaluations spent, each first decision counting as its part of one."""
+        looked_up = self._looked_up + len(self._first_decisions)
+        return self.evaluations + looked_up / max(1, self._problem.n_task)
 
     def _twin_waits(self, uav: int, sequence: Sequence) -> bool:
         """Whether ``uav`` would pass an equal UAV of smaller index, which changes only names."""
@@ -266,24 +367,8 @@ class _Search:
 
     def _in_twin_order(self, sequence: Sequence) -> Sequence:
         """The same sequence with equal UAVs in ascending order on their places."""
-        waiting = {twins: iter(twins) for twins in self._twins.values()}
+        waiting = {equals: iter(equals) for equals in self._twins.values()}
         return tuple(next(waiting[self._twins[uav]]) for uav in sequence)
-
-    def _stopped(self) -> bool:
-        work = self._work()
-        return self._evaluations > 0 and (work >= self._most_evaluations or self._should_stop(work))
-
-    def _work(self) -> float:
-        """Evaluations spent, each first decision counting as its part of one."""
-        return self._evaluations + len(self._first_decisions) / max(1, self._problem.n_task)
-
-    def _first_round(self, sequence: Sequence) -> FirstRound:
-        first_round: FirstRound = (_UNDECIDED,) * len(self.uavs)
-        for uav in sequence:
-            place = self._place[uav]
-            task = self._first_task(uav, first_round)
-            first_round = (*first_round[:place], task, *first_round[place + 1 :])
-        return first_round
 
     def _first_task(self, uav: int, first_round: FirstRound) -> int:
         """What ``uav`` takes after the UAVs decided in ``first_round``; `_NO_TASK` if nothing."""
@@ -310,49 +395,3 @@ class _Search:
                 continue
             if self._first_task(uav, partial) == task:
                 yield from self._sequences_of(first_round, (*sequence, uav))
-
-
-def _twins(problem: Problem, state: TeamState, uavs: Sequence) -> dict[int, Sequence]:
-    """For each UAV all that equal it in every respect, itself included, ascending."""
-    classes: dict[bytes, list[int]] = {}
-    for uav in uavs:
-        traits = (
-            state.free_s[uav],
-            state.survived[uav],
-            *state.place_enu_m[uav],
-            problem.speed_m_s[uav],
-            *problem.success[uav],
-            *problem.survival[uav],
-        )
-        classes.setdefault(np.array(traits).tobytes(), []).append(uav)
-    return {uav: tuple(twins) for twins in classes.values() for uav in twins}
-
-
-def _neighbours(sequence: Sequence, rng: np.random.Generator) -> Iterator[Sequence]:
-    """Every swap of two UAVs and every insertion of one elsewhere, in random order."""
-    n = len(sequence)
-    for move in rng.permutation(n * n):
-        low, high = divmod(int(move), n)
-        changed = list(sequence)
-        if low < high:
-            changed[low], changed[high] = changed[high], changed[low]
-        elif low > high:
-            changed.insert(high, changed.pop(low))
-        else:
-            continue
-        yield tuple(changed)
-    for move in rng.permutation(n * n):
-        low, high = divmod(int(move), n)
-        if low + 1 < high:  # neighbours in the sequence have been swapped above
-            changed = list(sequence)
-            changed.insert(high, changed.pop(low))
-            yield tuple(changed)
-
-
-def _disturbed(sequence: Sequence, rng: np.random.Generator) -> Sequence:
-    """A sequence a few random swaps away."""
-    changed = list(sequence)
-    for _ in range(max(3, len(changed) // 8)):
-        i, j = rng.integers(len(changed), size=2)
-        changed[i], changed[j] = changed[j], changed[i]
-    return tuple(changed)

@@ -1,15 +1,17 @@
 """Limits of a search: how many evaluations, how long, or whatever the caller says.
 
-A limit is a function of the work done so far, so searches themselves read no clock.
+A limit is a function of the work done so far, so searches themselves read no clock. Those made
+here also say how much of them is spent, which an annealing search cools by.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from swarm.clock import Clock
 
-__all__ = ["ShouldStop", "after_evaluations", "after_time", "first_of", "never"]
+__all__ = ["Limit", "ShouldStop", "after_evaluations", "after_time", "first_of", "never"]
 
 ShouldStop = Callable[[float], bool]
 """Given the evaluations spent so far (a part of one counts as its part), whether to stop."""
@@ -21,21 +23,48 @@ def never(evaluations: float) -> bool:
     return False
 
 
-def after_evaluations(limit: int) -> ShouldStop:
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A `ShouldStop` that is approached gradually."""
+
+    spent_frac: Callable[[float], float]
+    """Given the evaluations spent so far, the share of the limit that is spent; >= 1: stop."""
+
+    def __call__(self, evaluations: float) -> bool:
+        """Whether to stop."""
+        return self.spent_frac(evaluations) >= 1.0
+
+
+def after_evaluations(limit: int) -> Limit:
     """Stop once ``limit`` (>= 1) evaluations are spent."""
     if limit < 1:
         raise ValueError(f"limit must be >= 1 evaluation, not {limit}")
-    return lambda evaluations: evaluations >= limit
+    return Limit(lambda evaluations: evaluations / limit)
 
 
-def after_time(clock: Clock, limit_s: float) -> ShouldStop:
+def after_time(clock: Clock, limit_s: float) -> Limit:
     """Stop ``limit_s`` (>= 0) seconds of ``clock`` from now."""
     if not limit_s >= 0.0:
         raise ValueError(f"limit_s must be >= 0 s, not {limit_s}")
-    end_s = clock.now_s() + limit_s
-    return lambda _: clock.now_s() >= end_s
+    begin_s = clock.now_s()
+    end_s = begin_s + limit_s
+
+    def spent_frac(evaluations: float) -> float:
+        del evaluations
+        now_s = clock.now_s()
+        return 1.0 if now_s >= end_s else (now_s - begin_s) / limit_s
+
+    return Limit(spent_frac)
 
 
-def first_of(*stops: ShouldStop) -> ShouldStop:
-    """Stop as soon as any of ``stops`` says so."""
-    return lambda evaluations: any(stop(evaluations) for stop in stops)
+def first_of(*stops: ShouldStop) -> Limit:
+    """Stop as soon as any of ``stops`` says so; of several limits the one spent most counts."""
+
+    def spent_frac(evaluations: float) -> float:
+        shares = [
+            stop.spent_frac(evaluations) if isinstance(stop, Limit) else float(stop(evaluations))
+            for stop in stops
+        ]
+        return max(shares, default=0.0)
+
+    return Limit(spent_frac)

@@ -2,7 +2,8 @@
 
 The UAV that is free earliest decides next; at equal times the one earlier in the
 priority sequence; then the smaller index. Used unchanged by the offline planner and
-by every agent. Leaves out: how a UAV chooses (`swarm.allocation.rules`).
+by every agent: decision by decision with any rule, or as one compiled run with a rule
+that a kernel knows. Leaves out: how a UAV chooses (`swarm.allocation.rules`).
 """
 
 from __future__ import annotations
@@ -10,13 +11,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
-from typing import Protocol
+from math import isfinite
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from swarm.allocation.problem import BoolArray, FloatArray, IntArray, Problem
+from swarm.kernels import lower_level as kernel
+from swarm.kernels.lower_level import RuleCode
 
-__all__ = ["Decision", "Rule", "TeamState", "decisions", "next_decision", "rank_of", "run"]
+__all__ = [
+    "CompiledRule",
+    "Decision",
+    "Rule",
+    "TeamState",
+    "decisions",
+    "next_decision",
+    "rank_of",
+    "run",
+]
 
 
 @dataclass(slots=True, eq=False)
@@ -28,7 +41,8 @@ class TeamState:
     """
 
     free_s: FloatArray
-    """(n_uav,) mission time at which each UAV is next free [s]."""
+    """(n_uav,) mission time at which each UAV is next free [s]; infinite for one that decides
+    nothing more, though it takes part."""
     place_enu_m: FloatArray
     """(n_uav, 3) where each UAV is then [m; east, north, up]."""
     survived: FloatArray
@@ -115,6 +129,16 @@ class Rule(Protocol):
         ...
 
 
+@runtime_checkable
+class CompiledRule(Rule, Protocol):
+    """A rule that the kernels know, so that they can run the whole lower level by it."""
+
+    @property
+    def code(self) -> RuleCode:
+        """Its name to them."""
+        ...
+
+
 def rank_of(sequence: Sequence[int]) -> IntArray:
     """(n_uav,) place of each UAV in a priority sequence of UAV indices; 0 decides first.
 
@@ -144,7 +168,7 @@ def decisions(problem: Problem, state: TeamState, rank: IntArray, rule: Rule) ->
         for uav, (free_s, place) in enumerate(
             zip(state.free_s.tolist(), rank.tolist(), strict=True)
         )
-        if state.active[uav]
+        if state.active[uav] and isfinite(free_s)
     ]
     heapify(queue)
     while queue:
@@ -153,7 +177,8 @@ def decisions(problem: Problem, state: TeamState, rank: IntArray, rule: Rule) ->
         if decision is None:
             continue  # tasks only close, so this UAV has no further decision
         state.apply(problem, decision)
-        heappush(queue, (decision.completion_s, place, uav))
+        if isfinite(decision.completion_s):
+            heappush(queue, (decision.completion_s, place, uav))
         yield decision
 
 
@@ -180,6 +205,12 @@ def run(
     """
     routes: list[list[int]] = [[] for _ in range(problem.n_uav)]
     completion_s = np.full(problem.n_task, np.nan)
+    if isinstance(rule, CompiledRule):
+        uavs, tasks, times_s, _ = kernel.run(problem.kernel, state, rank, rule.code)
+        for uav, task in zip(uavs.tolist(), tasks.tolist(), strict=True):
+            routes[uav].append(task)
+        completion_s[tasks] = times_s
+        return routes, completion_s
     for decision in decisions(problem, state, rank, rule):
         routes[decision.uav].append(decision.task)
         completion_s[decision.task] = decision.completion_s

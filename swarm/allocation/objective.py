@@ -7,6 +7,7 @@ before this one on its list. Leaves out: finding good lists.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -33,16 +34,19 @@ def evaluate(problem: Problem, routes: Sequence[Sequence[int]]) -> tuple[float, 
     objective = 0.0
     completion_s = np.full(problem.n_task, np.nan)
     for uav, route in enumerate(routes):
-        free_s, survived, place = 0.0, 1.0, problem.start_enu_m[uav]
+        free_s, survived, place = 0.0, 1.0, problem.start_enu_m[uav].tolist()
+        speed_m_s = float(problem.speed_m_s[uav])
         for task in route:
             if not np.isnan(completion_s[task]):
                 raise ValueError(f"task {problem.task_ids[task]} is on the lists twice")
-            travel_s = problem.travel_s(uav, place)[task]
-            free_s = float((free_s + travel_s) + problem.service_s[task])
+            there = problem.task_enu_m[task].tolist()
+            dx_m, dy_m, dz_m = there[0] - place[0], there[1] - place[1], there[2] - place[2]
+            travel_s = sqrt(dx_m * dx_m + dy_m * dy_m + dz_m * dz_m) / speed_m_s
+            free_s = (free_s + travel_s) + float(problem.service_s[task])
             completion_s[task] = free_s
             objective += survived * problem.weight[uav, task] * (problem.horizon_s - free_s)
             survived *= problem.survival[uav, task]
-            place = problem.task_enu_m[task]
+            place = there
     return float(objective), completion_s
 
 

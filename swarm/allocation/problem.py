@@ -7,11 +7,12 @@ happened so far (`swarm.allocation.lower_level.TeamState`) and every decision.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import numpy.typing as npt
 
+from swarm.kernels.problem import KernelProblem, prepare
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 
 __all__ = ["BoolArray", "FloatArray", "IntArray", "Problem"]
@@ -53,6 +54,8 @@ class Problem:
     """(n_uav, n_task) success > 0."""
     weight: FloatArray = field(init=False, repr=False)
     """(n_uav, n_task) p · m."""
+    kernel: KernelProblem = field(init=False, repr=False)
+    """The same, prepared for the compiled kernels."""
     _task_columns_m: FloatArray = field(init=False, repr=False)
     """(3, n_task) the places again, one contiguous row per axis."""
 
@@ -88,6 +91,21 @@ class Problem:
         self._freeze("capable", self.success > 0.0)
         self._freeze("weight", self.success * self.value)
         self._freeze("_task_columns_m", np.ascontiguousarray(self.task_enu_m.T))
+        kernel = prepare(
+            start_enu_m=self.start_enu_m,
+            task_enu_m=self.task_enu_m,
+            speed_m_s=self.speed_m_s,
+            service_s=self.service_s,
+            weight=self.weight,
+            capable=self.capable,
+            survival=self.survival,
+            horizon_s=self.horizon_s,
+        )
+        object.__setattr__(self, "kernel", kernel)
+
+    def __reduce__(self) -> tuple[type[Problem], tuple[object, ...]]:
+        given = (getattr(self, item.name) for item in fields(self) if item.init)
+        return type(self), tuple(given)
 
     @classmethod
     def from_mission(

@@ -10,9 +10,21 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import permutations
 
-from swarm.allocation.problem import Problem
+from swarm.allocation.lower_level import TeamState
+from swarm.allocation.problem import FloatArray, Problem
 
-__all__ = ["completion_s", "extreme_values", "lists", "objective", "ordered_partitions"]
+__all__ = [
+    "certificate",
+    "choice",
+    "completion_s",
+    "extreme_values",
+    "first_round",
+    "lists",
+    "lists_from",
+    "objective",
+    "ordered_partitions",
+    "tour_worth",
+]
 
 Lists = list[list[int]]
 
@@ -43,33 +55,120 @@ def objective(problem: Problem, routes: Sequence[Sequence[int]]) -> float:
 
 
 def lists(problem: Problem, sequence: Sequence[int], rule: str) -> Lists:
-    """The lower level of Fig. 1 for a priority sequence of UAV indices."""
-    n_uav = problem.n_uav
-    free_s = [0.0] * n_uav
-    place = [[float(c) for c in problem.start_enu_m[uav]] for uav in range(n_uav)]
-    survived = [1.0] * n_uav
-    open_tasks = list(range(problem.n_task))
-    routes: Lists = [[] for _ in range(n_uav)]
+    """The lower level of Fig. 1 from the starts, for a priority sequence of UAV indices."""
+    return lists_from(problem, TeamState.at_start(problem), sequence, rule)[0]
+
+
+def lists_from(
+    problem: Problem, state: TeamState, sequence: Sequence[int], rule: str
+) -> tuple[Lists, float]:
+    """The same from any state, and Σ of eq. 1 over the decisions taken, in their order."""
+    state = state.copy()
+    routes: Lists = [[] for _ in range(problem.n_uav)]
+    total = 0.0
     while True:
         able = [
-            uav for uav in range(n_uav) if any(problem.success[uav, t] > 0.0 for t in open_tasks)
+            uav
+            for uav in range(problem.n_uav)
+            if state.active[uav] and math.isfinite(state.free_s[uav]) and _able(problem, state, uav)
         ]
         if not able:
-            return routes
-        uav = min(able, key=lambda u: (free_s[u], list(sequence).index(u), u))
-        tasks = [task for task in open_tasks if problem.success[uav, task] > 0.0]
-        tours: list[tuple[int, ...]] = (
-            [(task,) for task in tasks] if rule == "greedy" else list(permutations(tasks))
-        )
-        best_value, best_first = -math.inf, -1
-        for tour in tours:
-            value = _tour_value(problem, uav, free_s[uav], place[uav], survived[uav], tour)
-            if value > best_value or (value == best_value and tour[0] < best_first):
-                best_value, best_first = value, tour[0]
-        free_s[uav], place[uav] = _arrive(problem, uav, free_s[uav], place[uav], best_first)
-        survived[uav] *= float(problem.survival[uav, best_first])
-        routes[uav].append(best_first)
-        open_tasks.remove(best_first)
+            return routes, total
+        uav = min(able, key=lambda u: (float(state.free_s[u]), list(sequence).index(u), u))
+        task = choice(problem, state, uav, rule)[0]
+        survived = float(state.survived[uav])
+        state.free_s[uav], there = _arrive(problem, uav, *_stand(state, uav), task)
+        state.place_enu_m[uav] = there
+        weight = float(problem.success[uav, task]) * float(problem.value[task])
+        total += survived * weight * (problem.horizon_s - float(state.free_s[uav]))
+        state.survived[uav] = survived * float(problem.survival[uav, task])
+        state.open[task] = False
+        routes[uav].append(task)
+
+
+def choice(
+    problem: Problem, state: TeamState, uav: int, rule: str
+) -> tuple[int, float, float | None]:
+    """The task ``uav`` takes if it is its turn, its worth, and that of the best other task.
+
+    Greedy looks at single tasks, lookahead at all tours. Something must be open to it.
+    """
+    tasks = _able(problem, state, uav)
+    tours: list[tuple[int, ...]] = (
+        [(task,) for task in tasks] if rule == "greedy" else list(permutations(tasks))
+    )
+    survived = float(state.survived[uav])
+    best: dict[int, float] = {}
+    for tour in tours:
+        value = _tour_value(problem, uav, *_stand(state, uav), survived, tour)
+        best[tour[0]] = max(best.get(tour[0], -math.inf), value)
+    task = min(best, key=lambda t: (-best[t], t))
+    return task, best[task], max((best[t] for t in best if t != task), default=None)
+
+
+def certificate(problem: Problem, state: TeamState, uav: int) -> bool:
+    """Whether Theorem 5 proves that greedy and lookahead agree on the decision of ``uav``.
+
+    With λ = Z2/Z1 (second best over best greedy score) and p̄ the largest survival probability,
+    p̄ ≤ (1 − λ)/(2 − λ) is sufficient. Why: a tour that begins with another task is worth at most
+    Z2 + Z1·(p̄ + p̄² + …) < Z1 then, because a later task earns at most its greedy score times the
+    survival of all before it; and some tour that begins with the greedy task is worth at least
+    Z1. The second half fails if the rest of that tour comes so late that it costs more than it
+    earns, so it is checked on one tour, the greedy one; finding that one to earn less than 0
+    proves nothing. Nothing is claimed where a premise fails.
+    """
+    tasks = _able(problem, state, uav)
+    if len(tasks) == 1:
+        return True  # one tour only
+    first, best, second = choice(problem, state, uav, "greedy")
+    if not best > 0.0 or second is None:
+        return False
+    ratio = max(0.0, second / best)  # a negative second best is left to the check of the rest
+    highest = max(float(problem.survival[uav, task]) for task in tasks)
+    if highest * (2.0 - ratio) > 1.0 - ratio:
+        return False
+    free_s, place = _arrive(problem, uav, *_stand(state, uav), first)
+    left = [task for task in tasks if task != first]
+    earned, survived = 0.0, 1.0
+    while left and survived > 0.0:
+        scores = [_tour_value(problem, uav, free_s, place, 1.0, (task,)) for task in left]
+        task = left[scores.index(max(scores))]
+        earned += survived * max(scores)
+        survived *= float(problem.survival[uav, task])
+        free_s, place = _arrive(problem, uav, free_s, place, task)
+        left.remove(task)
+    return earned >= 0.0
+
+
+def first_round(
+    problem: Problem, state: TeamState, sequence: Sequence[int], rule: str
+) -> list[int]:
+    """What each UAV takes if all active ones decide once in the order of the sequence; else -1."""
+    state = state.copy()
+    tasks = [-1] * problem.n_uav
+    for uav in sequence:
+        if state.active[uav] and math.isfinite(state.free_s[uav]) and _able(problem, state, uav):
+            tasks[uav] = choice(problem, state, uav, rule)[0]
+            state.open[tasks[uav]] = False
+    return tasks
+
+
+def tour_worth(
+    tour: Sequence[int],
+    completion_s: FloatArray,
+    weight: FloatArray,
+    survival: FloatArray,
+    leg_s: FloatArray,
+    horizon_s: float,
+) -> float:
+    """Worth of a tour of positions, S = 1 before it; other arguments as of `swarm.kernels.tours`."""
+    total, survived, time_s, last = 0.0, 1.0, 0.0, -1
+    for task in tour:
+        time_s = float(completion_s[task]) if last < 0 else time_s + float(leg_s[last, task])
+        total += survived * float(weight[task]) * (horizon_s - time_s)
+        survived *= float(survival[task])
+        last = task
+    return total
 
 
 def ordered_partitions(problem: Problem) -> Iterator[Lists]:
@@ -98,6 +197,16 @@ def extreme_values(problem: Problem) -> tuple[float, float]:
     """J of the best and of the worst ordered partition, by trying all."""
     values = [objective(problem, routes) for routes in ordered_partitions(problem)]
     return max(values), min(values)
+
+
+def _able(problem: Problem, state: TeamState, uav: int) -> list[int]:
+    """Open tasks that ``uav`` is capable of, ascending."""
+    return [t for t in range(problem.n_task) if state.open[t] and problem.success[uav, t] > 0.0]
+
+
+def _stand(state: TeamState, uav: int) -> tuple[float, list[float]]:
+    """When and where ``uav`` is next free [s], [m]."""
+    return float(state.free_s[uav]), [float(c) for c in state.place_enu_m[uav]]
 
 
 def _arrive(

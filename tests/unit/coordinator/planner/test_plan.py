@@ -120,4 +120,4 @@ def test_mission_without_tasks_is_planned_as_nothing() -> None:
 
 def test_unknown_method_is_refused() -> None:
     with pytest.raises(ValueError, match="guided"):
-        make_plan(table_1_mission(), "guided", clock=TickingClock())
+        make_plan(table_1_mission(), "guessed", clock=TickingClock())

@@ -1,0 +1,1 @@
+"""Studies: many simulated missions side by side, and the missions they draw."""

@@ -1,0 +1,94 @@
+"""Random missions for benchmarks and studies: of any size, and those the paper draws.
+
+Of any size: UAVs and tasks uniform over a square whose side grows with the root of the number of
+tasks, so that tasks stand equally dense at every size. Leaves out: faults and pop-ups.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarm.allocation.problem import Problem
+from swarm.model import TaskId, UavId
+
+__all__ = ["random_mission", "random_table_problem"]
+
+_TABLE_SIDE_M = 10.0
+"""Of the paper's square of targets."""
+_SIDE_M = 5000.0
+"""Of the square with `_TASKS_ON_IT` tasks."""
+_TASKS_ON_IT = 500
+_HORIZON_SHARE = 1.2
+_LATENESS = 3.3
+"""Makespan of a good plan over (time to fly a list in a row + first leg), as measured."""
+
+
+def random_mission(
+    n_uav: int,
+    n_task: int,
+    seed: int,
+    *,
+    horizon_s: float | None = None,
+    lowest_survival: float = 1.0,
+) -> Problem:
+    """Speeds 8–15 m/s, p 0.6–1, values 1–10, service 0–20 s, all uniform.
+
+    Args:
+        n_uav: number of UAVs; >= 1.
+        n_task: number of tasks; >= 1.
+        seed: of the drawing.
+        horizon_s: D [s]; some 1.2 × the makespan of a good plan when None.
+        lowest_survival: survival probabilities are uniform from this to 1.
+    """
+    rng = np.random.default_rng(seed)
+    side_m = _SIDE_M * math.sqrt(n_task / _TASKS_ON_IT)
+    if horizon_s is None:
+        # a tour of n of M uniform places is some 0.75·side·n/√M long
+        leg_s = 0.75 * side_m / math.sqrt(n_task) / 11.5 + 10.0
+        horizon_s = _HORIZON_SHARE * (n_task / n_uav * leg_s * 1.5 + 0.1 * side_m / 11.5)
+    ground = np.zeros((n_uav + n_task, 3))
+    ground[:, :2] = rng.uniform(0.0, side_m, (n_uav + n_task, 2))
+    return Problem(
+        uav_ids=tuple(UavId(f"uav{i + 1}") for i in range(n_uav)),
+        task_ids=tuple(TaskId(f"t{i + 1}") for i in range(n_task)),
+        start_enu_m=ground[:n_uav],
+        task_enu_m=ground[n_uav:],
+        speed_m_s=rng.uniform(8.0, 15.0, n_uav),
+        value=rng.uniform(1.0, 10.0, n_task),
+        service_s=rng.uniform(0.0, 20.0, n_task),
+        success=rng.uniform(0.6, 1.0, (n_uav, n_task)),
+        survival=rng.uniform(lowest_survival, 1.0, (n_uav, n_task)),
+        horizon_s=float(horizon_s),
+    )
+
+
+def random_table_problem(table: Problem, seed: int, index: int) -> Problem:
+    """One of the paper's random problems: targets uniform in 10 × 10, all UAVs at one (x, 0).
+
+    x is uniform within 0..10; everything else is as in ``table``. Each index is drawn by itself,
+    so that the first problems are the same however many follow.
+
+    Args:
+        table: Table I.
+        seed: of all problems; >= 0.
+        index: which of them; >= 0.
+    """
+    rng = np.random.default_rng([seed, index])
+    start_enu_m = np.zeros((table.n_uav, 3))
+    start_enu_m[:, 0] = rng.uniform(0.0, _TABLE_SIDE_M)
+    task_enu_m = np.zeros((table.n_task, 3))
+    task_enu_m[:, :2] = rng.uniform(0.0, _TABLE_SIDE_M, (table.n_task, 2))
+    return Problem(
+        uav_ids=table.uav_ids,
+        task_ids=table.task_ids,
+        start_enu_m=start_enu_m,
+        task_enu_m=task_enu_m,
+        speed_m_s=table.speed_m_s,
+        value=table.value,
+        service_s=table.service_s,
+        success=table.success,
+        survival=table.survival,
+        horizon_s=table.horizon_s,
+    )

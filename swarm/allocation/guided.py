@@ -1,0 +1,129 @@
+"""The rule `guided`: keep to the published lists unless something better can be shown.
+
+While nothing unforeseen has happened, a UAV leaves its list only for a task with which the whole
+team's lists are worth more, so the executed J never falls below the plan's. Once tasks stand on
+no list (pop-ups) or on the list of a UAV that no longer takes part, the lists are repaired and
+those around the deciding UAV searched anew, alike in every replica: the choice follows from
+lists and shared state alone. Leaves out: making lists (`coordinator.planner.routes`) and
+publishing them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from swarm.allocation.lower_level import Decision, TeamState
+from swarm.allocation.problem import BoolArray, IntArray, Problem
+from swarm.kernels.rollout import guided_choice
+from swarm.kernels.routes import RouteArrays, Routes, TeamArrays
+
+__all__ = ["GuidedRule", "route_arrays", "team_arrays"]
+
+_REPAIR_ITERATIONS = 300
+"""Steps of the search after a disturbance; some 2 ms."""
+
+
+class GuidedRule:
+    """Decide by published lists; see the module.
+
+    Args:
+        lists: task ids per UAV id in order; ids that a problem does not know are skipped.
+        repair_iterations: steps of the search after a disturbance; all replicas need the same.
+
+    Arrays derived from the problem last asked about are kept; they change speed, never results.
+    """
+
+    name = "guided"
+
+    def __init__(
+        self,
+        lists: Mapping[str, Sequence[str]],
+        *,
+        repair_iterations: int = _REPAIR_ITERATIONS,
+    ) -> None:
+        self._lists = {uav: tuple(tasks) for uav, tasks in lists.items()}
+        self._repair_iterations = repair_iterations
+        self._problem: Problem | None = None
+        self._arrays: RouteArrays | None = None
+        self._routes: Routes = []
+        self._owner: IntArray = np.zeros(0, dtype=np.int64)
+
+    def decide(
+        self, problem: Problem, state: TeamState, rank: IntArray, uav: int
+    ) -> Decision | None:
+        """The next task of ``uav``; None when nothing open suits it or the team is better off.
+
+        UAVs that have had their turn without taking a task are not counted upon: those free
+        before this decision, or at the same time with a better rank.
+        """
+        if not (state.open & problem.capable[uav]).any():
+            return None
+        mission = self._arrays_of(problem)
+        now_s = float(state.free_s[uav])
+        active = state.active & ~_has_declined(state, rank, now_s, int(rank[uav]))
+        active[uav] = True
+        team = team_arrays(mission, state, active, now_s)
+        on_a_list = self._owner >= 0
+        kept = on_a_list & active[self._owner]
+        disturbed = bool((problem.capable.any(axis=0) & ~on_a_list).any())
+        disturbed |= bool((state.open & ~kept).any())
+        choice = guided_choice(
+            team, self._routes, uav, iterations=self._repair_iterations if disturbed else 0
+        )
+        if choice.task is None:
+            return None
+        task = choice.task
+        travel_s = problem.travel_s(uav, state.place_enu_m[uav])[task]
+        return Decision(
+            uav=uav,
+            task=task,
+            decided_s=now_s,
+            completion_s=float((now_s + travel_s) + problem.service_s[task]),
+            score=choice.worth,
+            second_score=choice.second_worth,
+            certificate=False,
+            exact=False,
+        )
+
+    def _arrays_of(self, problem: Problem) -> RouteArrays:
+        if self._problem is not problem or self._arrays is None:
+            self._arrays = route_arrays(problem)
+            self._problem = problem
+            index: dict[str, int] = {task: i for i, task in enumerate(problem.task_ids)}
+            self._routes = [
+                [index[task] for task in self._lists.get(uav, ()) if task in index]
+                for uav in problem.uav_ids
+            ]
+            self._owner = np.full(problem.n_task, -1, dtype=np.int64)
+            for uav_index, route in enumerate(self._routes):
+                self._owner[route] = uav_index
+        return self._arrays
+
+
+def route_arrays(problem: Problem) -> RouteArrays:
+    """The problem laid out for route kernels."""
+    return RouteArrays(
+        problem.task_enu_m,
+        problem.speed_m_s,
+        problem.value,
+        problem.service_s,
+        problem.success,
+        problem.survival,
+        problem.horizon_s,
+    )
+
+
+def team_arrays(
+    mission: RouteArrays, state: TeamState, active: BoolArray, now_s: float
+) -> TeamArrays:
+    """The state for route kernels; UAVs that are free at an unknown time count as free now."""
+    free_s = np.where(np.isfinite(state.free_s), state.free_s, now_s)
+    return TeamArrays(mission, free_s, state.place_enu_m, state.survived, active, state.open)
+
+
+def _has_declined(state: TeamState, rank: IntArray, now_s: float, own_rank: int) -> BoolArray:
+    declined: BoolArray = state.free_s < now_s
+    declined |= (state.free_s == now_s) & (rank < own_rank)
+    return declined

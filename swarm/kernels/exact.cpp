@@ -1,0 +1,174 @@
+// The exact optimum of eq. 1: dynamic programming over task subsets per UAV (tours.hpp), then over
+// the division of the tasks among the UAVs, 3^M combinations per UAV.
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "parallel.hpp"
+#include "problem.hpp"
+#include "tours.hpp"
+
+namespace peckorder {
+
+namespace {
+
+using Size = std::size_t;
+using Mask = std::uint32_t;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// One UAV's tours over some tasks.
+struct UavTours {
+    UavTours(const Problem& problem, int uav, double sign, const std::vector<int>& tasks) {
+        const Size n = tasks.size();
+        const double* start = &problem.start_m[3 * static_cast<Size>(uav)];
+        std::vector<double> weight(n), survival(n), leg_s(n * n);
+        completion_s.resize(n);
+        for (Size i = 0; i < n; ++i) {
+            const Size from = static_cast<Size>(tasks[i]);
+            weight[i] = sign * problem.weight[problem.cell(uav, tasks[i])];
+            survival[i] = problem.survival[problem.cell(uav, tasks[i])];
+            completion_s[i] = problem.travel_s(uav, start[0], start[1], start[2], tasks[i]) +
+                              problem.service_s[from];
+            for (Size j = 0; j < n; ++j) {
+                leg_s[i * n + j] = problem.travel_s(uav, problem.x_m[from], problem.y_m[from],
+                                                    problem.z_m[from], tasks[j]) +
+                                   problem.service_s[static_cast<Size>(tasks[j])];
+            }
+        }
+        table = std::make_unique<TourTable>(static_cast<int>(n), weight.data(), survival.data(),
+                                            leg_s.data(), problem.horizon_s);
+    }
+
+    std::vector<double> completion_s;
+    std::unique_ptr<TourTable> table;
+};
+
+// Best worth of every subset of the universe for one UAV; -infinity where a task is beyond it.
+std::vector<double> subset_values(const Problem& problem, int uav, double sign,
+                                  const std::vector<int>& universe) {
+    std::vector<int> own;
+    std::vector<Mask> bits;
+    for (Size i = 0; i < universe.size(); ++i) {
+        if (problem.capable[problem.cell(uav, universe[i])]) {
+            own.push_back(universe[i]);
+            bits.push_back(Mask{1} << i);
+        }
+    }
+    const UavTours tours(problem, uav, sign, own);
+    std::vector<double> inside(Size{1} << own.size());
+    tours.table->values(tours.completion_s.data(), inside.data());
+    std::vector<double> values(Size{1} << universe.size(), -kInfinity);
+    std::vector<Mask> spread(inside.size(), 0);
+    for (Size s = 0; s < inside.size(); ++s) {
+        if (s) {
+            Size low = 0;
+            while (!(s >> low & 1)) ++low;
+            spread[s] = spread[s & (s - 1)] | bits[low];
+        }
+        values[spread[s]] = inside[s];
+    }
+    return values;
+}
+
+// For every set the best of first[set without s] + second[s] over its subsets s.
+std::vector<double> divide(const std::vector<double>& first, const std::vector<double>& second,
+                           int threads) {
+    std::vector<double> best(first.size());
+    parallel_for(first.size(), threads, 256, [&] {
+        return [&](Size job) {
+            const Mask set = static_cast<Mask>(job);
+            double most = first[set] + second[0];
+            for (Mask s = set; s; s = (s - 1) & set) {
+                const double worth = first[set ^ s] + second[s];
+                most = worth > most ? worth : most;
+            }
+            best[set] = most;
+        };
+    });
+    return best;
+}
+
+using Lists = std::vector<std::vector<int>>;
+
+std::tuple<double, Lists> optimum(const Problem& problem, bool worst, int threads) {
+    const double sign = worst ? -1.0 : 1.0;
+    const Size n_uav = static_cast<Size>(problem.n_uav);
+    std::vector<int> universe;
+    bool certain = true;
+    for (int task = 0; task < problem.n_task; ++task) {
+        bool possible = false;
+        for (int uav = 0; uav < problem.n_uav; ++uav) {
+            const Size cell = problem.cell(uav, task);
+            if (!problem.capable[cell]) continue;
+            possible = true;
+            certain = certain && problem.survival[cell] == 1.0;
+        }
+        if (possible) universe.push_back(task);
+    }
+    const int most = certain ? TourTable::kMostTasks : TourTable::kMostUncertainTasks;
+    if (universe.size() > static_cast<Size>(most)) {
+        refuse("problem must have at most " + std::to_string(most) + " tasks");
+    }
+    if (threads < 1 || threads > 1024) refuse("threads must be within 1..1024");
+    Lists routes(n_uav);
+    double objective = 0.0;
+    if (!universe.empty()) {
+        nb::gil_scoped_release released;
+        std::vector<std::vector<double>> own(n_uav), best(n_uav);
+        parallel_for(n_uav, threads, 1, [&] {
+            return [&](Size uav) {
+                own[uav] = subset_values(problem, static_cast<int>(uav), sign, universe);
+            };
+        });
+        best[0] = own[0];  // best[j][subset]: its worth divided among UAVs 0..j
+        for (Size j = 1; j + 1 < n_uav; ++j) best[j] = divide(best[j - 1], own[j], threads);
+        Mask left = static_cast<Mask>((Size{1} << universe.size()) - 1);
+        for (Size j = n_uav; j-- > 0;) {
+            Mask chosen = left;
+            double most_worth = j ? best[j - 1][left] + own[j][0] : best[0][left];
+            if (j) {
+                chosen = 0;
+                for (Mask s = (0 - left) & left; s; s = (s - left) & left) {
+                    const double worth = best[j - 1][left ^ s] + own[j][s];
+                    if (worth > most_worth) {
+                        most_worth = worth;
+                        chosen = s;
+                    }
+                }
+            }
+            if (j + 1 == n_uav) objective = most_worth;
+            std::vector<int> tasks;
+            for (Size i = 0; i < universe.size(); ++i) {
+                if (chosen >> i & 1) tasks.push_back(universe[i]);
+            }
+            const UavTours tours(problem, static_cast<int>(j), sign, tasks);
+            const Mask all = static_cast<Mask>((Size{1} << tasks.size()) - 1);
+            for (const int place : tours.table->best_tour(all, tours.completion_s.data())) {
+                routes[j].push_back(tasks[static_cast<Size>(place)]);
+            }
+            left ^= chosen;
+        }
+    }
+    return {worst ? 0.0 - objective : objective, std::move(routes)};
+}
+
+}  // namespace
+
+void bind_exact(nb::module_& module) {
+    module.attr("MOST_TASKS") = TourTable::kMostTasks;
+    module.attr("MOST_UNCERTAIN_TASKS") = TourTable::kMostUncertainTasks;
+    module.def("optimum", &optimum, nb::arg("problem"), nb::arg("worst"), nb::arg("threads"));
+}
+
+}  // namespace peckorder

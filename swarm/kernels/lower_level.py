@@ -1,0 +1,173 @@
+"""Decisions of UAVs, one by one, as whole runs of Fig. 1, and for many sequences at once.
+
+A UAV that is free at infinity takes no decision. Leaves out: rules that are not compiled
+(`swarm.allocation.lower_level` runs any) and the search for a sequence.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.kernels import _kernels
+from swarm.kernels._kernels import KernelProblem
+from swarm.kernels.arguments import converted
+
+__all__ = [
+    "EXACT_TASKS",
+    "GREEDY",
+    "LOOKAHEAD",
+    "Fields",
+    "RuleCode",
+    "Team",
+    "decide",
+    "default_threads",
+    "evaluate_sequences",
+    "first_rounds",
+    "run",
+]
+
+_Floats = npt.NDArray[np.float64]
+_Ints = npt.NDArray[np.int64]
+_Bools = npt.NDArray[np.bool_]
+
+RuleCode = Literal[0, 1]
+GREEDY: RuleCode = 0
+"""Eq. 7: the open task with the largest p·S·m·(D − t)."""
+LOOKAHEAD: RuleCode = 1
+"""Eq. 6, 8: the first task of the UAV's own best complete tour of all tasks open to it."""
+
+EXACT_TASKS: int = _kernels.EXACT_TASKS
+"""Lookahead is exact up to this many open tasks that the UAV is capable of."""
+
+Fields = tuple[int, int, float, float, float, float | None, bool, bool]
+"""A decision: uav, task, decided_s, completion_s, score, second_score, certificate, exact."""
+
+
+class Team(Protocol):
+    """Where the team stands; `swarm.allocation.TeamState` is one."""
+
+    free_s: _Floats
+    """(n_uav,) mission time at which each UAV is next free [s]; not NaN."""
+    place_enu_m: _Floats
+    """(n_uav, 3) where each UAV is then [m; east, north, up]."""
+    survived: _Floats
+    """(n_uav,) S of eq. 1 so far, within 0..1."""
+    open: _Bools
+    """(n_task,) tasks nobody has taken."""
+    active: _Bools
+    """(n_uav,) UAVs that take part."""
+
+
+def default_threads() -> int:
+    """As many threads as this process may use processors."""
+    if hasattr(os, "sched_getaffinity"):
+        return max(1, len(os.sched_getaffinity(0)))
+    return os.cpu_count() or 1
+
+
+def decide(problem: KernelProblem, team: Team, uav: int, rule: RuleCode) -> Fields | None:
+    """The next task of ``uav`` if it is its turn now; None when nothing open suits it.
+
+    Ties go to the smaller task index. The certificate is Theorem 5's. Lookahead beyond
+    `EXACT_TASKS` tasks is a beam search with local search, and then not exact unless certified.
+
+    Args:
+        problem: the prepared mission.
+        team: where the team stands; only the row of ``uav`` and the open tasks are read.
+        uav: index of the deciding UAV.
+        rule: `GREEDY` or `LOOKAHEAD`.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+    try:
+        return _kernels.decide(
+            problem, team.free_s, team.place_enu_m, team.survived, team.open, uav, rule
+        )
+    except TypeError:  # not arrays as they should be: convert or refuse them by name
+        return _kernels.decide(problem, *_converted(team)[:4], uav, rule)
+
+
+def run(
+    problem: KernelProblem, team: Team, rank: npt.ArrayLike, rule: RuleCode
+) -> tuple[_Ints, _Ints, _Floats, _Floats]:
+    """All decisions of Fig. 1 from ``team`` on, in order.
+
+    Args:
+        problem: the prepared mission.
+        team: where the team stands; left unchanged.
+        rank: (n_uav,) place of each UAV in the priority sequence; smaller decides first.
+        rule: `GREEDY` or `LOOKAHEAD`.
+
+    Returns:
+        (k,) UAVs, (k,) the tasks they take, (k,) completion times [s], (k,) scores [value·s].
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+    ranks = converted("rank", rank, np.int64, 1)
+    return _kernels.run(problem, *_converted(team), ranks, rule)
+
+
+def evaluate_sequences(
+    problem: KernelProblem,
+    team: Team,
+    ranks: npt.ArrayLike,
+    rule: RuleCode,
+    threads: int | None = None,
+) -> tuple[_Floats, _Bools]:
+    """J of the lower level for many priority sequences; the same with any number of threads.
+
+    Args:
+        problem: the prepared mission.
+        team: where the team stands; left unchanged.
+        ranks: (k, n_uav) a row for every sequence, as for `run`.
+        rule: `GREEDY` or `LOOKAHEAD`.
+        threads: how many work at it; as many as there are processors when None.
+
+    Returns:
+        (k,) Σ of eq. 1 over the decisions taken, added in their order [value·s], and (k,) whether
+        the sequence mattered after the first round: two UAVs were free at the same time later.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+    rows = converted("rank", ranks, np.int64, 2)
+    count = default_threads() if threads is None else threads
+    return _kernels.evaluate_sequences(problem, *_converted(team), rows, rule, count)
+
+
+def first_rounds(
+    problem: KernelProblem,
+    team: Team,
+    ranks: npt.ArrayLike,
+    rule: RuleCode,
+    threads: int | None = None,
+) -> _Ints:
+    """What each UAV takes if all active ones decide once, in the order of their ranks alone.
+
+    Arguments as for `evaluate_sequences`.
+
+    Returns:
+        (k, n_uav) task indices; -1 for UAVs that take nothing.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+    rows = converted("rank", ranks, np.int64, 2)
+    count = default_threads() if threads is None else threads
+    return _kernels.first_rounds(problem, *_converted(team), rows, rule, count)
+
+
+def _converted(team: Team) -> tuple[_Floats, _Floats, _Floats, _Bools, _Bools]:
+    return (
+        converted("free_s", team.free_s, np.float64, 1),
+        converted("place_enu_m", team.place_enu_m, np.float64, 2),
+        converted("survived", team.survived, np.float64, 1),
+        converted("open", team.open, np.bool_, 1),
+        converted("active", team.active, np.bool_, 1),
+    )

@@ -1,0 +1,13 @@
+// The extension module `swarm.kernels._kernels`: one list of all kernels.
+#include "bindings.hpp"
+
+NB_MODULE(_kernels, module) {
+    module.doc() = "Compiled kernels; call them through the typed functions of swarm.kernels.";
+    peckorder::bind_problem(module);
+    peckorder::bind_tours(module);
+    peckorder::bind_long_tours(module);
+    peckorder::bind_lower_level(module);
+    peckorder::bind_exact(module);
+    peckorder::bind_rollout(module);
+    peckorder::bind_routes(module);
+}

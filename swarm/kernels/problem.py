@@ -1,0 +1,52 @@
+"""A mission prepared for the kernels: checked and copied into C++ once, used by all of them.
+
+Leaves out: names of UAVs and tasks (`swarm.allocation.Problem`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.kernels._kernels import KernelProblem
+from swarm.kernels.arguments import converted
+
+__all__ = ["KernelProblem", "prepare"]
+
+
+def prepare(
+    *,
+    start_enu_m: npt.ArrayLike,
+    task_enu_m: npt.ArrayLike,
+    speed_m_s: npt.ArrayLike,
+    service_s: npt.ArrayLike,
+    weight: npt.ArrayLike,
+    capable: npt.ArrayLike,
+    survival: npt.ArrayLike,
+    horizon_s: float,
+) -> KernelProblem:
+    """The handle that every kernel takes for the arrays of eq. 1.
+
+    Args:
+        start_enu_m: (n_uav, 3) starts [m; east, north, up from the mission origin].
+        task_enu_m: (n_task, 3) task places [m; same frame].
+        speed_m_s: (n_uav,) cruise speeds [m/s]; > 0.
+        service_s: (n_task,) time on the spot [s]; >= 0.
+        weight: (n_uav, n_task) p · m; >= 0.
+        capable: (n_uav, n_task) whether the UAV may take the task.
+        survival: (n_uav, n_task) probability of surviving the task, within 0..1.
+        horizon_s: D [s]; > 0.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+    return KernelProblem(
+        start_enu_m=converted("start_enu_m", start_enu_m, np.float64, 2),
+        task_enu_m=converted("task_enu_m", task_enu_m, np.float64, 2),
+        speed_m_s=converted("speed_m_s", speed_m_s, np.float64, 1),
+        service_s=converted("service_s", service_s, np.float64, 1),
+        weight=converted("weight", weight, np.float64, 2),
+        capable=converted("capable", capable, np.bool_, 2),
+        survival=converted("survival", survival, np.float64, 2),
+        horizon_s=float(horizon_s),
+    )

@@ -1,0 +1,147 @@
+// Fortified rollout: what the team's lists are worth with each of a few first tasks.
+#include "rollout.hpp"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/tuple.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+#include "bindings.hpp"
+#include "routes_binding.hpp"
+#include "routes_local.hpp"
+#include "routes_search.hpp"
+
+namespace peckorder {
+
+namespace {
+
+constexpr int kCandidates = 10;
+constexpr int kMostSearched = 12;      // UAVs whose lists a decision reconsiders
+constexpr double kTie = 1e-9;          // of the worth; less is no reason to leave the lists
+constexpr double kHeat = 0.02;         // of the mean delay
+constexpr std::uint64_t kSeed = 2005;  // every replica searches alike
+
+// Open tasks by m·p / (travel + service), best first.
+std::vector<int> candidates(const Solution& solution, const std::vector<int>& open, int uav) {
+  const Instance& instance = solution.instance();
+  std::vector<std::pair<double, int>> order;
+  for (const int task : open) {
+    if (!instance.capable(uav, task)) continue;
+    const double leg_s = solution.start().first_m(uav, task) * instance.pace(uav) +
+                         instance.service_s(task);
+    order.emplace_back(-instance.weight(uav, task) / (leg_s + 1e-9), task);
+  }
+  const std::size_t count = std::min<std::size_t>(kCandidates, order.size());
+  std::partial_sort(order.begin(), order.begin() + count, order.end());
+  std::vector<int> tasks;
+  for (std::size_t k = 0; k < count; ++k) tasks.push_back(order[k].second);
+  return tasks;
+}
+
+// J with `task` moved to the front of `uav`'s list; leaves `solution` as it was.
+double worth_with_first(Solution& solution, int uav, int task, double total) {
+  const int from = solution.uav_of(task);
+  const Route own = solution.route(uav);
+  const Route other = from >= 0 ? solution.route(from) : Route{};
+  double worth = total - solution.route_value(uav);
+  if (from >= 0 && from != uav) worth -= solution.route_value(from);
+  if (from >= 0) solution.remove(from, solution.place_of(task), 1);
+  solution.insert(uav, 0, task);
+  worth += solution.route_value(uav);
+  if (from >= 0 && from != uav) worth += solution.route_value(from);
+  solution.set_route(uav, own);
+  if (from >= 0 && from != uav) solution.set_route(from, other);
+  return worth;
+}
+
+// The deciding UAV and those whose next places are nearest to it.
+std::vector<int> near_uavs(const Solution& solution, int uav) {
+  const Start& start = solution.start();
+  const double* here = &start.place_m[3 * static_cast<std::size_t>(uav)];
+  std::vector<std::pair<double, int>> order;
+  for (const int other : solution.allowed()) {
+    const double* there = &start.place_m[3 * static_cast<std::size_t>(other)];
+    const double x = there[0] - here[0], y = there[1] - here[1], z = there[2] - here[2];
+    double nearest_m = std::sqrt((x * x + y * y) + z * z);
+    for (const int task : solution.route(other))
+      nearest_m = std::min(nearest_m, start.first_m(uav, task));
+    order.emplace_back(other == uav ? -1.0 : nearest_m, other);
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<int> uavs;
+  for (std::size_t k = 0; k < std::min<std::size_t>(kMostSearched, order.size()); ++k)
+    uavs.push_back(order[k].second);
+  std::sort(uavs.begin(), uavs.end());
+  return uavs;
+}
+
+void reconsider(Solution& solution, int uav, long iterations) {
+  const std::vector<int> uavs = near_uavs(solution, uav);
+  improve(solution, uavs);
+  Search search(solution.instance(), solution.start(), kSeed);
+  search.load(solution.routes(), uavs);
+  const double hottest = kHeat * solution.mean_delay();
+  constexpr int kSteps = 10;
+  for (int step = 0; step < kSteps; ++step)
+    search.run(iterations / kSteps, hottest * (kSteps - step) / kSteps);
+  for (const int other : uavs) solution.set_route(other, search.best_route(other));
+  improve(solution, uavs);
+}
+
+}  // namespace
+
+GuidedChoice guided_choice(const Instance& instance, const Start& start,
+                           const std::vector<Route>& lists, const std::vector<int>& open, int uav,
+                           long iterations) {
+  Solution solution(instance, start);
+  for (const int other : solution.allowed()) solution.set_route(other, lists[other]);
+  insert_missing(solution, open);
+  if (iterations > 0) reconsider(solution, uav, iterations);
+  GuidedChoice choice;
+  const double total = solution.total();
+  const Route& own = solution.route(uav);
+  choice.planned = choice.task = own.empty() ? -1 : own.front();
+  choice.worth = total;
+  choice.second = std::numeric_limits<double>::quiet_NaN();
+  const double enough = total + kTie * std::abs(total);
+  for (const int task : candidates(solution, open, uav)) {
+    if (task == choice.planned) continue;
+    const double worth = worth_with_first(solution, uav, task, total);
+    if (worth > enough && worth > choice.worth) {
+      if (choice.task >= 0) choice.second = choice.worth;
+      choice.task = task;
+      choice.worth = worth;
+    } else if (!(worth <= choice.second)) {
+      choice.second = worth;
+    }
+  }
+  return choice;
+}
+
+void bind_rollout(nb::module_& module) {
+  module.def(
+      "guided_choice",
+      [](const Instance& instance, const Vector& free_s, const Matrix& place_m,
+         const Vector& survived, const Mask& active, const Indices& flat, const Indices& offsets,
+         const Mask& open, int uav, long iterations) {
+        const StartArrays arrays{free_s, place_m, survived, active};
+        const Routes lists = ListArrays{flat, offsets}.routes();
+        GuidedChoice choice;
+        {
+          const nb::gil_scoped_release released;
+          choice = guided_choice(instance, arrays.start(instance), lists, open_tasks(open), uav,
+                                 iterations);
+        }
+        return std::make_tuple(choice.task, choice.worth, choice.second, choice.planned);
+      },
+      nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
+      nb::arg("active"), nb::arg("flat"), nb::arg("offsets"), nb::arg("open"), nb::arg("uav"),
+      nb::arg("iterations"));
+}
+
+}  // namespace peckorder

@@ -1,0 +1,23 @@
+// One online decision of the rule `guided` (a fortified rollout, see swarm/kernels/rollout.py).
+#pragma once
+
+#include <vector>
+
+#include "routes_solution.hpp"
+
+namespace peckorder {
+
+struct GuidedChoice {
+  int task = -1;        // -1: better to take nothing
+  double worth = 0.0;   // J to go of the whole team with it
+  double second = 0.0;  // the same for the best other candidate; NaN if there is none
+  int planned = -1;     // what the lists, repaired, had the UAV do
+};
+
+// Lists name open tasks only. `iterations` > 0 searches around the deciding UAV; otherwise the
+// choice is between the lists as they are and other first tasks.
+GuidedChoice guided_choice(const Instance& instance, const Start& start,
+                           const std::vector<Route>& lists, const std::vector<int>& open, int uav,
+                           long iterations);
+
+}  // namespace peckorder

@@ -1,0 +1,320 @@
+"""Route optimiser: good ordered task lists for a whole team, from any state it is in.
+
+Large-neighbourhood search with annealing (slack induction by string removals, Christiaens and
+Vanden Berghe 2020, doi:10.1287/trsc.2019.0914) and local search, on segments joined in O(1)
+(Silva et al. 2012, doi:10.1016/j.ejor.2012.03.044; Vidal et al. 2014,
+doi:10.1016/j.ejor.2013.09.045). What segments are worth is defined plainly in
+`swarm.allocation.reference_routes`. Leaves out: the clock and the decision when to stop, which
+are the caller's; proofs of quality (`coordinator.planner.bound`).
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.kernels import _kernels
+
+__all__ = [
+    "FloatArray",
+    "RouteArrays",
+    "Routes",
+    "TeamArrays",
+    "flat_lists",
+    "improve_routes",
+    "open_lists",
+    "optimise_routes",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Routes = list[list[int]]
+"""Task indices per UAV in order of execution."""
+
+_MAX_SEED = 2**64 - 1
+_SLICES = 64
+"""At least so many steps of cooling, if that leaves each some iterations."""
+_MOST_IN_SLICE = 1000
+_FEWEST_IN_SLICE = 20
+_LONG_LIST = 100
+"""Tasks; the time of an iteration grows with the lists, so slices of longer ones are smaller."""
+_COOL_START = 0.3
+"""Heat while it is unknown how long the search will be."""
+_ITERATIONS_FOR_FULL_HEAT = 1600.0
+"""Per task; the annealing of a shorter search begins cooler, by the fourth root."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RouteArrays:
+    """What the mission is, checked once and laid out for route kernels.
+
+    Building it takes time in n_task² · log n_task, about 10 ms for 500 tasks; keep it.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+
+    task_enu_m: npt.ArrayLike
+    """(n_task, 3) places [m; east, north, up]."""
+    speed_m_s: npt.ArrayLike
+    """(n_uav,) cruise speeds [m/s]; > 0."""
+    value: npt.ArrayLike
+    """(n_task,) m_i; >= 0."""
+    service_s: npt.ArrayLike
+    """(n_task,) time on the spot [s]; >= 0."""
+    success: npt.ArrayLike
+    """(n_uav, n_task) p within 0..1; 0: incapable, never on the list."""
+    survival: npt.ArrayLike
+    """(n_uav, n_task) probability of surviving the task, within 0..1."""
+    horizon_s: float
+    """D [s]; > 0."""
+    n_uav: int = field(init=False)
+    n_task: int = field(init=False)
+    capable: npt.NDArray[np.bool_] = field(init=False, repr=False)
+    """(n_uav, n_task) success > 0."""
+    kernel: _kernels.RouteInstance = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        speed_m_s = _floats("speed_m_s", self.speed_m_s, (None,))
+        value = _floats("value", self.value, (None,))
+        n_uav, n_task = len(speed_m_s), len(value)
+        task_enu_m = _floats("task_enu_m", self.task_enu_m, (n_task, 3))
+        service_s = _floats("service_s", self.service_s, (n_task,))
+        success = _floats("success", self.success, (n_uav, n_task))
+        survival = _floats("survival", self.survival, (n_uav, n_task))
+        horizon_s = float(self.horizon_s)
+        if not 0.0 < horizon_s < float("inf"):
+            raise ValueError(f"horizon_s must be > 0 and finite, not {horizon_s}")
+        if (speed_m_s <= 0.0).any():
+            raise ValueError(f"speed_m_s must be > 0, not {speed_m_s.min()}")
+        for name, array in (("value", value), ("service_s", service_s)):
+            if (array < 0.0).any():
+                raise ValueError(f"{name} must be >= 0, not {array.min()}")
+        for name, array in (("success", success), ("survival", survival)):
+            if ((array < 0.0) | (array > 1.0)).any():
+                raise ValueError(f"{name} must be within 0..1")
+        kernel = _kernels.RouteInstance(
+            task_enu_m, speed_m_s, value, service_s, success, survival, horizon_s
+        )
+        for name, item in (
+            ("n_uav", n_uav),
+            ("n_task", n_task),
+            ("capable", success > 0.0),
+            ("kernel", kernel),
+        ):
+            object.__setattr__(self, name, item)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TeamArrays:
+    """Where the team stands, checked against the mission.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+
+    mission: RouteArrays
+    free_s: npt.ArrayLike
+    """(n_uav,) mission time at which each UAV is next free [s]; finite."""
+    place_enu_m: npt.ArrayLike
+    """(n_uav, 3) where it is then [m; east, north, up]."""
+    survived: npt.ArrayLike
+    """(n_uav,) S of eq. 1 so far, within 0..1."""
+    active: npt.ArrayLike
+    """(n_uav,) whether it may be given tasks."""
+    open: npt.ArrayLike
+    """(n_task,) tasks to be put on lists."""
+
+    def __post_init__(self) -> None:
+        n_uav, n_task = self.mission.n_uav, self.mission.n_task
+        survived = _floats("survived", self.survived, (n_uav,))
+        if ((survived < 0.0) | (survived > 1.0)).any():
+            raise ValueError("survived must be within 0..1")
+        for name, array in (
+            ("free_s", _floats("free_s", self.free_s, (n_uav,))),
+            ("place_enu_m", _floats("place_enu_m", self.place_enu_m, (n_uav, 3))),
+            ("survived", survived),
+            ("active", _mask("active", self.active, n_uav)),
+            ("open", _mask("open", self.open, n_task)),
+        ):
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def at_start(cls, mission: RouteArrays, start_enu_m: npt.ArrayLike) -> TeamArrays:
+        """Mission time 0, everything open; ``start_enu_m`` is (n_uav, 3) [m]."""
+        n_uav, n_task = mission.n_uav, mission.n_task
+        return cls(
+            mission,
+            np.zeros(n_uav),
+            start_enu_m,
+            np.ones(n_uav),
+            np.ones(n_uav, dtype=np.bool_),
+            np.ones(n_task, dtype=np.bool_),
+        )
+
+    def arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+        """Times, places, survival and activity as kernels take them."""
+        return (
+            np.asarray(self.free_s),
+            np.asarray(self.place_enu_m),
+            np.asarray(self.survived),
+            np.asarray(self.active),
+        )
+
+
+def optimise_routes(
+    team: TeamArrays,
+    *,
+    seed: int = 0,
+    iterations: int | None = None,
+    spent_frac: Callable[[int], float] | None = None,
+    lists: Sequence[Sequence[int]] | None = None,
+    progress: Callable[[int, float], None] | None = None,
+    threads: int | None = None,
+) -> tuple[Routes, float]:
+    """Lists that hold every open task some active UAV is capable of, late ones too.
+
+    With ``iterations`` the result follows from the arguments alone, on every machine and with
+    any number of threads. With ``spent_frac`` it depends on how many slices fit into what is
+    spent, but for that number of slices and the fractions told it is again the same.
+    The search works in slices of at most some 10 to 20 ms. An exception raised by a callable, such
+    as KeyboardInterrupt, ends it without a result; to stop with the best lists, say 1.
+
+    Args:
+        team: mission and state.
+        seed: 0..2**64 - 1.
+        iterations: removals and re-insertions in all; >= 0. Give this or ``spent_frac``.
+        spent_frac: given the iterations so far, the share of the time or work that is spent; the
+            annealing cools along it and ends at 1.
+        lists: to begin with, disjoint; tasks that are not open are dropped, missing ones added.
+        progress: told the iterations so far and the best J to go after each slice.
+        threads: at most this many; as many as there are processors when None.
+
+    Returns:
+        Lists per UAV, and Σ p·S·m·(D − t) over them [value·s].
+
+    Raises:
+        ValueError: names the argument that is wrong.
+    """
+    if (iterations is None) == (spent_frac is None):
+        raise ValueError("iterations or spent_frac must be given, and not both")
+    if iterations is not None and iterations < 0:
+        raise ValueError(f"iterations must be >= 0, not {iterations}")
+    if not 0 <= seed <= _MAX_SEED:
+        raise ValueError(f"seed must be within 0..2**64 - 1, not {seed}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be >= 1, not {threads}")
+    kernel_threads = (os.cpu_count() or 1) if threads is None else threads
+    search = _kernels.RouteSearch(
+        team.mission.kernel,
+        *team.arguments(),
+        *open_lists(team, lists),
+        np.asarray(team.open),
+        seed,
+    )
+    search.polish()
+    lanes = search.n_lane()
+    n_open = int(np.sum(team.open))
+    length = team.mission.n_task / max(1, int(np.sum(team.active)))
+    most = int(_MOST_IN_SLICE * min(1.0, _LONG_LIST / max(1.0, length)))
+    done = 0
+    while True:
+        if spent_frac is not None:
+            spent = float(spent_frac(done))
+        else:
+            spent = done / iterations if iterations else 1.0
+        if not spent < 1.0:
+            break
+        total = iterations if iterations is not None else done / spent if spent > 0.0 else 0.0
+        now = max(_FEWEST_IN_SLICE, min(most, int(total / lanes / _SLICES)))
+        if iterations is not None:
+            now = min(now, -(-(iterations - done) // lanes))
+        search.round(now, _heat(max(0.0, spent), total, n_open), kernel_threads)
+        done += now * lanes
+        if progress is not None:
+            progress(done, search.best_value())
+    search.polish()
+    return _routes(*search.best()), search.best_value()
+
+
+def _heat(spent_frac: float, total: float, n_task: int) -> float:
+    """Cool along what is spent, from a heat that a run of ``total`` iterations can afford."""
+    if total == 0.0:
+        return _COOL_START
+    # two square roots, not a power: their floats are the same everywhere
+    share = total / max(1, n_task) / _ITERATIONS_FOR_FULL_HEAT
+    return min(1.0, math.sqrt(math.sqrt(share))) * (1.0 - spent_frac)
+
+
+def improve_routes(team: TeamArrays, lists: Sequence[Sequence[int]]) -> Routes:
+    """Lists after local search, in which no move gains any more; tasks stay those on the lists."""
+    arrays = open_lists(team, lists)
+    return _routes(*_kernels.improve_routes(team.mission.kernel, *team.arguments(), *arrays))
+
+
+def flat_lists(
+    lists: Sequence[Sequence[int]], n_uav: int, n_task: int
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Lists end to end, and where each begins.
+
+    Raises:
+        ValueError: a list too many or too few, an unknown task, or one task twice.
+    """
+    if len(lists) != n_uav:
+        raise ValueError(f"lists must hold {n_uav} lists, not {len(lists)}")
+    flat = np.array([task for route in lists for task in route], dtype=np.int64)
+    if len(flat) and (flat.min() < 0 or flat.max() >= n_task):
+        raise ValueError(f"lists name a task outside 0..{n_task - 1}")
+    if len(np.unique(flat)) != len(flat):
+        raise ValueError("lists name a task twice")
+    offsets = np.zeros(n_uav + 1, dtype=np.int64)
+    np.cumsum([len(route) for route in lists], out=offsets[1:])
+    return flat, offsets
+
+
+def open_lists(
+    team: TeamArrays, lists: Sequence[Sequence[int]] | None
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The lists without what is closed, beyond the UAV or on the list of an inactive UAV."""
+    mission = team.mission
+    if lists is None:
+        return flat_lists([[]] * mission.n_uav, mission.n_uav, mission.n_task)
+    flat, offsets = flat_lists(lists, mission.n_uav, mission.n_task)
+    uav = np.repeat(np.arange(mission.n_uav), np.diff(offsets))
+    keep = np.asarray(team.open)[flat] & np.asarray(team.active)[uav] & mission.capable[uav, flat]
+    kept_offsets = np.zeros_like(offsets)
+    np.cumsum(np.bincount(uav[keep], minlength=mission.n_uav), out=kept_offsets[1:])
+    return flat[keep], kept_offsets
+
+
+def _routes(flat: npt.NDArray[np.int64], offsets: npt.NDArray[np.int64]) -> Routes:
+    tasks, ends = flat.tolist(), offsets.tolist()
+    return [tasks[begin:end] for begin, end in pairwise(ends)]
+
+
+def _floats(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...]) -> FloatArray:
+    try:
+        array = np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be numbers of one shape") from None
+    fits = len(array.shape) == len(shape) and all(
+        want is None or want == have for want, have in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        wanted = tuple("any" if n is None else n for n in shape)
+        raise ValueError(f"{name} must have shape {wanted}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, not NaN or infinite")
+    return array
+
+
+def _mask(name: str, value: npt.ArrayLike, n: int) -> npt.NDArray[np.bool_]:
+    array = np.array(value)
+    if array.dtype != np.bool_ or array.shape != (n,):
+        raise ValueError(f"{name} must be booleans of shape {(n,)}")
+    return array

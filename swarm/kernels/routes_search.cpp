@@ -1,0 +1,161 @@
+#include "routes_search.hpp"
+
+#include <algorithm>
+
+namespace peckorder {
+
+namespace {
+constexpr double kMeanTorn = 15.0;
+constexpr double kLongestString = 10.0;
+constexpr double kSplitShare = 0.5;
+constexpr double kSplitDepth = 0.01;
+constexpr std::uint64_t kBlink = 0x028F5C28F5C28F5Cull;  // 1 % of 2^64
+}  // namespace
+
+void insert_missing(Solution& solution, const std::vector<int>& tasks) {
+  const Instance& instance = solution.instance();
+  std::vector<std::pair<double, int>> order;
+  for (const int task : tasks) {
+    if (solution.uav_of(task) >= 0) continue;
+    double most = -1.0;
+    for (const int uav : solution.allowed())
+      if (instance.capable(uav, task)) most = std::max(most, instance.weight(uav, task));
+    if (most >= 0.0) order.emplace_back(-most, task);
+  }
+  std::sort(order.begin(), order.end());
+  for (const auto& [key, task] : order) {
+    const Insertion best = best_insertion(solution, task);
+    if (best.uav >= 0) solution.insert(best.uav, best.place, task);
+  }
+}
+
+Search::Search(const Instance& instance, const Start& start, std::uint64_t seed)
+    : current_(instance, start),
+      random_(seed),
+      best_(instance.n_uav()),
+      is_unsaved_(instance.n_uav(), 0),
+      is_touched_(instance.n_uav(), 0),
+      copies_(instance.n_uav()) {}
+
+void Search::load(const std::vector<Route>& routes, const std::vector<int>& uavs) {
+  current_.restrict_to(uavs);
+  tasks_.clear();
+  for (const int uav : unsaved_) is_unsaved_[uav] = 0;
+  unsaved_.clear();
+  for (const int uav : uavs) {
+    current_.set_route(uav, routes[uav]);
+    best_[uav] = routes[uav];
+    tasks_.insert(tasks_.end(), routes[uav].begin(), routes[uav].end());
+  }
+  std::sort(tasks_.begin(), tasks_.end());
+  best_value_ = current_.total();
+}
+
+void Search::keep_copy(int uav) {
+  if (is_touched_[uav]) return;
+  is_touched_[uav] = 1;
+  copies_[touched_.size()] = current_.route(uav);
+  touched_.push_back(uav);
+  value_before_ += current_.route_value(uav);
+}
+
+void Search::ruin() {
+  const int mean_length = std::max(1, static_cast<int>(tasks_.size() / uavs().size()));
+  const double longest = std::min(kLongestString, static_cast<double>(mean_length));
+  const double most_strings = 4.0 * kMeanTorn / (1.0 + longest) - 1.0;
+  const int strings = static_cast<int>(random_.uniform() * most_strings + 1.0);
+  const int seed = tasks_[random_.below(static_cast<int>(tasks_.size()))];
+  const Instance& instance = current_.instance();
+  torn_.clear();
+  tear(seed, longest);
+  const std::int32_t* near = instance.near(seed);
+  for (int k = 0; k < instance.n_near() && static_cast<int>(touched_.size()) < strings; ++k) {
+    const int uav = current_.uav_of(near[k]);
+    if (uav >= 0 && !is_touched_[uav]) tear(near[k], longest);
+  }
+}
+
+// Take a string that holds `task` out of its list; sometimes keep some tasks inside the string.
+void Search::tear(int task, double longest) {
+  const int uav = current_.uav_of(task);
+  const int size = static_cast<int>(current_.route(uav).size());
+  const double most = std::min(longest, static_cast<double>(size));
+  const int length = static_cast<int>(random_.uniform() * most + 1.0);  // at most `most`
+  int kept = 0;
+  if (length > 1 && length < size && random_.uniform() < kSplitShare) {
+    kept = 1;
+    while (length + kept < size && random_.uniform() > kSplitDepth) ++kept;
+  }
+  const int span = length + kept;
+  const int here = current_.place_of(task);
+  const int low = std::max(0, here - span + 1), high = std::min(here, size - span);
+  const int begin = low + random_.below(high - low + 1);
+  const int gap = kept == 0 ? span : 1 + random_.below(length);  // tasks torn before the kept ones
+  keep_copy(uav);
+  const Route& route = current_.route(uav);
+  for (int k = 0; k < span; ++k)
+    if (k < gap || k >= gap + kept) torn_.push_back(route[begin + k]);
+  if (span > gap + kept) current_.remove(uav, begin + gap + kept, span - gap - kept);
+  current_.remove(uav, begin, std::min(gap, length));
+}
+
+void Search::recreate() {
+  const Instance& instance = current_.instance();
+  const int kind = random_.below(10);
+  order_.clear();
+  for (const int task : torn_) {
+    double key;
+    if (kind < 4) {
+      key = random_.uniform();
+    } else if (kind < 8) {
+      key = -instance.value(task);
+    } else {
+      key = current_.completion_s(task) * (kind == 8 ? 1.0 : -1.0);
+    }
+    order_.emplace_back(key, task);
+  }
+  std::sort(order_.begin(), order_.end());
+  for (const auto& [key, task] : order_) {
+    Insertion best =
+        best_insertion(current_, task, [this] { return random_.bits() < kBlink; });
+    if (best.uav < 0) best = best_insertion(current_, task);
+    keep_copy(best.uav);
+    current_.insert(best.uav, best.place, task);
+  }
+}
+
+void Search::run(long iterations, double temperature) {
+  if (tasks_.empty()) return;
+  double value = current_.total();
+  for (long iteration = 0; iteration < iterations; ++iteration) {
+    value_before_ = 0.0;
+    ruin();
+    recreate();
+    double gain = -value_before_;
+    for (const int uav : touched_) gain += current_.route_value(uav);
+    const bool accepted = gain > -temperature * random_.exponential();
+    for (std::size_t k = 0; k < touched_.size(); ++k) {
+      const int uav = touched_[k];
+      is_touched_[uav] = 0;
+      if (!accepted) {
+        current_.set_route(uav, copies_[k]);
+      } else if (!is_unsaved_[uav]) {
+        is_unsaved_[uav] = 1;
+        unsaved_.push_back(uav);
+      }
+    }
+    touched_.clear();
+    if (!accepted) continue;
+    value += gain;
+    if (value > best_value_) {
+      best_value_ = value;
+      for (const int uav : unsaved_) {
+        best_[uav] = current_.route(uav);
+        is_unsaved_[uav] = 0;
+      }
+      unsaved_.clear();
+    }
+  }
+}
+
+}  // namespace peckorder

@@ -1,0 +1,55 @@
+// Large-neighbourhood search with annealing on one set of lists.
+//
+// Slack induction by string removals (Christiaens and Vanden Berghe 2020,
+// doi:10.1287/trsc.2019.0914) carried over to eq. 1: near tasks are torn out of a few lists as
+// strings and put back one by one where J gains most, now and then overlooking a place.
+// Single-threaded; sharing the work between threads is routes_team.hpp's part.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "routes_random.hpp"
+#include "routes_solution.hpp"
+
+namespace peckorder {
+
+// Put every capable open task that is on no list where J gains most, most valuable first.
+void insert_missing(Solution& solution, const std::vector<int>& tasks);
+
+class Search {
+ public:
+  Search(const Instance& instance, const Start& start, std::uint64_t seed);
+
+  // Work on the lists of these UAVs alone; best := current.
+  void load(const std::vector<Route>& routes, const std::vector<int>& uavs);
+
+  void run(long iterations, double temperature);
+
+  const Solution& current() const { return current_; }
+  const std::vector<int>& uavs() const { return current_.allowed(); }
+  double best_value() const { return best_value_; }
+  const Route& best_route(int uav) const { return best_[uav]; }
+
+ private:
+  void ruin();
+  void tear(int task, double longest);
+  void recreate();
+  void keep_copy(int uav);
+
+  Solution current_;
+  Random random_;
+  double best_value_ = 0.0;
+  std::vector<Route> best_;
+  std::vector<int> tasks_;                     // all tasks on the lists
+  std::vector<int> unsaved_;                   // UAVs whose lists changed since best_ was copied
+  std::vector<std::uint8_t> is_unsaved_;
+  std::vector<int> torn_;                      // tasks taken out in this iteration
+  std::vector<std::pair<double, int>> order_;  // in which they are put back
+  std::vector<int> touched_;                   // UAVs whose lists changed in this iteration
+  std::vector<std::uint8_t> is_touched_;
+  std::vector<Route> copies_;                  // their lists before, in the order of touched_
+  double value_before_ = 0.0;                  // Σ of their values before
+};
+
+}  // namespace peckorder

@@ -1,0 +1,45 @@
+// The search of a whole team, on several threads with one result.
+//
+// A round hands every lane some UAVs and their lists, runs the lanes' searches side by side and
+// joins what they found; J is a sum over UAVs, so parts are found apart and added. How UAVs are
+// divided follows from the seed and the team alone, never from the number of threads. Small teams
+// are not divided: each lane then searches the whole by its own random numbers.
+#pragma once
+
+#include <vector>
+
+#include "routes_search.hpp"
+
+namespace peckorder {
+
+class TeamSearch {
+ public:
+  TeamSearch(const Instance& instance, const Start& start, std::vector<Route> lists,
+             const std::vector<int>& tasks, std::uint64_t seed);
+
+  // `iterations` per lane; heat within 0..1, 1 at the beginning of the annealing, 0 at its end.
+  void round(long iterations, double heat, int threads);
+
+  // Local search on the best lists, until no move gains.
+  void polish();
+
+  double best_value() const { return best_value_; }
+  const std::vector<Route>& best() const { return best_; }
+  int n_lane() const { return static_cast<int>(lanes_.size()); }
+
+ private:
+  void divide();
+  void join();
+
+  const Instance& instance_;
+  const Start& start_;
+  Random random_;
+  std::vector<int> uavs_;
+  std::vector<Search> lanes_;
+  bool divided_;
+  std::vector<Route> current_, best_;
+  double best_value_;
+  double hottest_;
+};
+
+}  // namespace peckorder

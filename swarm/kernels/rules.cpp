@@ -1,0 +1,349 @@
+// Greedy (eq. 7), lookahead (eq. 6, 8) and the certificate of Theorem 5; see rules.hpp.
+#include "rules.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "long_tours.hpp"
+
+#if defined(_MSC_VER)
+#define PECKORDER_RESTRICT __restrict
+#else
+#define PECKORDER_RESTRICT __restrict__
+#endif
+
+namespace peckorder {
+
+namespace {
+
+using Size = std::size_t;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr Size kTableBytes = 16u << 20;  // tour tables a workspace keeps
+constexpr Size kLongestTour = 512;       // tasks lookahead tours beyond kExactTasks
+
+// The first of the largest. Four running maxima, so that the processor need not wait for one, and
+// block by block, so that the place is sought in one block only.
+Size argmax(const std::vector<double>& values, Size n) {
+    constexpr Size kBlock = 64;
+    const double* v = values.data();
+    double best = -kInfinity;
+    Size best_block = 0;
+    for (Size block = 0; block < n; block += kBlock) {
+        const Size end = std::min(n, block + kBlock);
+        double m0 = -kInfinity, m1 = m0, m2 = m0, m3 = m0;
+        Size i = block;
+        for (; i + 4 <= end; i += 4) {
+            m0 = v[i] > m0 ? v[i] : m0;
+            m1 = v[i + 1] > m1 ? v[i + 1] : m1;
+            m2 = v[i + 2] > m2 ? v[i + 2] : m2;
+            m3 = v[i + 3] > m3 ? v[i + 3] : m3;
+        }
+        for (; i < end; ++i) m0 = v[i] > m0 ? v[i] : m0;
+        const double most = std::max(std::max(m0, m1), std::max(m2, m3));
+        if (most > best) {
+            best = most;
+            best_block = block;
+        }
+    }
+    for (Size i = best_block; i < std::min(n, best_block + kBlock); ++i) {
+        if (v[i] == best) return i;
+    }
+    return 0;
+}
+
+// Told that no two arrays overlap, compilers do two tasks or more at once.
+void score_all(Size n, const double* PECKORDER_RESTRICT x_m, const double* PECKORDER_RESTRICT y_m,
+               const double* PECKORDER_RESTRICT z_m, const double* PECKORDER_RESTRICT service_s,
+               const double* PECKORDER_RESTRICT weight, const Decider& decider, double speed_m_s,
+               double horizon_s, double* PECKORDER_RESTRICT completion_s,
+               double* PECKORDER_RESTRICT score) {
+    const double x = decider.place_m[0], y = decider.place_m[1], z = decider.place_m[2];
+    const double free_s = decider.free_s, survived = decider.survived;
+    for (Size i = 0; i < n; ++i) {
+        const double dx = x_m[i] - x, dy = y_m[i] - y, dz = z_m[i] - z;
+        const double travel_s = std::sqrt((dx * dx + dy * dy) + dz * dz) / speed_m_s;
+        const double time_s = (free_s + travel_s) + service_s[i];
+        completion_s[i] = time_s;
+        score[i] = (horizon_s - time_s) * (survived * weight[i]);
+    }
+}
+
+// -infinity if there is no other.
+double largest_but(const std::vector<double>& values, Size n, Size left_out) {
+    double most = -kInfinity;
+    for (Size i = 0; i < n; ++i) {
+        if (i != left_out && values[i] > most) most = values[i];
+    }
+    return most;
+}
+
+}  // namespace
+
+void OpenTasks::assign(const Problem& problem, const std::uint8_t* open) {
+    task.clear();
+    for (int t = 0; t < problem.n_task; ++t) {
+        if (open[t]) task.push_back(t);
+    }
+    const Size n = task.size();
+    x_m.resize(n);
+    y_m.resize(n);
+    z_m.resize(n);
+    service_s.resize(n);
+    for (Size i = 0; i < n; ++i) {
+        const Size t = static_cast<Size>(task[i]);
+        x_m[i] = problem.x_m[t];
+        y_m[i] = problem.y_m[t];
+        z_m[i] = problem.z_m[t];
+        service_s[i] = problem.service_s[t];
+    }
+}
+
+void OpenTasks::assign_capable(const Problem& problem, const OpenTasks& all, int uav) {
+    const std::uint8_t* capable = &problem.capable[problem.cell(uav, 0)];
+    const Size most = all.size();
+    task.resize(most);
+    x_m.resize(most);
+    y_m.resize(most);
+    z_m.resize(most);
+    service_s.resize(most);
+    Size n = 0;
+    for (Size i = 0; i < most; ++i) {
+        task[n] = all.task[i];
+        x_m[n] = all.x_m[i];
+        y_m[n] = all.y_m[i];
+        z_m[n] = all.z_m[i];
+        service_s[n] = all.service_s[i];
+        n += capable[all.task[i]] ? 1 : 0;
+    }
+    task.resize(n);
+    x_m.resize(n);
+    y_m.resize(n);
+    z_m.resize(n);
+    service_s.resize(n);
+}
+
+void OpenTasks::remove(Size place) {
+    const auto at = static_cast<std::ptrdiff_t>(place);
+    task.erase(task.begin() + at);
+    x_m.erase(x_m.begin() + at);
+    y_m.erase(y_m.begin() + at);
+    z_m.erase(z_m.begin() + at);
+    service_s.erase(service_s.begin() + at);
+}
+
+void OpenTasks::remove_task(int which) {
+    const auto at = std::lower_bound(task.begin(), task.end(), which);
+    remove(static_cast<Size>(at - task.begin()));
+}
+
+Choice Workspace::decide(const Problem& problem, const OpenTasks& all, const Decider& decider,
+                         RuleCode rule, bool brief) {
+    tasks_ = &all;
+    if (!problem.capable_of_all[static_cast<Size>(decider.uav)]) {
+        capable_.assign_capable(problem, all, decider.uav);
+        tasks_ = &capable_;
+    }
+    if (tasks_->empty()) return {};
+    look_out(problem, decider);
+    const Size n = tasks_->size();
+    if (rule == RuleCode::kGreedy || n == 1) return decide_greedily(problem, decider, brief);
+    return n <= kExactTasks ? look_ahead(problem, decider) : look_ahead_far(problem, decider);
+}
+
+// When each task would be complete if taken next, and its greedy score S·p·m·(D − t).
+void Workspace::look_out(const Problem& problem, const Decider& decider) {
+    const OpenTasks& tasks = *tasks_;
+    const Size n = tasks.size();
+    completion_s_.resize(n);
+    score_.resize(n);
+    weight_.resize(n);
+    const double* row = problem.weight.data() + problem.cell(decider.uav, 0);
+    for (Size i = 0; i < n; ++i) weight_[i] = row[tasks.task[i]];
+    score_all(n, tasks.x_m.data(), tasks.y_m.data(), tasks.z_m.data(), tasks.service_s.data(),
+              weight_.data(), decider, problem.speed_m_s[static_cast<Size>(decider.uav)],
+              problem.horizon_s, completion_s_.data(), score_.data());
+}
+
+Choice Workspace::decide_greedily(const Problem& problem, const Decider& decider, bool brief) {
+    const Size n = tasks_->size(), best = argmax(score_, n);
+    Choice choice;
+    choice.task = tasks_->task[best];
+    choice.completion_s = completion_s_[best];
+    choice.score = score_[best];
+    if (brief) return choice;
+    choice.has_second = n > 1;
+    if (choice.has_second) choice.second = largest_but(score_, n, best);
+    choice.certificate = certificate(problem, decider, best, choice.second);
+    return choice;
+}
+
+Choice Workspace::look_ahead(const Problem& problem, const Decider& decider) {
+    const Size n = tasks_->size();
+    const Table& known = table(problem, decider.uav);
+    double completion_s[kExactTasks] = {}, values[kExactTasks];
+    std::uint32_t mask = 0;
+    Size place[kExactTasks];
+    for (Size i = 0, at = 0; i < n; ++i, ++at) {
+        while (known.tasks[at] != tasks_->task[i]) ++at;
+        place[i] = at;
+        mask |= std::uint32_t{1} << at;
+        completion_s[at] = completion_s_[i];
+    }
+    known.tours->first_values(mask, completion_s, values);
+    std::vector<double>& worth = tour_completion_s_;
+    worth.resize(n);
+    for (Size i = 0; i < n; ++i) worth[i] = values[place[i]] * decider.survived;
+    const Size greedy = argmax(score_, n);
+    Choice choice;
+    choice.certificate = certificate(problem, decider, greedy, largest_but(score_, n, greedy));
+    // where Theorem 5 settles the choice, rounding in the tours' sums must not
+    const Size best = choice.certificate ? greedy : argmax(worth, n);
+    choice.task = tasks_->task[best];
+    choice.completion_s = completion_s_[best];
+    choice.score = worth[best];
+    choice.second = largest_but(worth, n, best);
+    choice.has_second = true;
+    return choice;
+}
+
+Choice Workspace::look_ahead_far(const Problem& problem, const Decider& decider) {
+    const OpenTasks& tasks = *tasks_;
+    picked_.resize(tasks.size());
+    std::iota(picked_.begin(), picked_.end(), 0);
+    if (picked_.size() > kLongestTour) {  // those worth most per time spent, in ascending order
+        auto rate = [&](std::int32_t i) {
+            const double spent_s = completion_s_[static_cast<Size>(i)] - decider.free_s;
+            const double per_s = weight_[static_cast<Size>(i)] / (spent_s + 1e-9);
+            return per_s == per_s ? per_s : 0.0;
+        };
+        std::sort(picked_.begin(), picked_.end(), [&](std::int32_t a, std::int32_t b) {
+            const double x = rate(a), y = rate(b);
+            return x != y ? x > y : a < b;
+        });
+        picked_.resize(kLongestTour);
+        std::sort(picked_.begin(), picked_.end());
+    }
+    const Size n = picked_.size();
+    std::vector<double> weight(n);
+    tour_completion_s_.resize(n);
+    tour_survival_.resize(n);
+    leg_s_.resize(n * n);
+    for (Size i = 0; i < n; ++i) {
+        const Size from = static_cast<Size>(picked_[i]);
+        weight[i] = weight_[from];
+        tour_completion_s_[i] = completion_s_[from];
+        tour_survival_[i] = problem.survival[problem.cell(decider.uav, tasks.task[from])];
+        for (Size j = 0; j < n; ++j) {
+            const int to = tasks.task[static_cast<Size>(picked_[j])];
+            leg_s_[i * n + j] = problem.travel_s(decider.uav, tasks.x_m[from], tasks.y_m[from],
+                                                 tasks.z_m[from], to) +
+                                problem.service_s[static_cast<Size>(to)];
+        }
+    }
+    const GoodTour tour = good_tour({static_cast<int>(n), problem.horizon_s,
+                                     tour_completion_s_.data(), weight.data(),
+                                     tour_survival_.data(), leg_s_.data()});
+    const Size all = tasks.size(), greedy = argmax(score_, all);
+    Size best = static_cast<Size>(picked_[static_cast<Size>(tour.order[0])]);
+    double value = tour.value, second = tour.second;
+    Choice choice;
+    choice.certificate = certificate(problem, decider, greedy, largest_but(score_, all, greedy));
+    if (choice.certificate && greedy != best) {
+        best = greedy;
+        std::swap(value, second);
+    }
+    choice.task = tasks.task[best];
+    choice.completion_s = completion_s_[best];
+    choice.score = decider.survived * value;
+    choice.second = decider.survived * second;
+    choice.has_second = true;
+    choice.exact = choice.certificate;
+    return choice;
+}
+
+// Theorem 5: p̄ <= (1 − λ)/(2 − λ), and some tour that begins greedily is worth its first task.
+bool Workspace::certificate(const Problem& problem, const Decider& decider, Size best,
+                            double second) {
+    const Size n = tasks_->size();
+    if (n == 1) return true;  // one tour only
+    const double first = score_[best];
+    if (!(first > 0.0)) return false;
+    const double* survival = problem.survival.data() + problem.cell(decider.uav, 0);
+    double highest = 0.0;
+    for (Size i = 0; i < n; ++i) highest = std::max(highest, survival[tasks_->task[i]]);
+    if (highest > 0.5) return false;  // (1 − λ)/(2 − λ) is at most 1/2 for λ within 0..1
+    const double ratio = std::max(0.0, second / first);
+    if (highest * (2.0 - ratio) > 1.0 - ratio) return false;
+    return rest_is_worth_flying(problem, decider, best);
+}
+
+// Whether the tour that always goes to the best greedy score next earns >= 0 after its first task.
+bool Workspace::rest_is_worth_flying(const Problem& problem, const Decider& decider, Size best) {
+    std::vector<Size> left(tasks_->size());
+    std::iota(left.begin(), left.end(), Size{0});
+    const double* survival = problem.survival.data() + problem.cell(decider.uav, 0);
+    double free_s = completion_s_[best], earned = 0.0, survived = 1.0;
+    Size at = best;
+    left.erase(left.begin() + static_cast<std::ptrdiff_t>(best));
+    while (!left.empty() && survived > 0.0) {
+        Size chosen = 0;
+        double most = -kInfinity, time_s = free_s;
+        for (Size k = 0; k < left.size(); ++k) {
+            const Size i = left[k];
+            const double t = (free_s + problem.travel_s(decider.uav, tasks_->x_m[at], tasks_->y_m[at],
+                                                        tasks_->z_m[at], tasks_->task[i])) +
+                             tasks_->service_s[i];
+            const double score = weight_[i] * (problem.horizon_s - t);
+            if (score > most) {
+                most = score;
+                chosen = k;
+                time_s = t;
+            }
+        }
+        at = left[chosen];
+        earned += survived * most;
+        survived *= survival[tasks_->task[at]];
+        free_s = time_s;
+        left.erase(left.begin() + static_cast<std::ptrdiff_t>(chosen));
+    }
+    return earned >= 0.0;
+}
+
+// A table over the decider's tasks or more of them.
+const Workspace::Table& Workspace::table(const Problem& problem, int uav) {
+    const std::vector<std::int32_t>& wanted = tasks_->task;
+    tables_.resize(static_cast<Size>(problem.n_uav));
+    Table& known = tables_[static_cast<Size>(uav)];
+    if (known.tours && std::includes(known.tasks.begin(), known.tasks.end(), wanted.begin(),
+                                     wanted.end())) {
+        return known;
+    }
+    if (known.tours) table_bytes_ -= known.tours->bytes();
+    known.tours.reset();
+    if (table_bytes_ > kTableBytes) {
+        for (Table& other : tables_) other.tours.reset();
+        table_bytes_ = 0;
+    }
+    const Size n = wanted.size();
+    std::vector<double> weight(n), survival(n), leg_s(n * n);
+    for (Size i = 0; i < n; ++i) {
+        const Size from = static_cast<Size>(wanted[i]);
+        weight[i] = problem.weight[problem.cell(uav, wanted[i])];
+        survival[i] = problem.survival[problem.cell(uav, wanted[i])];
+        for (Size j = 0; j < n; ++j) {
+            leg_s[i * n + j] = problem.travel_s(uav, problem.x_m[from], problem.y_m[from],
+                                                problem.z_m[from], wanted[j]) +
+                               problem.service_s[static_cast<Size>(wanted[j])];
+        }
+    }
+    known.tasks = wanted;
+    known.tours = std::make_unique<TourTable>(static_cast<int>(n), weight.data(), survival.data(),
+                                              leg_s.data(), problem.horizon_s);
+    table_bytes_ += known.tours->bytes();
+    return known;
+}
+
+}  // namespace peckorder

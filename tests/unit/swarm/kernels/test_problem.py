@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm.allocation import TeamState
+from swarm.kernels.lower_level import GREEDY, decide
+from swarm.kernels.problem import prepare
+from tests.problems import table_1
+
+
+def arguments() -> dict[str, Any]:
+    problem = table_1()
+    names = ("start_enu_m", "task_enu_m", "speed_m_s", "service_s", "weight", "capable")
+    return {name: getattr(problem, name) for name in (*names, "survival", "horizon_s")}
+
+
+def test_handle_knows_its_size() -> None:
+    handle = prepare(**arguments())
+
+    assert (handle.n_uav, handle.n_task) == (3, 8)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("start_enu_m", np.zeros((3, 2))),
+        ("start_enu_m", np.zeros((2, 3))),
+        ("start_enu_m", np.full((3, 3), np.inf)),
+        ("task_enu_m", np.zeros(24)),
+        ("task_enu_m", np.full((8, 3), np.nan)),
+        ("task_enu_m", "here"),
+        ("speed_m_s", np.array([1.0, 0.0, 1.0])),
+        ("speed_m_s", np.array([1.0, -1.0, 1.0])),
+        ("speed_m_s", np.array([1.0, np.inf, 1.0])),
+        ("speed_m_s", np.array([1.0, np.nan, 1.0])),
+        ("speed_m_s", 3.0),
+        ("speed_m_s", [1j, 1j, 1j]),
+        ("service_s", np.full(8, -0.1)),
+        ("service_s", np.full(8, np.nan)),
+        ("weight", np.full((3, 8), -1.0)),
+        ("weight", np.ones((8, 3))),
+        ("capable", np.ones((3, 8))),
+        ("capable", np.ones((3, 7), dtype=np.bool_)),
+        ("survival", np.full((3, 8), 1.1)),
+        ("survival", np.full((3, 8), np.nan)),
+        ("horizon_s", 0.0),
+        ("horizon_s", -1.0),
+        ("horizon_s", float("nan")),
+        ("horizon_s", float("inf")),
+    ],
+)
+def test_wrong_argument_is_refused_by_name(name: str, value: object) -> None:
+    with pytest.raises(ValueError, match=name):
+        prepare(**{**arguments(), name: value})
+
+
+def test_arrays_may_change_afterwards() -> None:
+    given = {name: np.array(value) for name, value in arguments().items() if name != "horizon_s"}
+    handle = prepare(**given, horizon_s=5.0)
+    state = TeamState.at_start(table_1())
+    before = decide(handle, state, 0, GREEDY)
+    for array in given.values():
+        array[:] = 0
+
+    assert decide(handle, state, 0, GREEDY) == before
+
+
+def test_problems_survive_copying_and_pickling() -> None:
+    problem = table_1()
+    state = TeamState.at_start(problem)
+
+    for twin in (copy.deepcopy(problem), pickle.loads(pickle.dumps(problem))):
+        assert twin.task_ids == problem.task_ids
+        assert decide(twin.kernel, state, 0, GREEDY) == decide(problem.kernel, state, 0, GREEDY)

@@ -1,0 +1,159 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm.allocation import Problem, TeamState, evaluate, run
+from swarm.allocation.guided import GuidedRule, route_arrays, team_arrays
+from swarm.allocation.lower_level import Decision
+from swarm.allocation.reference_routes import team_worth
+from swarm.kernels.rollout import guided_choice
+from swarm.kernels.routes import optimise_routes
+from tests.problems import any_problem, random_problem
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def any_lists(problem: Problem, rng: np.random.Generator, left_out: float = 0.0) -> list[list[int]]:
+    lists: list[list[int]] = [[] for _ in range(problem.n_uav)]
+    for task in rng.permutation(problem.n_task):
+        able = np.flatnonzero(problem.capable[:, task])
+        if len(able) and rng.uniform() >= left_out:
+            lists[rng.choice(able)].append(int(task))
+    return lists
+
+
+def rule_of(problem: Problem, lists: list[list[int]], **options: Any) -> GuidedRule:
+    by_id: dict[str, list[str]] = {
+        uav: [problem.task_ids[task] for task in route]
+        for uav, route in zip(problem.uav_ids, lists, strict=True)
+    }
+    return GuidedRule(by_id, **options)
+
+
+@settings(deadline=None, max_examples=80)
+@given(seed=SEEDS, n_uav=st.integers(1, 5), n_task=st.integers(0, 15))
+def test_undisturbed_the_executed_lists_are_worth_no_less_than_the_published(
+    seed: int, n_uav: int, n_task: int
+) -> None:
+    problem = any_problem(seed, n_uav, n_task)
+    lists = any_lists(problem, np.random.default_rng(seed))
+
+    routes, _ = run(problem, TeamState.at_start(problem), np.arange(n_uav), rule_of(problem, lists))
+
+    assert sorted(t for r in routes for t in r) == sorted(t for r in lists for t in r)
+    planned = evaluate(problem, lists)[0]
+    assert evaluate(problem, routes)[0] >= planned - 1e-8 * (1.0 + abs(planned))
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_lists_without_a_gaining_move_are_kept_to_the_letter(seed: int) -> None:
+    problem = random_problem(np.random.default_rng(seed), 4, 25, horizon_s=30.0)
+    team = team_arrays(
+        route_arrays(problem), state := TeamState.at_start(problem), state.active, 0.0
+    )
+    lists, _ = optimise_routes(team, iterations=500)
+
+    routes, _ = run(problem, state, np.arange(4), rule_of(problem, lists))
+
+    assert routes == lists
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=SEEDS, n_uav=st.integers(1, 4), n_task=st.integers(1, 12))
+def test_a_choice_is_worth_what_the_whole_team_then_flies(
+    seed: int, n_uav: int, n_task: int
+) -> None:
+    problem = any_problem(seed, n_uav, n_task)
+    lists = any_lists(problem, np.random.default_rng(seed))
+    state = TeamState.at_start(problem)
+    team = team_arrays(route_arrays(problem), state, state.active, 0.0)
+
+    choice = guided_choice(team, lists, 0)
+
+    planned = lists[0][0] if lists[0] else None
+    assert choice.planned == planned
+    before = team_worth(problem, state, lists)
+    moved = [[t for t in route if t != choice.task] for route in lists]
+    if choice.task is not None:
+        moved[0].insert(0, choice.task)
+    scale = 1.0 + abs(before)
+    assert abs(team_worth(problem, state, moved) - choice.worth) <= 1e-9 * scale
+    assert choice.worth >= before - 1e-9 * scale
+    if choice.task != planned:
+        assert choice.worth > before
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=SEEDS, n_uav=st.integers(2, 5), n_task=st.integers(1, 15))
+def test_after_a_loss_and_pop_ups_every_task_is_still_done(
+    seed: int, n_uav: int, n_task: int
+) -> None:
+    problem = any_problem(seed, n_uav, n_task)
+    rng = np.random.default_rng(seed)
+    lists = any_lists(problem, rng, left_out=0.3)
+    state = TeamState.at_start(problem)
+    state.active[rng.integers(n_uav)] = False
+    state.free_s[:] = rng.uniform(0.0, 3.0, n_uav)
+
+    routes, _ = run(problem, state, np.arange(n_uav), rule_of(problem, lists, repair_iterations=20))
+
+    able = (problem.capable & state.active[:, None]).any(axis=0)
+    done = sorted(t for route in routes for t in route)
+    # a task that only UAVs can do that went home early may stay, but only then
+    assert set(done) <= set(np.flatnonzero(able).tolist())
+    everybody = problem.capable[state.active].all(axis=0)
+    assert set(np.flatnonzero(able & everybody).tolist()) <= set(done)
+
+
+def test_every_replica_decides_alike() -> None:
+    problem = random_problem(np.random.default_rng(4), 6, 30, horizon_s=30.0)
+    lists = any_lists(problem, np.random.default_rng(4), left_out=0.3)
+    state = TeamState.at_start(problem)
+    used, fresh = rule_of(problem, lists), rule_of(problem, lists)
+    used.decide(problem, state, np.arange(6), 3)
+
+    a, b = (rule.decide(problem, state, np.arange(6), 0) for rule in (used, fresh))
+
+    assert isinstance(a, Decision)
+    assert a == b
+
+
+def test_a_uav_free_at_an_unknown_time_does_not_spoil_the_numbers() -> None:
+    problem = random_problem(np.random.default_rng(4), 3, 12, horizon_s=30.0)
+    lists = any_lists(problem, np.random.default_rng(4))
+    state = TeamState.at_start(problem)
+    state.free_s[:] = (1.0, np.inf, 2.0)
+
+    decision = rule_of(problem, lists).decide(problem, state, np.arange(3), 0)
+
+    assert decision is not None
+    assert np.isfinite(decision.score)
+
+
+def test_nothing_open_needs_no_decision() -> None:
+    problem = random_problem(np.random.default_rng(4), 3, 12, horizon_s=30.0)
+    state = TeamState.at_start(problem)
+    state.open[:] = False
+
+    assert rule_of(problem, [[], [], []]).decide(problem, state, np.arange(3), 0) is None
+
+
+def test_a_wrong_call_is_refused() -> None:
+    problem = random_problem(np.random.default_rng(4), 2, 3, horizon_s=30.0)
+    state = TeamState.at_start(problem)
+    state.active[1] = False
+    team = team_arrays(route_arrays(problem), state, state.active, 0.0)
+
+    for uav in (-1, 1, 2):
+        with pytest.raises(ValueError, match="uav"):
+            guided_choice(team, [[], []], uav)
+    with pytest.raises(ValueError, match="iterations"):
+        guided_choice(team, [[], []], 0, iterations=-1)
+    with pytest.raises(ValueError, match="lists"):
+        guided_choice(team, [[]], 0)

@@ -1,0 +1,241 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordinator.planner.exact import optimum
+from swarm.allocation import Problem, TeamState, evaluate
+from swarm.allocation.guided import route_arrays, team_arrays
+from swarm.allocation.reference_routes import best_of_neighbourhood, team_worth
+from swarm.kernels.routes import RouteArrays, TeamArrays, improve_routes, optimise_routes
+from tests.problems import any_problem, paper_problem, random_problem, table_1
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def team_of(problem: Problem, state: TeamState | None = None) -> TeamArrays:
+    state = TeamState.at_start(problem) if state is None else state
+    return team_arrays(route_arrays(problem), state, state.active, 0.0)
+
+
+def any_state(problem: Problem, rng: np.random.Generator) -> TeamState:
+    state = TeamState.at_start(problem)
+    state.free_s[:] = rng.uniform(0.0, 2.0, problem.n_uav)
+    state.place_enu_m[:] = rng.uniform(0.0, 10.0, (problem.n_uav, 3))
+    state.survived[:] = rng.uniform(0.2, 1.0, problem.n_uav)
+    state.open[:] = rng.uniform(size=problem.n_task) < 0.8
+    state.active[:] = rng.uniform(size=problem.n_uav) < 0.8
+    return state
+
+
+def random_lists(problem: Problem, state: TeamState, rng: np.random.Generator) -> list[list[int]]:
+    lists: list[list[int]] = [[] for _ in range(problem.n_uav)]
+    for task in rng.permutation(np.flatnonzero(state.open)):
+        able = np.flatnonzero(problem.capable[:, task] & state.active)
+        if len(able):
+            lists[rng.choice(able)].append(int(task))
+    return lists
+
+
+def test_table_1_reaches_the_optimum() -> None:
+    lists, worth = optimise_routes(team_of(table_1()), iterations=2000)
+
+    assert worth == pytest.approx(120.3335, abs=5e-5)
+    assert evaluate(table_1(), lists)[0] == pytest.approx(worth, rel=1e-12)
+
+
+def test_the_papers_kind_of_problem_is_solved_to_its_optimum() -> None:
+    rng = np.random.default_rng(5)
+    shares = []
+    for _ in range(10):
+        problem = paper_problem(rng)
+        _, worth = optimise_routes(team_of(problem), iterations=2000)
+        shares.append(worth / optimum(problem).objective)
+
+    assert min(shares) >= 0.999
+    assert max(shares) <= 1.0 + 1e-12
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=SEEDS, n_uav=st.integers(0, 4), n_task=st.integers(0, 12))
+def test_lists_hold_every_task_once_and_are_worth_what_is_said(
+    seed: int, n_uav: int, n_task: int
+) -> None:
+    problem = any_problem(seed, n_uav, n_task)
+    state = any_state(problem, np.random.default_rng(seed))
+
+    lists, worth = optimise_routes(team_of(problem, state), seed=seed, iterations=200)
+
+    able = (problem.capable & state.active[:, None]).any(axis=0) & state.open
+    assert sorted(task for route in lists for task in route) == np.flatnonzero(able).tolist()
+    for uav, route in enumerate(lists):
+        assert state.active[uav] or not route
+        assert problem.capable[uav, route].all()
+    scale = 1.0 + abs(worth)
+    assert abs(team_worth(problem, state, lists) - worth) <= 1e-9 * scale
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=SEEDS, n_uav=st.integers(1, 4), n_task=st.integers(1, 11))
+def test_local_search_ends_where_no_move_gains(seed: int, n_uav: int, n_task: int) -> None:
+    problem = any_problem(seed, n_uav, n_task)
+    rng = np.random.default_rng(seed)
+    state = any_state(problem, rng)
+    begin = random_lists(problem, state, rng)
+
+    lists = improve_routes(team_of(problem, state), begin)
+
+    worth = team_worth(problem, state, lists)
+    assert sorted(t for r in lists for t in r) == sorted(t for r in begin for t in r)
+    assert worth >= team_worth(problem, state, begin) - 1e-9
+    idle = [list(lists[u]) for u in range(n_uav)]
+    active = np.flatnonzero(state.active)
+    part = Problem(
+        uav_ids=tuple(problem.uav_ids[u] for u in active),
+        task_ids=problem.task_ids,
+        start_enu_m=problem.start_enu_m[active],
+        task_enu_m=problem.task_enu_m,
+        speed_m_s=problem.speed_m_s[active],
+        value=problem.value,
+        service_s=problem.service_s,
+        success=problem.success[active],
+        survival=problem.survival[active],
+        horizon_s=problem.horizon_s,
+    )
+    team = TeamState(
+        state.free_s[active],
+        state.place_enu_m[active],
+        state.survived[active],
+        state.open,
+        state.active[active],
+    )
+    best = best_of_neighbourhood(part, team, [idle[u] for u in active])
+    assert best <= worth + 1e-8 * (1.0 + abs(worth))
+
+
+def test_the_number_of_threads_does_not_change_the_result() -> None:
+    problem = random_problem(np.random.default_rng(1), 14, 90, horizon_s=60.0)
+    runs = [optimise_routes(team_of(problem), iterations=6000, threads=n) for n in (1, 2, 5)]
+
+    assert runs[0] == runs[1] == runs[2]
+
+
+def test_another_seed_gives_another_search() -> None:
+    problem = random_problem(np.random.default_rng(1), 14, 90, horizon_s=60.0)
+
+    a, b = (optimise_routes(team_of(problem), iterations=3000, seed=s)[0] for s in (0, 1))
+
+    assert a != b
+
+
+def test_begun_with_lists_it_never_returns_worse() -> None:
+    problem = random_problem(np.random.default_rng(2), 12, 80, horizon_s=60.0)
+    lists, worth = optimise_routes(team_of(problem), iterations=8000)
+
+    again, value = optimise_routes(team_of(problem), lists=lists, iterations=0)
+
+    assert value >= worth - 1e-9 * abs(worth)
+    assert again == lists
+
+
+def test_it_stops_when_all_is_spent_and_reports_progress() -> None:
+    problem = random_problem(np.random.default_rng(3), 4, 40, horizon_s=60.0)
+    told: list[tuple[int, float]] = []
+
+    _, worth = optimise_routes(
+        team_of(problem),
+        spent_frac=lambda done: done / 9000,
+        progress=lambda done, best: told.append((done, best)),
+    )
+
+    assert told[-1][0] >= 9000
+    assert told[-2][0] < 9000
+    bests = [best for _, best in told]
+    assert bests == sorted(bests)
+    assert worth >= bests[-1] - 1e-9 * worth
+
+
+def arguments() -> dict[str, Any]:
+    return {
+        "task_enu_m": np.zeros((3, 3)),
+        "speed_m_s": np.ones(2),
+        "value": np.ones(3),
+        "service_s": np.zeros(3),
+        "success": np.ones((2, 3)),
+        "survival": np.ones((2, 3)),
+        "horizon_s": 10.0,
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("task_enu_m", np.zeros((3, 2))),
+        ("task_enu_m", [[0.0, 0.0, np.nan]] * 3),
+        ("speed_m_s", [1.0, -1.0]),
+        ("speed_m_s", [1.0, 0.0]),
+        ("speed_m_s", "fast"),
+        ("value", [[1.0]]),
+        ("value", [1.0, -1.0, 1.0]),
+        ("service_s", [0.0, 0.0]),
+        ("service_s", [0.0, 0.0, -1.0]),
+        ("success", np.full((2, 3), 1.1)),
+        ("success", np.ones((3, 2))),
+        ("survival", np.full((2, 3), -0.1)),
+        ("survival", np.full((2, 3), np.inf)),
+        ("horizon_s", 0.0),
+        ("horizon_s", float("nan")),
+    ],
+)
+def test_a_wrong_mission_is_refused_by_name(name: str, wrong: object) -> None:
+    with pytest.raises(ValueError, match=name):
+        RouteArrays(**(arguments() | {name: wrong}))
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("free_s", [0.0, np.inf]),
+        ("place_enu_m", np.zeros((3, 3))),
+        ("survived", [1.0, 1.1]),
+        ("active", [1, 1]),
+        ("open", [True, True]),
+    ],
+)
+def test_a_wrong_state_is_refused_by_name(name: str, wrong: object) -> None:
+    right: dict[str, Any] = {
+        "free_s": np.zeros(2),
+        "place_enu_m": np.zeros((2, 3)),
+        "survived": np.ones(2),
+        "active": np.ones(2, dtype=np.bool_),
+        "open": np.ones(3, dtype=np.bool_),
+    }
+    with pytest.raises(ValueError, match=name):
+        TeamArrays(RouteArrays(**arguments()), **(right | {name: wrong}))
+
+
+@pytest.mark.parametrize("lists", [[[0]], [[0], [3]], [[0], [-1]], [[0, 0], []], [[1], [1]]])
+def test_wrong_lists_are_refused(lists: list[list[int]]) -> None:
+    team = TeamArrays.at_start(RouteArrays(**arguments()), np.zeros((2, 3)))
+    with pytest.raises(ValueError, match="lists"):
+        optimise_routes(team, iterations=10, lists=lists)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("iterations", {}),
+        ("iterations", {"iterations": 1, "spent_frac": lambda _: 1.0}),
+        ("iterations", {"iterations": -1}),
+        ("seed", {"iterations": 1, "seed": -1}),
+        ("threads", {"iterations": 1, "threads": 0}),
+    ],
+)
+def test_wrong_options_are_refused(name: str, options: dict[str, Any]) -> None:
+    team = TeamArrays.at_start(RouteArrays(**arguments()), np.zeros((2, 3)))
+    with pytest.raises(ValueError, match=name):
+        optimise_routes(team, **options)
