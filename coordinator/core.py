@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from coordinator.events import Action, Event, MakePlan, PlanFailed, PlanMade
 from swarm.config import Timing
 from swarm.events import (
+    Ask,
     Finish,
     Heard,
     Learned,
@@ -189,10 +190,14 @@ class CoordinatorCore:
         return epoch is not None and epoch.phase is EpochPhase.ENDED
 
     def _advance(self, now_s: float) -> None:
+        anybody_lost = False
         for writer in self._membership.lost(now_s):
             claim = self.replica.claims.get(writer)
             left = claim is not None and claim.phase is ClaimPhase.OUT
             self._actions.append(Note("left" if left else "lost", {"writer": writer}))
+            anybody_lost |= not left
+        if anybody_lost:
+            self._actions.append(Ask())  # others may have heard its last words
         if self._ended:
             self._leave_when_empty(now_s)
         else:

@@ -7,7 +7,7 @@ import pytest
 from coordinator.core import FlightLayers
 from coordinator.events import PlanFailed, PlanMade
 from swarm.config import Timing
-from swarm.events import Heard, Learned, LinkChanged, PeerGone, PeerSeen, Stop, Tick
+from swarm.events import Ask, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Stop, Tick
 from swarm.model.ids import COORDINATOR
 from swarm.wire.codec import Codec, encode, key_of
 from swarm.wire.messages import Board, Brief, Epoch, EpochPhase, Snapshot
@@ -232,6 +232,24 @@ def test_it_ends_when_all_who_could_go_on_are_lost() -> None:
     actions = coordinator.lose("u0", 110.0)
     assert coordinator.reason == "nobody is left who could go on"
     assert next(n.text for n in notes(actions)) == "lost"
+
+
+def test_it_asks_the_others_for_the_last_words_of_the_lost() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+    asked = coordinator.lose("u0", 110.0).count(Ask())
+    witness = Snapshot(MISSION, "u1", 11.0, (message("u0", done("t0"), 9),))
+    coordinator.happen(Learned((witness,)))
+    coordinator.hear("u1", done("t1"))
+
+    assert asked == 1
+    assert coordinator.reason == "every task has ended"
+
+
+def test_it_has_nothing_to_ask_about_who_leaves() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+    coordinator.hear("u0", OUT)
+
+    assert Ask() not in coordinator.lose("u0", 110.0)
 
 
 def test_it_ends_when_all_who_could_go_on_are_out() -> None:
