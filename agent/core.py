@@ -210,6 +210,8 @@ class AgentCore:
         before = self.replica.claims.get(message.writer)
         if not self.replica.join(message):
             return
+        if isinstance(message.body, Outcome):
+            self._peers.turned_idle(message.writer, now_s)
         match message.body:
             case Brief() | Board() | Outcome(result=Result.FAILED):
                 self._awake(now_s)
@@ -397,7 +399,7 @@ class AgentCore:
             decided_s=self._free_since_s,
             place_enu_m=place,
             credible=self._peers.credible,
-            awaited=self._peers.awaited(self.replica.claims, now_s),
+            awaited=self._peers.awaited(self.replica, now_s),
             patience_s=self._timing.patience_s,
             excluded=self._excluded,
         )
@@ -446,7 +448,7 @@ class AgentCore:
             self._leg += 1
             self._actions.append(Order(GoTo(self._leg, self._telemetry.position_enu_m)))
         self._adrift = False
-        self._retry_at_s = self._peers.patience_ends_s(self.replica.claims, now_s)
+        self._retry_at_s = self._peers.patience_ends_s(self.replica, now_s)
 
     # -- pieces ---------------------------------------------------------------------
 

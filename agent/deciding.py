@@ -15,9 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swarm.allocation.guided import GuidedRule
 from swarm.allocation.lower_level import Decision, Rule, TeamState, decisions
 from swarm.allocation.problem import Problem
-from swarm.allocation.rules import rule_by_name
+from swarm.allocation.rules import RULE_NAMES, rule_by_name
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.claims import claim_strength
 from swarm.wire.messages import Claim, ClaimPhase, Epoch
@@ -51,10 +52,9 @@ def rule_of(epoch: Epoch) -> Rule | None:
 
     Rules keep what they worked out for one decision to be quicker at the next.
     """
-    try:
-        return rule_by_name(epoch.rule)
-    except ValueError:
-        return None
+    if epoch.rule == GuidedRule.name:
+        return GuidedRule(epoch.routes)
+    return rule_by_name(epoch.rule) if epoch.rule in RULE_NAMES else None
 
 
 def ranks(sequence: Sequence[str], uavs: Sequence[str]) -> dict[str, int]:

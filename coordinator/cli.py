@@ -102,8 +102,10 @@ def coordinator(
     scenario: ScenarioArgument,
     method: Annotated[
         str,
-        typer.Option("--method", metavar="METHOD", help="Decision rule: greedy or lookahead."),
-    ] = "greedy",
+        typer.Option(
+            "--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."
+        ),
+    ] = "guided",
     seed: SeedOption = 0,
     start_timeout_s: Annotated[
         float,

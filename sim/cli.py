@@ -21,7 +21,7 @@ __all__ = ["run", "simulate"]
 
 MethodOption = Annotated[
     str,
-    typer.Option("--method", metavar="METHOD", help="Decision rule: greedy or lookahead."),
+    typer.Option("--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."),
 ]
 
 ReportOption = Annotated[
@@ -37,7 +37,7 @@ ReportOption = Annotated[
 
 def run(
     scenario: ScenarioArgument,
-    method: MethodOption = "greedy",
+    method: MethodOption = "guided",
     speedup: SpeedupOption = 1.0,
     seed: SeedOption = 0,
     bus: Annotated[

@@ -161,7 +161,7 @@ def tour_worth(
     leg_s: FloatArray,
     horizon_s: float,
 ) -> float:
-    """Worth of a tour of positions, S = 1 before it; other arguments as of `swarm.kernels.tours`."""
+    """Worth of a tour of positions, S = 1 before it; other arguments: `swarm.kernels.tours`."""
     total, survived, time_s, last = 0.0, 1.0, 0.0, -1
     for task in tour:
         time_s = float(completion_s[task]) if last < 0 else time_s + float(leg_s[last, task])
