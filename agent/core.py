@@ -100,6 +100,8 @@ class AgentCore:
         self._leg = 0
         self._excluded: set[str] = set()
         self._adrift = False
+        self._to_decide = False
+        self._awaits_peers = False
         self._note = ""
         self._held_at_s: float | None = None
         self._served_at_s: float | None = None
@@ -207,7 +209,7 @@ class AgentCore:
         if message.writer == self.uav:
             self._actions += self._speech.hear_echo(message)
             return
-        before = self.replica.claims.get(message.writer)
+        before, epoch = self.replica.claims.get(message.writer), self.replica.epoch
         if not self.replica.join(message):
             return
         if isinstance(message.body, Outcome):
@@ -220,6 +222,8 @@ class AgentCore:
                     self._peers.turned_idle(message.writer, now_s)
                 if before is not None and before.task != claim.task and self._is_open(before.task):
                     self._awake(now_s)
+            case Epoch(number=number) if epoch is None or number != epoch.number:
+                self._awake(now_s)
             case _:
                 pass
 
@@ -236,14 +240,14 @@ class AgentCore:
     def _set_clock(self, epoch: Epoch, now_s: float) -> None:
         if self._zero_s is None and epoch.phase is EpochPhase.RUNNING:
             self._zero_s = now_s - epoch.mission_s
-            self._peers.awake(now_s)
+            self._awake(now_s)
             self._actions.append(Note("mission runs", {"mission_s": epoch.mission_s}))
 
     def _become_airborne(self, now_s: float) -> None:
         if self.phase is not StatusPhase.PREPARING:
             return
-        self.phase, self._note = StatusPhase.IDLE, ""
-        self._free_since_s = self._mission_s(now_s) if self._zero_s is not None else 0.0
+        self._note = ""
+        self._become_free(self._mission_s(now_s) if self._zero_s is not None else 0.0)
         if self._place_enu_m is None and (me := self._me()) is not None:
             self._place_enu_m = me.position_enu_m
         self._publish_idle()
@@ -301,7 +305,9 @@ class AgentCore:
         if self._airborne and self._running:
             self._serve(now_s)
             self._keep_or_lose_claim(now_s)
-            if self.phase is StatusPhase.IDLE:
+            if self._retry_at_s is not None and self._retry_at_s <= now_s:
+                self._wake(now_s)
+            if self.phase is StatusPhase.IDLE and self._to_decide:
                 self._decide(now_s)
         if not self._finished:
             self._actions += self._speech.repeat(
@@ -348,8 +354,9 @@ class AgentCore:
         """Tasks may be open still: those that nobody who is there can or will take."""
         if TaskState.OPEN not in self._board.states.values():
             return True
-        free = self.phase in (StatusPhase.IDLE, StatusPhase.OUT) and self._retry_at_s is None
-        return free and not self._peers_at_work()
+        if self.phase is StatusPhase.IDLE:
+            return not (self._to_decide or self._awaits_peers or self._peers_at_work())
+        return self.phase is StatusPhase.OUT and not self._peers_at_work()
 
     def _peers_at_work(self) -> bool:
         credible = self._peers.credible
@@ -447,8 +454,13 @@ class AgentCore:
             # Nothing to fly to any more: stop here rather than at a lost target.
             self._leg += 1
             self._actions.append(Order(GoTo(self._leg, self._telemetry.position_enu_m)))
-        self._adrift = False
-        self._retry_at_s = self._peers.patience_ends_s(self.replica, now_s)
+        self._adrift = self._to_decide = False
+        patience_ends_s = self._peers.patience_ends_s(self.replica, now_s)
+        self._awaits_peers = patience_ends_s is not None
+        # Look again by and by while anything is open, lest a lost message strand it.
+        unfinished = TaskState.OPEN in self._board.states.values()
+        again_s = now_s + self._timing.announce_s if unfinished else None
+        self._retry_at_s = patience_ends_s if patience_ends_s is not None else again_s
 
     # -- pieces ---------------------------------------------------------------------
 
@@ -495,11 +507,18 @@ class AgentCore:
     def _awake(self, now_s: float) -> None:
         """A task may have opened: everyone who is free decides anew, in sequence order."""
         self._peers.awake(now_s)
-        if self.phase is StatusPhase.IDLE and self._running:
-            self._free_since_s = self._mission_s(now_s)
+        self._wake(now_s)
+
+    def _wake(self, now_s: float) -> None:
+        """Decide anew when free; who found nothing before takes no precedence from that."""
+        self._retry_at_s = None
+        if self.phase is StatusPhase.IDLE and not self._to_decide:
+            self._to_decide = True
+            if self._running:
+                self._free_since_s = self._mission_s(now_s)
 
     def _become_free(self, free_since_s: float) -> None:
-        self.phase = StatusPhase.IDLE
+        self.phase, self._to_decide = StatusPhase.IDLE, True
         self._free_since_s = free_since_s
         self._held_at_s = self._served_at_s = self._retry_at_s = None
 
