@@ -222,6 +222,8 @@ class AgentCore:
                     self._peers.turned_idle(message.writer, now_s)
                 if before is not None and before.task != claim.task and self._is_open(before.task):
                     self._awake(now_s)
+                elif self._awaits_peers:
+                    self._wake(now_s)
             case Epoch(number=number) if epoch is None or number != epoch.number:
                 self._awake(now_s)
             case _:

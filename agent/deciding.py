@@ -76,6 +76,11 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decisi
     rank = ranks(epoch.sequence if epoch is not None else (), problem.uav_ids)
     mine = problem.uav_ids.index(turn.uav)
     stronger = _stronger_claims(replica.claims, rank[turn.uav], turn)
+    weaker = {
+        uav
+        for uav, claim in replica.claims.items()
+        if uav in turn.credible and uav not in stronger and claim.task is not None
+    }
     state = TeamState.at_start(problem)
     taken = {claim.task for claim in stronger.values()} | set(turn.excluded)
     for index, task in enumerate(problem.task_ids):
@@ -102,8 +107,10 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decisi
             state.survived[index] *= problem.survival[index, columns[claim.task]]
             # Who is a little late is about to decide, or its word is on its way.
             state.active[index] = turn.now_s < claim.completion_s + turn.patience_s
-        elif uav in turn.awaited:
-            state.free_s[index] = turn.now_s
+        elif uav in turn.awaited or uav in weaker:
+            # Who has claimed after this UAV became free decides again, but after it.
+            after_s = math.nextafter(turn.now_s, math.inf)
+            state.free_s[index] = after_s if uav in weaker else turn.now_s
             if ended:
                 state.place_enu_m[index] = problem.task_enu_m[columns[ended[-1][1]]]
         else:

@@ -207,9 +207,8 @@ def _check_plan_options(method: str, plot: Path | None) -> None:
 
     faults = []
     if method not in METHODS:
-        problem = "not available yet" if method == "guided" else "no such method"
-        methods = ", ".join(METHODS)
-        faults.append(Fault("--method", method, problem, f"choose one of {methods}"))
+        remedy = f"choose one of {', '.join(METHODS)}"
+        faults.append(Fault("--method", method, "no such method", remedy))
     if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
         remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"

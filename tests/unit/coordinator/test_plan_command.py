@@ -98,7 +98,6 @@ def test_late_tasks_are_flagged(tmp_path: Path, capsys: pytest.CaptureFixture[st
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (["--method", "guided"], ["--method", "guided", "not available yet", "lookahead"]),
         (["--method", "best"], ["--method", "best", "no such method", "exact"]),
         (["--plot", "map.bmp"], ["--plot", "map.bmp", ".svg"]),
         (["--plot", "map"], ["--plot", "map", ".png"]),
