@@ -37,7 +37,8 @@ def plan(
         str,
         typer.Option(
             metavar="METHOD",
-            help="greedy or lookahead: how UAVs decide; exact: the proven best lists.",
+            help="greedy or lookahead: how UAVs decide; guided: optimised lists; exact: the proven "
+            "best lists.",
         ),
     ] = "greedy",
     seed: SeedOption = 0,
@@ -78,7 +79,7 @@ def plan(
     try:
         result = make_plan(mission, method, clock=clock, seed=seed, stop=stop)
     except ProblemTooLargeError as error:
-        remedy = "choose --method greedy or lookahead"
+        remedy = "choose --method guided, greedy or lookahead"
         raise InputError(Fault(str(scenario), "", str(error), remedy)) from error
     if plot is not None:
         from coordinator.plot import draw_plan
