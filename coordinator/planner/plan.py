@@ -28,12 +28,12 @@ ONLINE_METHODS = ("greedy", "lookahead", "guided")
 
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""
-_EXHAUSTIVE_DECISIONS = 600_000
-"""Decisions all first rounds together may take to be tried one by one: some 10 s."""
-_LOCAL_DECISIONS = 120_000
-"""The same for the local search: some 2 s."""
-_LONG_LOOKAHEAD_EVALUATIONS = 8
-"""One of them takes about half a second at 60 tasks, so a few must do."""
+_EXHAUSTIVE_DECISIONS = 3_000_000
+"""Decisions all first rounds together may take to be tried one by one: some seconds."""
+_LOCAL_DECISIONS = 600_000
+"""The same for the local search: a second or two."""
+_LONG_LOOKAHEAD_WORK = 60_000
+"""Evaluations × tasks² of lookahead where its tours are long: a few seconds."""
 
 
 def make_plan(
@@ -56,7 +56,7 @@ def make_plan(
         seed: of ``guided`` and of the local search, which only large fleets need.
         stop: ends the search for a sequence or for lists; None means after a few seconds' worth of
             work.
-        progress: told the iterations and the best J so far by method ``guided``.
+        progress: told the evaluations or iterations and the best J so far, again and again.
 
     Returns:
         The plan. Its sequence is None for ``exact``, which has none.
@@ -88,6 +88,7 @@ def make_plan(
             np.random.default_rng(seed),
             never if stop is None else stop,
             limits=_limits(problem, method, stopped=stop is not None),
+            progress=progress,
         )
         sequence, evaluations = search.sequence, search.evaluations
         routes, _ = run(problem, TeamState.at_start(problem), rank_of(sequence), rule)
@@ -131,17 +132,17 @@ def _limits(problem: Problem, method: str, *, stopped: bool) -> SearchLimits:
     """What is cheap here; with ``stopped`` the caller's limit alone ends the local search."""
     n_task = max(1, problem.n_task)
     if method == "lookahead" and n_task > EXACT_TASKS:
-        few = _LONG_LOOKAHEAD_EVALUATIONS
+        few = max(2, min(300, _LONG_LOOKAHEAD_WORK // n_task**2))
         return SearchLimits(
             first_rounds=few,
             first_rounds_large_fleet=few,
-            decisions=few * n_task,
+            decisions=2 * few,
             local_evaluations=None if stopped else few,
         )
     local = max(100, _LOCAL_DECISIONS // n_task)
     return SearchLimits(
         first_rounds=max(local, _EXHAUSTIVE_DECISIONS // n_task),
         first_rounds_large_fleet=local,
-        partial_rounds=60_000 if problem.n_uav <= EXHAUSTIVE_UAVS else 20_000,
+        partial_rounds=60_000 if problem.n_uav <= EXHAUSTIVE_UAVS else 4_000,
         local_evaluations=None if stopped else local,
     )

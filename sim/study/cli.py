@@ -18,6 +18,8 @@ from swarm.options import JsonOption, SeedOption
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from sim.study.reproduce import Reproduction
+
 __all__ = ["reproduce"]
 
 
@@ -51,12 +53,7 @@ def reproduce(
         swarm reproduce --problems 300 --plots figures
         swarm reproduce --seed 7 --json
     """
-    from json import dumps
-
-    from rich.console import Console
-
     from sim.study.reproduce import reproduce_paper
-    from sim.study.reproduce_report import reproduction_text
     from swarm.clock import SystemClock
     from swarm.kernels.lower_level import default_threads
 
@@ -74,6 +71,17 @@ def reproduce(
             drawn = draw_figures(found, plots)
         except OSError as error:
             raise _unwritable(plots, error) from error
+    return _tell(found, drawn, json=json)
+
+
+def _tell(found: Reproduction, drawn: list[Path], *, json: bool) -> int:
+    """Print it; the exit status of the command."""
+    from json import dumps
+
+    from rich.console import Console
+
+    from sim.study.reproduce_report import reproduction_text
+
     if json:
         figures = [str(path) for path in drawn]
         print(dumps({**found.as_json(), "figures": figures}, allow_nan=False))

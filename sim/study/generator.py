@@ -21,8 +21,6 @@ _SIDE_M = 5000.0
 """Of the square with `_TASKS_ON_IT` tasks."""
 _TASKS_ON_IT = 500
 _HORIZON_SHARE = 1.2
-_LATENESS = 3.3
-"""Makespan of a good plan over (time to fly a list in a row + first leg), as measured."""
 
 
 def random_mission(

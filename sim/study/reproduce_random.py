@@ -6,7 +6,7 @@ may have averaged. Leaves out: drawing the problems (sim.study.generator).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -45,7 +45,7 @@ class ProblemResult:
 
     optimum: float
     worst: float
-    sequences: dict[str, tuple[float, ...]]
+    sequences: Mapping[str, tuple[float, ...]]
     """By rule, for every sequence in lexicographic order."""
     guided: float
 

@@ -217,20 +217,6 @@ Out<std::int64_t, 2> first_rounds(const Problem& problem, const Team& team,
 
 }  // namespace
 
-void Turns::push(double free_s, std::int64_t rank, int uav) {
-    waiting_.push_back({free_s, rank, uav});
-    std::push_heap(waiting_.begin(), waiting_.end(),
-                   [](const Turn& a, const Turn& b) { return b.before(a); });
-}
-
-int Turns::pop() {
-    std::pop_heap(waiting_.begin(), waiting_.end(),
-                  [](const Turn& a, const Turn& b) { return b.before(a); });
-    const int uav = waiting_.back().uav;
-    waiting_.pop_back();
-    return uav;
-}
-
 void bind_lower_level(nb::module_& module) {
     module.attr("EXACT_TASKS") = kExactTasks;
     module.def("decide", &decide, nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(),

@@ -29,11 +29,33 @@ struct TeamView {
 // Who decides next: free earliest, then first in the sequence, then smaller index.
 class Turns {
   public:
-    void clear() { waiting_.clear(); }
-    void push(double free_s, std::int64_t rank, int uav);
-    int pop();
     bool empty() const { return waiting_.empty(); }
-    double next_free_s() const { return waiting_.front().free_s; }
+    int next() const { return waiting_.front().uav; }
+
+    void add(double free_s, std::int64_t rank, int uav) {
+        waiting_.push_back({free_s, rank, uav});
+        for (std::size_t at = waiting_.size() - 1; at > 0;) {
+            const std::size_t above = (at - 1) / 2;
+            if (!waiting_[at].before(waiting_[above])) break;
+            std::swap(waiting_[at], waiting_[above]);
+            at = above;
+        }
+    }
+
+    // Whether another one waits that is free at the same time as the next.
+    bool tied() const {
+        const double free_s = waiting_.front().free_s;
+        return (waiting_.size() > 1 && waiting_[1].free_s == free_s) ||
+               (waiting_.size() > 2 && waiting_[2].free_s == free_s);
+    }
+
+    void put_off_next(double free_s) { settle({free_s, waiting_.front().rank, next()}); }
+
+    void drop_next() {
+        const Turn last = waiting_.back();
+        waiting_.pop_back();
+        if (!waiting_.empty()) settle(last);
+    }
 
   private:
     struct Turn {
@@ -46,6 +68,19 @@ class Turns {
         }
     };
 
+    // Put `turn` where the first one stood, and let it sink to its place.
+    void settle(const Turn& turn) {
+        const std::size_t n = waiting_.size();
+        std::size_t at = 0;
+        for (std::size_t below = 1; below < n; below = 2 * at + 1) {
+            if (below + 1 < n && waiting_[below + 1].before(waiting_[below])) ++below;
+            if (!waiting_[below].before(turn)) break;
+            waiting_[at] = waiting_[below];
+            at = below;
+        }
+        waiting_[at] = turn;
+    }
+
     std::vector<Turn> waiting_;  // a binary heap
 };
 
@@ -57,26 +92,27 @@ void simulate(const Problem& problem, const TeamView& team, const std::int64_t* 
               bool brief, Workspace& workspace, const Took& took) {
     struct Flying {
         Decider decider;
-        std::int64_t rank;
         bool decided;
     };
     std::vector<Flying> fleet(static_cast<std::size_t>(problem.n_uav));
     Turns turns;
     for (int uav = 0; uav < problem.n_uav; ++uav) {
-        fleet[static_cast<std::size_t>(uav)] = {team.decider(uav), rank[uav], false};
+        fleet[static_cast<std::size_t>(uav)] = {team.decider(uav), false};
         if (team.active[uav] && std::isfinite(team.free_s[uav])) {
-            turns.push(team.free_s[uav], rank[uav], uav);
+            turns.add(team.free_s[uav], rank[uav], uav);
         }
     }
     OpenTasks& open = workspace.open;
     open.assign(problem, team.open);
     while (!turns.empty() && !open.empty()) {
-        Flying& next = fleet[static_cast<std::size_t>(turns.pop())];
+        Flying& next = fleet[static_cast<std::size_t>(turns.next())];
         Decider& decider = next.decider;
         const Choice choice = workspace.decide(problem, open, decider, rule, brief);
-        if (choice.task < 0) continue;  // tasks only close, so it has no further decision
-        const bool tied = next.decided && !turns.empty() && turns.next_free_s() == decider.free_s;
-        took(decider, choice, tied);
+        if (choice.task < 0) {
+            turns.drop_next();  // tasks only close, so it has no further decision
+            continue;
+        }
+        took(decider, choice, next.decided && turns.tied());
         next.decided = true;
         const std::size_t task = static_cast<std::size_t>(choice.task);
         decider.free_s = choice.completion_s;
@@ -85,7 +121,11 @@ void simulate(const Problem& problem, const TeamView& team, const std::int64_t* 
         decider.place_m[2] = problem.z_m[task];
         decider.survived *= problem.survival[problem.cell(decider.uav, choice.task)];
         open.remove_task(choice.task);
-        if (std::isfinite(decider.free_s)) turns.push(decider.free_s, next.rank, decider.uav);
+        if (std::isfinite(decider.free_s)) {
+            turns.put_off_next(decider.free_s);
+        } else {
+            turns.drop_next();
+        }
     }
 }
 

@@ -3,8 +3,12 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 
+#include <utility>
+#include <vector>
+
 #include "bindings.hpp"
 #include "routes_binding.hpp"
+#include "routes_bound.hpp"
 #include "routes_local.hpp"
 #include "routes_team.hpp"
 
@@ -107,6 +111,37 @@ void bind_routes(nb::module_& module) {
       },
       nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"), nb::arg("flat"), nb::arg("offsets"));
+
+  module.def(
+      "shortest_leg_s",
+      [](const Instance& instance, const Vector& free_s, const Matrix& place_m,
+         const Vector& survived, const Mask& active) {
+        const Start start = StartArrays{free_s, place_m, survived, active}.start(instance);
+        const nb::gil_scoped_release released;
+        return shortest_leg_s(instance, start);
+      },
+      nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
+      nb::arg("active"));
+
+  module.def(
+      "priced_lists",
+      [](const Instance& instance, const Vector& free_s, const Matrix& place_m,
+         const Vector& survived, const Mask& active, const Mask& open, const Vector& prices,
+         double bucket_s, int threads) {
+        const Start start = StartArrays{free_s, place_m, survived, active}.start(instance);
+        const std::vector<int> tasks = open_tasks(open);
+        const std::vector<double> price(prices.data(), prices.data() + prices.shape(0));
+        std::vector<int> visits;
+        double value;
+        {
+          const nb::gil_scoped_release released;
+          value = priced_lists(instance, start, tasks, price, bucket_s, threads, visits);
+        }
+        return std::make_pair(value, to_array({visits.begin(), visits.end()}));
+      },
+      nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
+      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("bucket_s"),
+      nb::arg("threads"));
 }
 
 }  // namespace peckorder

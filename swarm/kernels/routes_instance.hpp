@@ -67,7 +67,7 @@ class Instance {
 
   int n_near() const { return n_near_; }
   const std::int32_t* near(int task) const {
-    return &near_[static_cast<std::size_t>(task) * n_near_];
+    return near_.data() + static_cast<std::size_t>(task) * n_near_;
   }
 
  private:

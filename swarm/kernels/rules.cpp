@@ -24,32 +24,27 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr Size kTableBytes = 16u << 20;  // tour tables a workspace keeps
 constexpr Size kLongestTour = 512;       // tasks lookahead tours beyond kExactTasks
 
-// The first of the largest. Four running maxima, so that the processor need not wait for one, and
-// block by block, so that the place is sought in one block only.
-Size argmax(const std::vector<double>& values, Size n) {
-    constexpr Size kBlock = 64;
-    const double* v = values.data();
-    double best = -kInfinity;
-    Size best_block = 0;
-    for (Size block = 0; block < n; block += kBlock) {
-        const Size end = std::min(n, block + kBlock);
-        double m0 = -kInfinity, m1 = m0, m2 = m0, m3 = m0;
-        Size i = block;
-        for (; i + 4 <= end; i += 4) {
-            m0 = v[i] > m0 ? v[i] : m0;
-            m1 = v[i + 1] > m1 ? v[i + 1] : m1;
-            m2 = v[i + 2] > m2 ? v[i + 2] : m2;
-            m3 = v[i + 3] > m3 ? v[i + 3] : m3;
-        }
-        for (; i < end; ++i) m0 = v[i] > m0 ? v[i] : m0;
-        const double most = std::max(std::max(m0, m1), std::max(m2, m3));
-        if (most > best) {
-            best = most;
-            best_block = block;
-        }
+constexpr Size kBlock = 128;             // tasks looked at together, so that they stay in cache
+
+// Four running maxima, so that the processor need not wait for one.
+double largest(const double* v, Size n) {
+    double m0 = -kInfinity, m1 = m0, m2 = m0, m3 = m0;
+    Size i = 0;
+    for (; i + 4 <= n; i += 4) {
+        m0 = v[i] > m0 ? v[i] : m0;
+        m1 = v[i + 1] > m1 ? v[i + 1] : m1;
+        m2 = v[i + 2] > m2 ? v[i + 2] : m2;
+        m3 = v[i + 3] > m3 ? v[i + 3] : m3;
     }
-    for (Size i = best_block; i < std::min(n, best_block + kBlock); ++i) {
-        if (v[i] == best) return i;
+    for (; i < n; ++i) m0 = v[i] > m0 ? v[i] : m0;
+    return std::max(std::max(m0, m1), std::max(m2, m3));
+}
+
+// The first of the largest; 0 if none is above -infinity.
+Size argmax(const std::vector<double>& values, Size n) {
+    const double most = largest(values.data(), n);
+    for (Size i = 0; i < n; ++i) {
+        if (values[i] == most) return i;
     }
     return 0;
 }
@@ -147,9 +142,10 @@ Choice Workspace::decide(const Problem& problem, const OpenTasks& all, const Dec
         tasks_ = &capable_;
     }
     if (tasks_->empty()) return {};
+    if (rule == RuleCode::kGreedy && brief) return decide_briefly(problem, decider);
     look_out(problem, decider);
     const Size n = tasks_->size();
-    if (rule == RuleCode::kGreedy || n == 1) return decide_greedily(problem, decider, brief);
+    if (rule == RuleCode::kGreedy || n == 1) return decide_greedily(problem, decider);
     return n <= kExactTasks ? look_ahead(problem, decider) : look_ahead_far(problem, decider);
 }
 
@@ -167,13 +163,41 @@ void Workspace::look_out(const Problem& problem, const Decider& decider) {
               problem.horizon_s, completion_s_.data(), score_.data());
 }
 
-Choice Workspace::decide_greedily(const Problem& problem, const Decider& decider, bool brief) {
+// Greedy without second and certificate: nothing is kept of a block but its best task.
+Choice Workspace::decide_briefly(const Problem& problem, const Decider& decider) {
+    const OpenTasks& tasks = *tasks_;
+    const Size n = tasks.size();
+    const double* row = problem.weight.data() + problem.cell(decider.uav, 0);
+    const double speed_m_s = problem.speed_m_s[static_cast<Size>(decider.uav)];
+    double weight[kBlock], completion_s[kBlock], score[kBlock];
+    Choice choice;
+    choice.score = -kInfinity;
+    for (Size from = 0; from < n; from += kBlock) {
+        const Size count = std::min(n - from, kBlock);
+        const std::int32_t* task = tasks.task.data() + from;
+        for (Size i = 0; i < count; ++i) weight[i] = row[task[i]];
+        score_all(count, tasks.x_m.data() + from, tasks.y_m.data() + from, tasks.z_m.data() + from,
+                  tasks.service_s.data() + from, weight, decider, speed_m_s, problem.horizon_s,
+                  completion_s, score);
+        const double most = largest(score, count);
+        // the very first task is taken where no score is above -infinity
+        if (!(most > choice.score) && choice.task >= 0) continue;
+        Size i = 0;
+        while (i < count && score[i] != most) ++i;
+        if (i == count) i = 0;
+        choice.task = task[i];
+        choice.completion_s = completion_s[i];
+        choice.score = most;
+    }
+    return choice;
+}
+
+Choice Workspace::decide_greedily(const Problem& problem, const Decider& decider) {
     const Size n = tasks_->size(), best = argmax(score_, n);
     Choice choice;
     choice.task = tasks_->task[best];
     choice.completion_s = completion_s_[best];
     choice.score = score_[best];
-    if (brief) return choice;
     choice.has_second = n > 1;
     if (choice.has_second) choice.second = largest_but(score_, n, best);
     choice.certificate = certificate(problem, decider, best, choice.second);

@@ -63,7 +63,8 @@ class Workspace {
         std::unique_ptr<TourTable> tours;
     };
 
-    Choice decide_greedily(const Problem& problem, const Decider& decider, bool brief);
+    Choice decide_briefly(const Problem& problem, const Decider& decider);
+    Choice decide_greedily(const Problem& problem, const Decider& decider);
     Choice look_ahead(const Problem& problem, const Decider& decider);
     Choice look_ahead_far(const Problem& problem, const Decider& decider);
     void look_out(const Problem& problem, const Decider& decider);

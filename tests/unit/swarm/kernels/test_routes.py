@@ -239,3 +239,20 @@ def test_wrong_options_are_refused(name: str, options: dict[str, Any]) -> None:
     team = TeamArrays.at_start(RouteArrays(**arguments()), np.zeros((2, 3)))
     with pytest.raises(ValueError, match=name):
         optimise_routes(team, **options)
+
+
+@settings(deadline=None, max_examples=4)
+@given(seed=SEEDS, survival=st.sampled_from([0.5, 1.0]))
+def test_many_tasks_are_all_on_the_lists_too(seed: int, survival: float) -> None:
+    rng = np.random.default_rng(seed)
+    problem = random_problem(
+        rng, 25, 220, lowest_survival=survival, incapable_frac=0.4, horizon_s=60.0
+    )
+    state = any_state(problem, rng)
+
+    lists, worth = optimise_routes(team_of(problem, state), seed=seed, iterations=1500)
+
+    able = (problem.capable & state.active[:, None]).any(axis=0) & state.open
+    assert sorted(task for route in lists for task in route) == np.flatnonzero(able).tolist()
+    assert all(problem.capable[uav, route].all() for uav, route in enumerate(lists))
+    assert abs(team_worth(problem, state, lists) - worth) <= 1e-9 * (1.0 + abs(worth))

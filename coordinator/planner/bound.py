@@ -1,0 +1,178 @@
+"""An upper bound on J for missions too large to be solved exactly.
+
+**Trivial.** By the triangle inequality no task is complete before its best UAV has flown straight
+to it; so J <= Σ_i max_j p·m·(D − t_direct). Where survival is below 1 a negative term may be
+scaled down to nothing by S, so it counts 0.
+
+**Lagrangian.** Let a list's worth be Σ p·m·(D − t)⁺ over its tasks. Dropping S <= 1 and the
+negative terms only adds to J; what comes after D on a list changes nothing before it; and a task
+nobody can do earns nothing. So J is at most the largest sum of worths over disjoint lists, of
+which no task need be on any. Relax "each task at most once" with prices π >= 0:
+
+    J <= Σ_i π_i + Σ_j max over lists of (worth_j − Σ π along the list)    for every π >= 0.
+
+Each maximum is bounded from above by a dynamic programme over (task, bucket of time) in which
+legs are rounded down to whole buckets (completions only become earlier, terms only larger) and a
+task may be visited again (more lists than there are); `swarm.kernels.routes_bound`. The prices
+begin as what each task adds to known lists and follow subgradients, a group of UAVs at a time
+(incremental subgradients: Nedić and Bertsekas 2001, doi:10.1137/S1052623499362111) with Polyak's
+step at first, which then shrinks. Any prices yield a bound, and the least one seen is kept.
+
+Leaves out: proofs of optimality (`coordinator.planner.exact`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from coordinator.planner.stop import ShouldStop, never
+from swarm.allocation.guided import route_arrays
+from swarm.allocation.objective import evaluate
+from swarm.allocation.problem import FloatArray, Problem
+from swarm.kernels.routes import TeamArrays
+from swarm.kernels.routes_bound import MOST_BUCKETS, priced_lists, shortest_leg_s
+
+__all__ = ["UpperBound", "trivial_bound", "upper_bound"]
+
+_GROUPS = 10
+_FIRST_STRIDE = 2.0
+_LAST_STRIDE = 0.1
+_FEWEST_CYCLES = 4
+_MOST_CYCLES = 150
+_BETWEEN_BOUNDS = 3
+"""Cycles over all groups between two evaluations of the bound."""
+_OPERATIONS = 4e10
+"""Of the dynamic programme in all: some 8 s on two cores."""
+_FINEST, _COARSEST = 400.0, 50.0
+"""Buckets up to the horizon."""
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class UpperBound:
+    """No lists whatever have a larger J."""
+
+    objective: float
+    """[value·s]."""
+    method: str
+    """``trivial`` or ``lagrangian``, whichever is lower."""
+    steps: int
+    """Cycles of price changes made."""
+
+    def gap(self, objective: float) -> float:
+        """How far ``objective`` may at most be below the optimum, as a share of the bound."""
+        scale = abs(self.objective)
+        return max(0.0, (self.objective - objective) / scale) if scale > 0.0 else 0.0
+
+
+def trivial_bound(problem: Problem) -> float:
+    """Every task reached straight from its best UAV's start [value·s]."""
+    possible = np.flatnonzero(problem.capable.any(axis=0))
+    if len(possible) == 0:
+        return 0.0
+    terms = np.full((problem.n_uav, problem.n_task), -np.inf)
+    for uav in range(problem.n_uav):
+        travel_s = problem.travel_s(uav, problem.start_enu_m[uav])
+        terms[uav] = problem.weight[uav] * (problem.horizon_s - (travel_s + problem.service_s))
+    terms[~problem.capable] = -np.inf
+    best = terms[:, possible].max(axis=0)
+    if (problem.survival[problem.capable] < 1.0).any():
+        best = np.maximum(best, 0.0)
+    return float(best.sum()) + _ROUNDING * float(np.abs(best).sum())
+
+
+def upper_bound(
+    problem: Problem,
+    lists: Sequence[Sequence[int]],
+    should_stop: ShouldStop = never,
+    *,
+    threads: int | None = None,
+) -> UpperBound:
+    """The better of the trivial and the Lagrangian bound; some seconds at 50 UAVs × 500 tasks.
+
+    Where the dynamic programme would take much longer only the trivial bound is given: thousands
+    of tasks, or legs that are very short against the horizon.
+
+    Args:
+        problem: the mission, from its start.
+        lists: good ones; the better they are the sooner the prices are right.
+        should_stop: asked between cycles of price changes with the cycles made.
+        threads: at most this many; does not change the result.
+    """
+    trivial = trivial_bound(problem)
+    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    bucket_s, cycles = _affordable(problem, team)
+    if cycles < _FEWEST_CYCLES:
+        return UpperBound(trivial, "trivial", 0)
+    n_group = min(_GROUPS, problem.n_uav)
+    groups = [
+        replace(team, active=np.arange(problem.n_uav) % n_group == group)
+        for group in range(n_group)
+    ]
+    known = max(0.0, evaluate(problem, lists)[0])
+    price = _marginal_worth(problem, lists)
+    lowest, made, stride = np.inf, 0, 0.0
+    while True:
+        if made % _BETWEEN_BOUNDS == 0 or made == cycles or should_stop(made):
+            worth, visits = priced_lists(team, price, bucket_s, threads=threads)
+            bound = float(price.sum()) + worth
+            lowest = min(lowest, bound)
+            slope = 1.0 - visits
+            slope[(price <= 0.0) & (slope > 0.0)] = 0.0
+            square = float(slope @ slope)
+            if made == 0 and square > 0.0:
+                stride = _FIRST_STRIDE * (bound - known) / square
+            if made == cycles or square == 0.0 or bound <= known or should_stop(made):
+                break
+        for group in groups:
+            _, visits = priced_lists(group, price, bucket_s, threads=threads)
+            price = np.maximum(0.0, price - stride * (1.0 / n_group - visits))
+        stride *= (_LAST_STRIDE / _FIRST_STRIDE) ** (1.0 / cycles)
+        made += 1
+    lowest += _ROUNDING * abs(lowest)
+    if lowest < trivial:
+        return UpperBound(lowest, "lagrangian", made)
+    return UpperBound(trivial, "trivial", made)
+
+
+def _affordable(problem: Problem, team: TeamArrays) -> tuple[float, int]:
+    """Width of buckets [s] and cycles that `_OPERATIONS` allow; 0 cycles where that is too few."""
+    shortest_s = shortest_leg_s(team)
+    if shortest_s <= 0.0 or problem.n_task < 2 or problem.n_uav == 0:
+        return 0.0, 0
+    horizon_s = problem.horizon_s
+    bucket_s, cycles = 0.0, 0
+    for most in (_FINEST, _COARSEST):
+        bucket_s = min(shortest_s, horizon_s / most)
+        if horizon_s / bucket_s > MOST_BUCKETS:
+            return bucket_s, 0
+        each = problem.n_uav * problem.n_task**2 * (horizon_s / bucket_s / 2.0 + 10.0)
+        passes = _OPERATIONS / each
+        cycles = int(min(_MOST_CYCLES, passes * _BETWEEN_BOUNDS / (_BETWEEN_BOUNDS + 1.0) - 1.0))
+        if cycles >= _MOST_CYCLES / 2:
+            break
+    return bucket_s, cycles
+
+
+def _marginal_worth(problem: Problem, lists: Sequence[Sequence[int]]) -> FloatArray:
+    """(n_task,) what J loses if a task is taken off the lists, at least 0."""
+    price = np.zeros(problem.n_task)
+    for uav, route in enumerate(lists):
+        whole = _list_worth(problem, uav, route)
+        for place, task in enumerate(route):
+            without = [*route[:place], *route[place + 1 :]]
+            price[task] = max(0.0, whole - _list_worth(problem, uav, without))
+    return price
+
+
+def _list_worth(problem: Problem, uav: int, route: Sequence[int]) -> float:
+    """Σ p·m·(D − t)⁺, S left out."""
+    tasks = np.array(route, dtype=np.int64)
+    places = np.vstack([problem.start_enu_m[uav], problem.task_enu_m[tasks]])
+    legs_m = np.sqrt((np.diff(places, axis=0) ** 2).sum(axis=1))
+    times_s = np.cumsum(legs_m / problem.speed_m_s[uav] + problem.service_s[tasks])
+    left_s = np.maximum(0.0, problem.horizon_s - times_s)
+    return float(problem.weight[uav, tasks] @ left_s)

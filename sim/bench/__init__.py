@@ -1,0 +1,4 @@
+"""Benchmarks: methods side by side in one run, with the machine and the seeds they ran with.
+
+Leaves out: the methods (`coordinator.planner`, `sim.study.baselines`).
+"""

@@ -1,0 +1,291 @@
+"""The commands of the family `swarm bench`.
+
+Leaves out: what they do (`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown
+(`sim.bench.plan_report`, `sim.bench.plan_plot`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
+
+from swarm.errors import Fault, InputError
+from swarm.options import JsonOption, SeedOption
+from swarm.scenario.shipped import resolve_scenario
+
+if TYPE_CHECKING:
+    from sim.bench.worker import Source
+
+__all__ = ["bench"]
+
+T = TypeVar("T")
+
+_DEFAULT_SIZES = "10x50,50x500"
+_SCALING_SIZES = "10x50,10x500,50x500,50x2000,100x1000,200x2000,200x5000"
+_SIZE = re.compile(r"([1-9]\d{0,3})[x×]([1-9]\d{0,4})")
+_LONGEST_S = 86_400.0
+_PLAN_HELP = """Compare planning methods side by side, each with the same time.
+
+Without SCENARIO and --sizes: random missions of 10 × 50 and 50 × 500.
+
+\b
+Examples:
+    swarm bench plan
+    swarm bench plan --sizes 20x100 --time-limit-s 1,3,10 --plot value.png
+    swarm bench plan valley-survey --methods guided,cbba,exact --json
+    swarm bench plan --scaling --out scaling.md
+"""
+_DECIDE_HELP = """Time one online decision of each rule, over a whole random mission.
+
+\b
+Examples:
+    swarm bench decide
+    swarm bench decide --size 10x50 --json
+"""
+
+bench = typer.Typer(
+    help="Benchmarks, each printing machine, seeds and ratios.",
+    rich_markup_mode=None,
+    no_args_is_help=True,
+)
+
+
+@bench.callback()
+def _family() -> None:
+    """Keep the family a family, however many commands it has."""
+
+
+@bench.command("plan", help=_PLAN_HELP, short_help="Compare planning methods side by side.")
+def plan(
+    scenario: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="SCENARIO",
+            help="Scenario file, or the name of a shipped one such as table-1.",
+            parser=resolve_scenario,
+            show_default=False,
+        ),
+    ] = None,
+    sizes: Annotated[
+        str | None,
+        typer.Option(
+            "--sizes",
+            metavar="NxM,…",
+            help=f"UAVs and tasks of random missions. Default: {_DEFAULT_SIZES}.",
+            show_default=False,
+        ),
+    ] = None,
+    time_limit_s: Annotated[
+        str,
+        typer.Option("--time-limit-s", metavar="S,…", help="Time for each method; one or several."),
+    ] = "10",
+    seeds: Annotated[
+        str, typer.Option("--seeds", metavar="N,…", help="Of random missions and methods.")
+    ] = "0,1,2",
+    methods: Annotated[
+        str | None,
+        typer.Option(
+            "--methods",
+            metavar="NAME,…",
+            help="Which to compare. Default: all.",
+            show_default=False,
+        ),
+    ] = None,
+    long_run_s: Annotated[
+        float | None,
+        typer.Option(
+            "--long-run-s",
+            min=0.01,
+            max=_LONGEST_S,
+            metavar="S",
+            help="Also run guided for this long, and compare with that.",
+            show_default=False,
+        ),
+    ] = None,
+    scaling: Annotated[
+        bool,
+        typer.Option(
+            "--scaling",
+            help="Instead: time and memory of guided and greedy from 10 to 200 UAVs and 50 to "
+            "5000 tasks, with the first of the seeds.",
+        ),
+    ] = False,
+    json: JsonOption = False,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE",
+            help="Draw value against time limit or size, as .png, .svg or .pdf.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE.md",
+            help="Also write the tables as Markdown.",
+            show_default=False,
+        ),
+    ] = None,
+) -> int:
+    """See `_PLAN_HELP`."""
+    from json import dumps
+
+    from rich.console import Console
+
+    from sim.bench.methods import METHODS
+    from sim.bench.plan_bench import measure
+    from sim.bench.plan_report import (
+        as_json,
+        as_markdown,
+        as_rich,
+        comparison_grids,
+        scaling_grid,
+    )
+
+    limits_s = _each("--time-limit-s", time_limit_s, _limit_s)
+    all_seeds = _each("--seeds", seeds, _seed)
+    default_methods = "guided,greedy" if scaling else ",".join(METHODS)
+    names = _each("--methods", methods or default_methods, _method)
+    _check_files(plot, out)
+    if scaling:
+        limits_s, all_seeds = limits_s[:1], all_seeds[:1]
+    default_sizes = _SCALING_SIZES if scaling else _DEFAULT_SIZES
+    sources = _sources(scenario, sizes, default_sizes)
+    if methods is not None and any(name.startswith("ortools") for name in names):
+        from sim.study.baselines.ortools_routing import require_installed
+
+        require_installed()
+
+    console = Console(stderr=True)
+    with console.status("", spinner_style="dim") as status:
+        done = measure(
+            sources,
+            names,
+            limits_s,
+            all_seeds,
+            long_run_s=long_run_s,
+            on_progress=status.update if console.is_terminal else None,
+        )
+    grids = [scaling_grid(done)] if scaling else comparison_grids(done)
+    if plot is not None:
+        from sim.bench.plan_plot import comparison_figure, scaling_figure, write_figure
+
+        figure = scaling_figure(done) if scaling else comparison_figure(done)
+        _write("--plot", plot, lambda path: write_figure(figure, path))
+    if out is not None:
+        text = as_markdown(done, grids)
+        _write("--out", out, lambda path: path.write_text(text, encoding="utf-8"))
+    if json:
+        print(dumps(as_json(done), allow_nan=False))
+    else:
+        Console(highlight=False).print(as_rich(done, grids))
+    return 0
+
+
+@bench.command("decide", help=_DECIDE_HELP, short_help="Time one online decision of each rule.")
+def decide(
+    size: Annotated[
+        str, typer.Option("--size", metavar="NxM", help="UAVs and tasks of the random mission.")
+    ] = "50x500",
+    seed: SeedOption = 0,
+    json: JsonOption = False,
+) -> int:
+    """See `_DECIDE_HELP`."""
+    from json import dumps
+
+    from rich.console import Console
+
+    from sim.bench.decide import decide_as_json, decide_as_rich, measure_decisions
+    from swarm.clock import SystemClock
+
+    n_uav, n_task = _size("--size", size)
+    done = measure_decisions(n_uav, n_task, seed, SystemClock())
+    if json:
+        print(dumps(decide_as_json(done), allow_nan=False))
+    else:
+        Console(highlight=False).print(decide_as_rich(done))
+    return 0
+
+
+def _sources(scenario: Path | None, sizes: str | None, default: str) -> list[tuple[str, Source]]:
+    """Cases by name, the scenario first."""
+    from sim.bench.worker import Source
+    from swarm.scenario import load_scenario
+
+    found: list[tuple[str, Source]] = []
+    if scenario is not None:
+        name = load_scenario(scenario).name
+        found.append((name, Source(scenario=str(scenario.resolve()))))
+    if scenario is None or sizes is not None:
+        for n_uav, n_task in _each("--sizes", sizes or default, _size):
+            found.append((f"{n_uav}×{n_task}", Source(n_uav=n_uav, n_task=n_task)))
+    return found
+
+
+def _each(flag: str, text: str, read: Callable[[str, str], T]) -> list[T]:
+    """The values between commas, each once."""
+    words = [word.strip() for word in text.split(",")]
+    return list(dict.fromkeys(read(flag, word) for word in words))
+
+
+def _size(flag: str, word: str) -> tuple[int, int]:
+    match = _SIZE.fullmatch(word)
+    if match is None:
+        raise InputError(Fault(flag, word, "no size", "write UAVs x tasks, such as 50x500"))
+    return int(match[1]), int(match[2])
+
+
+def _limit_s(flag: str, word: str) -> float:
+    try:
+        limit_s = float(word)
+    except ValueError:
+        limit_s = -1.0
+    if not 0.0 < limit_s <= _LONGEST_S:
+        remedy = "give seconds above 0, such as 10 or 1,3,10"
+        raise InputError(Fault(flag, word, "no time limit", remedy))
+    return limit_s
+
+
+def _seed(flag: str, word: str) -> int:
+    if not (word.isascii() and word.isdigit() and len(word) <= 18):
+        raise InputError(Fault(flag, word, "no seed", "give whole numbers from 0 on, such as 0,1"))
+    return int(word)
+
+
+def _method(flag: str, word: str) -> str:
+    from sim.bench.methods import METHODS
+
+    if word not in METHODS:
+        remedy = f"choose among {', '.join(METHODS)}"
+        raise InputError(Fault(flag, word, "no such method", remedy))
+    return word
+
+
+def _check_files(plot: Path | None, out: Path | None) -> None:
+    """Refuse what cannot be written before anything is measured."""
+    from coordinator.plot import PLOT_SUFFIXES
+
+    faults = []
+    if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
+        remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
+        faults.append(Fault("--plot", str(plot), "no picture has this suffix", remedy))
+    for flag, path in (("--plot", plot), ("--out", out)):
+        if path is not None and not path.absolute().parent.is_dir():
+            faults.append(Fault(flag, str(path), "its folder is not there", "make it first"))
+    if faults:
+        raise InputError(*faults)
+
+
+def _write(flag: str, path: Path, write: Callable[[Path], object]) -> None:
+    try:
+        write(path)
+    except OSError as error:
+        problem = f"cannot write {path}: {error.strerror or error}"
+        raise InputError(Fault(flag, "", problem, "name a file that can be")) from error

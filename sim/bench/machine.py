@@ -1,0 +1,100 @@
+"""What the figures were measured on.
+
+Leaves out: anything that needs more rights than reading /proc.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+import swarm
+
+__all__ = ["Machine", "peak_memory_bytes", "this_machine"]
+
+_CPU_INFO = Path("/proc/cpuinfo")
+_STATUS = Path("/proc/self/status")
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """A computer and the versions on it."""
+
+    cpu: str
+    """Model as it calls itself."""
+    cores: int
+    """Processors this process may use."""
+    memory_bytes: int
+    """RAM; 0 when unknown."""
+    system: str
+    versions: dict[str, str]
+    """By name: Python, this project, and packages that matter here."""
+    load: float | None
+    """Processes that wanted to run in the last minute, before the benchmark began."""
+
+    def __str__(self) -> str:
+        memory = f", {self.memory_bytes / 2**30:.0f} GiB RAM" if self.memory_bytes else ""
+        load = "" if self.load is None else f"; load before the start {self.load:.1f}"
+        versions = ", ".join(f"{name} {number}" for name, number in self.versions.items())
+        return f"{self.cpu}, {self.cores} cores{memory}; {self.system}; {versions}{load}"
+
+
+def this_machine() -> Machine:
+    """Describe the machine this process runs on."""
+    versions = {"Python": platform.python_version(), "peckorder": swarm.__version__}
+    versions["NumPy"] = np.__version__
+    with suppress(PackageNotFoundError):
+        versions["OR-Tools"] = version("ortools")
+    return Machine(
+        cpu=_cpu_model(),
+        cores=len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
+        else os.cpu_count() or 1,
+        memory_bytes=_memory_bytes(),
+        system=f"{platform.system()} {platform.machine()}",
+        versions=versions,
+        load=os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+    )
+
+
+def peak_memory_bytes() -> int:
+    """Most memory this process has held in RAM since its program was started.
+
+    Linux tells it per address space; getrusage there would count what the process was forked
+    from too.
+    """
+    try:
+        for line in _STATUS.read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024
+
+
+def _cpu_model() -> str:
+    try:
+        for line in _CPU_INFO.read_text().splitlines():
+            name, _, model = line.partition(":")
+            if name.strip() == "model name":
+                return model.strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine() or "unknown processor"
+
+
+def _memory_bytes() -> int:
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return 0

@@ -1,0 +1,207 @@
+"""What `swarm bench plan` shows: tables for terminals, Markdown for documents, JSON for programs.
+
+Leaves out: measuring (`sim.bench.plan_bench`) and plots (`sim.bench.plan_plot`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+from rich.console import Group, JustifyMethod, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from sim.bench.methods import METHODS
+from sim.bench.plan_bench import LONG_RUN, PlanBench, Summary, summaries
+from sim.bench.worker import HORIZON_SHARE
+from sim.study.baselines.ortools_routing import SHORTFALL
+
+__all__ = ["Grid", "as_json", "as_markdown", "as_rich", "comparison_grids", "scaling_grid"]
+
+_MIB = 2.0**20
+_RANDOM = (
+    "Random missions: UAVs and tasks uniform over a square (5 km for 500 tasks, its area in "
+    "proportion to their number), speeds 8–15 m/s, p 0.6–1, values 1–10, service 0–20 s, "
+    f"D = {HORIZON_SHARE:g} × the makespan of value-per-time."
+)
+_MEASURED = (
+    "Each method runs alone, in a process of its own, one after another, with the same limit in "
+    "wall time; imports are not counted, and OR-Tools' building of its model comes on top of its "
+    "limit. MiB: peak memory of the whole process, interpreter and mission included. late: tasks "
+    "completed after D. guided and greedy use every core, the others one."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A table as text."""
+
+    title: str
+    headings: tuple[str, ...]
+    """The last is that of the notes."""
+    rows: tuple[tuple[str, ...], ...]
+
+
+def comparison_grids(bench: PlanBench) -> list[Grid]:
+    """One table per case and limit; the long run is told in each of its case."""
+    found = summaries(bench)
+    long_runs = {s.case: s for s in found if s.method == LONG_RUN}
+    groups: dict[tuple[str, float], list[Summary]] = {}
+    for summary in found:
+        if summary.method != LONG_RUN:
+            groups.setdefault((summary.case, summary.limit_s), []).append(summary)
+    grids = []
+    for (case, limit_s), group in groups.items():
+        long_run = long_runs.get(case)
+        rows = [*group, long_run] if long_run is not None else group
+        headings = ["method", "J / best", "worst"]
+        headings += ["J / long run"] if long_run is not None else []
+        headings += ["time [s]", "CPU [s]", "MiB", "late", "notes"]
+        grids.append(
+            Grid(
+                f"{case}, {limit_s:g} s",
+                tuple(headings),
+                tuple(_comparison_row(row, long_run is not None) for row in rows),
+            )
+        )
+    return grids
+
+
+def scaling_grid(bench: PlanBench) -> Grid:
+    """Time to a first plan, growth of J and memory by size."""
+    rows = []
+    for row in bench.measured:
+        if row.objective is None:
+            rows.append((row.case, row.method, *("–",) * 6, row.note))
+            continue
+        first = row.trace[0] if row.trace else (row.elapsed_s, row.objective)
+        half = [worth for time_s, worth in row.trace if time_s <= row.limit_s / 2.0]
+        rows.append(
+            (
+                row.case,
+                row.method,
+                f"{first[0]:.3f}",
+                _share(first[1], row.objective),
+                _share(half[-1] if half else None, row.objective),
+                _ratio(row.ratio),
+                f"{row.elapsed_s:.2f}",
+                f"{row.peak_bytes / _MIB:.0f}",
+                row.note,
+            )
+        )
+    headings = (
+        "size", "method", "first plan [s]", "its J / last", "half time's", "J / best", "time [s]",
+        "MiB", "notes",
+    )  # fmt: skip
+    return Grid("Time and memory by size", headings, tuple(rows))
+
+
+def as_rich(bench: PlanBench, grids: Sequence[Grid]) -> RenderableType:
+    """Everything for a terminal."""
+    parts: list[RenderableType] = [Text(str(bench.machine)), Text(_seeds(bench))]
+    for grid in grids:
+        table = Table(
+            title=grid.title,
+            title_justify="left",
+            title_style="bold",
+            box=None,
+            pad_edge=False,
+            padding=(0, 2, 0, 0),
+        )
+        for i, heading in enumerate(grid.headings[:-1]):
+            justify: JustifyMethod = "right" if _is_number_column(i, heading) else "left"
+            table.add_column(Text(heading), justify=justify)
+        for row in grid.rows:
+            table.add_row(*(Text(cell) for cell in row[:-1]))
+        told = [Text(f"{_name(row)}: {row[-1]}", style="dim") for row in grid.rows if row[-1]]
+        parts += [Text(), table, *told]
+    parts += [Text(), *(Text(note) for note in _notes(bench))]
+    return Group(*parts)
+
+
+def as_markdown(bench: PlanBench, grids: Sequence[Grid]) -> str:
+    """Everything for a document."""
+    lines = [f"Measured on {bench.machine}. {_seeds(bench)}", ""]
+    for grid in grids:
+        rules = [
+            "--:" if _is_number_column(i, heading) else "---"
+            for i, heading in enumerate(grid.headings)
+        ]
+        lines += [f"**{grid.title}**", "", _markdown_row(grid.headings), _markdown_row(rules)]
+        lines += [_markdown_row(row) for row in grid.rows]
+        lines.append("")
+    for note in _notes(bench):
+        lines += [note, ""]
+    return "\n".join(lines)
+
+
+def as_json(bench: PlanBench) -> dict[str, object]:
+    """Everything for programs, ready for `json.dumps`."""
+    return {
+        "machine": asdict(bench.machine),
+        "measured": [asdict(row) for row in bench.measured],
+        "summaries": [asdict(summary) for summary in summaries(bench)],
+        "notes": _notes(bench),
+    }
+
+
+def _comparison_row(summary: Summary, with_long_run: bool) -> tuple[str, ...]:
+    if not summary.runs:
+        blanks = 7 if with_long_run else 6
+        return (summary.method, *("–",) * blanks, summary.note)
+    notes = summary.note
+    if summary.unassigned:
+        notes += f"; {summary.unassigned} tasks on no list"
+    cells = [summary.method, _ratio(summary.ratio), _ratio(summary.worst_ratio)]
+    cells += [_ratio(summary.ratio_long)] if with_long_run else []
+    cells += [
+        f"{summary.elapsed_s:.2f}" if summary.elapsed_s >= 0.01 else f"{summary.elapsed_s:.4f}",
+        f"{summary.cpu_s:.1f}",
+        f"{summary.peak_bytes / _MIB:.0f}",
+        str(summary.late),
+        notes,
+    ]
+    return tuple(cells)
+
+
+def _notes(bench: PlanBench) -> list[str]:
+    """What the figures mean, as far as it concerns methods and cases that are there."""
+    methods = list(dict.fromkeys(row.method for row in bench.measured))
+    told = [f"{name}: {METHODS[name].what}" for name in methods if name in METHODS]
+    notes = [_MEASURED, "; ".join(told) + "."]
+    if any(name.startswith("ortools") for name in methods):
+        notes.append(SHORTFALL)
+    if any(_is_size(row.case) for row in bench.measured):
+        notes.append(_RANDOM)
+    return notes
+
+
+def _seeds(bench: PlanBench) -> str:
+    seeds = list(dict.fromkeys(row.seed for row in bench.measured))
+    return f"Seeds {', '.join(map(str, seeds))}; J / best: mean over seeds, best of this run = 1."
+
+
+def _is_size(case: str) -> bool:
+    return all(part.isdigit() for part in case.split("×")) and "×" in case
+
+
+def _is_number_column(i: int, heading: str) -> bool:
+    return i > 0 and heading not in ("notes", "method")
+
+
+def _name(row: Sequence[str]) -> str:
+    """What a note is about: the method, and in a table by size the size too."""
+    return f"{row[0]} {row[1]}" if row[1] in METHODS else row[0]
+
+
+def _ratio(ratio: float | None) -> str:
+    return "–" if ratio is None else f"{ratio:.4f}"
+
+
+def _share(worth: float | None, last: float) -> str:
+    return "–" if worth is None or last <= 0.0 else f"{worth / last:.4f}"
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordinator.planner.bound import trivial_bound, upper_bound
+from coordinator.planner.exact import optimum
+from coordinator.planner.routes import guided_plan
+from coordinator.planner.stop import after_evaluations
+from sim.study.generator import random_mission
+from swarm.allocation.guided import route_arrays
+from swarm.kernels.routes import TeamArrays
+from swarm.kernels.routes_bound import priced_lists, shortest_leg_s
+from tests.problems import any_problem, random_problem, table_1
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), n_uav=st.integers(1, 3), n_task=st.integers(0, 6))
+def test_no_bound_is_below_the_optimum(seed: int, n_uav: int, n_task: int) -> None:
+    problem = any_problem(seed, n_uav, n_task)
+    best = optimum(problem)
+
+    bound = upper_bound(problem, best.routes)
+
+    assert bound.objective >= best.objective - 1e-9 * abs(best.objective)
+    assert bound.objective <= trivial_bound(problem)
+    assert trivial_bound(problem) >= best.objective - 1e-9 * abs(best.objective)
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_any_prices_give_a_bound(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    problem = random_problem(rng, 2, 5, horizon_s=float(rng.uniform(2.0, 12.0)))
+    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    price = rng.uniform(0.0, 20.0, 5)
+
+    worth, visits = priced_lists(team, price, shortest_leg_s(team) * rng.uniform(0.05, 1.0))
+
+    best = optimum(problem).objective
+    assert price.sum() + worth >= best - 1e-9 * abs(best)
+    assert worth >= 0.0
+    assert visits.min() >= 0
+
+
+def test_it_is_closer_than_the_trivial_bound() -> None:
+    problem = random_mission(10, 50, 1)
+    plan = guided_plan(problem)
+
+    bound = upper_bound(problem, plan.routes)
+
+    assert bound.method == "lagrangian"
+    assert bound.gap(plan.objective) < 0.06
+    assert 1.0 - plan.objective / trivial_bound(problem) > 0.15
+
+
+def test_threads_do_not_change_it_and_it_stops_when_told() -> None:
+    problem = table_1()
+    routes = optimum(problem).routes
+
+    assert upper_bound(problem, routes, threads=1) == upper_bound(problem, routes, threads=3)
+    assert upper_bound(problem, routes, after_evaluations(2)).steps == 2
+
+
+def test_nothing_to_do_is_worth_nothing() -> None:
+    problem = random_problem(np.random.default_rng(0), 2, 3, incapable_frac=1.0)
+
+    assert upper_bound(problem, [[], []]).objective == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "price", "bucket_s", "threads"),
+    [
+        ("price", [1.0], 0.1, 1),
+        ("price", [np.nan] * 8, 0.1, 1),
+        ("price", [-1.0] * 8, 0.1, 1),
+        ("bucket_s", [1.0] * 8, 0.0, 1),
+        ("bucket_s", [1.0] * 8, float("nan"), 1),
+        ("bucket_s", [1.0] * 8, 3.0, 1),
+        ("bucket_s", [1.0] * 8, 1e-9, 1),
+        ("threads", [1.0] * 8, 0.1, 0),
+    ],
+)
+def test_wrong_arguments_are_refused_by_name(
+    name: str, price: list[float], bucket_s: float, threads: int
+) -> None:
+    problem = table_1()
+    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+
+    with pytest.raises(ValueError, match=name):
+        priced_lists(team, np.array(price), bucket_s, threads=threads)

@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+import io
+import json
+
+from rich.console import Console
+
+from sim.bench.decide import decide_as_json, decide_as_rich, measure_decisions
+from swarm.clock import SystemClock
+
+
+def test_decisions_of_every_rule_are_timed() -> None:
+    bench = measure_decisions(4, 20, 0, SystemClock(), sequences=10)
+    assert [row.name for row in bench.times] == [
+        "greedy", "lookahead", "guided", "guided, disturbed"
+    ]  # fmt: skip
+    for row in bench.times:
+        assert 0.0 <= row.median_s <= row.p99_s <= row.largest_s
+        assert row.first_s <= row.largest_s
+    assert [row.decisions >= 20 for row in bench.times[:3]] == [True] * 3
+    assert bench.times[3].decisions > 0
+    assert bench.sequences_per_s > 0.0
+    assert bench.sequences_per_s_threaded > 0.0
+
+
+def test_a_long_mission_may_be_cut_short() -> None:
+    bench = measure_decisions(4, 20, 0, SystemClock(), most_decisions=5, sequences=1)
+    assert [row.decisions for row in bench.times[:2]] == [5, 5]
+
+
+def test_it_is_told_to_people_and_programs() -> None:
+    bench = measure_decisions(3, 9, 1, SystemClock(), sequences=5)
+    stream = io.StringIO()
+    Console(file=stream, width=80).print(decide_as_rich(bench))
+    text = stream.getvalue()
+    assert "One online decision at 3 × 9, seed 1" in text
+    assert "guided, disturbed" in text
+    assert "…" not in text
+    said = json.loads(json.dumps(decide_as_json(bench), allow_nan=False))
+    assert said["n_task"] == 9
+    assert len(said["times"]) == 4
