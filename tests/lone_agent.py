@@ -80,7 +80,10 @@ class LoneAgent:
     def run_until(self, mission_s: float) -> list[Action]:
         """Tick at every deadline up to then; gives all actions."""
         actions: list[Action] = []
+        spins = 0
         while (due_s := self.core.next_deadline_s()) is not None and due_s < ZERO_S + mission_s:
+            spins = spins + 1 if due_s <= self.now_s else 0
+            assert spins < 5, f"it spins at {self.now_s} s, due since {due_s} s"
             actions += self.tick_when_due()
         return actions + self.tick(mission_s)
 
