@@ -31,6 +31,11 @@ _MEASURED = (
     "limit. MiB: peak memory of the whole process, interpreter and mission included. late: tasks "
     "completed after D. guided and greedy use every core, the others one."
 )
+_SCALING_TITLE = "Time and memory by size"
+_SCALING = (
+    "first plan: when the method can first tell how good its best lists are, from the problem's "
+    "arrays on; its J and that of half the time over the J at the end."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +99,7 @@ def scaling_grid(bench: PlanBench) -> Grid:
         "size", "method", "first plan [s]", "its J / last", "half time's", "J / best", "time [s]",
         "MiB", "notes",
     )  # fmt: skip
-    return Grid("Time and memory by size", headings, tuple(rows))
+    return Grid(_SCALING_TITLE, headings, tuple(rows))
 
 
 def as_rich(bench: PlanBench, grids: Sequence[Grid]) -> RenderableType:
@@ -116,7 +121,7 @@ def as_rich(bench: PlanBench, grids: Sequence[Grid]) -> RenderableType:
             table.add_row(*(Text(cell) for cell in row[:-1]))
         told = [Text(f"{_name(row)}: {row[-1]}", style="dim") for row in grid.rows if row[-1]]
         parts += [Text(), table, *told]
-    parts += [Text(), *(Text(note) for note in _notes(bench))]
+    parts += [Text(), *(Text(note) for note in _notes(bench, grids))]
     return Group(*parts)
 
 
@@ -131,7 +136,7 @@ def as_markdown(bench: PlanBench, grids: Sequence[Grid]) -> str:
         lines += [f"**{grid.title}**", "", _markdown_row(grid.headings), _markdown_row(rules)]
         lines += [_markdown_row(row) for row in grid.rows]
         lines.append("")
-    for note in _notes(bench):
+    for note in _notes(bench, grids):
         lines += [note, ""]
     return "\n".join(lines)
 
@@ -142,7 +147,7 @@ def as_json(bench: PlanBench) -> dict[str, object]:
         "machine": asdict(bench.machine),
         "measured": [asdict(row) for row in bench.measured],
         "summaries": [asdict(summary) for summary in summaries(bench)],
-        "notes": _notes(bench),
+        "notes": _notes(bench, ()),
     }
 
 
@@ -165,11 +170,13 @@ def _comparison_row(summary: Summary, with_long_run: bool) -> tuple[str, ...]:
     return tuple(cells)
 
 
-def _notes(bench: PlanBench) -> list[str]:
+def _notes(bench: PlanBench, grids: Sequence[Grid]) -> list[str]:
     """What the figures mean, as far as it concerns methods and cases that are there."""
     methods = list(dict.fromkeys(row.method for row in bench.measured))
     told = [f"{name}: {METHODS[name].what}" for name in methods if name in METHODS]
     notes = [_MEASURED, "; ".join(told) + "."]
+    if any(grid.title == _SCALING_TITLE for grid in grids):
+        notes.append(_SCALING)
     if any(name.startswith("ortools") for name in methods):
         notes.append(SHORTFALL)
     if any(_is_size(row.case) for row in bench.measured):

@@ -191,18 +191,20 @@ Out<std::int64_t, 2> first_rounds(const Problem& problem, const Team& team,
     {
         nb::gil_scoped_release released;
         parallel_for(count, sequences.threads, 16, [&] {
-            return [&, lease = Lease(problem), order = std::vector<int>()](Size job) mutable {
+            using Place = std::pair<std::int64_t, int>;  // rank, then UAV
+            return [&, lease = Lease(problem), order = std::vector<Place>()](Size job) mutable {
                 const std::int64_t* rank = sequences.rank.data() + job * n_uav;
                 order.clear();
                 for (int uav = 0; uav < problem.n_uav; ++uav) {
-                    if (view.active[uav] && std::isfinite(view.free_s[uav])) order.push_back(uav);
+                    if (view.active[uav] && std::isfinite(view.free_s[uav])) {
+                        order.emplace_back(rank[uav], uav);
+                    }
                 }
-                std::sort(order.begin(), order.end(), [&](int a, int b) {
-                    return rank[a] != rank[b] ? rank[a] < rank[b] : a < b;
-                });
+                std::sort(order.begin(), order.end());
                 Workspace& workspace = *lease;
                 workspace.open.assign(problem, view.open);
-                for (const int uav : order) {
+                for (const auto& [place, uav] : order) {
+                    (void)place;
                     const Choice choice = workspace.decide(problem, workspace.open,
                                                            view.decider(uav), rule, true);
                     if (choice.task < 0) continue;
