@@ -5,8 +5,12 @@ Leaves out: what they do (coordinator.planner, coordinator.plan_report, coordina
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 from typing import Annotated
 
 import typer
@@ -30,6 +34,9 @@ from swarm.options import (
 
 __all__ = ["coordinator", "plan"]
 
+_BOUND_S = 3.0
+"""Time `plan` spends on an upper bound [s]."""
+
 
 def plan(
     scenario: ScenarioArgument,
@@ -52,11 +59,18 @@ def plan(
             show_default=False,
         ),
     ] = None,
+    bound: Annotated[
+        bool,
+        typer.Option(
+            "--bound/--no-bound",
+            help="Where the optimum cannot be proven, spend some seconds on an upper bound on J.",
+        ),
+    ] = True,
 ) -> int:
     """Compute the priority sequence, and the task lists it leads to.
 
     Tasks that appear later are unknown to a plan. The same seed gives the same plan,
-    unless --time-limit-s cuts the search short.
+    unless --time-limit-s cuts the search short. Ctrl-C ends the search with the best so far.
 
     Examples:
         swarm plan table-1
@@ -68,16 +82,27 @@ def plan(
     from coordinator.plan_report import plan_as_json, plan_table
     from coordinator.planner.exact import ProblemTooLargeError
     from coordinator.planner.plan import make_plan
-    from coordinator.planner.stop import after_time
+    from coordinator.planner.stop import after_time, first_of
     from swarm.clock import SystemClock
+    from swarm.process import EXIT_INTERRUPTED
     from swarm.scenario import load_scenario
 
     _check_plan_options(method, plot)
     mission = load_scenario(scenario)
     clock = SystemClock()
-    stop = None if time_limit_s is None else after_time(clock, time_limit_s)
     try:
-        result = make_plan(mission, method, clock=clock, seed=seed, stop=stop)
+        with _searching() as (interrupted, progress):
+            limit = None if time_limit_s is None else after_time(clock, time_limit_s)
+            result = make_plan(
+                mission,
+                method,
+                clock=clock,
+                seed=seed,
+                stop=interrupted if limit is None else first_of(limit, interrupted),
+                progress=progress,
+                bound_s=_BOUND_S if bound else None,
+            )
+            told_to_stop = interrupted(0)
     except ProblemTooLargeError as error:
         remedy = "choose --method guided, greedy or lookahead"
         raise InputError(Fault(str(scenario), "", str(error), remedy)) from error
@@ -96,7 +121,39 @@ def plan(
         from rich.console import Console
 
         Console(highlight=False).print(plan_table(mission, result))
-    return 0
+    return EXIT_INTERRUPTED if told_to_stop else 0
+
+
+@contextlib.contextmanager
+def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float], None]]]:
+    """Whether Ctrl-C was pressed, and a place to show how far a search is.
+
+    The first Ctrl-C asks for the best so far; a second one interrupts. Progress shows on a
+    terminal only.
+    """
+    from rich.console import Console
+
+    console, pressed = Console(stderr=True), False
+
+    def on_interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal pressed
+        pressed = True
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        with (
+            console.status("planning") if console.is_terminal else contextlib.nullcontext() as show
+        ):
+
+            def progress(evaluations: int, worth: float) -> None:
+                if show is not None:
+                    show.update(f"planning: {evaluations} tried, best J {worth:.2f} value·s")
+
+            yield lambda _: pressed, progress
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def coordinator(

@@ -33,6 +33,8 @@ def plan_as_json(plan: Plan) -> dict[str, object]:
         "completion_s": dict(plan.completion_s),
         "optimum": plan.optimum,
         "gap": plan.gap,
+        "bound": plan.bound,
+        "basis": plan.basis,
         "evaluations": plan.evaluations,
         "elapsed_s": plan.elapsed_s,
         "seed": plan.seed,
@@ -53,6 +55,7 @@ def plan_from_json(said: Mapping[str, Any]) -> Plan:
         evaluations=said["evaluations"],
         elapsed_s=said["elapsed_s"],
         seed=said["seed"],
+        bound=said["bound"],
     )
 
 
@@ -98,6 +101,9 @@ def _worth(mission: Mission, plan: Plan, late: list[TaskId]) -> list[tuple[str, 
     rows: list[tuple[str, str | Text]] = [("objective J", f"{plan.objective:.4f} value·s")]
     if plan.optimum is None:
         rows.append(("optimum", "not proven: the problem is too large for a quick proof"))
+        if plan.bound is not None:
+            of_bound = f" ({100.0 * plan.objective / plan.bound:.1f} % of it)" if plan.bound else ""
+            rows.append(("bound", f"no lists have more than {plan.bound:.4f} value·s{of_bound}"))
     else:
         gap = "" if plan.gap is None else f", gap {100.0 * plan.gap:.2f} %"
         rows.append(("optimum", f"{plan.optimum:.4f} value·s, proven{gap}"))

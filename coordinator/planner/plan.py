@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from coordinator.planner.bound import upper_bound
 from coordinator.planner.exact import estimated_s, optimum
 from coordinator.planner.routes import Progress, guided_plan
 from coordinator.planner.sequence import EXHAUSTIVE_UAVS, SearchLimits, best_sequence
-from coordinator.planner.stop import ShouldStop, never
+from coordinator.planner.stop import Limit, ShouldStop, after_time, never
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.allocation.rules import EXACT_TASKS
 from swarm.clock import Clock
@@ -44,6 +45,7 @@ def make_plan(
     seed: int = 0,
     stop: ShouldStop | None = None,
     progress: Progress | None = None,
+    bound_s: float | None = None,
 ) -> Plan:
     """Plan a mission.
 
@@ -57,6 +59,8 @@ def make_plan(
         stop: ends the search for a sequence or for lists; None means after a few seconds' worth of
             work.
         progress: told the evaluations or iterations and the best J so far, again and again.
+        bound_s: work out an upper bound on J for about this long where the optimum is not proven
+            [s]; not at all when None.
 
     Returns:
         The plan. Its sequence is None for ``exact``, which has none.
@@ -87,7 +91,7 @@ def make_plan(
             rule := rule_by_name(method),
             np.random.default_rng(seed),
             never if stop is None else stop,
-            limits=_limits(problem, method, stopped=stop is not None),
+            limits=_limits(problem, method, stopped=isinstance(stop, Limit)),
             progress=progress,
         )
         sequence, evaluations = search.sequence, search.evaluations
@@ -97,6 +101,9 @@ def make_plan(
     objective, completion_s = evaluate(problem, routes)
     if proven is not None:
         proven = max(proven, objective)  # the same lists summed in another order may be 1e-15 off
+    bound: float | None = None
+    if proven is None and bound_s is not None:
+        bound = upper_bound(problem, routes, after_time(clock, bound_s)).objective
     return Plan(
         scenario=mission.name,
         method=method,
@@ -113,6 +120,7 @@ def make_plan(
         evaluations=evaluations,
         elapsed_s=clock.now_s() - begin_s,
         seed=seed,
+        bound=bound,
     )
 
 

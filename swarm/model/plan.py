@@ -40,6 +40,15 @@ class Plan:
     """Lower-level runs spent."""
     elapsed_s: float
     seed: int
+    bound: float | None = None
+    """No lists whatever have a larger J; None where none was asked for or the optimum is known."""
+
+    @property
+    def basis(self) -> str:
+        """What the plan's quality stands on, in words."""
+        if self.optimum is not None:
+            return "proven optimal" if self.gap == 0.0 else "gap to the proven optimum"
+        return "best known" if self.bound is None else "gap to an upper bound"
 
     @property
     def gap(self) -> float | None:
