@@ -87,22 +87,25 @@ def agent(
     import asyncio
     from collections.abc import Callable
 
-    from swarm.bus.zenoh_bus import open_zenoh_bus
-
     from agent.core import AgentCore
     from agent.mavlink.config import BridgeConfig
+    from agent.mavlink.link_address import parse_link
     from agent.mavlink.vehicle import MavlinkVehicle
-    from agent.runner import Vehicle, run_agent
+    from agent.runner import Vehicle, run_agent, seat_or_stop
     from agent.vehicle import Report
     from swarm.bus.config import bus_config
+    from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, incarnation
     from swarm.config import Timing
-    from swarm.log import configure_logging
+    from swarm.log import configure_logging, get_logger
     from swarm.model import Origin
     from swarm.process import stop_requests
 
     configure_logging(log_level, log_format)
     config = bus_config(bus, listen, connect or (), lease_s)
+    _check_ids(mission, uav)
+    parse_link(mavlink)
+    log = get_logger(uav, mission=mission)
 
     async def run() -> int:
         clock = ScaledClock(speedup)
@@ -118,10 +121,31 @@ def agent(
 
         core = AgentCore(mission, uav, incarnation(), Timing().scaled(speedup))
         async with stop_requests(lifeline=lifeline) as stop:
-            seat = await open_zenoh_bus(config)
+            seat = await seat_or_stop(
+                lambda: open_zenoh_bus(config),
+                stop,
+                lambda reason: log.warning("no bus yet", reason=reason),
+            )
+            if seat is None:
+                return stop.exit_status or 0
             try:
                 return await run_agent(core, mission, seat, clock, vehicle, stop)
             finally:
                 seat.close()
 
     return asyncio.run(run())
+
+
+def _check_ids(mission: str, uav: str) -> None:
+    from swarm.errors import Fault, InputError
+    from swarm.model.ids import COORDINATOR, ID_RULE, valid_id
+
+    faults = [
+        Fault(option, "", f"{text!r} is no id", f"give {ID_RULE}")
+        for option, text in (("--mission", mission), ("--uav", uav))
+        if not valid_id(text)
+    ]
+    if uav == COORDINATOR:
+        faults.append(Fault("--uav", "", f"{uav!r} is the coordinator's name", "give a UAV's id"))
+    if faults:
+        raise InputError(*faults)

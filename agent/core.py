@@ -3,15 +3,18 @@
 The core owns one replica of the shared registers and its UAV's claim. It learns
 before it prepares its vehicle, decides whenever it is free, gives way to stronger
 claims, and goes home when the mission has ended. Leaves out: which task to take
-(agent.deciding), flying (agent.vehicle) and transport (agent.runner).
+(agent.deciding), what it makes of the others (agent.peers), when it repeats itself
+(agent.speech), flying (agent.vehicle) and transport (agent.runner).
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from agent.deciding import Turn, decide, ranks
+from agent.deciding import Turn, decide, ranks, rule_of
 from agent.events import Action, Event, Order
+from agent.peers import Peers
+from agent.speech import Speech
 from agent.vehicle import (
     Arrived,
     GoTo,
@@ -24,6 +27,7 @@ from agent.vehicle import (
     Telemetry,
     VehicleReady,
 )
+from swarm.allocation.lower_level import Rule
 from swarm.config import Timing
 from swarm.events import (
     Ask,
@@ -34,14 +38,12 @@ from swarm.events import (
     Note,
     PeerGone,
     PeerSeen,
-    Publish,
     Stop,
     Tick,
 )
 from swarm.model.ids import COORDINATOR
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.claims import winner
-from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
@@ -81,30 +83,31 @@ class AgentCore:
         self.phase = StatusPhase.LEARNING
         self.dropped = 0
         """Messages the shell has dropped so far; goes out with the status."""
+        self._mission = mission
         self._timing = timing
-        self._voice = Voice(mission, uav, incarnation)
-        self._membership = Membership(timing)
-        self._actions: list[Action] = []
+        self._speech = Speech(Voice(mission, uav, incarnation), self.replica, timing)
+        self._peers = Peers(uav, timing)
         self._board = TaskBoard(self.replica, mission)
+        self._actions: list[Action] = []
         self._learned = False
+        self._rule: Rule | None = None
+        self._rule_epoch: tuple[int, str] | None = None
+        self._finished = False
         self._zero_s: float | None = None
         self._free_since_s = 0.0
         self._telemetry: Telemetry | None = None
         self._place_enu_m: Point | None = None
         self._leg = 0
         self._excluded: set[str] = set()
-        self._idle_since_s: dict[str, float] = {}
-        self._awake_since_s = 0.0
         self._adrift = False
-        self._announced = 0
+        self._to_decide = False
+        self._awaits_peers = False
         self._note = ""
         self._held_at_s: float | None = None
         self._served_at_s: float | None = None
         self._retry_at_s: float | None = None
-        self._settled_at_s: float | None = None
+        self._forsaken_at_s: float | None = None
         self._ask_at_s: float | None = None
-        self._announce_at_s: float | None = None
-        self._status_at_s = 0.0
 
     # -- the one entry point ------------------------------------------------------
 
@@ -120,32 +123,37 @@ class AgentCore:
             event: what happened.
             now_s: now, on this process's own clock [s]; never decreases.
         """
-        self._handle(event, now_s)
-        if self.phase is not StatusPhase.HOME:
+        if not self._finished:
+            self._handle(event, now_s)
+        if not self._finished:
             self._advance(now_s)
         return self._drain()
 
-    def next_deadline_s(self) -> float:
-        """When `step` wants a `Tick` at the latest.
+    def next_deadline_s(self) -> float | None:
+        """When `step` wants a `Tick` at the latest; None when it has finished.
 
-        Only what the present phase acts upon counts: a deadline that nobody heeds
-        would be past for ever.
+        Each deadline is None from the moment on at which nobody would heed it any
+        more: one that stayed would be past for ever.
         """
-        deadlines = [self._membership.next_deadline_s(), self._announce_at_s, self._status_at_s]
-        if self.phase is StatusPhase.LEARNING:
-            deadlines.append(self._ask_at_s)
-        if self._airborne:
-            deadlines.append(self._settled_at_s)
-            if self._running:
-                deadlines += [self._held_at_s, self._served_at_s, self._retry_at_s]
-        return min(deadline for deadline in deadlines if deadline is not None)
+        if self._finished:
+            return None
+        deadlines = (
+            self._peers.membership.next_deadline_s(),
+            self._speech.next_deadline_s(),
+            self._held_at_s,
+            self._served_at_s,
+            self._retry_at_s,
+            self._forsaken_at_s,
+            self._ask_at_s,
+        )
+        return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
     def snapshot(self, now_s: float) -> Snapshot:
-        """What this process answers for: its own registers, and those of the absent."""
-        writers = {self.uav} | (self.replica.writers() - self._membership.present)
+        """What this process answers for: its own registers, and those of who cannot."""
+        writers = {self.uav} | (self.replica.writers() - self._peers.membership.steady)
         messages = tuple(self.replica.messages(writers))
         mission_s = None if self._zero_s is None else now_s - self._zero_s
-        return Snapshot(self._voice.mission, self.uav, mission_s, messages)
+        return Snapshot(self._mission, self.uav, mission_s, messages)
 
     @property
     def claim(self) -> Claim | None:
@@ -158,20 +166,23 @@ class AgentCore:
         match event:
             case Heard(message):
                 self._take_in(message, now_s)
+                if isinstance(message.body, Claim | Epoch):
+                    self._peers.spoke(message.writer)
                 if isinstance(message.body, Epoch):
                     self._set_clock(message.body, now_s)
             case Learned(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
-                if self._membership.seen(writer) and self._learned and writer != self.uav:
-                    self._announce(now_s)
+                if self._peers.membership.seen(writer) and self._learned and writer != self.uav:
+                    self._actions += self._speech.announce(now_s)
                     if writer == COORDINATOR:
                         self._ask(now_s)
             case PeerGone(writer):
-                self._membership.gone(writer, now_s)
+                self._peers.membership.gone(writer, now_s)
             case LinkChanged(up):
-                self._membership.link(up, now_s)
+                self._peers.membership.link(up, now_s)
                 if up and self._learned:
+                    self._actions += self._speech.announce(now_s)
                     self._ask(now_s)
             case Stop(reason):
                 self._go_home(reason, now_s)
@@ -196,19 +207,24 @@ class AgentCore:
 
     def _take_in(self, message: Message, now_s: float) -> None:
         if message.writer == self.uav:
-            # An echo of an earlier life: never say less than others remember.
-            self._voice.outdo(message.stamp)
-            if isinstance(message.body, Outcome):
-                self.replica.join(message)
+            self._actions += self._speech.hear_echo(message)
             return
+        before, epoch = self.replica.claims.get(message.writer), self.replica.epoch
         if not self.replica.join(message):
             return
+        if isinstance(message.body, Outcome):
+            self._peers.turned_idle(message.writer, now_s)
         match message.body:
-            case Brief() | Board():
+            case Brief() | Board() | Outcome(result=Result.FAILED):
                 self._awake(now_s)
-            case Claim(phase=ClaimPhase.IDLE):
-                self._idle_since_s[message.writer] = now_s
-            case Claim(phase=ClaimPhase.OUT) | Outcome(result=Result.FAILED):
+            case Claim() as claim:
+                if claim.phase is ClaimPhase.IDLE:
+                    self._peers.turned_idle(message.writer, now_s)
+                if before is not None and before.task != claim.task and self._is_open(before.task):
+                    self._awake(now_s)
+                elif self._awaits_peers:
+                    self._wake(now_s)
+            case Epoch(number=number) if epoch is None or number != epoch.number:
                 self._awake(now_s)
             case _:
                 pass
@@ -226,14 +242,14 @@ class AgentCore:
     def _set_clock(self, epoch: Epoch, now_s: float) -> None:
         if self._zero_s is None and epoch.phase is EpochPhase.RUNNING:
             self._zero_s = now_s - epoch.mission_s
-            self._awake_since_s = now_s
+            self._awake(now_s)
             self._actions.append(Note("mission runs", {"mission_s": epoch.mission_s}))
 
     def _become_airborne(self, now_s: float) -> None:
         if self.phase is not StatusPhase.PREPARING:
             return
-        self.phase, self._note = StatusPhase.IDLE, ""
-        self._free_since_s = self._mission_s(now_s) if self._zero_s is not None else 0.0
+        self._note = ""
+        self._become_free(self._mission_s(now_s) if self._zero_s is not None else 0.0)
         if self._place_enu_m is None and (me := self._me()) is not None:
             self._place_enu_m = me.position_enu_m
         self._publish_idle()
@@ -254,70 +270,102 @@ class AgentCore:
             if task is not None:
                 self._excluded.add(task.task)
                 self._release(f"vehicle refused: {reason}", now_s)
-        elif isinstance(order, Prepare):
+        elif isinstance(order, Prepare | Return):
             self._hand_over(reason, now_s)
 
     def _hand_over(self, reason: str, now_s: float) -> None:
-        if self.phase in (StatusPhase.RETURNING, StatusPhase.HOME):
+        if self.phase is StatusPhase.OUT:
             return
-        self._say_out(now_s)
-        self.phase, self._note = StatusPhase.OUT, reason[:200]
         self._actions.append(Note("vehicle handed over", {"reason": reason}))
+        returning = self.phase is StatusPhase.RETURNING
+        if not returning:
+            self._say_out(now_s)
+        self.phase, self._note = StatusPhase.OUT, reason[:200]
+        if returning:
+            # It was told to come home; nobody here can see whether it does.
+            self._finish(1, now_s)
 
     def _come_home(self, now_s: float) -> None:
         if self.phase is StatusPhase.RETURNING:
             self.phase = StatusPhase.HOME
-            self._actions.append(Publish(self._voice.say(self._status(now_s))))
-            self._actions += [Note("landed at home"), Finish(0)]
+            self._actions.append(Note("landed at home"))
+            self._finish(0, now_s)
 
     # -- what follows from the state ------------------------------------------------
 
     def _advance(self, now_s: float) -> None:
-        for writer in self._membership.lost(now_s):
+        for writer in self._peers.membership.lost(now_s):
             claim = self.replica.claims.get(writer)
             left = claim is not None and claim.phase is ClaimPhase.OUT
             self._actions.append(Note("left" if left else "lost", {"writer": writer}))
             self._awake(now_s)
+            if writer == COORDINATOR and self._learned and not self._running:
+                self._ask(now_s)  # others may have heard its last words
+        self._go_home_if_over(now_s)
         if self.phase is StatusPhase.LEARNING:
             self._prepare(now_s)
-        self._finish_if_over(now_s)
         if self._airborne and self._running:
             self._serve(now_s)
             self._keep_or_lose_claim(now_s)
-            if self.phase is StatusPhase.IDLE:
+            if self._retry_at_s is not None and self._retry_at_s <= now_s:
+                self._wake(now_s)
+            if self.phase is StatusPhase.IDLE and self._to_decide:
                 self._decide(now_s)
-        self._repeat(now_s)
+        if not self._finished:
+            self._actions += self._speech.repeat(
+                lambda: self._status(now_s), now_s, learned=self._learned
+            )
 
     def _prepare(self, now_s: float) -> None:
         me = self._me()
         if self._learned and me is not None:
-            self.phase = StatusPhase.PREPARING
+            self.phase, self._ask_at_s = StatusPhase.PREPARING, None
             self._actions.append(
                 Order(Prepare(self._in_layer(me.position_enu_m), me.speed_m_s)),
             )
         elif self._ask_at_s is not None and self._ask_at_s <= now_s:
-            self._note = "waiting for the coordinator's brief"
+            missing = self.replica.brief is None
+            waits = "waiting for the coordinator's brief" if missing else "not in the brief"
+            if self._note != waits:
+                self._note = waits
+                self._actions.append(Note(waits, {"uav": self.uav}))
             self._ask(now_s)
 
-    def _finish_if_over(self, now_s: float) -> None:
-        if self.phase in (StatusPhase.RETURNING, StatusPhase.HOME, StatusPhase.OUT):
-            return
+    def _go_home_if_over(self, now_s: float) -> None:
         epoch = self.replica.epoch
-        if epoch is not None and epoch.phase is EpochPhase.ENDED and self._learned:
+        if self.phase is StatusPhase.RETURNING or not self._learned:
+            return
+        if epoch is not None and epoch.phase is EpochPhase.ENDED:
             self._go_home(epoch.reason, now_s)
-        elif self._settled(now_s):
-            self._go_home("nothing left to do and no coordinator", now_s)
+        elif self._forsaken(now_s):
+            self._go_home("no coordinator and nothing left to do", now_s)
 
-    def _settled(self, now_s: float) -> bool:
-        """Without a coordinator: whether nothing has been open or claimed for long enough."""
-        orphaned = COORDINATOR not in self._membership.present and self._running
-        states = self._board.states.values()
-        if not orphaned or not states or TaskState.OPEN in states:
-            self._settled_at_s = None
+    def _forsaken(self, now_s: float) -> bool:
+        """Whether there has been neither a coordinator nor anything to do for long enough."""
+        waiting = self.phase is StatusPhase.IDLE and not self._running
+        finished = self._running and self._nothing_to_do()
+        if COORDINATOR in self._peers.membership.present or not (waiting or finished):
+            self._forsaken_at_s = None
             return False
-        if self._settled_at_s is None:
-            self._settled_at_s = now_s + self._timing.linger_s
-        return self._settled_at_s <= now_s
+        if self._forsaken_at_s is None:
+            patience_s = self._timing.abandon_s if waiting else self._timing.linger_s
+            self._forsaken_at_s = now_s + patience_s
+        return self._forsaken_at_s <= now_s
+
+    def _nothing_to_do(self) -> bool:
+        """Tasks may be open still: those that nobody who is there can or will take."""
+        if TaskState.OPEN not in self._board.states.values():
+            return True
+        if self.phase is StatusPhase.IDLE:
+            return not (self._to_decide or self._awaits_peers or self._peers_at_work())
+        return self.phase is StatusPhase.OUT and not self._peers_at_work()
+
+    def _peers_at_work(self) -> bool:
+        credible = self._peers.credible
+        return any(
+            uav in credible and self._is_open(claim.task)
+            for uav, claim in self.replica.claims.items()
+        )
 
     def _serve(self, now_s: float) -> None:
         task = self._task()
@@ -329,8 +377,8 @@ class AgentCore:
         attempt = 1 if earlier is None else earlier.attempt + 1
         self._publish(Outcome(task.task, Result.DONE, attempt, mission_s))
         self._actions.append(Note("task done", {"task": task.task, "mission_s": mission_s}))
-        self._become_free(mission_s)
         # The next claim, made in this same step, replaces the old one on the bus.
+        self._become_free(mission_s)
 
     def _keep_or_lose_claim(self, now_s: float) -> None:
         claim, task = self.claim, self._task()
@@ -350,16 +398,21 @@ class AgentCore:
         epoch, problem, place = self.replica.epoch, self._board.problem, self._place_enu_m
         if epoch is None or problem is None or place is None or self.uav not in problem.uav_ids:
             return
+        rule = self._rule_of(epoch)
+        if rule is None:
+            self._stay_idle(now_s)
+            return
         turn = Turn(
             uav=self.uav,
             now_s=self._mission_s(now_s),
             decided_s=self._free_since_s,
             place_enu_m=place,
-            present=self._membership.present,
-            awaited=self._awaited(now_s),
+            credible=self._peers.credible,
+            awaited=self._peers.awaited(self.replica, now_s),
+            patience_s=self._timing.patience_s,
             excluded=self._excluded,
         )
-        decision = decide(problem, self._board, epoch.rule, turn)
+        decision = decide(problem, self._board, rule, turn)
         if decision is None:
             self._stay_idle(now_s)
             return
@@ -387,6 +440,14 @@ class AgentCore:
             )
         )
 
+    def _rule_of(self, epoch: Epoch) -> Rule | None:
+        if self._rule_epoch != (epoch.number, epoch.rule):
+            self._rule, self._rule_epoch = rule_of(epoch), (epoch.number, epoch.rule)
+            if self._rule is None:
+                self._note = f"cannot decide by rule {epoch.rule}"
+                self._actions.append(Note("unknown rule", {"rule": epoch.rule}))
+        return self._rule
+
     def _stay_idle(self, now_s: float) -> None:
         claim = self.claim
         if claim is not None and claim.phase is not ClaimPhase.IDLE:
@@ -395,9 +456,13 @@ class AgentCore:
             # Nothing to fly to any more: stop here rather than at a lost target.
             self._leg += 1
             self._actions.append(Order(GoTo(self._leg, self._telemetry.position_enu_m)))
-        self._adrift = False
-        patience_ends_s = [self._patience_ends_s(uav) for uav in self._awaited(now_s)]
-        self._retry_at_s = min(patience_ends_s, default=None)
+        self._adrift = self._to_decide = False
+        patience_ends_s = self._peers.patience_ends_s(self.replica, now_s)
+        self._awaits_peers = patience_ends_s is not None
+        # Look again by and by while anything is open, lest a lost message strand it.
+        unfinished = TaskState.OPEN in self._board.states.values()
+        again_s = now_s + self._timing.announce_s if unfinished else None
+        self._retry_at_s = patience_ends_s if patience_ends_s is not None else again_s
 
     # -- pieces ---------------------------------------------------------------------
 
@@ -408,8 +473,8 @@ class AgentCore:
     @property
     def _running(self) -> bool:
         epoch = self.replica.epoch
-        running = epoch is not None and epoch.phase is EpochPhase.RUNNING
-        return running and self._zero_s is not None
+        over = epoch is None or epoch.phase is EpochPhase.ENDED
+        return self._zero_s is not None and not over
 
     def _mission_s(self, now_s: float) -> float:
         if self._zero_s is None:
@@ -434,35 +499,30 @@ class AgentCore:
         return point[0], point[1], point[2] - (0.0 if me is None else me.layer_m)
 
     def _winner(self, task: str) -> str | None:
-        present = self._membership.present | {self.uav}
+        rivals = {*self._peers.credible, self.uav}
         claims = self.replica.claims.items()
-        return winner((uav, c) for uav, c in claims if c.task == task and uav in present)
+        return winner((uav, c) for uav, c in claims if c.task == task and uav in rivals)
 
-    def _patience_ends_s(self, uav: str) -> float:
-        since_s = max(self._idle_since_s.get(uav, 0.0), self._awake_since_s)
-        return since_s + self._timing.patience_s
-
-    def _awaited(self, now_s: float) -> set[str]:
-        """Free peers that may still be expected to decide in their turn."""
-        return {
-            uav
-            for uav, claim in self.replica.claims.items()
-            if claim.phase is ClaimPhase.IDLE
-            and uav != self.uav
-            and uav in self._membership.present
-            and now_s < self._patience_ends_s(uav)
-        }
+    def _is_open(self, task: str | None) -> bool:
+        return task is not None and self._board.states.get(task) is TaskState.OPEN
 
     def _awake(self, now_s: float) -> None:
         """A task may have opened: everyone who is free decides anew, in sequence order."""
-        self._awake_since_s = now_s
-        if self.phase is StatusPhase.IDLE and self._running:
-            self._free_since_s = self._mission_s(now_s)
+        self._peers.awake(now_s)
+        self._wake(now_s)
+
+    def _wake(self, now_s: float) -> None:
+        """Decide anew when free; who found nothing before takes no precedence from that."""
+        self._retry_at_s = None
+        if self.phase is StatusPhase.IDLE and not self._to_decide:
+            self._to_decide = True
+            if self._running:
+                self._free_since_s = self._mission_s(now_s)
 
     def _become_free(self, free_since_s: float) -> None:
-        self.phase = StatusPhase.IDLE
+        self.phase, self._to_decide = StatusPhase.IDLE, True
         self._free_since_s = free_since_s
-        self._held_at_s = self._served_at_s = None
+        self._held_at_s = self._served_at_s = self._retry_at_s = None
 
     def _release(self, reason: str, now_s: float) -> None:
         """Give the task up; a claim lost while only proposed keeps its place in the order."""
@@ -475,22 +535,25 @@ class AgentCore:
         self._adrift = True
 
     def _go_home(self, reason: str, now_s: float) -> None:
-        if self.phase in (StatusPhase.RETURNING, StatusPhase.HOME):
-            return
         if self.phase is StatusPhase.OUT:
             # The vehicle is not ours to command any more.
-            self.phase = StatusPhase.HOME
-            self._actions.append(Finish(0))
-            return
-        self._say_out(now_s)
-        self.phase, self._note = StatusPhase.RETURNING, reason[:200]
-        self._actions += [Note("returning", {"reason": reason}), Order(Return(reason))]
+            self._finish(0, now_s)
+        elif self.phase is not StatusPhase.RETURNING:
+            self._say_out(now_s)
+            self._forsaken_at_s = None
+            self.phase, self._note = StatusPhase.RETURNING, reason[:200]
+            self._actions += [Note("returning", {"reason": reason}), Order(Return(reason))]
+
+    def _finish(self, status: int, now_s: float) -> None:
+        self._actions += [self._speech.say(self._status(now_s)), Finish(status)]
+        self._finished = True
 
     # -- saying ---------------------------------------------------------------------
 
     def _say_out(self, now_s: float) -> None:
         mission_s = 0.0 if self._zero_s is None else self._mission_s(now_s)
         self._become_free(mission_s)
+        self._ask_at_s = None
         self._publish(Claim(ClaimPhase.OUT, None, mission_s, 0, mission_s))
 
     def _publish_idle(self) -> None:
@@ -498,27 +561,7 @@ class AgentCore:
         self._publish(Claim(ClaimPhase.IDLE, None, since_s, 0, since_s))
 
     def _publish(self, body: Body) -> None:
-        message = self._voice.say(body)
-        self.replica.join(message)
-        self._actions.append(Publish(message))
-
-    def _announce(self, now_s: float) -> None:
-        """Repeat the own registers, so that what got lost on the way arrives after all."""
-        own = [m for m in self.replica.messages({self.uav}) if m.stamp.incarnation]
-        claims = [message for message in own if isinstance(message.body, Claim)]
-        outcomes = [message for message in own if isinstance(message.body, Outcome)]
-        if outcomes:
-            self._announced = (self._announced + 1) % len(outcomes)
-            claims.append(outcomes[self._announced])
-        self._actions += [Publish(message) for message in claims]
-        self._announce_at_s = now_s + self._timing.announce_s
-
-    def _repeat(self, now_s: float) -> None:
-        if self._learned and (self._announce_at_s is None or self._announce_at_s <= now_s):
-            self._announce(now_s)
-        if self._status_at_s <= now_s:
-            self._status_at_s = now_s + self._timing.status_s
-            self._actions.append(Publish(self._voice.say(self._status(now_s))))
+        self._actions.append(self._speech.say(body))
 
     def _status(self, now_s: float) -> Status:
         claim, telemetry = self.claim, self._telemetry
@@ -534,7 +577,8 @@ class AgentCore:
         )
 
     def _ask(self, now_s: float) -> None:
-        self._ask_at_s = now_s + self._timing.ask_s
+        if self.phase is StatusPhase.LEARNING:
+            self._ask_at_s = now_s + self._timing.ask_s
         self._actions.append(Ask())
 
     def _drain(self) -> list[Action]:

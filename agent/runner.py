@@ -9,7 +9,7 @@ out: every decision (agent.core) and flying (agent.mavlink).
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Protocol
 
 from agent.core import AgentCore
@@ -17,13 +17,16 @@ from agent.events import Action, Event, Order
 from agent.vehicle import Home, Orders, Report, Return
 from swarm.bus.port import Bus
 from swarm.clock import Clock
+from swarm.errors import BusError
 from swarm.events import Stop
 from swarm.model import Origin
 from swarm.process import StopRequest
 from swarm.shell import Shell, take_seat
 
-__all__ = ["Vehicle", "run_agent"]
+__all__ = ["Vehicle", "run_agent", "seat_or_stop"]
 
+RETRY_S = 0.5
+"""Wall time between a failed try for a seat on the bus and the next."""
 FAREWELL_S = 2.0
 """Wall time that a vehicle has to come home when the agent is told to stop; after that
 it returns on its own."""
@@ -43,6 +46,37 @@ class Vehicle(Protocol):
     async def close(self) -> None:
         """Close the link; the vehicle goes on with what it does."""
         ...
+
+
+async def seat_or_stop(
+    open_bus: Callable[[], Awaitable[Bus]], stop: StopRequest, on_wait: Callable[[str], None]
+) -> Bus | None:
+    """A seat on the bus, tried for until there is one; None when told to stop first.
+
+    Args:
+        open_bus: tries once, for a bounded time.
+        stop: asks to give up.
+        on_wait: called with the reason whenever a try has failed.
+    """
+    loop = asyncio.get_running_loop()
+    trying, stopped = loop.create_task(_seat(open_bus, on_wait)), loop.create_task(stop.wait())
+    try:
+        await asyncio.wait((trying, stopped), return_when=asyncio.FIRST_COMPLETED)
+        return trying.result() if trying.done() else None
+    finally:
+        for task in (trying, stopped):
+            task.cancel()
+        await asyncio.gather(trying, stopped, return_exceptions=True)
+
+
+async def _seat(open_bus: Callable[[], Awaitable[Bus]], on_wait: Callable[[str], None]) -> Bus:
+    while True:
+        try:
+            return await open_bus()
+        except BusError as fault:
+            on_wait(str(fault))
+        # A try may fail at once, such as when the endpoint to listen on is taken.
+        await asyncio.sleep(RETRY_S)
 
 
 async def run_agent(
@@ -116,8 +150,12 @@ async def run_agent(
     flying, leaving = loop.create_task(shell.run()), loop.create_task(farewell())
     try:
         await asyncio.wait((flying, leaving), return_when=asyncio.FIRST_COMPLETED)
-        told = stop.exit_status
-        return flying.result() if told is None else await leaving
+        if stop.exit_status is None:
+            return flying.result()
+        told = await leaving
+        if flying.done():
+            flying.result()  # raises what went wrong while leaving
+        return told
     finally:
         tasks = [task for task in (flying, leaving, starting) if task is not None]
         for task in tasks:

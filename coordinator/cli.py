@@ -37,7 +37,8 @@ def plan(
         str,
         typer.Option(
             metavar="METHOD",
-            help="greedy or lookahead: how UAVs decide; exact: the proven best lists.",
+            help="greedy or lookahead: how UAVs decide; guided: optimised lists; exact: the proven "
+            "best lists.",
         ),
     ] = "greedy",
     seed: SeedOption = 0,
@@ -78,7 +79,7 @@ def plan(
     try:
         result = make_plan(mission, method, clock=clock, seed=seed, stop=stop)
     except ProblemTooLargeError as error:
-        remedy = "choose --method greedy or lookahead"
+        remedy = "choose --method guided, greedy or lookahead"
         raise InputError(Fault(str(scenario), "", str(error), remedy)) from error
     if plot is not None:
         from coordinator.plot import draw_plan
@@ -102,8 +103,10 @@ def coordinator(
     scenario: ScenarioArgument,
     method: Annotated[
         str,
-        typer.Option("--method", metavar="METHOD", help="Decision rule: greedy or lookahead."),
-    ] = "greedy",
+        typer.Option(
+            "--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."
+        ),
+    ] = "guided",
     seed: SeedOption = 0,
     start_timeout_s: Annotated[
         float,
@@ -111,7 +114,8 @@ def coordinator(
             "--start-timeout-s",
             min=1.0,
             metavar="S",
-            help="UAVs that are not airborne by then, in mission seconds, are given up.",
+            help="UAVs that are not airborne by then are given up; mission seconds, or wall "
+            "seconds where the mission runs faster.",
         ),
     ] = 120.0,
     lowest_layer_m: Annotated[
@@ -185,7 +189,7 @@ def coordinator(
             seed=seed,
             incarnation=incarnation(),
             timing=Timing().scaled(speedup),
-            start_timeout_s=start_timeout_s,
+            start_timeout_s=start_timeout_s * max(1.0, speedup),
             layers=FlightLayers(lowest_layer_m, layer_spacing_m),
         )
         seat = await open_zenoh_bus(config)
@@ -204,9 +208,8 @@ def _check_plan_options(method: str, plot: Path | None) -> None:
 
     faults = []
     if method not in METHODS:
-        problem = "not available yet" if method == "guided" else "no such method"
-        methods = ", ".join(METHODS)
-        faults.append(Fault("--method", method, problem, f"choose one of {methods}"))
+        remedy = f"choose one of {', '.join(METHODS)}"
+        faults.append(Fault("--method", method, "no such method", remedy))
     if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
         remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from coordinator.events import Action, Event, MakePlan, PlanFailed, PlanMade
 from swarm.config import Timing
 from swarm.events import (
+    Ask,
     Finish,
     Heard,
     Learned,
@@ -28,7 +29,7 @@ from swarm.events import (
 from swarm.model import Mission, Origin, Plan, Task, UavId
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.model.ids import COORDINATOR
-from swarm.state.board import TaskBoard, TaskState
+from swarm.state.board import TaskBoard, TaskState, doable
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
@@ -36,6 +37,7 @@ from swarm.wire.messages import (
     Board,
     Body,
     Brief,
+    Claim,
     ClaimPhase,
     Epoch,
     EpochPhase,
@@ -108,7 +110,8 @@ class CoordinatorCore:
         self._zero_s: float | None = None
         self._request = 0
         self._planned_for: tuple[UavId, ...] = ()
-        self._start_by_s = 0.0
+        self._start_by_s: float | None = None
+        self._stalemate_at_s: float | None = None
         self._announce_at_s = 0.0
         self._leave_at_s: float | None = None
         self._announced = 0
@@ -119,7 +122,7 @@ class CoordinatorCore:
         self._start_by_s = now_s + self._start_timeout_s
         self._announce_at_s = now_s + self._timing.announce_s
         self._say(_brief(self._mission, self._layers))
-        self._post(-1.0)
+        self._post(now_s)
         self._make_plan(tuple(uav.id for uav in self._mission.uavs))
         return self._drain()
 
@@ -133,6 +136,8 @@ class CoordinatorCore:
         match event:
             case Heard(message):
                 self.replica.join(message)
+                if isinstance(message.body, Claim):
+                    self._membership.spoke(message.writer)
             case Learned(snapshots):
                 for snapshot in snapshots:
                     self.replica.join_all(snapshot.messages)
@@ -159,16 +164,20 @@ class CoordinatorCore:
         """When `step` wants a `Tick` at the latest; None when it has finished."""
         if self._finished:
             return None
-        deadlines = [self._announce_at_s, self._membership.next_deadline_s(), self._leave_at_s]
-        if self._zero_s is None:
-            deadlines.append(self._start_by_s)
-        else:
+        deadlines = [
+            self._announce_at_s,
+            self._membership.next_deadline_s(),
+            self._start_by_s,
+            self._stalemate_at_s,
+            self._leave_at_s,
+        ]
+        if self._zero_s is not None and not self._ended:
             deadlines += [self._zero_s + task.appears_s for task in self._unposted()]
         return min(deadline for deadline in deadlines if deadline is not None)
 
     def snapshot(self, now_s: float) -> Snapshot:
-        """What this process answers for: its own registers, and those of the absent."""
-        writers = {COORDINATOR} | (self.replica.writers() - self._membership.present)
+        """What this process answers for: its own registers, and those of who cannot."""
+        writers = {COORDINATOR} | (self.replica.writers() - self._membership.steady)
         mission_s = None if self._zero_s is None else now_s - self._zero_s
         messages = tuple(self.replica.messages(writers))
         return Snapshot(self._mission.name, COORDINATOR, mission_s, messages)
@@ -181,65 +190,71 @@ class CoordinatorCore:
         return epoch is not None and epoch.phase is EpochPhase.ENDED
 
     def _advance(self, now_s: float) -> None:
+        anybody_lost = False
         for writer in self._membership.lost(now_s):
             claim = self.replica.claims.get(writer)
             left = claim is not None and claim.phase is ClaimPhase.OUT
             self._actions.append(Note("left" if left else "lost", {"writer": writer}))
+            anybody_lost |= not left
+        if anybody_lost:
+            self._actions.append(Ask())  # others may have heard its last words
         if self._ended:
             self._leave_when_empty(now_s)
-        elif self._zero_s is None:
-            self._start_if_ready(now_s)
         else:
-            self._post(now_s - self._zero_s)
-            self._end_if_over(now_s)
+            if self._zero_s is None:
+                self._start_if_ready(now_s)
+            if self._zero_s is not None:
+                self._post(now_s)
+                self._end_if_over(now_s)
         if self._announce_at_s <= now_s and not self._finished:
             self._announce(now_s)
 
     def _start_if_ready(self, now_s: float) -> None:
-        ready = tuple(
-            uav.id
-            for uav in self._mission.uavs
-            if uav.id in self._membership.present and self._is_idle(uav.id)
-        )
-        if len(ready) < len(self._mission.uavs) and now_s < self._start_by_s:
+        if self._start_by_s is not None and self._start_by_s <= now_s:
+            self._start_by_s = None
+        uavs = tuple(uav.id for uav in self._mission.uavs)
+        ready = tuple(uav for uav in uavs if self._phase_of(uav) is ClaimPhase.IDLE)
+        out = [uav for uav in uavs if self._phase_of(uav) is ClaimPhase.OUT]
+        if len(ready) + len(out) < len(uavs) and self._start_by_s is not None:
             return
         if not ready:
-            self._end(f"no UAV was airborne within {self._start_timeout_s:g} s", now_s)
+            self._end("no UAV is airborne", now_s)
         elif self._planned_for != ready:
             # Somebody is missing: the sequence must be one of those who fly.
-            missing = sorted({uav.id for uav in self._mission.uavs} - set(ready))
+            missing = sorted(set(uavs) - set(ready))
             self._actions.append(Note("starting without", {"uavs": ", ".join(missing)}))
             self._make_plan(ready)
         elif self.plan is not None:
-            self._zero_s = now_s
+            self._zero_s, self._start_by_s = now_s, None
             self._say_epoch(1, EpochPhase.RUNNING, "every UAV is airborne or given up", now_s)
 
-    def _is_idle(self, uav: str) -> bool:
+    def _phase_of(self, uav: str) -> ClaimPhase | None:
+        """Phase of its claim; None while it is absent or has none."""
         claim = self.replica.claims.get(uav)
-        return claim is not None and claim.phase is ClaimPhase.IDLE
+        return None if claim is None or uav not in self._membership.present else claim.phase
 
     def _end_if_over(self, now_s: float) -> None:
-        problem = self._board.problem
-        if problem is None:
+        phases = {self._phase_of(uav.id) for uav in self._mission.uavs} - {None, ClaimPhase.OUT}
+        if doable(self._board, self._membership.present) or (self._unposted() and phases):
+            self._end_if_stale(phases == {ClaimPhase.IDLE} and not self._unposted(), now_s)
             return
-        unfinished = [task for task, state in self._board.states.items() if state is TaskState.OPEN]
-        able = [index for index, uav in enumerate(problem.uav_ids) if self._takes_part(uav)]
-        doable = [
-            task for task in unfinished if problem.capable[able, problem.task_ids.index(task)].any()
-        ]
-        if doable or (self._unposted() and able):
-            return
-        reason = "every task has ended" if not unfinished else "nobody is left who could go on"
+        left = TaskState.OPEN in self._board.states.values() or self._unposted()
+        reason = "nobody is left who could go on" if left else "every task has ended"
         self._end(reason, now_s)
 
-    def _takes_part(self, uav: str) -> bool:
-        claim = self.replica.claims.get(uav)
-        present = uav in self._membership.present
-        return present and claim is not None and claim.phase is not ClaimPhase.OUT
+    def _end_if_stale(self, stalemate: bool, now_s: float) -> None:
+        """Tasks may be open that every UAV refuses for reasons of its own, such as a geofence."""
+        if not stalemate:
+            self._stalemate_at_s = None
+        elif self._stalemate_at_s is None:
+            self._stalemate_at_s = now_s + self._timing.stalemate_s
+        elif self._stalemate_at_s <= now_s:
+            self._end("nobody takes what is left", now_s)
 
     def _end(self, reason: str, now_s: float) -> None:
         if self._ended:
             return
+        self._start_by_s = self._stalemate_at_s = None
         number = 1 if self.replica.epoch is None else self.replica.epoch.number + 1
         self._say_epoch(number, EpochPhase.ENDED, reason, now_s)
         self._actions.append(Note("mission ends", {"reason": reason}))
@@ -262,10 +277,12 @@ class CoordinatorCore:
     def _unposted(self) -> list[Task]:
         return [task for task in self._mission.tasks if task.id not in self.replica.board]
 
-    def _post(self, mission_s: float) -> None:
+    def _post(self, now_s: float) -> None:
+        """Post what is due; before the start, what has been there all along."""
         numbers = {task.id: number for number, task in enumerate(self._mission.tasks)}
         for task in self._unposted():
-            if task.appears_s == 0.0 or task.appears_s <= mission_s:
+            popped_up = self._zero_s is not None and self._zero_s + task.appears_s <= now_s
+            if task.appears_s == 0.0 or popped_up:
                 self._say(
                     Board(
                         task=task.id,
@@ -297,7 +314,11 @@ class CoordinatorCore:
     def _say_epoch(self, number: int, phase: EpochPhase, reason: str, now_s: float) -> None:
         sequence = () if self.plan is None else self.plan.sequence or ()
         mission_s = 0.0 if self._zero_s is None else now_s - self._zero_s
-        self._say(Epoch(number, phase, self._method, tuple(sequence), mission_s, reason[:200]))
+        plan = {} if self.plan is None else self.plan.routes
+        routes = {str(uav): tuple(map(str, tasks)) for uav, tasks in plan.items()}
+        self._say(
+            Epoch(number, phase, self._method, tuple(sequence), mission_s, reason[:200], routes)
+        )
 
     def _announce(self, now_s: float) -> None:
         """Repeat the epoch with the mission time of now, the brief and some of the board.

@@ -17,6 +17,7 @@ from swarm.bus.port import Bus
 from swarm.clock import Clock
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
+from swarm.process import call_in_background
 from swarm.shell import Shell, take_seat
 
 __all__ = ["run_coordinator"]
@@ -37,8 +38,12 @@ async def run_coordinator(
     planning: set[asyncio.Task[None]] = set()
 
     async def plan(request: MakePlan) -> None:
+        def call() -> Plan:
+            return make_plan(request.mission, request.method, request.seed)
+
         try:
-            made = await asyncio.to_thread(make_plan, request.mission, request.method, request.seed)
+            # On a thread that does not hold the process up when it is told to end.
+            made = await asyncio.wrap_future(call_in_background(call, "planner"))
         except ValueError as fault:
             shell.step(PlanFailed(request.request, str(fault)))
         else:
@@ -48,7 +53,12 @@ async def run_coordinator(
         if isinstance(action, MakePlan):
             task = asyncio.get_running_loop().create_task(plan(action))
             planning.add(task)
-            task.add_done_callback(planning.discard)
+            task.add_done_callback(planned)
+
+    def planned(task: asyncio.Task[None]) -> None:
+        planning.discard(task)
+        if not task.cancelled() and (fault := task.exception()):
+            shell.fail(fault)
 
     def as_event(fact: Event) -> Event:
         return fact
@@ -67,5 +77,7 @@ async def run_coordinator(
     try:
         return await shell.run()
     finally:
-        for task in planning:
+        tasks = list(planning)
+        for task in tasks:
             task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)

@@ -92,6 +92,7 @@ class Observer:
         self._zero_s: float | None = None
         self._orphans: dict[str, str] = {}
         self._numbers: set[int] = set()
+        self._known_at_start = {task.id for task in mission.known_at_start().tasks}
         self._ended_told = False
         self._timing = timing
         self._ask_at_s = 0.0
@@ -157,11 +158,13 @@ class Observer:
         problem = self._problem
         index = {task: number for number, task in enumerate(problem.task_ids)}
         uav_index = {uav: number for number, uav in enumerate(problem.uav_ids)}
-        visits = sorted(
+        visits = [
             (outcome.completed_s, UavId(uav), TaskId(task))
             for (uav, task), outcome in self.replica.outcomes.items()
             if outcome.result is Result.DONE and task in index and uav in uav_index
-        )
+        ]
+        # Tasks at one place may end at one instant: those stay in the order they were told in.
+        visits.sort(key=lambda visit: visit[:2])
         lists: dict[UavId, list[TaskId]] = {uav: [] for uav in problem.uav_ids}
         times_s = np.full(problem.n_task, np.nan)
         by = np.full(problem.n_task, -1, dtype=np.int64)
@@ -211,7 +214,7 @@ class Observer:
                 self._hear_epoch(epoch, now_s)
             case Board(task=task, withdrawn=True):
                 self._tell(f"task {task} withdrawn", now_s)
-            case Board(task=task) if self._zero_s is not None:
+            case Board(task=task) if self._is_news(task):
                 self._tell(f"task {task} appeared", now_s)
             case Claim() as claim:
                 self._hear_claim(message.writer, claim, before, now_s)
@@ -219,6 +222,10 @@ class Observer:
                 self._tell(f"{message.writer} ended {task}: {result}", now_s)
             case _:
                 pass
+
+    def _is_news(self, task: str) -> bool:
+        """Whether the task is a pop-up, or one that the scenario does not know at all."""
+        return self._zero_s is not None and task not in self._known_at_start
 
     def _hear_epoch(self, epoch: Epoch, now_s: float) -> None:
         if epoch.phase is EpochPhase.RUNNING and epoch.number not in self._numbers:
@@ -232,22 +239,27 @@ class Observer:
             self._tell(f"mission ends: {epoch.reason}", now_s)
 
     def _hear_claim(self, uav: str, claim: Claim, before: Claim | None, now_s: float) -> None:
-        if claim.phase is ClaimPhase.OUT and self.phase is EpochPhase.RUNNING:
+        unfinished = TaskState.OPEN in self.board.states.values()
+        if claim.phase is ClaimPhase.OUT and self.phase is EpochPhase.RUNNING and unfinished:
             self._tell(f"{uav} takes no further part", now_s)
         if claim.task is None or (before is not None and before.task == claim.task):
             return
-        if (former := self._orphans.pop(claim.task, None)) is not None:
+        former = self._orphans.pop(claim.task, uav)
+        if former != uav:
             self._tell(f"{uav} took over {claim.task} from {former}", now_s)
 
     def _lose(self, writer: str, now_s: float) -> None:
         if writer == COORDINATOR:
-            if self.phase is not EpochPhase.ENDED:
+            if self.phase is EpochPhase.RUNNING:
                 self._tell("coordinator lost; the fleet goes on with the last epoch", now_s)
+            elif self.phase is EpochPhase.PREPARING:
+                self._tell("coordinator lost before the mission began", now_s)
             return
         claim = self.replica.claims.get(writer)
         if claim is None or claim.phase is ClaimPhase.OUT:
             return
-        self.lost.append(UavId(writer))
+        if writer not in self.lost:
+            self.lost.append(UavId(writer))
         opened = self.board.states.get(claim.task or "") is TaskState.OPEN
         if claim.task is not None and opened:
             self._orphans[claim.task] = writer

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["PLOT_SUFFIXES", "draw_plan", "plan_figure"]
+__all__ = ["PLOT_SUFFIXES", "Look", "draw_plan", "path_looks", "plan_figure"]
 
 PLOT_SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of picture, named by the file's suffix."""
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-_STYLES: tuple[tuple[int, tuple[float, ...]], ...] = (
+_DASHES: tuple[tuple[int, tuple[float, ...]], ...] = (
     (0, ()),
     (0, (5.0, 2.0)),
     (0, (1.2, 1.6)),
@@ -44,9 +44,12 @@ _LISTED_TASKS = 24
 
 
 @dataclass(frozen=True, slots=True)
-class _Look:
+class Look:
+    """How one UAV's path is drawn."""
+
     colour: str
-    style: tuple[int, tuple[float, ...]]
+    dashes: tuple[int, tuple[float, ...]]
+    """Offset, then lengths of dashes and gaps [line widths]."""
 
 
 def draw_plan(mission: Mission, plan: Plan, path: Path) -> None:
@@ -74,10 +77,7 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
 
     figure = Figure(figsize=_size_inches(mission), layout="constrained")
     axes = figure.add_subplot()
-    looks = {
-        uav: _Look(_COLOURS[i % len(_COLOURS)], _STYLES[i % len(_STYLES)])
-        for i, uav in enumerate(plan.routes)
-    }
+    looks = dict(zip(plan.routes, path_looks(len(plan.routes)), strict=True))
     diameters = _diameters_points(mission)
     _draw_paths(axes, mission, plan, looks, diameters)
     _draw_tasks(axes, mission, plan, looks, diameters)
@@ -95,6 +95,11 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     return figure
 
 
+def path_looks(count: int) -> list[Look]:
+    """Looks of ``count`` UAVs; 28 differ, as 7 colours and 4 dashes share no factor."""
+    return [Look(_COLOURS[i % len(_COLOURS)], _DASHES[i % len(_DASHES)]) for i in range(count)]
+
+
 def _size_inches(mission: Mission) -> tuple[float, float]:
     """A map as large as its number of names needs, with the legend beside it."""
     places = _places_m(mission)
@@ -108,7 +113,7 @@ def _size_inches(mission: Mission) -> tuple[float, float]:
 def _places_m(mission: Mission) -> list[tuple[float, float]]:
     """East and north [m] of all starts and all tasks."""
     starts = [uav.position_enu_m[:2] for uav in mission.uavs]
-    return starts + [task.position_enu_m[:2] for task in mission.tasks]
+    return starts + [task.position_enu_m[:2] for task in mission.tasks] or [(0.0, 0.0)]
 
 
 def _diameters_points(mission: Mission) -> dict[TaskId, float]:
@@ -128,7 +133,7 @@ def _draw_paths(
     axes: Axes,
     mission: Mission,
     plan: Plan,
-    looks: Mapping[UavId, _Look],
+    looks: Mapping[UavId, Look],
     diameters: Mapping[TaskId, float],
 ) -> None:
     del diameters
@@ -136,7 +141,7 @@ def _draw_paths(
         axes.plot(
             *points.T,
             color=look.colour,
-            linestyle=look.style,
+            linestyle=look.dashes,
             linewidth=1.7,
             zorder=2,
             solid_capstyle="round",
@@ -161,8 +166,8 @@ def _draw_paths(
 
 
 def _paths(
-    mission: Mission, plan: Plan, looks: Mapping[UavId, _Look]
-) -> list[tuple[np.ndarray, _Look]]:
+    mission: Mission, plan: Plan, looks: Mapping[UavId, Look]
+) -> list[tuple[np.ndarray, Look]]:
     tasks = {task.id: task.position_enu_m[:2] for task in mission.tasks}
     return [
         (
@@ -177,7 +182,7 @@ def _draw_tasks(
     axes: Axes,
     mission: Mission,
     plan: Plan,
-    looks: Mapping[UavId, _Look],
+    looks: Mapping[UavId, Look],
     diameters: Mapping[TaskId, float],
 ) -> None:
     owner = {task: uav for uav, route in plan.routes.items() for task in route}
@@ -196,7 +201,7 @@ def _draw_tasks(
         )
 
 
-def _draw_starts(axes: Axes, mission: Mission, looks: Mapping[UavId, _Look]) -> None:
+def _draw_starts(axes: Axes, mission: Mission, looks: Mapping[UavId, Look]) -> None:
     for uavs in _start_groups(mission):
         colour = looks[uavs[0].id].colour if len(uavs) == 1 else _SHARED
         axes.plot(
@@ -232,9 +237,7 @@ def _middle_m(uavs: Sequence[Uav]) -> tuple[float, float]:
     return float(east_m), float(north_m)
 
 
-def _draw_legend(
-    figure: Figure, mission: Mission, plan: Plan, looks: Mapping[UavId, _Look]
-) -> None:
+def _draw_legend(figure: Figure, mission: Mission, plan: Plan, looks: Mapping[UavId, Look]) -> None:
     from matplotlib.lines import Line2D
 
     handles: list[Line2D] = []
@@ -248,7 +251,7 @@ def _draw_legend(
                 [],
                 [],
                 color=looks[uav].colour,
-                linestyle=looks[uav].style,
+                linestyle=looks[uav].dashes,
                 linewidth=1.7,
                 label=count if long else _wrapped(f"{uav}:", route),
             )

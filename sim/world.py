@@ -36,7 +36,7 @@ from swarm.events import (
 )
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Message, Status
+from swarm.wire.messages import Epoch, EpochPhase, Message, Status
 
 __all__ = ["QUIET", "Faults", "World"]
 
@@ -96,6 +96,8 @@ class World:
         self._latency_s = latency_s
         self._queue = EventQueue()
         self._wakes: dict[str, float] = {}
+        self._faults_scheduled = False
+        self._observer_wakes_s: float | None = None
         self._coordinator = CoordinatorCore(
             mission,
             method=method,
@@ -116,12 +118,8 @@ class World:
         self._execute_coordinator(self._coordinator.start(0.0))
         for uav, agent in self._agents.items():
             self._execute_agent(uav, agent.start(0.0))
-        for name in self._alive:
+        for name in (COORDINATOR, *self._agents):  # a set would have another order in each process
             self._tell_everyone(PeerSeen(name), sender=None)
-        for uav, lost_at_s in self._faults.lost_at_s.items():
-            self._queue.at(lost_at_s, lambda uav=uav: self._lose(uav))  # type: ignore[misc]
-        if self._faults.coordinator_lost_at_s is not None:
-            self._queue.at(self._faults.coordinator_lost_at_s, lambda: self._lose(COORDINATOR))
         return self._queue.run(limit_s) and not self._alive
 
     # -- processes --------------------------------------------------------------------
@@ -189,6 +187,16 @@ class World:
 
         self._queue.at(deadline_s, tick)
 
+    def _schedule_faults(self, zero_s: float) -> None:
+        """Mission time has begun: from now on things may go wrong."""
+        if self._faults_scheduled:
+            return
+        self._faults_scheduled = True
+        for uav, lost_at_s in self._faults.lost_at_s.items():
+            self._queue.at(zero_s + lost_at_s, lambda uav=uav: self._lose(uav))  # type: ignore[misc]
+        if (lost_at := self._faults.coordinator_lost_at_s) is not None:
+            self._queue.at(zero_s + lost_at, lambda: self._lose(COORDINATOR))
+
     def _lose(self, name: str) -> None:
         if name in self._alive:
             self._leave(name)
@@ -203,6 +211,8 @@ class World:
     # -- bus ----------------------------------------------------------------------------
 
     def _publish(self, sender: str, message: Message) -> None:
+        if isinstance(message.body, Epoch) and message.body.phase is EpochPhase.RUNNING:
+            self._schedule_faults(self._queue.now_s() - message.body.mission_s)
         if isinstance(message.body, Status):
             self._later(self._latency_s, lambda: self._observe(Heard(message)))
             return
@@ -232,6 +242,10 @@ class World:
 
     def _observe(self, fact: BusFact) -> None:
         self.observer.step(fact, self._queue.now_s())
+        deadline_s = self.observer.next_deadline_s()
+        if deadline_s is not None and self._observer_wakes_s != deadline_s:
+            self._observer_wakes_s = deadline_s
+            self._queue.at(deadline_s, lambda: self._observe(Tick()))
 
     def _later(self, delay_s: float, callback: Callable[[], None]) -> None:
         self._queue.at(self._queue.now_s() + delay_s, callback)

@@ -94,6 +94,9 @@ def console_main() -> int:
         # What is still buffered can reach nobody; the interpreter must not try again at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = _FAILED
+    daemon = sys.modules.get("swarm.process")
+    if daemon is not None:  # loaded by commands that use the bus: one may hang at the exit
+        daemon.leave(status)
     return status
 
 

@@ -41,6 +41,10 @@ class Timing:
     """Interval at which a process that lacks the brief asks for it again."""
     linger_s: float = 2.0
     """Without a coordinator: how long after the last task agents wait before going home."""
+    abandon_s: float = 60.0
+    """Without a coordinator: how long airborne agents wait for a mission to start."""
+    stalemate_s: float = 30.0
+    """How long a fleet may leave open tasks to themselves before the mission ends."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):

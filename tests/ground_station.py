@@ -110,7 +110,7 @@ class GroundStation:
         assert self.set_mode(GUIDED) == ACCEPTED
         assert self.arm() == ACCEPTED
         assert self.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height_m) == ACCEPTED
-        self.wait(height_m / 2.5 + 0.1)
+        self.wait(self.vehicle.config.spool_up_s + height_m / 2.5 + 0.1)
 
     def upload(self, *items: Any) -> int:
         """Upload a mission the vehicle asks for item by item; the type of its MISSION_ACK."""
@@ -148,7 +148,9 @@ class GroundStation:
 
 def ground_station(**config: Any) -> GroundStation:
     """A ground station connected to a vehicle that has just been powered up."""
-    vehicle = Vehicle(VehicleConfig(**{"system_id": 1, **config}), ArduCopter(), 0.0)
+    vehicle = Vehicle(
+        VehicleConfig(**{"system_id": 1, "spool_up_s": 0.0, **config}), ArduCopter(), 0.0
+    )
     return GroundStation(vehicle)
 
 

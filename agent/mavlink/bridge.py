@@ -263,7 +263,7 @@ class Bridge:
                 self._return(order)
 
     def _begin_preparation(self, order: Prepare) -> None:
-        if fault := self._out_of_bounds(order.position_enu_m):
+        if fault := self.config.out_of_bounds(order.position_enu_m):
             self._actions.append(Refused(order, fault))
             return
         if not (math.isfinite(order.speed_m_s) and order.speed_m_s > 0.0):
@@ -278,7 +278,7 @@ class Bridge:
         if self.phase not in (Phase.HOVERING, Phase.FLYING) or self._flavour is None:
             self._actions.append(Refused(order, f"the vehicle is {self.phase.value}"))
             return
-        if fault := self._out_of_bounds(order.position_enu_m):
+        if fault := self.config.out_of_bounds(order.position_enu_m):
             self._actions.append(Refused(order, fault))
             return
         place = wgs84_from_enu(self.config.origin, order.position_enu_m)
@@ -320,17 +320,6 @@ class Bridge:
     def _refuse_return(self, order: Return, reason: str) -> None:
         self.phase = Phase.HANDED_OVER
         self._actions.append(Refused(order, reason))
-
-    def _out_of_bounds(self, position_enu_m: tuple[float, float, float]) -> str | None:
-        """Why a target must not be sent to the vehicle; None if it may be."""
-        east_m, north_m, up_m = position_enu_m
-        if not all(math.isfinite(c) for c in position_enu_m):
-            return f"target {position_enu_m} is not three finite numbers"
-        if math.hypot(east_m, north_m) > self.config.fence_radius_m:
-            return f"target is farther than {self.config.fence_radius_m:g} m from the origin"
-        if abs(up_m) > self.config.fence_height_m:
-            return f"target height {up_m:g} m is beyond {self.config.fence_height_m:g} m"
-        return None
 
     # What time brings.
 

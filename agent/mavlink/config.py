@@ -94,6 +94,17 @@ class BridgeConfig:
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be a number > 0, not {value}")
 
+    def out_of_bounds(self, position_enu_m: tuple[float, float, float]) -> str | None:
+        """Why a target must not be sent to the vehicle, in words; None if it may be."""
+        east_m, north_m, up_m = position_enu_m
+        if not all(math.isfinite(c) for c in position_enu_m):
+            return f"target {position_enu_m} is not three finite numbers"
+        if math.hypot(east_m, north_m) > self.fence_radius_m:
+            return f"target is farther than {self.fence_radius_m:g} m from the origin"
+        if abs(up_m) > self.fence_height_m:
+            return f"target height {up_m:g} m is beyond {self.fence_height_m:g} m"
+        return None
+
     def for_speedup(self, speedup: float) -> BridgeConfig:
         """The same, but with patience for a vehicle whose time runs ``speedup`` times as fast.
 

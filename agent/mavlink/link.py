@@ -26,7 +26,7 @@ from agent.mavlink.link_address import (
 )
 from swarm.log import get_logger
 
-__all__ = ["Link", "LinkListener", "open_link"]
+__all__ = ["Link", "LinkCounts", "LinkListener", "open_link"]
 
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 2.0

@@ -20,7 +20,7 @@ _REMEDY = (
     "give tcp:HOST:PORT, udpout:HOST:PORT, udpin:HOST:PORT or serial:DEVICE:BAUD, "
     "such as tcp:127.0.0.1:5760"
 )
-_HOST = re.compile(r"\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9_.-]+")
+_HOST = re.compile(r"\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63})*")
 
 
 @dataclass(frozen=True, slots=True)

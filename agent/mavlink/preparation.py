@@ -37,6 +37,8 @@ class _Step:
     tag: str
     what: str
     limit: int
+    effect_timeout_s: float
+    """Wait for the effect of an accepted command to be seen."""
     count: int = 0
     next_at_s: float = -math.inf
     refusal: str = ""
@@ -53,9 +55,11 @@ class Preparation:
         self._commands = commands
         self._flavour = flavour
         _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
-        self._mode = _Step("mode", "setting the guided mode", config.mode_tries)
-        self._arm = _Step("arm", "arming", config.arm_tries)
-        self._takeoff = _Step("takeoff", "takeoff", config.takeoff_tries)
+        wait_s = config.effect_timeout_s
+        self._mode = _Step("mode", "setting the guided mode", config.mode_tries, wait_s)
+        self._arm = _Step("arm", "arming", config.arm_tries, wait_s)
+        # ArduCopter spools up for 3 to 4 s before it leaves the ground.
+        self._takeoff = _Step("takeoff", "takeoff", config.takeoff_tries, 2.0 * wait_s)
         self._steps = {step.tag: step for step in (self._mode, self._arm, self._takeoff)}
         self._highest_m = -math.inf
         self._climbed_at_s = math.inf
@@ -87,8 +91,8 @@ class Preparation:
         if step is not None:
             accepted = ended.ending is Ending.ACCEPTED
             step.refusal = "" if accepted else result_text(ended.result)
-            config = self._config
-            step.next_at_s = now_s + (config.effect_timeout_s if accepted else config.retry_delay_s)
+            wait_s = step.effect_timeout_s if accepted else self._config.retry_delay_s
+            step.next_at_s = now_s + wait_s
         if self._leg is not None:
             self._leg.on_ended(ended)
         return self._speed.on_ended(ended, now_s)

@@ -23,7 +23,7 @@ from swarm.model import Mission, Plan
 __all__ = ["METHODS", "ONLINE_METHODS", "check_online_method", "make_plan"]
 
 METHODS = ("greedy", "lookahead", "guided", "exact")
-ONLINE_METHODS = ("greedy", "lookahead")
+ONLINE_METHODS = ("greedy", "lookahead", "guided")
 """Those whose rule agents can follow by themselves."""
 
 _PROOF_S = 1.0

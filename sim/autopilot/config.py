@@ -58,6 +58,8 @@ class VehicleConfig:
     land_m_s: float = 1.5
     """Landing speed [m/s]."""
     delays: Delays = Delays()
+    spool_up_s: float = 1.0
+    """From an accepted take-off to leaving the ground [s]; 3 to 4 on ArduCopter."""
     touchdown_s: float = 1.0
     """Rest on the ground that makes a landing [s]."""
     endurance_s: float | None = None
@@ -70,5 +72,6 @@ class VehicleConfig:
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
                 raise ValueError(f"{name} must be positive and finite, not {value}")
-        if not 0.0 <= self.touchdown_s < math.inf:
-            raise ValueError(f"touchdown_s must be >= 0, not {self.touchdown_s}")
+        for name in ("spool_up_s", "touchdown_s"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be >= 0, not {getattr(self, name)}")

@@ -23,6 +23,7 @@ class Activity(Enum):
     """What the vehicle is doing."""
 
     GROUNDED = "on the ground"
+    SPOOLING_UP = "spooling up"
     TAKING_OFF = "taking off"
     HOLDING = "holding"
     NAVIGATING = "navigating"
@@ -53,7 +54,9 @@ class Flight:
         self.motion = motion
         self._ground_up_m = config.start_enu_m[2]
         """Height of the flat ground everywhere [m]."""
+        self._spool_up_s = config.spool_up_s
         self._touchdown_s = config.touchdown_s
+        self._take_off_up_m = 0.0
         self._parameters = parameters
         self._cruise_override_m_s: float | None = None
         self._timer_s: float | None = None
@@ -61,7 +64,7 @@ class Flight:
     @property
     def on_ground(self) -> bool:
         """Whether the vehicle knows that it stands on the ground."""
-        return self.activity is Activity.GROUNDED
+        return self.activity in (Activity.GROUNDED, Activity.SPOOLING_UP)
 
     @property
     def cruise_m_s(self) -> float:
@@ -77,11 +80,13 @@ class Flight:
             self.motion.fly_to(self.motion.target_enu_m, speed_m_s, now_s)
 
     def take_off(self, up_m: float, now_s: float) -> None:
-        """Rise straight to a height in the local frame [m]."""
-        east_m, north_m, _ = self.motion.position_enu_m(now_s)
-        self._leave(
-            Activity.TAKING_OFF, (east_m, north_m, up_m), self._speed(Setting.CLIMB_M_S), now_s
-        )
+        """Rise straight to a height in the local frame [m], once the motors are up to it."""
+        self._take_off_up_m = up_m
+        if self.activity is Activity.GROUNDED:
+            self.activity = Activity.SPOOLING_UP
+            self._timer_s = now_s + self._spool_up_s
+        elif self.activity is not Activity.SPOOLING_UP:
+            self._lift(now_s)
 
     def navigate(self, target_enu_m: Point, now_s: float) -> None:
         """Fly straight to a place, in place of whatever was being done."""
@@ -91,25 +96,29 @@ class Flight:
         """Stay in the air where the vehicle is; on the ground, stay there."""
         self.motion.stop(now_s)
         self._timer_s = None
-        if self.activity in (Activity.GROUNDED, Activity.TOUCHED_DOWN):
+        if self.on_ground or self.activity is Activity.TOUCHED_DOWN:
             self.activity = Activity.GROUNDED
         else:
             self.activity = Activity.HOLDING
 
     def land(self, now_s: float) -> None:
         """Descend where the vehicle is; nothing to do on the ground."""
-        if self.activity not in (Activity.GROUNDED, Activity.TOUCHED_DOWN):
+        if self.on_ground:
+            self.hold(now_s)
+        elif self.activity is not Activity.TOUCHED_DOWN:
             self._descend(Activity.LANDING, self._speed(Setting.LAND_M_S), now_s)
 
     def fall(self, now_s: float) -> None:
         """Drop, because the motors stand still."""
-        if self.activity is Activity.TOUCHED_DOWN:
+        if self.on_ground or self.activity is Activity.TOUCHED_DOWN:
             self.hold(now_s)
-        elif self.activity is not Activity.GROUNDED:
+        else:
             self._descend(Activity.FALLING, _FALL_M_S, now_s)
 
     def return_home(self, now_s: float) -> None:
         """Rise to the return height if below it, fly home, wait, land."""
+        if self.on_ground:
+            self.hold(now_s)
         if self.activity in (Activity.GROUNDED, Activity.TOUCHED_DOWN):
             return
         east_m, north_m, up_m = self.motion.position_enu_m(now_s)
@@ -126,6 +135,8 @@ class Flight:
     def advance(self, at_s: float) -> Milestone:
         """End the current activity at its deadline ``at_s`` and begin what follows."""
         match self.activity:
+            case Activity.SPOOLING_UP:
+                self._lift(at_s)
             case Activity.TAKING_OFF:
                 self.hold(at_s)
                 return Milestone.TAKEN_OFF
@@ -153,6 +164,11 @@ class Flight:
             case Activity.GROUNDED | Activity.HOLDING:
                 pass
         return Milestone.UNDERWAY
+
+    def _lift(self, now_s: float) -> None:
+        east_m, north_m, _ = self.motion.position_enu_m(now_s)
+        target_enu_m = (east_m, north_m, self._take_off_up_m)
+        self._leave(Activity.TAKING_OFF, target_enu_m, self._speed(Setting.CLIMB_M_S), now_s)
 
     def _speed(self, setting: Setting) -> float:
         return max(_LEAST_SPEED_M_S, self._parameters.value_si(setting))

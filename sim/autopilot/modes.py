@@ -33,8 +33,3 @@ class Mode(Enum):
     def controls_position(self) -> bool:
         """Whether the autopilot itself holds the horizontal position."""
         return self not in (Mode.STABILIZE, Mode.ALT_HOLD)
-
-    @property
-    def armable(self) -> bool:
-        """Whether a ground station may arm in it."""
-        return self not in (Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE)

@@ -93,11 +93,19 @@ class ParameterTable:
 class ParameterServer:
     """Answers what ground stations ask of the table."""
 
-    def __init__(self, table: ParameterTable, outbox: Outbox, *, reports_errors: bool) -> None:
+    def __init__(
+        self,
+        table: ParameterTable,
+        outbox: Outbox,
+        *,
+        reports_errors: bool,
+        unanswered: frozenset[str],
+    ) -> None:
         self._table = table
         self._outbox = outbox
         self._reports_errors = reports_errors
         """Whether the firmware knows PARAM_ERROR; otherwise it keeps silent."""
+        self._unanswered = unanswered
 
     def announce(self, name: str, value: float) -> None:
         """Change a value from inside and tell everybody."""
@@ -131,7 +139,7 @@ class ParameterServer:
             self.announce(parameter.name, value)
 
     def _refuse(self, message: mavlink.MAVLink_message, error: int, sender: Sender) -> None:
-        if self._reports_errors:
+        if self._reports_errors and message.param_id not in self._unanswered:
             self._outbox.reply(
                 sender,
                 mavlink.MAVLink_param_error_message(

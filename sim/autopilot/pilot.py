@@ -59,7 +59,10 @@ class Pilot:
         self.outbox = outbox
         self.parameters = parameters
         self.parameter_server = ParameterServer(
-            self.parameters, outbox, reports_errors=flavour.reports_parameter_errors
+            self.parameters,
+            outbox,
+            reports_errors=flavour.reports_parameter_errors,
+            unanswered=flavour.unanswered_parameters,
         )
         self.readiness = Readiness(config.delays, boot_s)
         self.flight = Flight(config, self.parameters, IdealMotion(config.start_enu_m))
@@ -72,7 +75,7 @@ class Pilot:
         self._auto_armed = False
         """The vehicle may leave the ground in AUTO."""
         self._position_control = False
-        """GUIDED flies to places already, so that an ordered speed is kept."""
+        """A place was flown to since GUIDED was entered or the vehicle took off."""
         self._disarm_s: float | None = None
         self._prearm_text_s = boot_s + _PREARM_TEXT_S
         self._armed_s = 0.0
@@ -108,28 +111,26 @@ class Pilot:
         return due
 
     def _pass_stage(self, at_s: float) -> None:
-        info = mavlink.MAV_SEVERITY_INFO
-        match self.readiness.advance():
+        stage = self.readiness.advance()
+        match stage:
             case Stage.BOOTED:
                 # A mode that was set meanwhile was acknowledged, and is lost here.
                 self.mode = self.flavour.boot_mode
                 self._mode_changed(at_s)
-                self.outbox.text(info, "ArduPilot Ready")
-            case Stage.SENSORS:
-                pass
             case Stage.ORIGIN:
                 self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(at_s)))
                 self.set_home(self.position_enu_m(at_s), at_s, lock=False)
-                self.outbox.text(info, "EKF3 IMU0 origin set")
                 self.parameter_server.announce("MIS_TOTAL", float(max(1, len(self.store.items))))
-            case Stage.POSITION:
-                self.outbox.text(info, "EKF3 IMU0 is using GPS")
+            case Stage.SENSORS | Stage.POSITION:
+                pass
+        if stage in self.flavour.stage_texts:
+            self.outbox.text(mavlink.MAV_SEVERITY_INFO, self.flavour.stage_texts[stage])
 
     def _say_obstacle(self, at_s: float) -> None:
         self._prearm_text_s = at_s + _PREARM_TEXT_S
         obstacle = self.readiness.obstacle(self.mode)
         if obstacle is not None and not self.armed:
-            self.outbox.text(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {obstacle}")
+            self.outbox.text(mavlink.MAV_SEVERITY_CRITICAL, self.flavour.not_ready(obstacle))
 
     def _advance_flight(self, at_s: float) -> None:
         milestone = self.flight.advance(at_s)
@@ -201,19 +202,16 @@ class Pilot:
         else:
             # In manual modes too: a pilot who takes over is taken to hold the place.
             self.flight.hold(now_s)
-            if self.flight.on_ground and self._disarm_s is None:
-                self._arm_delay(now_s)
+        if self.flight.on_ground and self.run.state is not RunState.RUNNING:
+            self._stay_on_ground(now_s)
 
     def arm(self, now_s: float, *, forced: bool) -> bool:
         """Start the motors; False, with a text, while the vehicle isn't ready."""
         if self.armed:
             return True
-        obstacle = None if forced else self.readiness.obstacle(self.mode)
-        if obstacle is None and not forced and not self.mode.armable:
-            obstacle = f"{self.mode.value} mode not armable"
-        if obstacle is not None or not self.flight.on_ground:
-            obstacle = obstacle or "Falling"
-            self.outbox.text(mavlink.MAV_SEVERITY_CRITICAL, f"Arm: {obstacle}")
+        obstacle = self._arming_obstacle(forced=forced)
+        if obstacle is not None:
+            self.outbox.text(mavlink.MAV_SEVERITY_CRITICAL, self.flavour.cannot_arm(obstacle))
             return False
         self.armed = True
         self._armed_since_s = now_s
@@ -224,6 +222,15 @@ class Pilot:
             self.set_home(here_enu_m, now_s, lock=False)
         self.outbox.text(mavlink.MAV_SEVERITY_INFO, "Arming motors")
         return True
+
+    def _arming_obstacle(self, *, forced: bool) -> str | None:
+        if not self.flight.on_ground:
+            return "Falling"
+        obstacle = self.readiness.obstacle(self.mode)
+        if obstacle is None and self.mode in self.flavour.unarmable_modes:
+            obstacle = f"{self.mode.value} mode not armable"
+        # Force overcomes checks, but starts no motors of a computer that is still booting.
+        return None if forced and self.readiness.booted else obstacle
 
     def disarm(self, now_s: float, *, forced: bool) -> bool:
         """Stop the motors; False in the air, unless forced."""
@@ -247,6 +254,12 @@ class Pilot:
         self.flight.fall(now_s)
         self.outbox.text(mavlink.MAV_SEVERITY_INFO, "Disarming motors")
 
+    def _stay_on_ground(self, now_s: float) -> None:
+        """Give up a take-off that has not begun to rise; the motors stop after the usual delay."""
+        self.flight.hold(now_s)
+        if self._disarm_s is None:
+            self._arm_delay(now_s)
+
     def _arm_delay(self, now_s: float) -> None:
         delay_s = self.parameters.value_si(Setting.DISARM_DELAY_S)
         self._disarm_s = now_s + delay_s if delay_s > 0.0 else None
@@ -268,15 +281,20 @@ class Pilot:
         self.flight.take_off(up_m, now_s)
 
     def fly_guided(self, target_enu_m: Point, now_s: float) -> None:
-        """Fly to a place at once, in GUIDED; on the ground the target is taken and not flown."""
-        if not self.armed or self.flight.on_ground:
+        """Fly to a place at once, in GUIDED.
+
+        On the ground the target is taken and not flown; worse, it takes the place
+        of a take-off that has not left the ground yet, as on ArduCopter.
+        """
+        if not self.armed:
+            return
+        if self.flight.on_ground:
+            self._stay_on_ground(now_s)
             return
         if not self._position_control:
-            # ArduCopter gives the speed parameter its say again when its position
-            # controller starts: at the first target after GUIDED was entered or after
-            # a take-off. A speed that was ordered before is lost.
             self._position_control = True
-            self.flight.override_cruise(None, now_s)
+            if self.flavour.forgets_speed:
+                self.flight.override_cruise(None, now_s)
         self.flight.navigate(target_enu_m, now_s)
 
     def change_speed(self, speed_m_s: float, now_s: float) -> bool:
@@ -336,7 +354,9 @@ class Pilot:
 
     def mission_navigate(self, item: MissionItem, now_s: float) -> None:
         """Fly to the place of the item; not from the ground."""
-        if not self.flight.on_ground:
+        if self.flight.on_ground:
+            self._stay_on_ground(now_s)
+        else:
             self.flight.navigate(self._place(item, now_s), now_s)
 
     def mission_land(self, now_s: float) -> None:

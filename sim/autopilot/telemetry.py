@@ -59,6 +59,7 @@ DATA_STREAMS: dict[int, tuple[int, ...]] = {
         mavlink.MAVLINK_MSG_ID_SYS_STATUS,
         mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
         mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+        mavlink.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
     ),
     mavlink.MAV_DATA_STREAM_POSITION: (
         mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
@@ -90,6 +91,7 @@ class Telemetry:
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
             mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+            mavlink.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self._navigation,
             mavlink.MAVLINK_MSG_ID_VFR_HUD: self._vfr_hud,
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self._battery,
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._version,
@@ -245,6 +247,18 @@ class Telemetry:
             self._heading_cdeg(now_s),
         )
 
+    def _navigation(self, now_s: float) -> mavlink.MAVLink_message:
+        here, target = self._pilot.position_enu_m(now_s), self._pilot.flight.motion.target_enu_m
+        east_m, north_m, up_m = (to - at for to, at in zip(target, here, strict=True))
+        bearing_deg = round(math.degrees(math.atan2(east_m, north_m)))
+        return mavlink.MAVLink_nav_controller_output_message(
+            *(0.0, 0.0),
+            round(self._heading_deg),
+            bearing_deg,
+            min(65535, round(math.hypot(east_m, north_m))),
+            *(up_m, 0.0, 0.0),
+        )
+
     def _vfr_hud(self, now_s: float) -> mavlink.MAVLink_message:
         ground_speed_m_s = self._ground_speed_m_s(now_s)
         return mavlink.MAVLink_vfr_hud_message(
@@ -297,6 +311,7 @@ class Telemetry:
         del now_s
         landed = {
             Activity.GROUNDED: mavlink.MAV_LANDED_STATE_ON_GROUND,
+            Activity.SPOOLING_UP: mavlink.MAV_LANDED_STATE_ON_GROUND,
             Activity.TAKING_OFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
             Activity.LANDING: mavlink.MAV_LANDED_STATE_LANDING,
             Activity.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,

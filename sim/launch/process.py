@@ -111,28 +111,36 @@ class Child:
             ChildFailedError: it ended or said nothing in time.
         """
         said: list[dict[str, Any]] = []
-        ended = asyncio.ensure_future(self.ended())
+        ended = asyncio.get_running_loop().create_task(self.ended())
         try:
             async with asyncio.timeout(READY_TIMEOUT_S):
                 while len(said) < count:
-                    line = asyncio.ensure_future(self._lines.get())
-                    await asyncio.wait((line, ended), return_when=asyncio.FIRST_COMPLETED)
-                    if not line.done():
-                        line.cancel()
-                        raise ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
-                    said.append(line.result())
+                    said.append(await self._next_line(ended))
         except TimeoutError:
             raise ChildFailedError(
                 f"{self.name} was not ready within {READY_TIMEOUT_S:g} s: {self.last_words()}"
             ) from None
         finally:
             ended.cancel()
+            await asyncio.gather(ended, return_exceptions=True)
         return said
+
+    async def _next_line(self, ended: asyncio.Task[int]) -> dict[str, Any]:
+        line = asyncio.get_running_loop().create_task(self._lines.get())
+        try:
+            await asyncio.wait((line, ended), return_when=asyncio.FIRST_COMPLETED)
+            if line.done():
+                return line.result()
+            raise ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
+        finally:
+            line.cancel()
+            await asyncio.gather(line, return_exceptions=True)
 
     async def ended(self) -> int:
         """Wait for its end and for all it had to say; its exit status."""
         code = await self._started.wait()
-        await asyncio.gather(*self._readers, return_exceptions=True)
+        # Unlike a gathering, a wait that is cancelled lets the readers go on.
+        await asyncio.wait(self._readers)
         return code
 
     async def stop(self) -> None:

@@ -36,7 +36,7 @@ ROUTER = "router"
 PATIENCE = 4.0
 """A mission may take this many times its planned time..."""
 PATIENCE_S = 60.0
-"""...and this much longer [vehicle s], before it is given up."""
+"""...and this much longer, before it is given up [s of mission or wall, whichever is slower]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,8 @@ class _Launch:
             failed = child.returncode not in (None, 0) and not child.stopped
             told = any(fate.startswith(f"{child.name}:") for fate in self.fates)
             if failed and not told:
-                self.fates.append(f"{child.name}: {child.fate}")
+                words = f" ({child.last_words()})" if (child.returncode or 0) > 0 else ""
+                self.fates.append(f"{child.name}: {child.fate}{words}")
 
     @property
     def over(self) -> str | None:
@@ -134,18 +135,17 @@ class _Launch:
         router = self.child(ROUTER)
         if router is not None and router.returncode is not None:
             return f"the router {router.fate}"
-        limit_s = self._limit_s()
-        if limit_s is not None and self.clock.now_s() > limit_s:
+        if self.clock.now_s() > self._limit_s():
             return "it took far longer than planned"
         return None
 
-    def _limit_s(self) -> float | None:
-        plan, observer = self.observer.plan, self.observer
+    def _limit_s(self) -> float:
+        plan, fast = self.observer.plan, max(1.0, self.options.speedup)
+        patience_s = PATIENCE_S * fast
         if self.zero_s is None or plan is None:
-            return self.options.start_timeout_s + PATIENCE_S * self.options.speedup
-        latest_s = max((task.appears_s for task in observer.mission.tasks), default=0.0)
+            return self.options.start_timeout_s * fast + patience_s
+        latest_s = max((task.appears_s for task in self.mission.tasks), default=0.0)
         planned_s = max(plan.completion_s.values(), default=0.0)
-        patience_s = PATIENCE_S * max(1.0, self.options.speedup)
         return self.zero_s + latest_s + PATIENCE * planned_s + patience_s
 
 
@@ -172,6 +172,7 @@ async def fly(
         BusError: the bus could not be opened.
     """
     launch = _Launch(mission, options, on_log)
+    on_frame(launch.observer, launch.clock.now_s())
     try:
         layout = await launch.start()
         async with _watching(launch, layout):

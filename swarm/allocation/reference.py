@@ -161,7 +161,7 @@ def tour_worth(
     leg_s: FloatArray,
     horizon_s: float,
 ) -> float:
-    """Worth of a tour of positions, S = 1 before it; other arguments as of `swarm.kernels.tours`."""
+    """Worth of a tour of positions, S = 1 before it; other arguments: `swarm.kernels.tours`."""
     total, survived, time_s, last = 0.0, 1.0, 0.0, -1
     for task in tour:
         time_s = float(completion_s[task]) if last < 0 else time_s + float(leg_s[last, task])
@@ -214,9 +214,8 @@ def _arrive(
 ) -> tuple[float, list[float]]:
     """Completion time [s] and place after flying to ``task`` and serving it."""
     there = [float(c) for c in problem.task_enu_m[task]]
-    distance_m = math.sqrt(
-        (there[0] - place[0]) ** 2 + (there[1] - place[1]) ** 2 + (there[2] - place[2]) ** 2
-    )
+    east_m, north_m, up_m = (there[axis] - place[axis] for axis in range(3))
+    distance_m = math.sqrt(east_m * east_m + north_m * north_m + up_m * up_m)
     travel_s = distance_m / float(problem.speed_m_s[uav])
     return free_s + travel_s + float(problem.service_s[task]), there
 

@@ -210,12 +210,13 @@ class ZenohBus:
         """Receive a `Sample` for everything others publish on ``key_expr``."""
         self._check_open()
         check_key_expr(key_expr)
-        if key_expr not in self._subscribed:
+        is_new = key_expr not in self._subscribed
+        self._subscribed[key_expr] = latest  # before the first sample can arrive
+        if is_new:
             on_sample = _direct(partial(self._on_sample, key_expr))
             declare = self._session.declare_subscriber
             remote = zenoh.Locality.REMOTE
             self._call(lambda: declare(key_expr, on_sample, allowed_origin=remote))
-        self._subscribed[key_expr] = latest
 
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token on ``key``."""

@@ -5,14 +5,17 @@ Leaves out: claims (swarm.state.claims).
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from enum import StrEnum
 
-from swarm.allocation.problem import Problem
+import numpy as np
+
+from swarm.allocation.problem import BoolArray, Problem
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.state.registers import Replica
-from swarm.wire.messages import Board, Brief, Outcome, Result
+from swarm.wire.messages import Board, Brief, ClaimPhase, Result
 
-__all__ = ["TaskBoard", "TaskState", "attempts", "first_done", "mission_of"]
+__all__ = ["TaskBoard", "TaskState", "doable", "mission_of"]
 
 
 class TaskState(StrEnum):
@@ -24,16 +27,29 @@ class TaskState(StrEnum):
     WITHDRAWN = "withdrawn"
 
 
-def attempts(replica: Replica, task: str) -> list[tuple[str, Outcome]]:
-    """(UAV id, outcome) of every ended attempt at ``task``, earliest first."""
-    found = [(uav, outcome) for (uav, name), outcome in replica.outcomes.items() if name == task]
-    return sorted(found, key=lambda item: (item[1].completed_s, item[0]))
+def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
+    """Open tasks that some UAV taking part in the mission is capable of, in board order.
 
-
-def first_done(replica: Replica, task: str) -> tuple[str, Outcome] | None:
-    """The visit that counts: the earliest that succeeded."""
-    done = (item for item in attempts(replica, task) if item[1].result is Result.DONE)
-    return next(done, None)
+    Args:
+        board: of the mission.
+        present: writers believed alive; the lost take no part.
+    """
+    problem = board.problem
+    if problem is None:
+        return []
+    claims = board.replica.claims
+    able = [
+        index
+        for index, uav in enumerate(problem.uav_ids)
+        if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
+    ]
+    can: BoolArray = np.any(problem.capable[able, :], axis=0)
+    states = board.states  # in board order, as the problem's tasks are
+    return [
+        task
+        for (task, state), somebody_can in zip(states.items(), can, strict=True)
+        if state is TaskState.OPEN and somebody_can
+    ]
 
 
 class TaskBoard:

@@ -19,8 +19,27 @@ class Membership:
         self._timing = timing
         self._doubted_until_s: dict[str, float] = {}
         self._linked = True
+        self._interrupted: set[str] = set()
+        self._ghosts: set[str] = set()
         self.present: set[str] = set()
         """Writers believed to be there."""
+
+    @property
+    def credible(self) -> set[str]:
+        """Writers believed to be there whose claims count.
+
+        Whoever was lost and is back may be a new process that knows nothing of what
+        the old one claimed: its claim counts again once it has said so itself.
+        """
+        return self.present - self._ghosts
+
+    @property
+    def steady(self) -> set[str]:
+        """Writers that are there and remember all they ever said, so answer for themselves.
+
+        A token that went and came back may be a new process's, which must be told.
+        """
+        return self.present - self._interrupted
 
     def seen(self, writer: str) -> bool:
         """``writer``'s token is there; whether it was not present before."""
@@ -29,10 +48,19 @@ class Membership:
         self.present.add(writer)
         return new
 
+    def spoke(self, writer: str) -> None:
+        """``writer`` itself has just said what it claims."""
+        self._ghosts.discard(writer)
+        if writer not in self._doubted_until_s:
+            self._interrupted.discard(writer)
+
     def gone(self, writer: str, now_s: float) -> None:
         """``writer``'s token has disappeared."""
-        if writer in self.present:
-            self._doubted_until_s[writer] = now_s + self._timing.loss_delay_s
+        if writer not in self.present:
+            return
+        self._doubted_until_s[writer] = now_s + self._timing.loss_delay_s
+        if self._linked:
+            self._interrupted.add(writer)
 
     def link(self, up: bool, now_s: float) -> None:
         """The own link came up or went down."""
@@ -49,6 +77,8 @@ class Membership:
         for writer in lost:
             del self._doubted_until_s[writer]
             self.present.discard(writer)
+            self._ghosts.add(writer)
+            self._interrupted.add(writer)
         return lost
 
     def next_deadline_s(self) -> float | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from swarm.wire.codec import encode, key_of
-from swarm.wire.messages import Board, Brief, Claim, Epoch, Message, Outcome, Stamp, Status
+from swarm.wire.messages import Board, Brief, Claim, Epoch, Message, Outcome, Status
 
 __all__ = ["Replica"]
 
@@ -76,10 +76,9 @@ class Replica:
         """Everyone who has said something."""
         return {message.writer for message in self._registers.values()}
 
-    def newest_stamp(self, writer: str) -> Stamp | None:
-        """The highest stamp known of ``writer``."""
-        stamps = [m.stamp for m in self._registers.values() if m.writer == writer]
-        return max(stamps, default=None)
+    def known(self, message: Message) -> Message | None:
+        """What is known of the register that ``message`` is about."""
+        return self._registers.get(key_of(message))
 
 
 def _beats(new: Message, known: Message) -> bool:

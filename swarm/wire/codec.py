@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from functools import cache
 from typing import Any, Final
 
 import msgpack
@@ -93,15 +94,21 @@ def _packable(message: Message | Snapshot) -> list[Any]:
     ]
 
 
+@cache
+def _bodies(kind: str) -> TypeAdapter[Body]:
+    return TypeAdapter(_KINDS[kind])
+
+
+@cache
+def _stamps() -> TypeAdapter[Stamp]:
+    return TypeAdapter(Stamp)
+
+
 class Codec:
     """Decodes what one mission's processes say, and counts what it drops."""
 
     def __init__(self, mission: str) -> None:
         self._mission = mission
-        self._bodies: dict[str, TypeAdapter[Body]] = {
-            name: TypeAdapter(kind) for name, kind in _KINDS.items()
-        }
-        self._stamps = TypeAdapter(Stamp)
         self.dropped: Counter[str] = Counter()
         """Messages dropped so far, by reason."""
 
@@ -152,12 +159,11 @@ class Codec:
         _require(version == SCHEMA_VERSION, "unknown version")
         _require(mission == self._mission, "another mission")
         _require(isinstance(writer, str) and valid_id(writer), "malformed")
-        adapter = self._bodies.get(kind) if isinstance(kind, str) else None
-        if adapter is None:
+        if not isinstance(kind, str) or kind not in _KINDS:
             raise _UnacceptableError("unknown kind")
         try:
-            stamp = self._stamps.validate_python({"incarnation": incarnation, "counter": counter})
-            body = adapter.validate_python(fields)
+            stamp = _stamps().validate_python({"incarnation": incarnation, "counter": counter})
+            body = _bodies(kind).validate_python(fields)
         except (ValidationError, RecursionError):
             raise _UnacceptableError("malformed") from None
         from_coordinator = isinstance(body, Brief | Epoch | Board)

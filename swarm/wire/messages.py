@@ -15,6 +15,7 @@ from annotated_types import Ge, Gt, Le, Len, Predicate
 from pydantic import Strict
 
 from swarm.model import Origin, valid_id
+from swarm.model.ids import COORDINATOR
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -94,8 +95,8 @@ class Brief:
 
     def __post_init__(self) -> None:
         Origin(*self.origin)
-        if len({uav.id for uav in self.uavs}) != len(self.uavs):
-            raise ValueError("UAV ids must differ")
+        if len({COORDINATOR, *(uav.id for uav in self.uavs)}) != 1 + len(self.uavs):
+            raise ValueError("UAV ids must differ, from each other and from the coordinator's")
 
 
 class EpochPhase(StrEnum):
@@ -121,6 +122,8 @@ class Epoch:
     """Mission time at which this statement was made [s]."""
     reason: Annotated[str, Strict(), Len(0, 200)]
     """Why this epoch, in words."""
+    routes: Mapping[Id, tuple[Id, ...]]
+    """Planned task lists by UAV; what rules make of them is theirs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +188,7 @@ class Outcome:
 
     task: Id
     result: Result
-    attempt: Annotated[int, Strict(), Ge(1)]
+    attempt: Annotated[int, Strict(), Ge(1), Le(2**63 - 1)]
     completed_s: Number
     """Mission time [s]."""
 

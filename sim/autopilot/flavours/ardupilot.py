@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.modes import Mode
 from sim.autopilot.params import Parameter, Setting
+from sim.autopilot.readiness import Stage
 
 __all__ = ["ArduCopter"]
 
@@ -66,13 +67,34 @@ class ArduCopter:
     take_off_above_home: bool = True
     uploads_by_int: bool = False
     first_item: int = 1
+    unanswered_parameters: frozenset[str] = frozenset({"SYSID_THISMAV"})
+    """As recorded: the old name of a renamed parameter got neither value nor error."""
     unasked_streams: Mapping[int, float] = MappingProxyType({})
+
+    stage_texts: Mapping[Stage, str] = MappingProxyType(
+        {
+            Stage.BOOTED: "ArduPilot Ready",
+            Stage.ORIGIN: "EKF3 IMU0 origin set",
+            Stage.POSITION: "EKF3 IMU0 is using GPS",
+        }
+    )
+    unarmable_modes: frozenset[Mode] = frozenset({Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE})
+    forgets_speed: bool = True
+    """Its position controller starts with the speed parameter at the first target."""
 
     def __init__(self, *, old_names: bool = False) -> None:
         self._old_names = old_names
         self.reports_parameter_errors: bool = not old_names
         minor = 6 if old_names else 8
         self.version: int = 4 << 24 | minor << 16
+
+    def cannot_arm(self, obstacle: str) -> str:
+        """What is said to people when arming is refused."""
+        return f"Arm: {obstacle}"
+
+    def not_ready(self, obstacle: str) -> str:
+        """What is said to people, now and then, while arming would be refused."""
+        return f"PreArm: {obstacle}"
 
     def parameters(self, config: VehicleConfig) -> tuple[Parameter, ...]:
         """The parameter table at power-up."""

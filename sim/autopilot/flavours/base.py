@@ -11,6 +11,7 @@ from typing import Protocol
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.modes import Mode
 from sim.autopilot.params import Parameter
+from sim.autopilot.readiness import Stage
 
 __all__ = ["Flavour"]
 
@@ -36,8 +37,26 @@ class Flavour(Protocol):
     """Number of the first mission item that is flown: 1 where item 0 is home."""
     reports_parameter_errors: bool
     """Whether an unknown parameter is answered by PARAM_ERROR; otherwise by nothing."""
+    unanswered_parameters: frozenset[str]
+    """Unknown parameters that are answered by nothing all the same."""
     unasked_streams: Mapping[int, float]
     """Messages and intervals [s] streamed on a new channel; heartbeats go without saying."""
+
+    stage_texts: Mapping[Stage, str]
+    """What is said to people when something has become ready."""
+    unarmable_modes: frozenset[Mode]
+    """Modes in which a ground station can't arm."""
+    forgets_speed: bool
+    """Whether a speed ordered before the first target, after the commanded mode was entered
+    or after a take-off, is lost."""
+
+    def cannot_arm(self, obstacle: str) -> str:
+        """What is said to people when arming is refused."""
+        ...
+
+    def not_ready(self, obstacle: str) -> str:
+        """What is said to people, now and then, while arming would be refused."""
+        ...
 
     def parameters(self, config: VehicleConfig) -> tuple[Parameter, ...]:
         """The parameter table at power-up; it has every `Setting`."""

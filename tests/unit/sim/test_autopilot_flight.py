@@ -73,6 +73,51 @@ def test_take_off_is_refused_when_disarmed_or_not_guided_or_flying_or_downwards(
     assert ground.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, 20.0) == FAILED
 
 
+def test_vehicle_leaves_the_ground_once_its_motors_are_up_to_it() -> None:
+    ground = ground_station(spool_up_s=3.0)
+    ground.wait(5.0)
+    ground.set_mode(GUIDED)
+    ground.arm()
+    ground.wait(9.0)  # the usual disarming no longer counts once a take-off is accepted
+    assert ground.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, 10.0) == ACCEPTED
+    ground.wait(2.0)
+    assert ground.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, 5.0) == ACCEPTED
+    assert landed_state(ground) == ON_GROUND
+
+    ground.wait(2.0)
+    assert ground.position_enu_m == (0.0, 0.0, 2.5)
+    ground.wait(5.0)
+    assert ground.position_enu_m == (0.0, 0.0, 5.0)
+
+
+def test_target_given_before_the_vehicle_leaves_the_ground_undoes_the_take_off() -> None:
+    ground = ground_station(spool_up_s=3.0)
+    ground.wait(5.0)
+    ground.set_mode(GUIDED)
+    ground.arm()
+    ground.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, 10.0)
+    assert ground.reposition(5.0, 5.0, 10.0) == ACCEPTED
+
+    ground.wait(9.0)
+    assert ground.position_enu_m == (0.0, 0.0, 0.0)
+    ground.wait(1.1)
+    assert ground.texts()[-1] == "Disarming motors"
+
+
+@pytest.mark.parametrize("mode", [LOITER, LAND, RTL])
+def test_mode_changed_before_the_vehicle_leaves_the_ground_undoes_the_take_off(mode: int) -> None:
+    ground = ground_station(spool_up_s=3.0)
+    ground.wait(5.0)
+    ground.set_mode(GUIDED)
+    ground.arm()
+    ground.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, 10.0)
+    assert ground.set_mode(mode) == ACCEPTED
+
+    ground.wait(10.1)
+    assert ground.position_enu_m == (0.0, 0.0, 0.0)
+    assert not ground.vehicle.pilot.armed
+
+
 def test_reposition_flies_straight_at_cruise_speed_and_stops_there() -> None:
     ground = ground_station(cruise_m_s=5.0)
     ground.take_off(10.0)

@@ -271,13 +271,12 @@ def test_waypoint_is_reached_when_its_hold_time_is_over() -> None:
 def test_whole_flight_from_take_off_to_landing_by_mission() -> None:
     ground = ground_station(cruise_m_s=10.0)
     ground.wait(5.0)
-    nowhere = {"east_m": 0.0, "north_m": 0.0}
     items = [
         ground.item(0),
         ground.item(1, height_m=10.0, command=mavlink.MAV_CMD_NAV_TAKEOFF),
         ground.item(2, command=mavlink.MAV_CMD_DO_CHANGE_SPEED, params=(1.0, 2.0, -1.0, 0.0)),
         ground.item(3, 0.0, 10.0, 10.0),
-        ground.item(4, **nowhere, command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+        ground.item(4, command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH),
     ]
     assert ground.upload(*items) == 0
     ground.set_mode(GUIDED)

@@ -44,6 +44,7 @@ def test_every_kind_of_link_is_read_and_written(url: str, address: LinkAddress) 
         ("udpout:localhost:0", "port 0 is not within 1..65535"),
         ("udpout:localhost:65536", "port 65536 is not within 1..65535"),
         ("tcp:a b:1", "'a b' is no host"),
+        ("tcp:a..b:1", "'a..b' is no host"),
         ("serial:/dev/ttyACM0", "a part is missing"),
         ("serial:/dev/ttyACM0:0", "0 is no baud rate"),
     ],

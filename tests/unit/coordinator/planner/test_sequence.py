@@ -202,3 +202,41 @@ def test_no_uav_and_no_task_are_searched_without_complaint() -> None:
 
         assert found.sequence == tuple(range(n_uav))
         assert found.objective == 0.0
+
+
+def one_depot_problem(n_uav: int, n_task: int) -> Problem:
+    """Different UAVs from one place to tasks in a row: nearly every order begins differently."""
+    template = random_problem(np.random.default_rng(6), n_uav, n_task)
+    return Problem(
+        uav_ids=template.uav_ids,
+        task_ids=template.task_ids,
+        start_enu_m=np.zeros((n_uav, 3)),
+        task_enu_m=template.task_enu_m,
+        speed_m_s=template.speed_m_s,
+        value=np.array([2.0**i for i in range(n_task)]),
+        service_s=template.service_s,
+        success=template.success,
+        survival=template.survival,
+        horizon_s=60.0,
+    )
+
+
+def test_many_first_rounds_are_climbed_and_then_all_tried() -> None:
+    problem = one_depot_problem(6, 10)
+
+    found = best_sequence(problem, rule_by_name("greedy"), rng())
+
+    assert found.exhaustive
+    assert 200 < found.evaluations <= 720
+    assert found.objective == pytest.approx(best_of_all(problem, "greedy"))
+
+
+def test_stopped_among_many_first_rounds_the_climb_has_paid() -> None:
+    problem = one_depot_problem(6, 10)
+    rule = rule_by_name("greedy")
+
+    found = best_sequence(problem, rule, rng(), after_evaluations(150))
+
+    assert not found.exhaustive
+    best = best_of_all(problem, "greedy")
+    assert found.objective >= 0.99 * best

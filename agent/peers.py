@@ -1,0 +1,71 @@
+"""What one agent makes of the others: whose claims count, and who may yet decide first.
+
+Leaves out: what they said (swarm.state.registers) and what follows for the own task
+(agent.core).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from swarm.config import Timing
+from swarm.state.membership import Membership
+from swarm.state.registers import Replica
+from swarm.wire.messages import Claim, ClaimPhase
+
+__all__ = ["Peers"]
+
+
+class Peers:
+    """The others, as the agent of ``uav`` sees them."""
+
+    def __init__(self, uav: str, timing: Timing) -> None:
+        self.membership = Membership(timing)
+        self._uav = uav
+        self._patience_s = timing.patience_s
+        self._idle_since_s: dict[str, float] = {}
+        self._awake_since_s = 0.0
+
+    @property
+    def credible(self) -> Collection[str]:
+        """Others whose claims count."""
+        return self.membership.credible - {self._uav}
+
+    def spoke(self, writer: str) -> None:
+        """``writer`` itself has just said what it claims."""
+        self.membership.spoke(writer)
+
+    def turned_idle(self, writer: str, now_s: float) -> None:
+        """``writer`` has become free."""
+        self._idle_since_s[writer] = now_s
+
+    def awake(self, now_s: float) -> None:
+        """A task may have opened: from now on everyone who is free may decide anew."""
+        self._awake_since_s = now_s
+
+    def awaited(self, replica: Replica, now_s: float) -> set[str]:
+        """Free others that may still be expected to decide in their turn."""
+        credible = self.credible
+        return {
+            uav
+            for uav, claim in replica.claims.items()
+            if uav in credible
+            and _is_free(uav, claim, replica)
+            and now_s < self._patience_ends_s(uav)
+        }
+
+    def patience_ends_s(self, replica: Replica, now_s: float) -> float | None:
+        """When the first of those awaited will be awaited no longer; None if nobody is."""
+        ends_s = [self._patience_ends_s(uav) for uav in self.awaited(replica, now_s)]
+        return min(ends_s, default=None)
+
+    def _patience_ends_s(self, uav: str) -> float:
+        since_s = max(self._idle_since_s.get(uav, 0.0), self._awake_since_s)
+        return since_s + self._patience_s
+
+
+def _is_free(uav: str, claim: Claim, replica: Replica) -> bool:
+    """Idle, or between the outcome of its task and the word of what it takes next."""
+    if claim.task is None:
+        return claim.phase is ClaimPhase.IDLE
+    return (uav, claim.task) in replica.outcomes

@@ -1,0 +1,84 @@
+"""What one agent says: its registers and status, when first and when again.
+
+Leaves out: what there is to say (agent.core) and keys and bytes (swarm.wire).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from swarm.config import Timing
+from swarm.events import Publish
+from swarm.state.registers import Replica
+from swarm.state.voice import Voice
+from swarm.wire.messages import Body, Claim, Message, Outcome, Status
+
+__all__ = ["Speech"]
+
+
+class Speech:
+    """The statements of one UAV's agent.
+
+    Args:
+        voice: stamps them.
+        replica: holds the own registers among all others.
+        timing: how often registers and status are repeated.
+    """
+
+    def __init__(self, voice: Voice, replica: Replica, timing: Timing) -> None:
+        self._voice = voice
+        self._replica = replica
+        self._timing = timing
+        self._turn = 0
+        self._announce_at_s: float | None = None
+        self._status_at_s: float | None = None
+
+    def say(self, body: Body) -> Publish:
+        """State the new content of an own register, or the status."""
+        message = self._voice.say(body)
+        self._replica.join(message)
+        return Publish(message)
+
+    def hear_echo(self, message: Message) -> list[Publish]:
+        """Learn what others remember of this writer: it must never say less than that."""
+        self._voice.outdo(message.stamp)
+        if isinstance(message.body, Outcome):
+            self._replica.join(message)
+            return []
+        said = self._replica.known(message)
+        return [] if said is None or said.stamp >= message.stamp else [self.say(said.body)]
+
+    def announce(self, now_s: float) -> list[Publish]:
+        """Repeat the own registers, so that what got lost on the way arrives after all.
+
+        Outcomes take turns, so that the bus stays quiet however many there are.
+        """
+        own = list(self._replica.messages({self._voice.writer}))
+        said = [message for message in own if isinstance(message.body, Claim)]
+        outcomes = [message for message in own if isinstance(message.body, Outcome)]
+        if outcomes:
+            self._turn = (self._turn + 1) % len(outcomes)
+            said.append(outcomes[self._turn])
+        self._announce_at_s = now_s + self._timing.announce_s
+        return [Publish(message) for message in said]
+
+    def repeat(self, status: Callable[[], Status], now_s: float, *, learned: bool) -> list[Publish]:
+        """What is due again by now.
+
+        Args:
+            status: makes the status.
+            now_s: now.
+            learned: whether the own registers are known to be news at all.
+        """
+        said: list[Publish] = []
+        if learned and (self._announce_at_s is None or self._announce_at_s <= now_s):
+            said += self.announce(now_s)
+        if self._status_at_s is None or self._status_at_s <= now_s:
+            self._status_at_s = now_s + self._timing.status_s
+            said.append(self.say(status()))
+        return said
+
+    def next_deadline_s(self) -> float | None:
+        """When `repeat` will next have something to say."""
+        times_s = (self._announce_at_s, self._status_at_s)
+        return min((time_s for time_s in times_s if time_s is not None), default=None)

@@ -1,0 +1,250 @@
+"""The commands `swarm run` and `swarm simulate`.
+
+Leaves out: what they do (sim.launch, sim.world) and how it is shown (sim.view).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm.errors import Fault, InputError
+from swarm.options import JsonOption, ScenarioArgument, SeedOption, SpeedupOption
+
+if TYPE_CHECKING:
+    from sim.launch.fleet import BusKind
+    from sim.view.report import MissionReport
+
+__all__ = ["run", "simulate"]
+
+MethodOption = Annotated[
+    str,
+    typer.Option("--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."),
+]
+
+ReportOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--report",
+        metavar="FILE",
+        help="Also write the report, as .json or .md.",
+        show_default=False,
+    ),
+]
+
+
+def run(
+    scenario: ScenarioArgument,
+    method: MethodOption = "guided",
+    speedup: SpeedupOption = 1.0,
+    seed: SeedOption = 0,
+    bus: Annotated[
+        str,
+        typer.Option(
+            "--bus",
+            metavar="auto|mesh|router",
+            help="How the processes reach each other; auto takes a mesh for small fleets.",
+        ),
+    ] = "auto",
+    position_rate_hz: Annotated[
+        float | None,
+        typer.Option(
+            "--position-rate-hz",
+            min=1.0,
+            max=200.0,
+            metavar="HZ",
+            help="Position reports of each autopilot per wall second. Default: 100, less for "
+            "more than 20 UAVs.",
+            show_default=False,
+        ),
+    ] = None,
+    acceptance_radius_m: Annotated[
+        float,
+        typer.Option(
+            "--acceptance-radius-m",
+            min=0.01,
+            max=1000.0,
+            metavar="M",
+            help="Within this distance of a task, and stopped, a UAV has arrived.",
+        ),
+    ] = 0.5,
+    start_timeout_s: Annotated[
+        float,
+        typer.Option(
+            "--start-timeout-s",
+            min=1.0,
+            metavar="S",
+            help="UAVs that are not airborne by then are given up; mission seconds, or wall "
+            "seconds where the mission runs faster.",
+        ),
+    ] = 120.0,
+    report: ReportOption = None,
+    json: JsonOption = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Show what every process logs, instead of a picture.")
+    ] = False,
+) -> int:
+    """Fly a mission with real processes on this machine and report how it went.
+
+    Starts the bus, the coordinator and, for every UAV, an agent and a simulated autopilot;
+    shows the mission live and ends with a report. Exit status 0: every task was done.
+
+    Examples:
+        swarm run table-1
+        swarm run valley-survey --speedup 20 --report flight.md
+        swarm run table-1 --json
+    """
+    import asyncio
+    import sys
+
+    from rich.console import Console
+
+    from coordinator.planner.plan import check_online_method
+    from sim.launch.fleet import LaunchOptions, default_position_rate_hz
+    from sim.launch.run import fly
+    from sim.view.live import LiveView
+    from sim.view.report import MissionReport, check_report_path
+    from swarm.log import LogLevel, configure_logging
+    from swarm.process import run_until_stopped
+    from swarm.scenario import load_scenario
+
+    check_online_method(method)
+    if report is not None:
+        check_report_path(report)
+    mission = load_scenario(scenario)
+    options = LaunchOptions(
+        scenario=scenario,
+        method=method,
+        seed=seed,
+        speedup=speedup,
+        bus=_bus_kind(bus),
+        position_rate_hz=position_rate_hz or default_position_rate_hz(len(mission.uavs)),
+        acceptance_radius_m=acceptance_radius_m,
+        start_timeout_s=start_timeout_s,
+    )
+    configure_logging(LogLevel.WARNING)
+    # With every process's log on the screen, a picture would only be torn apart.
+    console = Console(stderr=True, force_terminal=False if verbose else None)
+
+    def log(name: str, line: str) -> None:
+        print(f"{name}: {line}", file=sys.stderr)
+
+    async def work() -> int:
+        try:
+            with LiveView(console, speedup=speedup) as view:
+                flight = await fly(
+                    mission, options, on_frame=view.update, on_log=log if verbose else None
+                )
+        except asyncio.CancelledError:
+            console.print("interrupted: the mission was given up and every process ended")
+            raise
+        told = MissionReport(
+            mission=mission,
+            plan=flight.plan,
+            result=flight.result,
+            story=tuple(flight.observer.story),
+            takeoff_s=flight.takeoff_s,
+            wall_s=flight.wall_s,
+            speedup=speedup,
+            fates=flight.fates,
+        )
+        return _tell(told, json=json, report=report)
+
+    return asyncio.run(run_until_stopped(work()))
+
+
+def simulate(
+    scenario: ScenarioArgument,
+    method: MethodOption = "greedy",
+    seed: SeedOption = 0,
+    loss: Annotated[
+        float,
+        typer.Option(
+            "--loss",
+            min=0.0,
+            max=1.0,
+            metavar="P",
+            help="Probability that a UAV is lost, at a random moment.",
+        ),
+    ] = 0.0,
+    popup: Annotated[
+        float,
+        typer.Option(
+            "--popup",
+            min=0.0,
+            max=1.0,
+            metavar="P",
+            help="Probability that a task appears only during the mission.",
+        ),
+    ] = 0.0,
+    latency_s: Annotated[
+        float,
+        typer.Option(
+            "--latency-s",
+            min=0.0,
+            max=60.0,
+            metavar="S",
+            help="Delay of every message.",
+        ),
+    ] = 0.0,
+    report: ReportOption = None,
+    json: JsonOption = False,
+) -> int:
+    """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
+
+    Vehicles are ideal. Without losses, pop-ups and delays the lists flown are exactly those
+    planned. Exit status 0: every task was done.
+
+    Examples:
+        swarm simulate table-1
+        swarm simulate valley-survey --loss 0.3 --popup 0.3 --seed 7
+    """
+    from coordinator.planner.plan import check_online_method
+    from sim.simulate import simulate_mission
+    from sim.uncertainty import Uncertainty
+    from sim.view.report import MissionReport, check_report_path
+    from swarm.scenario import load_scenario
+
+    check_online_method(method)
+    if report is not None:
+        check_report_path(report)
+    mission = load_scenario(scenario)
+    world = simulate_mission(
+        mission, method=method, seed=seed, uncertainty=Uncertainty(loss, popup), latency_s=latency_s
+    )
+    told = MissionReport(
+        mission=world.mission,
+        plan=world.observer.plan,
+        result=world.observer.result(),
+        story=tuple(world.observer.story),
+    )
+    return _tell(told, json=json, report=report)
+
+
+def _bus_kind(text: str) -> BusKind:
+    from sim.launch.fleet import BusKind
+
+    try:
+        return BusKind(text)
+    except ValueError:
+        remedy = f"choose one of {', '.join(BusKind)}"
+        raise InputError(Fault("--bus", text, "no such bus", remedy)) from None
+
+
+def _tell(told: MissionReport, *, json: bool, report: Path | None) -> int:
+    """Print and write the report; the exit status of the command."""
+    from json import dumps
+
+    from rich.console import Console
+
+    from sim.view.report import mission_ok, write_report
+
+    if json:
+        print(dumps(told.as_json(), allow_nan=False))
+    else:
+        told.render(Console(highlight=False))
+    if report is not None:  # last: a full disk must not hide the result
+        write_report(told, report)
+    return 0 if mission_ok(told.result) else 1

@@ -1,0 +1,279 @@
+"""The live picture of a running mission in a terminal: map, fleet, worth and story.
+
+Off a terminal, only new lines of the story are printed. Leaves out: what is known
+(coordinator.observer) and the report at the end (sim.view.report).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.text import Text
+
+from coordinator.observer import Happening, Observer
+from sim.view.fleet_table import fit, fleet_table, lists, table_width
+from sim.view.map_panel import ideal_width, map_panel
+from sim.view.scene import Scene, scene_of
+from sim.view.signs import BAD, Signs, signs_for
+from sim.view.story import clean, is_trouble, shown_value, story_line, story_style
+from swarm.state.board import TaskState
+from swarm.wire.messages import EpochPhase
+
+__all__ = ["LiveView", "picture"]
+
+_WIDE = 104
+"""Columns from which on the story stands beside the map and not below."""
+_COLUMN = 48
+"""Narrowest column beside the map that can hold counts and story."""
+_NARROWEST_MAP = 24
+_TALLEST = 60
+"""No picture is higher, however high the terminal."""
+_PHASE_STYLE = {
+    EpochPhase.PREPARING: "bold yellow",
+    EpochPhase.RUNNING: "bold green",
+    EpochPhase.ENDED: "bold",
+}
+
+
+def picture(
+    observer: Observer,
+    now_s: float,
+    *,
+    width: int,
+    height: int,
+    speedup: float = 1.0,
+    ascii_only: bool = False,
+) -> RenderableType:
+    """What ``observer`` knows, as exactly ``height`` lines of at most ``width`` cells.
+
+    Args:
+        observer: of the mission.
+        now_s: time of the observer's clock [s].
+        width: columns.
+        height: lines; from 8 on everything has a place.
+        speedup: mission seconds per wall second, shown when not 1.
+        ascii_only: for consoles without UTF-8.
+    """
+    signs = signs_for(ascii_only)
+    scene = scene_of(observer, now_s)
+    body = _wide if width >= _WIDE else _narrow
+    lines = [_title(scene, width, speedup, signs)]
+    lines += body(observer, scene, width, height - 1, signs)
+    lines += [Text() for _ in range(height - len(lines))]
+    for line in lines:
+        line.truncate(width, overflow="crop")
+        line.no_wrap = True
+        line.end = "\n"
+    return Group(*lines[:height])
+
+
+class LiveView:
+    """Shows a mission on ``console`` while it runs; use it as a context manager.
+
+    On a terminal a picture is redrawn by every `update` and its last state stays there.
+    Elsewhere each new line of the story is printed once.
+
+    Args:
+        console: where to; standard error, so that results have standard output alone.
+        speedup: mission seconds per wall second.
+    """
+
+    def __init__(self, console: Console, *, speedup: float = 1.0) -> None:
+        self._console = console
+        self._speedup = speedup
+        self._told = 0
+        self._live: Live | None = None
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal and not self._console.is_dumb_terminal:
+            self._live = Live(
+                console=self._console,
+                auto_refresh=False,
+                # Standard output is for results; what goes to standard error meanwhile, such
+                # as logs, appears above the picture.
+                redirect_stdout=False,
+            )
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
+
+    def update(self, observer: Observer, now_s: float) -> None:
+        """Show what ``observer`` knows at ``now_s``."""
+        if self._live is None:
+            self._tell(observer)
+            return
+        # One line less than there is: a full screen would scroll at its end.
+        width, height = self._console.size
+        frame = picture(
+            observer,
+            now_s,
+            width=width,
+            height=min(_TALLEST, max(1, height - 1)),
+            speedup=self._speedup,
+            ascii_only=self._ascii_only,
+        )
+        self._live.update(frame, refresh=True)
+
+    def _tell(self, observer: Observer) -> None:
+        for happening in observer.story[self._told :]:
+            line = story_line(happening, ascii_only=self._ascii_only)
+            self._console.print(Text(line), soft_wrap=True)
+        self._told = len(observer.story)
+
+    @property
+    def _ascii_only(self) -> bool:
+        return self._console.options.ascii_only
+
+
+# -- layouts ------------------------------------------------------------------------
+
+
+def _narrow(observer: Observer, scene: Scene, width: int, height: int, signs: Signs) -> list[Text]:
+    """Map and fleet side by side, counts and story below."""
+    n_story = max(0, min(10, height // 4))
+    worth = _worth(scene, width, signs)
+    above = max(0, height - len(worth) - n_story)
+    lines = []
+    map_width = min(max(_NARROWEST_MAP, ideal_width(scene, above)), width - table_width(scene) - 2)
+    if map_width >= _NARROWEST_MAP and above >= 5:
+        rest = width - map_width - 1
+        table = fleet_table(scene, rest, above, signs)
+        table += lists(scene, rest, above - len(table), signs)
+        lines += _beside(map_panel(scene, map_width, above, signs), table)
+    else:
+        lines += fleet_table(scene, width, above, signs)
+    lines += [Text()] * (above - len(lines))
+    return [*lines, *worth, *_story(observer, width, n_story, signs)]
+
+
+def _wide(observer: Observer, scene: Scene, width: int, height: int, signs: Signs) -> list[Text]:
+    """The map as large as can be; fleet, counts and story in a column beside it."""
+    column = max(_COLUMN, table_width(scene))
+    map_width = min(max(_NARROWEST_MAP, ideal_width(scene, height)), width - column - 2)
+    rest = width - map_width - 1
+    worth = _worth(scene, rest, signs)
+    least_story = max(4, height // 5)
+    n_table = min(len(scene.uavs) + 1, max(2, height - len(worth) - least_story - 2))
+    table = fleet_table(scene, rest, n_table, signs)
+    table += lists(scene, rest, height - len(table) - len(worth) - least_story - 2, signs)
+    n_story = height - len(table) - len(worth) - 2
+    story = _story(observer, rest, n_story, signs)
+    return _beside(
+        map_panel(scene, map_width, height, signs), [*table, Text(), *worth, Text(), *story]
+    )
+
+
+def _beside(left: list[Text], right: list[Text]) -> list[Text]:
+    lines = []
+    for number, line in enumerate(left):
+        joined = Text.assemble(line, " ", no_wrap=True)
+        if number < len(right):
+            joined.append_text(right[number])
+        lines.append(joined)
+    return lines
+
+
+# -- parts --------------------------------------------------------------------------
+
+
+def _title(scene: Scene, width: int, speedup: float, signs: Signs) -> Text:
+    title = Text().append(clean(scene.mission.name), "bold")
+    between = f" {signs.dot} "
+    title.append(between)
+    title.append(scene.phase.upper(), _PHASE_STYLE[scene.phase])
+    if scene.mission_s is not None:
+        horizon_s = scene.mission.horizon_s
+        title.append(f"{between}mission time {scene.mission_s:.1f} s")
+        late = scene.phase is EpochPhase.RUNNING and scene.mission_s > horizon_s
+        title.append(f" (D = {horizon_s:g} s)", BAD if late else "dim")
+    if speedup != 1.0:
+        title.append(f"{between}{signs.times}{speedup:.3g}")
+    if scene.rule is not None:
+        order = " > ".join(scene.sequence)
+        text = f"{between}{scene.rule}" + (f": {order}" if order else "")
+        title.append(fit(text, max(0, width - title.cell_len), signs).rstrip())
+    return title
+
+
+def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
+    """Tasks by state, which is also the key to their signs, and J against plan and optimum."""
+    n_task = len(scene.tasks) - scene.count(TaskState.WITHDRAWN)
+    parts = [
+        (signs.done, f"{scene.count(TaskState.DONE)} of {n_task} done", ""),
+        (signs.taken, f"{sum(task.taken for task in scene.tasks)} taken", ""),
+        (signs.open, f"{scene.count(TaskState.OPEN)} open", ""),
+    ]
+    if failed := scene.count(TaskState.FAILED):
+        parts.append((signs.failed, f"{failed} failed", BAD))
+    if withdrawn := len(scene.tasks) - n_task:
+        parts.append((" ", f"{withdrawn} withdrawn", "dim"))
+    counts = Text().append("tasks  ", "bold")
+    for sign, text, style in parts:
+        counts.append(f"{sign} ", f"bold {style}")
+        counts.append(f"{text}  ", style)
+    value = Text().append("J      ", "bold")
+    value.append(shown_value(scene.objective), "bold")
+    if scene.plan is not None:
+        value.append(f" of {shown_value(scene.plan.objective)} planned")
+        if scene.plan.optimum is not None:
+            value.append(f", optimum {shown_value(scene.plan.optimum)}")
+    bar_width = width - value.cell_len - 2
+    if width < _WIDE - _COLUMN:
+        bar_width = max(0, width - 8)
+        return [counts, value, Text("       ").append_text(_bar(scene, bar_width, signs))]
+    value.append("  ")
+    value.append_text(_bar(scene, min(60, bar_width), signs))
+    return [counts, value]
+
+
+def _bar(scene: Scene, width: int, signs: Signs) -> Text:
+    """J so far, with marks where plan and optimum are."""
+    if scene.plan is None or width < 8:
+        return Text()
+    marks = [scene.plan.objective]
+    if scene.plan.optimum is not None:
+        marks.append(scene.plan.optimum)
+    largest = max(scene.objective, *marks, 0.0)
+    if largest <= 0.0:
+        return Text()
+    cells = [signs.bar_empty] * width
+    styles = ["dim"] * width
+    for cell in range(round(width * max(0.0, scene.objective) / largest)):
+        cells[cell], styles[cell] = signs.bar_full, "green"
+    for mark in marks:
+        if mark > 0.0:
+            cell = min(width - 1, round(width * mark / largest))
+            cells[cell], styles[cell] = signs.bar_mark, "bold"
+    return Text.assemble(*zip(cells, styles, strict=True))
+
+
+def _story(observer: Observer, width: int, height: int, signs: Signs) -> list[Text]:
+    """The newest lines of the story under a headline."""
+    if height < 2:
+        return [Text()] * max(0, height)
+    headline = f"{signs.horizontal * 2} story "
+    lines = [Text(headline + signs.horizontal * max(0, width - len(headline)), "dim")]
+    for happening in _newest(observer.story, height - 1):
+        line = story_line(happening, ascii_only=not signs.braille)
+        lines.append(Text(fit(line, width, signs).rstrip(), story_style(happening)))
+    return lines + [Text()] * (height - len(lines))
+
+
+def _newest(story: Sequence[Happening], count: int) -> list[Happening]:
+    """The newest lines; the last things that went wrong stay among them."""
+    newest = list(story[-count:])
+    pinned = [line for line in story[:-count] if is_trouble(line)][-max(1, count // 4) :]
+    return [*pinned, *newest[len(pinned) :]]

@@ -1,0 +1,198 @@
+"""One moment of a mission, in the words and numbers that a picture needs.
+
+Leaves out: where and how they are shown (sim.view.live).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from coordinator.observer import Observer
+from sim.view.signs import short_names
+from swarm.model import Mission, Plan, TaskId, Uav, UavId
+from swarm.state.board import TaskState
+from swarm.wire.messages import ClaimPhase, EpochPhase, StatusPhase
+
+__all__ = ["Scene", "TaskView", "UavView", "scene_of"]
+
+LOST = "lost"
+STARTING = "starting"
+_UNREADY = (STARTING, StatusPhase.LEARNING, StatusPhase.PREPARING)
+_BUSY = (StatusPhase.FLYING, StatusPhase.SERVING)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskView:
+    """One task on the board."""
+
+    id: TaskId
+    position_enu_m: tuple[float, float, float]
+    state: TaskState
+    taken: bool
+    """Whether a UAV is on its way to it or serves it."""
+    uav: int | None
+    """Number of the UAV that has taken or done it."""
+
+
+@dataclass(frozen=True, slots=True)
+class UavView:
+    """One UAV."""
+
+    id: UavId
+    short: str
+    """What tells its id from the others."""
+    number: int
+    """Place in the fleet, from 0."""
+    does: str
+    """`StatusPhase`, or lost, or starting."""
+    task: TaskId | None
+    eta_s: float | None
+    """Predicted completion of its task, from now [s]."""
+    flown: tuple[TaskId, ...]
+    """Tasks it has done, in order."""
+    planned: tuple[TaskId, ...]
+    """Tasks the offline plan has for it that are not over yet."""
+    battery_frac: float | None
+    note: str
+    start_enu_m: tuple[float, float, float]
+    position_enu_m: tuple[float, float, float]
+
+    @property
+    def troubled(self) -> bool:
+        """Whether it is gone or takes no part."""
+        return self.does in (LOST, StatusPhase.OUT)
+
+    @property
+    def unready(self) -> bool:
+        """Whether it is not at its start yet."""
+        return self.does in _UNREADY
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is on its way to a task or serves it."""
+        return self.does in _BUSY
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything a picture shows, but the story."""
+
+    mission: Mission
+    phase: EpochPhase
+    mission_s: float | None
+    rule: str | None
+    sequence: tuple[str, ...]
+    uavs: tuple[UavView, ...]
+    tasks: tuple[TaskView, ...]
+    objective: float
+    """J so far [value·s]."""
+    plan: Plan | None
+
+    def count(self, state: TaskState, *, taken: bool = False) -> int:
+        """Tasks in ``state``."""
+        return sum(task.state is state and task.taken is taken for task in self.tasks)
+
+
+def scene_of(observer: Observer, now_s: float) -> Scene:
+    """What ``observer`` knows at ``now_s``, in its own clock's seconds."""
+    result = observer.result()
+    mission, plan, epoch = observer.mission, observer.plan, observer.replica.epoch
+    mission_s = observer.mission_s(now_s)
+    numbers = {uav.id: number for number, uav in enumerate(mission.uavs)}
+    by: dict[str, int] = {}
+    for uav_id, route in result.executed_routes.items():
+        for task_id in route:
+            by.setdefault(task_id, numbers[uav_id])
+    over = {t for t, state in observer.board.states.items() if state is not TaskState.OPEN}
+    shorts = short_names([uav.id for uav in mission.uavs])
+    sequence = () if epoch is None else epoch.sequence
+    if not sequence and plan is not None and plan.sequence is not None:
+        sequence = plan.sequence
+    return Scene(
+        mission=mission,
+        phase=observer.phase,
+        mission_s=mission_s,
+        rule=epoch.rule if epoch is not None else None if plan is None else plan.method,
+        sequence=tuple(sequence),
+        uavs=tuple(
+            _uav_view(
+                observer,
+                uav,
+                short,
+                mission_s,
+                flown=result.executed_routes[uav.id],
+                planned=tuple(
+                    task
+                    for task in (() if plan is None else plan.routes.get(uav.id, ()))
+                    if task not in over
+                ),
+                number=numbers[uav.id],
+            )
+            for uav, short in zip(mission.uavs, shorts, strict=True)
+        ),
+        tasks=_task_views(observer, by, numbers),
+        objective=result.executed_objective,
+        plan=plan,
+    )
+
+
+def _uav_view(
+    observer: Observer,
+    uav: Uav,
+    short: str,
+    mission_s: float | None,
+    *,
+    flown: tuple[TaskId, ...],
+    planned: tuple[TaskId, ...],
+    number: int,
+) -> UavView:
+    status = observer.statuses.get(uav.id)
+    claim = observer.replica.claims.get(uav.id)
+    does: str = STARTING if status is None else status.phase
+    task = None if claim is None or claim.task is None else TaskId(claim.task)
+    if uav.id in observer.lost and uav.id not in observer.present:
+        does, task = LOST, None
+    elif task is not None and does not in _BUSY:
+        does = StatusPhase.FLYING  # claims never lag, status may
+    elif claim is not None and does == STARTING:
+        does = StatusPhase.OUT if claim.phase is ClaimPhase.OUT else StatusPhase.IDLE
+    elif task is None and does in _BUSY:
+        does = StatusPhase.IDLE
+    eta_s = None
+    if claim is not None and task is not None and mission_s is not None:
+        eta_s = claim.completion_s - mission_s
+    place = None if status is None else status.position_enu_m
+    return UavView(
+        id=uav.id,
+        short=short,
+        number=number,
+        does=does,
+        task=task,
+        eta_s=eta_s,
+        flown=flown,
+        planned=planned,
+        battery_frac=None if status is None else status.battery_frac,
+        note="" if status is None else status.note,
+        start_enu_m=uav.position_enu_m,
+        position_enu_m=uav.position_enu_m if place is None else place,
+    )
+
+
+def _task_views(
+    observer: Observer, by: dict[str, int], numbers: dict[UavId, int]
+) -> tuple[TaskView, ...]:
+    """The board; before there is one, what the scenario tells at the start."""
+    holders, states = observer.holders, observer.board.states
+    if not states:
+        known = observer.mission.known_at_start().tasks
+        return tuple(
+            TaskView(task.id, task.position_enu_m, TaskState.OPEN, taken=False, uav=None)
+            for task in known
+        )
+    views = []
+    for task_id, state in states.items():
+        holder = holders.get(task_id)
+        uav = by.get(task_id) if holder is None else numbers.get(UavId(holder))
+        place = observer.replica.board[task_id].position_enu_m
+        views.append(TaskView(TaskId(task_id), place, state, holder is not None, uav))
+    return tuple(views)

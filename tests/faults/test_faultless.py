@@ -1,0 +1,33 @@
+"""Without faults the fleet executes the offline plan, decision for decision (section III.C)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.fleet_builders import WatchedWorld, plan_for, random_mission
+
+CASES = [("greedy", seed, 8, 25) for seed in range(200)]
+CASES += [("lookahead", seed, 4, 9) for seed in range(40)]
+
+
+@pytest.mark.parametrize(("method", "seed", "most_uavs", "most_tasks"), CASES)
+def test_executed_lists_equal_the_offline_plan(
+    method: str, seed: int, most_uavs: int, most_tasks: int
+) -> None:
+    rng = np.random.default_rng([seed, most_tasks])
+    n_uav = int(rng.integers(1, most_uavs + 1))
+    n_task = int(rng.integers(1, most_tasks + 1))
+    mission = random_mission(rng, n_uav=n_uav, n_task=n_task)
+    plan = plan_for(mission, method, seed)
+    world = WatchedWorld(mission, lambda *_: plan, method=method, seed=seed)
+
+    assert world.run(limit_s=1e5)
+
+    result = world.observer.result()
+    assert result.executed_routes == plan.routes
+    assert result.executed_completion_s == pytest.approx(plan.completion_s, abs=1e-9)
+    assert result.executed_objective == pytest.approx(plan.objective, abs=1e-6)
+    assert set(result.done) == {task.id for task in mission.tasks}
+    assert (result.duplicate_visits, result.open, result.lost_uavs) == (0, (), ())
+    assert world.finished == dict.fromkeys(["coordinator", *(u.id for u in mission.uavs)], 0)

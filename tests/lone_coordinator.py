@@ -1,0 +1,145 @@
+"""The coordinator's core with the fleet played by the test."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TypeVar
+
+from coordinator.core import CoordinatorCore, FlightLayers
+from coordinator.events import Action, Event, MakePlan, PlanMade
+from swarm.config import Timing
+from swarm.events import Finish, Heard, Note, PeerGone, PeerSeen, Publish, Tick
+from swarm.model import Mission, Plan, UavId
+from swarm.wire.messages import Body, Epoch, EpochPhase
+from tests.builders import IDLE, OUT, message
+
+T = TypeVar("T")
+
+TIMING = Timing(announce_s=1e6)
+START_TIMEOUT_S = 60.0
+
+
+def plan_of(mission: Mission, *sequence: str) -> Plan:
+    """A plan of which only the sequence matters."""
+    return Plan(
+        scenario=mission.name,
+        method="greedy",
+        routes={uav.id: () for uav in mission.uavs},
+        objective=0.0,
+        completion_s={},
+        sequence=tuple(UavId(uav) for uav in sequence),
+        optimum=None,
+        evaluations=1,
+        elapsed_s=0.0,
+        seed=0,
+    )
+
+
+class LoneCoordinator:
+    """The coordinator of ``mission``, from the start of its process on."""
+
+    def __init__(
+        self, mission: Mission, *, timing: Timing = TIMING, begin_s: float = 100.0
+    ) -> None:
+        self.mission = mission
+        self.uavs: list[str] = [uav.id for uav in mission.uavs]
+        self.core = CoordinatorCore(
+            mission,
+            method="greedy",
+            seed=7,
+            incarnation=1,
+            timing=timing,
+            start_timeout_s=START_TIMEOUT_S,
+            layers=FlightLayers(lowest_m=10.0, spacing_m=3.0),
+        )
+        self.timing = timing
+        self.now_s = begin_s
+        self.log: list[Action] = []
+        self._counters: Counter[str] = Counter()
+        self._do(self.core.start(self.now_s))
+
+    def happen(self, event: Event, at_s: float | None = None) -> list[Action]:
+        """Step the core, at that time of its clock if one is given."""
+        if at_s is not None:
+            assert at_s >= self.now_s, "time never goes back"
+            self.now_s = at_s
+        return self._do(self.core.step(event, self.now_s))
+
+    def run_until(self, at_s: float) -> list[Action]:
+        """Tick at every deadline up to then."""
+        actions: list[Action] = []
+        while (due_s := self.core.next_deadline_s()) is not None and due_s <= at_s:
+            assert due_s > self.now_s or not actions, "it spins"
+            self.now_s = max(self.now_s, due_s)
+            actions += self.happen(Tick())
+        return actions + self.happen(Tick(), at_s)
+
+    def hear(self, writer: str, body: Body, at_s: float | None = None) -> list[Action]:
+        self._counters[writer] += 1
+        return self.happen(Heard(message(writer, body, self._counters[writer])), at_s)
+
+    def see(self, *uavs: str) -> list[Action]:
+        return [action for uav in uavs for action in self.happen(PeerSeen(uav))]
+
+    def lose(self, uav: str, at_s: float) -> list[Action]:
+        """Its token goes and does not come back."""
+        before = self.happen(PeerGone(uav), at_s)
+        return before + self.happen(Tick(), at_s + self.timing.loss_delay_s)
+
+    def answer_plan(self, *sequence: str) -> list[Action]:
+        """The plan it asked for last is made."""
+        request = plans_wanted(self.log)[-1]
+        return self.happen(PlanMade(request.request, plan_of(request.mission, *sequence)))
+
+    def ready(self, *uavs: str) -> list[Action]:
+        """They are there and airborne."""
+        return self.see(*uavs) + [action for uav in uavs for action in self.hear(uav, IDLE)]
+
+    def started(self) -> LoneCoordinator:
+        """The same with its mission running since now."""
+        self.answer_plan(*self.uavs)
+        self.ready(*self.uavs)
+        return self
+
+    def leave(self, uav: str) -> None:
+        """It goes home and its process ends."""
+        self.hear(uav, OUT)
+        self.lose(uav, self.now_s)
+
+    @property
+    def epoch(self) -> Epoch | None:
+        epochs = said(self.log, Epoch)
+        return epochs[-1] if epochs else None
+
+    @property
+    def phase(self) -> EpochPhase | None:
+        epoch = self.epoch
+        return None if epoch is None else epoch.phase
+
+    @property
+    def reason(self) -> str | None:
+        epoch = self.epoch
+        return None if epoch is None else epoch.reason
+
+    def _do(self, actions: Sequence[Action]) -> list[Action]:
+        self.log += actions
+        return list(actions)
+
+
+def said(actions: Sequence[Action], kind: type[T]) -> list[T]:
+    """Bodies of that kind that were published."""
+    bodies = [action.message.body for action in actions if isinstance(action, Publish)]
+    return [body for body in bodies if isinstance(body, kind)]
+
+
+def plans_wanted(actions: Sequence[Action]) -> list[MakePlan]:
+    return [action for action in actions if isinstance(action, MakePlan)]
+
+
+def finishes(actions: Sequence[Action]) -> list[int]:
+    return [action.status for action in actions if isinstance(action, Finish)]
+
+
+def notes(actions: Sequence[Action]) -> list[Note]:
+    return [action for action in actions if isinstance(action, Note)]

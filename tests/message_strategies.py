@@ -1,0 +1,111 @@
+"""Hypothesis strategies for everything that may be said on the bus."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from swarm.model.ids import COORDINATOR
+from swarm.wire.messages import (
+    Board,
+    Brief,
+    Claim,
+    ClaimPhase,
+    Epoch,
+    EpochPhase,
+    Fleet,
+    Message,
+    Outcome,
+    Result,
+    Stamp,
+    Status,
+    StatusPhase,
+)
+from tests.builders import MISSION
+
+ids = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", fullmatch=True)
+uav_ids = st.sampled_from(["u0", "u1", "u2", "quad-3"])
+task_ids = st.sampled_from(["t0", "t1", "t2"])
+numbers = st.floats(-1e6, 1e6)
+positives = st.floats(1e-3, 1e6)
+not_negatives = st.floats(0.0, 1e6)
+probabilities = st.floats(0.0, 1.0)
+points = st.tuples(numbers, numbers, numbers)
+tables = st.dictionaries(ids, probabilities, max_size=3)
+counts = st.integers(0, 2**63 - 1)
+notes = st.text(max_size=20) | st.just("x" * 200)
+stamps = st.builds(Stamp, counts, counts)
+
+fleets = st.builds(Fleet, uav_ids, points, positives, tables, tables, st.none() | ids, numbers)
+origins = st.tuples(st.floats(-89, 89), st.floats(-180, 180), numbers)
+briefs = st.builds(
+    Brief,
+    positives,
+    probabilities,
+    probabilities,
+    st.booleans(),
+    origins,
+    st.lists(fleets, max_size=4, unique_by=lambda fleet: fleet.id).map(tuple),
+)
+epochs = st.builds(
+    Epoch,
+    counts,
+    st.sampled_from(EpochPhase),
+    st.sampled_from(["greedy", "lookahead"]),
+    st.lists(uav_ids, unique=True).map(tuple),
+    numbers,
+    notes,
+    st.dictionaries(uav_ids, st.lists(task_ids, unique=True, max_size=3).map(tuple), max_size=3),
+)
+boards = st.builds(
+    Board,
+    task_ids,
+    counts,
+    points,
+    not_negatives,
+    not_negatives,
+    st.none() | ids,
+    st.booleans(),
+)
+claims = st.one_of(
+    st.builds(
+        Claim,
+        st.sampled_from([ClaimPhase.PROPOSED, ClaimPhase.HELD]),
+        task_ids,
+        numbers,
+        counts,
+        numbers,
+    ),
+    st.builds(
+        Claim,
+        st.sampled_from([ClaimPhase.IDLE, ClaimPhase.OUT]),
+        st.none(),
+        numbers,
+        counts,
+        numbers,
+    ),
+)
+outcomes = st.builds(Outcome, task_ids, st.sampled_from(Result), st.integers(1, 2**63 - 1), numbers)
+statuses = st.builds(
+    Status,
+    st.sampled_from(StatusPhase),
+    st.none() | task_ids,
+    st.none() | points,
+    st.none() | points,
+    st.none() | probabilities,
+    st.none() | numbers,
+    counts,
+    notes,
+)
+by_coordinator = briefs | epochs | boards
+by_uav = claims | outcomes | statuses
+
+
+def messages(
+    stamped: st.SearchStrategy[Stamp] = stamps, *, statuses_too: bool = True
+) -> st.SearchStrategy[Message]:
+    """Statements of the mission `MISSION`, each by a writer who may say it."""
+    said = by_uav if statuses_too else claims | outcomes
+    return st.one_of(
+        st.builds(Message, st.just(MISSION), st.just(COORDINATOR), stamped, by_coordinator),
+        st.builds(Message, st.just(MISSION), uav_ids, stamped, said),
+    )

@@ -1,0 +1,166 @@
+"""Drives `swarm run` as a user would, for tests that need the real thing."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+__all__ = ["SwarmRun", "alive", "child_pids", "wait_until"]
+
+
+def wait_until(condition: Callable[[], bool], timeout_s: float, what: str) -> None:
+    """Poll until ``condition`` holds; fail with ``what`` when it takes too long."""
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline_s, f"{what} did not happen within {timeout_s} s"
+        time.sleep(0.05)
+
+
+def child_pids(parent: int) -> dict[str, int]:
+    """Living children of a process: the words after ``swarm`` on their command line -> pid."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and _parent(entry) == parent:
+            try:
+                words = (entry / "cmdline").read_bytes().decode().split("\0")
+            except OSError:
+                continue
+            found[" ".join(words[words.index("swarm") + 1 :] if "swarm" in words else words)] = int(
+                entry.name
+            )
+    return found
+
+
+def alive(pid: int) -> bool:
+    """Whether the process runs (a zombie does not)."""
+    try:
+        state = (Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def _parent(entry: Path) -> int | None:
+    try:
+        return int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+    except (OSError, ValueError):
+        return None
+
+
+class SwarmRun:
+    """One `swarm run --json` in the background."""
+
+    def __init__(self, arguments: list[str], folder: Path) -> None:
+        environment = {**os.environ, "TMPDIR": str(folder), "NO_COLOR": "1"}
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "swarm", "run", *arguments, "--json"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+            cwd=folder,
+        )
+        self.lines: list[str] = []
+        """Standard error so far."""
+        self.seen: dict[str, int] = {}
+        """Every child ever seen."""
+        self._out: list[str] = []
+        self._readers = [
+            threading.Thread(target=self._read, args=(self.process.stderr, self.lines)),
+            threading.Thread(target=self._read, args=(self.process.stdout, self._out)),
+        ]
+        for reader in self._readers:
+            reader.start()
+
+    @staticmethod
+    def _read(stream: Any, lines: list[str]) -> None:
+        for line in stream:
+            lines.append(line.rstrip("\n"))  # noqa: PERF401 - each line is seen at once
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            try:
+                self.process.wait(20)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+        self.process.wait()
+        for reader in self._readers:
+            reader.join(10)
+        for stream in (self.process.stdout, self.process.stderr):
+            if stream is not None:
+                stream.close()
+        for pid in self.seen.values():
+            if alive(pid):  # only after a failed test
+                os.kill(pid, signal.SIGKILL)
+
+    def children(self) -> dict[str, int]:
+        """Living children by command line."""
+        found = child_pids(self.process.pid)
+        self.seen.update(found)
+        return found
+
+    def child(self, role: str, uav: str = "") -> int:
+        """Pid of the one living child of that role, and of that UAV."""
+        matches = [
+            pid
+            for words, pid in self.children().items()
+            if words.startswith(f"{role} ") and (not uav or f"--uav {uav} " in words)
+        ]
+        assert len(matches) == 1, f"{role} {uav}: {matches} of {self.children()}"
+        return matches[0]
+
+    def wait_for_line(self, text: str, timeout_s: float = 60.0, count: int = 1) -> None:
+        """Wait until ``text`` has come ``count`` times on standard error."""
+
+        def there() -> bool:
+            self.children()
+            assert self.process.poll() is None or self._count(text) >= count, self.story()
+            return self._count(text) >= count
+
+        wait_until(there, timeout_s, f"line {text!r}")
+
+    def _count(self, text: str) -> int:
+        return sum(text in line for line in self.lines)
+
+    def story(self) -> str:
+        """Everything said on standard error."""
+        return "\n".join(self.lines)
+
+    def result(self, timeout_s: float = 120.0) -> tuple[int, dict[str, Any]]:
+        """Exit status and JSON, once it has ended by itself."""
+        deadline_s = time.monotonic() + timeout_s
+        while self.process.poll() is None:
+            self.children()
+            assert time.monotonic() < deadline_s, self.story()
+            time.sleep(0.1)
+        for reader in self._readers:
+            reader.join(10)
+        assert len(self._out) == 1, (self._out, self.story())
+        return self.process.returncode, json.loads(self._out[0])
+
+    def end(self, number: signal.Signals, timeout_s: float = 30.0) -> int:
+        """Send a signal and wait for the end; the exit status."""
+        self.process.send_signal(number)
+        return self.process.wait(timeout_s)
+
+    def assert_nothing_left(self, timeout_s: float = 10.0) -> None:
+        """No process that was ever seen lives on, and no file is left."""
+        assert self.seen
+        wait_until(
+            lambda: not any(alive(pid) for pid in self.seen.values()), timeout_s, "the end of all"
+        )
+        assert list(self.folder.iterdir()) == []

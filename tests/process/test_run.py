@@ -1,0 +1,123 @@
+"""`swarm run`: whole missions with real processes, and what happens when one dies."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from tests.process.mission import SwarmRun, alive, wait_until
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+
+LARGE = ["valley-survey", "--speedup", "30"]
+
+
+def kill(pid: int) -> None:
+    os.kill(pid, signal.SIGKILL)
+
+
+@pytest.mark.parametrize("bus", ["mesh", "router"])
+def test_paper_mission_flies_the_offline_plan(tmp_path: Path, bus: str) -> None:
+    with SwarmRun(["table-1", "--bus", bus, "--method", "greedy"], tmp_path) as run:
+        status, told = run.result()
+
+        assert status == 0, run.story()
+        assert told["sequence"] == ["uav1", "uav3", "uav2"]
+        assert told["executed_routes"] == told["routes"]
+        assert sorted(told["done"]) == [f"t{number}" for number in range(1, 9)]
+        assert told["failed"] == told["open"] == told["lost_uavs"] == []
+        assert told["duplicate_visits"] == 0
+        assert told["epochs"] == 1
+        assert told["objective"] == pytest.approx(118.4939, abs=5e-5)
+        assert told["executed_objective"] == pytest.approx(118.49, rel=0.02)
+        assert told["optimum"] == pytest.approx(120.3335, abs=5e-5)
+        run.assert_nothing_left()
+
+
+def test_killed_agents_tasks_are_done_by_the_others(tmp_path: Path) -> None:
+    with SwarmRun(LARGE, tmp_path) as run:
+        run.wait_for_line(" ended ", count=5)
+        kill(run.child("agent", "uav07"))
+        status, told = run.result()
+
+        assert status == 0, run.story()
+        assert len(told["done"]) == 60
+        assert told["lost_uavs"] == ["uav07"]
+        assert any("uav07 lost; task" in line for line in run.lines)
+        assert any("took over" in line and "from uav07" in line for line in run.lines)
+        run.assert_nothing_left()
+
+
+def test_fleet_finishes_without_its_coordinator(tmp_path: Path) -> None:
+    with SwarmRun(LARGE, tmp_path) as run:
+        run.wait_for_line("epoch 1")
+        kill(run.child("coordinator"))
+        status, told = run.result()
+
+        assert status == 0, run.story()
+        assert len(told["done"]) == 60
+        assert told["executed_routes"].keys() == told["routes"].keys()
+        assert any("coordinator lost" in line for line in run.lines)
+        run.assert_nothing_left()
+
+
+def test_dead_autopilot_costs_its_uav_and_no_task(tmp_path: Path) -> None:
+    with SwarmRun(LARGE, tmp_path) as run:
+        run.wait_for_line(" ended ", count=3)
+        kill(run.child("autopilot", "uav03"))
+        status, told = run.result()
+
+        assert status == 0, run.story()
+        assert len(told["done"]) == 60
+        assert any("uav03 takes no further part" in line for line in run.lines)
+        run.assert_nothing_left()
+
+
+def test_dead_router_ends_the_run_and_leaves_nothing(tmp_path: Path) -> None:
+    with SwarmRun(["valley-survey", "--bus", "router"], tmp_path) as run:
+        run.wait_for_line("epoch 1")
+        kill(run.child("router"))
+        status, told = run.result()
+
+        assert status == 1
+        assert told["open"]
+        assert any("router: killed by SIGKILL" in line for line in told["processes"])
+        run.assert_nothing_left()
+
+
+def test_ctrl_c_ends_every_process(tmp_path: Path) -> None:
+    with SwarmRun(["valley-survey"], tmp_path) as run:
+        run.wait_for_line("epoch 1")
+
+        assert run.end(signal.SIGINT) == 130
+        run.assert_nothing_left()
+
+
+def test_ctrl_c_before_the_start_ends_every_process(tmp_path: Path) -> None:
+    with SwarmRun(["table-1"], tmp_path) as run:
+        wait_until(lambda: len(run.children()) >= 2, 30, "first children")
+
+        assert run.end(signal.SIGINT) == 130
+        run.assert_nothing_left()
+
+
+def test_killed_launcher_takes_every_process_along(tmp_path: Path) -> None:
+    with SwarmRun(["table-1"], tmp_path) as run:
+        wait_until(lambda: len(run.children()) == 7, 30, "all children")
+        agent = run.child("agent", "uav2")
+
+        assert run.end(signal.SIGKILL) == -signal.SIGKILL
+        run.assert_nothing_left()
+        assert not alive(agent)
+
+
+def test_scenario_that_cannot_be_read_starts_nothing(tmp_path: Path) -> None:
+    with SwarmRun(["no-such-scenario"], tmp_path) as run:
+        assert run.process.wait(20) == 2
+        for reader in run._readers:
+            reader.join(10)
+        assert len(run.lines) == 1
+        assert run.children() == {}

@@ -1,0 +1,182 @@
+"""The bridge against the simulated autopilot: in exact virtual time and through sockets.
+
+Neither side was written from the other's source, only from the recordings.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import math
+
+import pytest
+
+from agent.mavlink.bridge import Bridge
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.events import Event, LinkUp, Received, Send, Tick
+from agent.mavlink.vehicle import MavlinkVehicle
+from agent.vehicle import (
+    Arrived,
+    GoTo,
+    HandedOver,
+    Home,
+    NotReady,
+    Prepare,
+    Report,
+    Return,
+    Telemetry,
+    VehicleReady,
+)
+from sim.autopilot import events as autopilot
+from sim.autopilot.codec import ChannelCodec
+from sim.autopilot.config import VehicleConfig
+from sim.autopilot.endpoint import Endpoint, Transport
+from sim.autopilot.flavours.ardupilot import ArduCopter
+from sim.autopilot.modes import Mode
+from sim.autopilot.server import VehicleServer
+from sim.autopilot.vehicle import COMPONENT_ID, Vehicle
+from swarm.clock import ScaledClock
+from tests.bridge_flight import ORIGIN
+
+pytestmark = pytest.mark.sitl
+
+START = Prepare((5.0, 0.0, 10.0), 4.0)
+CONFIG = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, acceptance_radius_m=0.1)
+VEHICLE = VehicleConfig(1, start_enu_m=(5.0, 0.0, 0.0), origin=ORIGIN)
+
+
+class JoinedFlight:
+    """Both machines in one virtual time that leaps from deadline to deadline."""
+
+    def __init__(self, config: BridgeConfig = CONFIG, flavour: ArduCopter | None = None) -> None:
+        self.now_s = 0.0
+        self.bridge = Bridge(config)
+        self.vehicle = Vehicle(VEHICLE, flavour or ArduCopter(), self.now_s)
+        self.codec = ChannelCodec(1, COMPONENT_ID, datagrams=False)
+        self.reports: list[tuple[float, Report]] = []
+        self._read = 0
+        self.to_vehicle(autopilot.Connected(0))
+        self.to_bridge(LinkUp())
+
+    def to_bridge(self, event: Event) -> None:
+        for action in self.bridge.step(event, self.now_s):
+            if isinstance(action, Send):
+                for message in self.codec.decode(action.data):
+                    self.to_vehicle(autopilot.Received(0, message))
+            elif not isinstance(action, Telemetry | NotReady):
+                self.reports.append((self.now_s, action))
+
+    def to_vehicle(self, event: autopilot.Event) -> None:
+        for send in self.vehicle.step(event, self.now_s):
+            self.to_bridge(Received(self.codec.encode(send.message)))
+
+    def run_until(self, report: Report | type, limit_s: float = 300.0) -> float:
+        """Vehicle time at which that report came."""
+        end_s = self.now_s + limit_s
+        while self.now_s < end_s:
+            while self._read < len(self.reports):
+                at_s, new = self.reports[self._read]
+                self._read += 1
+                if new == report or (isinstance(report, type) and isinstance(new, report)):
+                    return at_s
+            vehicle_s, bridge_s = self.vehicle.next_deadline_s(), self.bridge.next_deadline_s()
+            self.now_s = max(self.now_s, min(vehicle_s, bridge_s))
+            if vehicle_s <= self.now_s:
+                self.to_vehicle(autopilot.Tick())
+            if self.bridge.next_deadline_s() <= self.now_s:
+                self.to_bridge(Tick())
+        raise AssertionError(f"no {report} within {limit_s} s, only {self.reports}")
+
+
+@pytest.mark.parametrize("old_names", [False, True])
+def test_whole_mission_is_flown(old_names: bool) -> None:
+    flight = JoinedFlight(flavour=ArduCopter(old_names=old_names))
+    flight.to_bridge(START)
+    ready_s = flight.run_until(VehicleReady())
+    assert 5.0 < ready_s < 20.0
+    for leg, target in enumerate([(5.0, 30.0, 10.0), (30.0, 30.0, 12.0)], start=1):
+        flight.to_bridge(GoTo(leg, target))
+        flight.run_until(Arrived(leg))
+        assert math.dist(flight.vehicle.pilot.position_enu_m(flight.now_s), target) <= 0.12
+    flight.to_bridge(Return("done"))
+    flight.run_until(Home())
+    assert not flight.vehicle.pilot.armed
+
+
+def test_legs_take_distance_over_speed() -> None:
+    flight = JoinedFlight()
+    flight.to_bridge(START)
+    flight.run_until(VehicleReady())
+    place, spent_s, flown_s = START.position_enu_m, 0.0, 0.0
+    for leg in range(20):
+        target = (5.0 + 3.0 * (leg % 3), 2.0 + 7.0 * (leg % 4), 10.0)
+        began_s = flight.now_s
+        flight.to_bridge(GoTo(leg, target))
+        spent_s += flight.run_until(Arrived(leg)) - began_s
+        flown_s += math.dist(place, target) / START.speed_m_s
+        place = target
+    assert spent_s / flown_s == pytest.approx(1.0, abs=0.02)
+
+
+def test_pilot_takes_over_the_simulated_vehicle() -> None:
+    flight = JoinedFlight()
+    flight.to_bridge(START)
+    flight.run_until(VehicleReady())
+    flight.to_bridge(GoTo(1, (5.0, 200.0, 10.0)))
+    flight.vehicle.pilot.set_mode(Mode.LOITER, flight.now_s)
+    flight.run_until(HandedOver("its pilot or a failsafe switched it to LOITER"))
+    with pytest.raises(AssertionError, match="no"):
+        flight.run_until(Arrived(1), limit_s=60.0)
+    assert flight.vehicle.pilot.mode is Mode.LOITER
+
+
+def test_reboot_of_the_simulated_vehicle_is_noticed() -> None:
+    flight = JoinedFlight()
+    flight.to_bridge(START)
+    flight.run_until(VehicleReady())
+    flight.to_vehicle(autopilot.Reboot())
+    flight.run_until(HandedOver, limit_s=5.0)
+
+
+@pytest.mark.parametrize("transport", [Transport.TCP, Transport.UDP_IN])
+def test_mission_is_flown_through_sockets_in_time(transport: Transport) -> None:
+    asyncio.run(_fly_through_sockets(transport))
+
+
+async def _fly_through_sockets(transport: Transport) -> None:
+    speedup = 10.0
+    clock = ScaledClock(speedup)
+    machine = Vehicle(VEHICLE, ArduCopter(), clock.now_s())
+    server = VehicleServer(machine, Endpoint(transport, "127.0.0.1", 0), clock)
+    await server.start()
+    home = asyncio.Event()
+    times_s: list[float] = []
+    targets = [(5.0, 12.0, 10.0), (17.0, 12.0, 10.0), (17.0, 0.0, 10.0)]
+
+    def on_report(report: Report) -> None:
+        match report:
+            case VehicleReady() | Arrived():
+                times_s.append(clock.now_s())
+                leg = len(times_s) - 1
+                if leg < len(targets):
+                    vehicle.order(GoTo(leg, targets[leg]))
+                else:
+                    vehicle.order(Return("done"))
+            case Home():
+                home.set()
+            case _:
+                pass
+
+    vehicle = MavlinkVehicle(CONFIG.for_speedup(speedup), server.url, clock, on_report)
+    try:
+        await vehicle.start()
+        vehicle.order(START)
+        async with asyncio.timeout(30.0):
+            await home.wait()
+    finally:
+        await vehicle.close()
+        await server.close()
+    legs_s = [b - a for a, b in itertools.pairwise(times_s)]
+    # Generous, as the machine may be busy: half a wall second in all.
+    assert 9.0 * 0.99 <= sum(legs_s) <= 9.0 + 0.5 * speedup
+    assert server.garbage == 0

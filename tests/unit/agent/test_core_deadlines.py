@@ -1,0 +1,236 @@
+"""Whatever happens: no exception, no busy loop, statements that never go back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from agent.core import AgentCore
+from agent.events import Action, Event, Order
+from agent.vehicle import (
+    Arrived,
+    GoTo,
+    HandedOver,
+    Home,
+    NotReady,
+    Orders,
+    Refused,
+    Telemetry,
+    VehicleReady,
+)
+from swarm.config import Timing
+from swarm.events import (
+    Finish,
+    Heard,
+    Learned,
+    LinkChanged,
+    PeerGone,
+    PeerSeen,
+    Publish,
+    Stop,
+    Tick,
+)
+from swarm.model.ids import COORDINATOR
+from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.messages import (
+    Body,
+    ClaimPhase,
+    EpochPhase,
+    Snapshot,
+    Stamp,
+)
+from tests.builders import (
+    IDLE,
+    MISSION,
+    OUT,
+    brief,
+    done,
+    entry,
+    epoch,
+    failed,
+    held,
+    message,
+    proposed,
+    uav,
+)
+
+OTHERS = ["u1", "u2"]
+WRITERS = [COORDINATOR, *OTHERS]
+TASKS = ["t0", "t1", "t2"]
+BRIEF = brief(uav("u0", t2=0.0), uav("u1"), uav("u2", t0=0.0))
+TIMING = Timing()
+
+
+class Storm:
+    """Random events for one agent, and what must hold after each."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.core = AgentCore(MISSION, "u0", 1, TIMING)
+        self.now_s = 50.0
+        self.finished = False
+        self.counter = 0
+        self.ordered: list[Orders] = []
+        self.stamps: dict[str, Stamp] = {}
+        self.codec = Codec(MISSION)
+        self.take(self.core.start(self.now_s))
+
+    def pick(self, *choices: Any) -> Any:
+        return choices[int(self.rng.integers(len(choices)))]
+
+    def blow(self) -> None:
+        """One random event, or time goes on to the next deadline."""
+        due_s = self.core.next_deadline_s()
+        if self.rng.random() < 0.4 and due_s is not None:
+            self.now_s = max(self.now_s, due_s)
+            self.step(Tick())
+        else:
+            self.now_s += float(self.pick(0.0, 0.0, self.rng.exponential(0.3)))
+            self.step(self.event())
+        self.let_time_go_on()
+
+    def let_time_go_on(self) -> None:
+        """A core that is ticked at its deadline must move the deadline on."""
+        now_s = self.now_s
+        for _ in range(5):
+            due_s = self.core.next_deadline_s()
+            if due_s is None or due_s > now_s:
+                return
+            self.step(Tick())
+        raise AssertionError(f"still due at {due_s} at {now_s}, {self.core.phase}")
+
+    def step(self, event: Event) -> None:
+        self.take(self.core.step(event, self.now_s))
+
+    def take(self, actions: list[Action]) -> None:
+        assert not (self.finished and actions), "it had finished"
+        for action in actions:
+            if isinstance(action, Order):
+                self.ordered.append(action.order)
+            elif isinstance(action, Finish):
+                self.finished = True
+            elif isinstance(action, Publish):
+                said = action.message
+                assert self.codec.decode(key_of(said), encode(said)) == said
+                before = self.stamps.get(key_of(said), said.stamp)
+                assert said.stamp >= before, "it went back"
+                self.stamps[key_of(said)] = said.stamp
+        claim = self.core.claim
+        if claim is not None and self.core.phase in ("flying", "serving"):
+            assert claim.phase in (ClaimPhase.PROPOSED, ClaimPhase.HELD)
+
+    def event(self) -> Event:
+        makers: list[Callable[[], Event]] = [
+            lambda: self.heard(self.pick(*OTHERS), self.uav_body()),
+            lambda: self.heard(COORDINATOR, self.coordinator_body()),
+            lambda: PeerSeen(self.pick(*WRITERS)),
+            lambda: PeerGone(self.pick(*WRITERS)),
+            lambda: LinkChanged(bool(self.rng.random() < 0.7)),
+            self.learned,
+            self.report,
+            self.report,
+        ]
+        if self.rng.random() < 0.01:
+            return Stop("told")
+        event: Event = self.pick(*makers)()
+        return event
+
+    def heard(self, writer: str, body: Body) -> Heard:
+        self.counter += 1
+        stale = int(self.rng.integers(0, 3))
+        return Heard(message(writer, body, max(1, self.counter - stale)))
+
+    def uav_body(self) -> Body:
+        task, at_s = self.pick(*TASKS), float(self.rng.uniform(-1.0, 20.0))
+        rank, until_s = int(self.rng.integers(0, 3)), at_s + float(self.rng.uniform(0.0, 9.0))
+        body: Body = self.pick(
+            proposed(task, at_s, rank, until_s),
+            held(task, at_s, rank, until_s),
+            IDLE,
+            OUT,
+            done(task, at_s),
+            failed(task, at_s),
+        )
+        return body
+
+    def coordinator_body(self) -> Body:
+        number = int(self.rng.integers(0, 3))
+        posted = entry(
+            f"t{number}",
+            east_m=float(self.rng.uniform(0.0, 9.0)),
+            number=number,
+            service_s=float(self.pick(0.0, 0.5)),
+            withdrawn=bool(self.rng.random() < 0.2),
+        )
+        sequence = [str(u) for u in self.rng.permutation(["u0", *OTHERS])]
+        phase = self.pick(*[EpochPhase.RUNNING] * 12, EpochPhase.PREPARING, EpochPhase.ENDED)
+        rule = self.pick("greedy", "lookahead")
+        body: Body = self.pick(BRIEF, posted, posted, epoch(*sequence, phase=phase, rule=rule))
+        return body
+
+    def learned(self) -> Learned:
+        said = [self.heard(COORDINATOR, self.coordinator_body()).message]
+        said += [self.heard(uav, self.uav_body()).message for uav in OTHERS]
+        own = message("u0", self.uav_body(), int(self.rng.integers(1, 99)))
+        if self.rng.random() < 0.3:
+            said.append(own)
+        mission_s = self.pick(None, float(self.rng.uniform(0.0, 9.0)))
+        return self.pick(Learned(()), Learned((Snapshot(MISSION, "u1", mission_s, tuple(said)),)))  # type: ignore[no-any-return]
+
+    def report(self) -> Event:
+        legs = [order.leg for order in self.ordered if isinstance(order, GoTo)] or [0]
+        place = tuple(float(x) for x in self.rng.uniform(0.0, 9.0, 3))
+        choices: list[Event] = [
+            VehicleReady(),
+            VehicleReady(),
+            NotReady("no position"),
+            Arrived(legs[-1]),
+            Arrived(legs[-1]),
+            Arrived(legs[0]),
+            Telemetry((place[0], place[1], place[2]), (0.0, 0.0, 0.0), None),
+        ]
+        if self.rng.random() < 0.1:
+            choices += [HandedOver("pilot"), Home()]
+            choices += [Refused(order, "no") for order in self.ordered[-1:]]
+        event: Event = self.pick(*choices)
+        return event
+
+
+@pytest.mark.parametrize("block", range(4))
+def test_no_storm_of_events_raises_or_leaves_a_deadline_behind(block: int) -> None:
+    for seed in range(block * 40, block * 40 + 40):
+        storm = Storm(seed)
+        for _ in range(150):
+            storm.blow()
+
+
+def test_the_storms_reach_every_phase() -> None:
+    """Else the test above would prove little."""
+    phases = set()
+    for seed in range(40):
+        storm = Storm(seed)
+        for _ in range(150):
+            storm.blow()
+            phases.add(storm.core.phase)
+    assert len(phases) == len(type(storm.core.phase))
+
+
+def test_in_the_quiet_it_wakes_only_for_status_and_repetition() -> None:
+    storm = Storm(0)
+    storm.step(PeerSeen(COORDINATOR))
+    known = (message(COORDINATOR, BRIEF), message(COORDINATOR, entry("t2"), 2))
+    storm.step(Learned((Snapshot(MISSION, COORDINATOR, None, known),)))
+    storm.step(VehicleReady())
+    storm.step(Heard(message(COORDINATOR, epoch("u0"), 9)))
+    begin_s, wakes = storm.now_s, 0
+    while storm.now_s < begin_s + 60.0:
+        due_s = storm.core.next_deadline_s()
+        assert due_s is not None
+        assert due_s > storm.now_s
+        storm.now_s = due_s
+        storm.step(Tick())
+        wakes += 1
+    assert wakes <= 60.0 / TIMING.status_s + 60.0 / TIMING.announce_s + 2

@@ -1,0 +1,406 @@
+"""The agent's process: a seat on the bus, a vehicle that obeys, and an end in order."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+
+import pytest
+
+from agent import runner
+from agent.core import AgentCore
+from agent.events import Action, Event
+from agent.runner import run_agent, seat_or_stop
+from agent.vehicle import Home, NotReady, Orders, Prepare, Report, Return, VehicleReady
+from swarm.bus.memory import MemoryBus, MemoryNetwork
+from swarm.bus.port import Bus, BusEvent, Sample, TokenGone, TokenSeen
+from swarm.config import Timing
+from swarm.errors import BusError
+from swarm.events import Stop
+from swarm.model import Origin
+from swarm.model.ids import COORDINATOR
+from swarm.process import StopRequest
+from swarm.shell import take_seat
+from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.keys import Keys
+from swarm.wire.messages import EpochPhase, Message
+from tests.builders import IDLE, MISSION, brief, epoch, message, uav
+from tests.shell_play import HandClock, play, take_until, until
+
+KEYS = Keys(MISSION)
+BRIEF = message(COORDINATOR, brief(uav("u0", east_m=3.0, speed_m_s=2.0), layer_m=10.0), counter=1)
+ENDED = message(COORDINATOR, epoch("u0", phase=EpochPhase.ENDED), counter=2)
+INTERRUPTED = 130
+
+
+class OwnError(Exception):
+    """Stands for a bug."""
+
+
+@dataclass(slots=True)
+class FakeVehicle:
+    """Does at once what it is told, unless its link is broken or it stays away."""
+
+    origin: Origin
+    report: Callable[[Report], None]
+    broken: bool = False
+    stays_away: bool = False
+    orders: list[Orders] = field(default_factory=list)
+    closed: int = 0
+
+    async def start(self) -> None:
+        await asyncio.sleep(0)
+        if self.broken:
+            raise OwnError
+
+    def order(self, order: Orders) -> None:
+        self.orders.append(order)
+        if isinstance(order, Prepare):
+            self.report(VehicleReady())
+        if isinstance(order, Return) and not self.stays_away:
+            self.report(Home())
+
+    async def close(self) -> None:
+        self.closed += 1
+
+
+@dataclass(slots=True)
+class Played:
+    """One agent at work, and the seat from which it is watched."""
+
+    core: AgentCore
+    running: asyncio.Task[int]
+    stop: StopRequest
+    seat: MemoryBus
+    coordinator: MemoryBus
+    vehicles: list[FakeVehicle]
+
+    def say(self, *said: Message) -> None:
+        for each in said:
+            self.coordinator.publish(key_of(each), encode(each))
+
+    async def seated(self) -> None:
+        token = TokenSeen(KEYS.alive("u0"))
+        await take_until(self.coordinator, lambda seen: token in seen)
+
+    async def airborne(self) -> FakeVehicle:
+        await self.seated()
+        self.say(BRIEF)
+        await until(lambda: self.core.claim is not None, "getting airborne")
+        return self.vehicles[0]
+
+
+@asynccontextmanager
+async def at_work(*, broken: bool = False, stays_away: bool = False) -> AsyncIterator[Played]:
+    """The agent of u0, whose vehicle is a `FakeVehicle`."""
+    network = MemoryNetwork()
+    watching, seat = network.join("watching"), network.join("u0")
+    take_seat(watching, MISSION, None, status=True)
+    core = AgentCore(MISSION, "u0", 1, Timing())
+    stop, vehicles = StopRequest(), list[FakeVehicle]()
+
+    def make_vehicle(origin: Origin, report: Callable[[Report], None]) -> FakeVehicle:
+        vehicles.append(FakeVehicle(origin, report, broken, stays_away))
+        return vehicles[-1]
+
+    running = asyncio.create_task(run_agent(core, MISSION, seat, HandClock(), make_vehicle, stop))
+    try:
+        yield Played(core, running, stop, seat, watching, vehicles)
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        seat.close()
+        watching.close()
+
+
+def test_the_vehicle_is_made_at_the_missions_origin_and_prepared_at_its_start() -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            vehicle = await played.airborne()
+
+            assert vehicle.origin == Origin(47.0, 8.0, 400.0)
+            assert vehicle.orders == [Prepare((3.0, 0.0, 10.0), 2.0)]
+            assert len(played.vehicles) == 1
+
+    play(scenario)
+
+
+def test_what_the_vehicle_reports_leads_to_what_is_said() -> None:
+    codec = Codec(MISSION)
+
+    async def scenario() -> None:
+        async with at_work() as played:
+            await played.airborne()
+
+            def free(seen: Sequence[BusEvent]) -> bool:
+                samples = [event for event in seen if isinstance(event, Sample)]
+                said = [codec.decode(sample.key, sample.payload) for sample in samples]
+                return any(each is not None and each.body == IDLE for each in said)
+
+            await take_until(played.coordinator, free)
+
+    play(scenario)
+
+
+def test_an_ended_mission_brings_the_vehicle_home_and_ends_the_agent() -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            vehicle = await played.airborne()
+            played.say(ENDED)
+
+            assert await played.running == 0
+            assert isinstance(vehicle.orders[-1], Return)
+            assert vehicle.closed == 1
+
+    play(scenario)
+
+
+def test_an_agent_shows_that_it_is_there_until_its_seat_is_closed() -> None:
+    async def scenario() -> None:
+        token = KEYS.alive("u0")
+        async with at_work() as played:
+            await played.seated()
+            played.stop.request(0)
+            await played.running
+            assert TokenGone(token) not in played.coordinator.inbox.take()
+            played.seat.close()
+            assert TokenGone(token) in played.coordinator.inbox.take()
+
+    play(scenario)
+
+
+def test_told_to_stop_it_brings_the_vehicle_home_first() -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            vehicle = await played.airborne()
+            played.stop.request(INTERRUPTED)
+
+            assert await played.running == INTERRUPTED
+            assert isinstance(vehicle.orders[-1], Return)
+            assert vehicle.closed == 1
+
+    play(scenario)
+
+
+def test_told_to_stop_it_does_not_wait_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "FAREWELL_S", 0.01)
+
+    async def scenario() -> None:
+        async with at_work(stays_away=True) as played:
+            vehicle = await played.airborne()
+            played.stop.request(0)
+
+            assert await played.running == 0
+            assert isinstance(vehicle.orders[-1], Return)
+            assert vehicle.closed == 1
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_told_to_stop_before_it_knows_the_mission_it_just_leaves(at_once: bool) -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            if not at_once:
+                await played.seated()
+            played.stop.request(0)
+
+            assert await played.running == 0
+            assert played.vehicles == []
+
+    play(scenario)
+
+
+def test_a_vehicle_that_cannot_be_reached_ends_the_agent_with_the_reason() -> None:
+    async def scenario() -> None:
+        async with at_work(broken=True) as played:
+            await played.seated()
+            played.say(BRIEF)
+            with pytest.raises(OwnError):
+                await played.running
+            assert played.vehicles[0].closed == 1
+
+    play(scenario)
+
+
+def break_core(played: Played, monkeypatch: pytest.MonkeyPatch, on: type[Event]) -> None:
+    """Let the core fail at events of that kind."""
+    step = played.core.step
+
+    def fail(event: Event, now_s: float) -> Sequence[Action]:
+        if isinstance(event, on):
+            raise OwnError
+        return step(event, now_s)
+
+    monkeypatch.setattr(played.core, "step", fail)
+
+
+def test_a_bug_in_the_core_ends_the_agent_and_closes_the_vehicle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            vehicle = await played.airborne()
+            break_core(played, monkeypatch, NotReady)
+            vehicle.report(NotReady("a reason"))
+            with pytest.raises(OwnError):
+                await played.running
+            assert vehicle.closed == 1
+
+    play(scenario)
+
+
+def test_a_bug_while_leaving_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            vehicle = await played.airborne()
+            break_core(played, monkeypatch, Stop)
+            played.stop.request(0)
+            with pytest.raises(OwnError):
+                await played.running
+            assert vehicle.closed == 1
+
+    play(scenario)
+
+
+def test_reports_that_come_after_the_end_do_no_harm() -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            vehicle = await played.airborne()
+            played.say(ENDED)
+            await played.running
+            vehicle.report(VehicleReady())
+
+    play(scenario)
+
+
+def test_the_core_is_told_how_much_was_dropped() -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            vehicle = await played.airborne()
+            played.coordinator.publish(KEYS.plan, b"nonsense")
+            played.coordinator.publish(KEYS.claim("u1"), b"nonsense")
+            played.say(message("u1", IDLE))
+            await until(lambda: "u1" in played.core.replica.claims, "hearing u1")
+            vehicle.report(NotReady("a reason"))
+
+            assert played.core.dropped == 2
+
+    play(scenario)
+
+
+# -- a seat on the bus ----------------------------------------------------------------
+
+
+class Opener:
+    """Fails as often as told, then opens a seat."""
+
+    def __init__(self, failures: int, fault: Exception | None = None) -> None:
+        self.tries = 0
+        self.reasons: list[str] = []
+        self._failures = failures
+        self._fault = fault or BusError("nobody there")
+
+    async def __call__(self) -> Bus:
+        self.tries += 1
+        if self.tries <= self._failures:
+            raise self._fault
+        return MemoryNetwork().join("u0")
+
+    async def seat(self, stop: StopRequest) -> Bus | None:
+        return await seat_or_stop(self, stop, self.reasons.append)
+
+
+def test_a_seat_is_tried_for_until_there_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "RETRY_S", 0.0)
+
+    async def scenario() -> None:
+        opener = Opener(failures=3)
+
+        assert await opener.seat(StopRequest()) is not None
+        assert opener.reasons == ["nobody there"] * 3
+
+    play(scenario)
+
+
+def test_tries_that_fail_at_once_are_not_repeated_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "RETRY_S", 100.0)
+
+    async def scenario() -> None:
+        opener, stop = Opener(failures=100), StopRequest()
+        seating = asyncio.create_task(opener.seat(stop))
+        await until(lambda: bool(opener.reasons), "the first failure")
+        for _ in range(100):
+            await asyncio.sleep(0)
+        assert opener.tries == 1
+
+        stop.request(0)
+        assert await seating is None
+
+    play(scenario)
+
+
+def test_a_stop_is_heard_between_tries_that_fail_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "RETRY_S", 0.0)
+
+    async def scenario() -> None:
+        opener, stop = Opener(failures=1000), StopRequest()
+        stop.request(0)
+
+        assert await opener.seat(stop) is None
+        assert opener.tries < 1000
+
+    play(scenario)
+
+
+class Hanging:
+    """Never opens; remembers that it was given up."""
+
+    def __init__(self) -> None:
+        self.trying = asyncio.Event()
+        self.given_up = False
+
+    async def __call__(self) -> Bus:
+        self.trying.set()
+        try:
+            await asyncio.Event().wait()
+        finally:
+            self.given_up = True
+        raise AssertionError
+
+
+def test_a_try_under_way_is_given_up_when_told_to_stop() -> None:
+    async def scenario() -> None:
+        opening, stop = Hanging(), StopRequest()
+        seating = asyncio.create_task(seat_or_stop(opening, stop, pytest.fail))
+        await opening.trying.wait()
+        stop.request(0)
+
+        assert await seating is None
+        assert opening.given_up
+
+    play(scenario)
+
+
+def test_a_try_under_way_does_not_outlive_who_wanted_it() -> None:
+    async def scenario() -> None:
+        opening = Hanging()
+        seating = asyncio.create_task(seat_or_stop(opening, StopRequest(), pytest.fail))
+        await opening.trying.wait()
+        seating.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await seating
+
+        assert opening.given_up
+
+    play(scenario)
+
+
+def test_what_is_no_trouble_of_the_bus_is_raised() -> None:
+    async def scenario() -> None:
+        with pytest.raises(OwnError):
+            await Opener(1, OwnError()).seat(StopRequest())
+
+    play(scenario)

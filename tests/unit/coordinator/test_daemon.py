@@ -1,0 +1,206 @@
+"""The coordinator's process: its core on a bus, plans made beside it."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from functools import partial
+
+import pytest
+
+from coordinator.core import CoordinatorCore, FlightLayers
+from coordinator.daemon import run_coordinator
+from swarm.bus.memory import MemoryBus, MemoryNetwork
+from swarm.bus.port import BusEvent, Sample
+from swarm.config import Timing
+from swarm.model import Mission, Plan, UavId
+from swarm.model.ids import COORDINATOR
+from swarm.shell import take_seat
+from swarm.state.registers import Replica
+from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.keys import Keys
+from swarm.wire.messages import Body, EpochPhase, Message
+from tests.builders import IDLE, MISSION, OUT, done, message, mission, task, uav
+from tests.shell_play import LIMIT_S, HandClock, play, take_until, until
+
+KEYS = Keys(MISSION)
+WHOLE = mission([uav("u0")], [task("t0", 1.0)])
+MakePlan = Callable[[Mission, str, int], Plan]
+
+
+class OwnError(Exception):
+    """Stands for a bug."""
+
+
+def planned(what: Mission, method: str, seed: int) -> Plan:
+    sequence = tuple(UavId(each.id) for each in what.uavs)
+    routes = dict.fromkeys(sequence, ())
+    return Plan(what.name, method, routes, 0.0, {}, sequence, None, 1, 0.0, seed)
+
+
+@dataclass(slots=True)
+class Played:
+    """A coordinator at work, and the seat of the fleet's one UAV."""
+
+    core: CoordinatorCore
+    running: asyncio.Task[int]
+    clock: HandClock
+    fleet: MemoryBus
+    onlooker: MemoryBus
+
+    def heard(self, said: Message) -> bool:
+        return self.running.done() or said in self.core.replica.messages()
+
+    async def phase(self, phase: EpochPhase) -> None:
+        def reached() -> bool:
+            epoch = self.core.replica.epoch
+            return epoch is not None and epoch.phase is phase
+
+        await until(reached, f"a mission that is {phase}")
+
+    def say(self, *bodies: Body, counter: int = 1) -> None:
+        for number, body in enumerate(bodies):
+            said = message("u0", body, counter=counter + number)
+            self.fleet.publish(key_of(said), encode(said))
+
+
+@asynccontextmanager
+async def at_work(make_plan: MakePlan = planned) -> AsyncIterator[Played]:
+    """The coordinator of `WHOLE`."""
+    network = MemoryNetwork()
+    onlooker = network.join("onlooker")
+    fleet, seat = network.join("u0"), network.join(COORDINATOR)
+    take_seat(fleet, MISSION, "u0", status=False)
+    core = CoordinatorCore(
+        WHOLE,
+        method="greedy",
+        seed=5,
+        incarnation=1,
+        timing=Timing(),
+        start_timeout_s=60.0,
+        layers=FlightLayers(),
+    )
+    clock = HandClock()
+    running = asyncio.create_task(run_coordinator(core, WHOLE, seat, clock, make_plan))
+    try:
+        yield Played(core, running, clock, fleet, onlooker)
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        seat.close()
+        fleet.close()
+
+
+def test_brief_and_board_are_said_at_once() -> None:
+    async def scenario() -> None:
+        replica, codec = Replica(), Codec(MISSION)
+        async with at_work() as played:
+
+            def told(seen: Sequence[BusEvent]) -> bool:
+                for event in seen:
+                    if isinstance(event, Sample):
+                        said = codec.decode(event.key, event.payload)
+                        assert said is not None
+                        replica.join(said)
+                return replica.brief is not None and set(replica.board) == {"t0"}
+
+            await take_until(played.fleet, told)
+
+    play(scenario)
+
+
+def test_the_planner_is_asked_for_the_mission_as_it_is_known_off_the_loops_thread() -> None:
+    asked: list[tuple[Mission, str, int, bool]] = []
+
+    def make_plan(what: Mission, method: str, seed: int) -> Plan:
+        asked.append((what, method, seed, threading.current_thread() is threading.main_thread()))
+        return planned(what, method, seed)
+
+    async def scenario() -> None:
+        async with at_work(make_plan) as played:
+            await until(lambda: played.core.plan is not None, "a plan")
+
+    play(scenario)
+    assert asked == [(WHOLE, "greedy", 5, False)]
+
+
+def test_a_mission_is_flown_to_its_end() -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            await until(lambda: played.core.plan is not None, "a plan")
+            played.say(IDLE)
+            await played.phase(EpochPhase.RUNNING)
+            played.say(done("t0"), OUT, counter=2)
+            await played.phase(EpochPhase.ENDED)
+            played.fleet.close()
+            for counter in range(4):
+                # The clock stands still between events: whatever is heard moves it on.
+                played.clock.time_s += 10.0
+                said = message("u1", OUT, counter=counter)
+                played.onlooker.publish(key_of(said), encode(said))
+                await until(partial(played.heard, said), "hearing the onlooker")
+            assert await played.running == 0
+
+    play(scenario)
+
+
+def test_a_mission_that_cannot_be_planned_ends_with_the_reason() -> None:
+    def make_plan(what: Mission, method: str, seed: int) -> Plan:
+        raise ValueError("no UAV can do it")
+
+    async def scenario() -> None:
+        async with at_work(make_plan) as played:
+            await played.phase(EpochPhase.ENDED)
+            epoch = played.core.replica.epoch
+            assert epoch is not None
+            assert "no UAV can do it" in epoch.reason
+
+    play(scenario)
+
+
+def test_a_bug_in_the_planner_ends_the_coordinator_with_it() -> None:
+    def make_plan(what: Mission, method: str, seed: int) -> Plan:
+        raise OwnError
+
+    async def scenario() -> None:
+        async with at_work(make_plan) as played:
+            with pytest.raises(OwnError):
+                await asyncio.wait_for(played.running, LIMIT_S)
+
+    play(scenario)
+
+
+def test_a_plan_under_way_does_not_outlive_the_coordinator() -> None:
+    begun, may_end = threading.Event(), threading.Event()
+
+    def make_plan(what: Mission, method: str, seed: int) -> Plan:
+        begun.set()
+        may_end.wait(LIMIT_S)
+        return planned(what, method, seed)
+
+    async def scenario() -> None:
+        async with at_work(make_plan) as played:
+            await until(begun.is_set, "planning")
+            played.running.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await played.running
+            assert len(asyncio.all_tasks()) == 1
+            may_end.set()
+
+    play(scenario)
+
+
+def test_queries_are_answered_with_brief_and_board() -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            await until(lambda: played.core.plan is not None, "a plan")
+            (answer,) = await played.fleet.query(KEYS.state("*"), timeout_s=LIMIT_S)
+
+            snapshot = Codec(MISSION).decode_snapshot(answer.key, answer.payload)
+            assert snapshot == played.core.snapshot(0.0)
+            assert len(snapshot.messages) == 2
+
+    play(scenario)

@@ -1,0 +1,303 @@
+"""What an onlooker makes of what it hears: a result, and a story in sentences."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from coordinator.observer import Observer
+from swarm.config import Timing
+from swarm.events import (
+    Ask,
+    BusFact,
+    Heard,
+    Learned,
+    LinkChanged,
+    PeerGone,
+    PeerSeen,
+    Tick,
+    Wish,
+)
+from swarm.model import Mission
+from swarm.model.ids import COORDINATOR
+from swarm.wire.messages import Body, EpochPhase, Message, Snapshot
+from tests.builders import (
+    IDLE,
+    MISSION,
+    OUT,
+    brief_of,
+    done,
+    entries_of,
+    entry,
+    epoch,
+    failed,
+    held,
+    message,
+    mission,
+    proposed,
+    status,
+    task,
+    uav,
+)
+
+TIMING = Timing()
+FLEET = uav("u0"), uav("u1", east_m=10.0, t1=0.5)
+T0, T1, POPUP = task("t0", 5.0, 2.0), task("t1", 9.0, 4.0), task("popup", 7.0, appears_s=30.0)
+FLOWN = mission(FLEET, [T0, T1, POPUP], horizon_s=100.0)
+
+
+class Onlooker:
+    """An observer of `FLOWN` whose mission begins at 200 s of its clock."""
+
+    def __init__(self, flown: Mission = FLOWN) -> None:
+        self.observer = Observer(flown, TIMING)
+        self.flown = flown
+        self.now_s = 100.0
+        self._counters: Counter[str] = Counter()
+
+    def happen(self, fact: BusFact, mission_s: float | None = None) -> list[Wish]:
+        if mission_s is not None:
+            self.now_s = 200.0 + mission_s
+        return self.observer.step(fact, self.now_s)
+
+    def statement(self, writer: str, body: Body) -> Message:
+        self._counters[writer] += 1
+        return message(writer, body, self._counters[writer])
+
+    def hear(self, writer: str, body: Body, mission_s: float | None = None) -> list[Wish]:
+        return self.happen(Heard(self.statement(writer, body)), mission_s)
+
+    def lose(self, writer: str, mission_s: float) -> None:
+        self.happen(PeerGone(writer), mission_s)
+        self.happen(Tick(), mission_s + TIMING.loss_delay_s)
+
+    def posted(self) -> list[Body]:
+        """What the coordinator says before the start."""
+        return [brief_of(self.flown), *entries_of(self.flown.known_at_start())]
+
+    def running(self) -> Onlooker:
+        """The same at the start of the mission, everybody there and idle."""
+        for writer in (COORDINATOR, "u0", "u1"):
+            self.happen(PeerSeen(writer))
+        for body in self.posted():
+            self.hear(COORDINATOR, body)
+        for name in ("u0", "u1"):
+            self.hear(name, IDLE)
+        self.hear(COORDINATOR, epoch("u0", "u1"), 0.0)
+        return self
+
+    @property
+    def story(self) -> list[str]:
+        return [happening.text for happening in self.observer.story]
+
+
+# -- the result -------------------------------------------------------------------------
+
+
+def test_the_result_tells_lists_times_and_worth_of_what_was_done() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", done("t0", 5.0), 5.0)
+    onlooker.hear("u1", done("t1", 1.5), 6.0)
+    result = onlooker.observer.result()
+
+    assert result.executed_routes == {"u0": ("t0",), "u1": ("t1",)}
+    assert result.executed_completion_s == {"t0": 5.0, "t1": 1.5}
+    assert result.executed_objective == 2.0 * 95.0 + 0.5 * 4.0 * 98.5
+    assert (result.done, result.failed, result.open) == (("t0", "t1"), (), ("popup",))
+    assert (result.makespan_s, result.duplicate_visits, result.epochs) == (5.0, 0, 1)
+
+
+def test_before_anything_was_heard_everything_is_open() -> None:
+    result = Onlooker().observer.result()
+
+    assert result.open == ("t0", "t1", "popup")
+    assert (result.executed_objective, result.makespan_s, result.epochs) == (0.0, 0.0, 0)
+
+
+def test_a_second_visit_is_counted_and_worth_nothing() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", done("t1", 9.0), 9.0)
+    onlooker.hear("u1", done("t1", 8.0), 9.5)
+    result = onlooker.observer.result()
+
+    assert result.duplicate_visits == 1
+    assert result.executed_completion_s == {"t1": 8.0}
+    assert result.executed_objective == 0.5 * 4.0 * 92.0
+    assert result.executed_routes == {"u0": ("t1",), "u1": ("t1",)}
+
+
+def test_tasks_that_failed_or_were_withdrawn_are_not_open() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", failed("t0"), 4.0)
+    onlooker.hear(COORDINATOR, entry("t1", withdrawn=True), 5.0)
+    result = onlooker.observer.result()
+
+    assert (result.done, result.failed, result.open) == ((), ("t0",), ("popup",))
+
+
+def test_visits_that_end_at_one_instant_stay_in_the_order_they_were_made_in() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", done("t1", 5.0), 5.0)
+    onlooker.hear("u0", done("t0", 5.0), 5.0)
+
+    assert onlooker.observer.result().executed_routes == {"u0": ("t1", "t0"), "u1": ()}
+
+
+def test_holders_are_those_who_are_there_and_whose_task_is_open() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", held("t0", 0.0), 1.0)
+    onlooker.hear("u1", proposed("t1", 0.0))
+    assert onlooker.observer.holders == {"t0": "u0", "t1": "u1"}
+
+    onlooker.hear("u0", done("t0"))
+    assert onlooker.observer.holders == {"t1": "u1"}
+    onlooker.lose("u1", 2.0)
+    assert onlooker.observer.holders == {}
+
+
+def test_the_newest_status_of_each_uav_is_kept() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", status(position_enu_m=(1.0, 0.0, 0.0)))
+    onlooker.hear("u0", status(position_enu_m=(2.0, 0.0, 0.0)))
+
+    assert onlooker.observer.statuses["u0"].position_enu_m == (2.0, 0.0, 0.0)
+    assert set(onlooker.observer.statuses) == {"u0"}
+
+
+# -- the story --------------------------------------------------------------------------
+
+
+def test_a_faultless_mission_in_sentences() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", held("t0", 0.0), 0.5)
+    onlooker.hear("u0", done("t0", 5.0), 5.0)
+    onlooker.hear(COORDINATOR, entries_of(FLOWN)[2], 30.0)
+    onlooker.hear("u0", done("popup", 33.0), 33.0)
+    onlooker.hear(COORDINATOR, epoch("u0", phase=EpochPhase.ENDED, reason="over"), 34.0)
+
+    assert [(h.mission_s, h.text) for h in onlooker.observer.story] == [
+        (0.0, "epoch 1: greedy, u0 > u1"),
+        (5.0, "u0 ended t0: done"),
+        (30.0, "task popup appeared"),
+        (33.0, "u0 ended popup: done"),
+        (34.0, "mission ends: over"),
+    ]
+
+
+def test_hearing_it_again_makes_no_second_sentence() -> None:
+    onlooker = Onlooker().running()
+    ended = epoch("u0", phase=EpochPhase.ENDED, reason="over")
+    told = onlooker.statement("u0", done("t0", 5.0))
+    for _ in range(2):
+        onlooker.happen(Heard(told), 5.0)
+        onlooker.hear(COORDINATOR, epoch("u0", "u1", mission_s=5.0))
+    for _ in range(2):
+        onlooker.hear(COORDINATOR, ended, 9.0)
+
+    assert len(onlooker.story) == 3
+
+
+def test_a_loss_is_told_with_the_task_it_opens_and_who_takes_over() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", held("t0", 0.0), 0.5)
+    onlooker.lose("u0", 3.0)
+    onlooker.hear("u1", proposed("t0", 3.3), 3.3)
+    onlooker.hear("u1", held("t0", 3.3), 3.6)
+
+    assert onlooker.story[1:] == ["u0 lost; task t0 is open again", "u1 took over t0 from u0"]
+    assert onlooker.observer.lost == ["u0"]
+    assert onlooker.observer.result().lost_uavs == ("u0",)
+
+
+def test_a_uav_lost_with_nothing_to_do_opens_nothing() -> None:
+    onlooker = Onlooker().running()
+    onlooker.lose("u0", 3.0)
+
+    assert onlooker.story[1:] == ["u0 lost"]
+
+
+def test_a_uav_that_comes_back_takes_its_task_over_from_nobody() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", held("t0", 0.0), 0.5)
+    onlooker.lose("u0", 3.0)
+    onlooker.happen(PeerSeen("u0"), 4.0)
+    onlooker.hear("u0", IDLE)
+    onlooker.hear("u0", proposed("t0", 4.0))
+    onlooker.lose("u0", 5.0)
+
+    assert onlooker.story[1:] == ["u0 lost; task t0 is open again"] * 2
+    assert onlooker.observer.result().lost_uavs == ("u0",)
+
+
+def test_who_leaves_after_its_last_word_is_not_lost() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", OUT, 3.0)
+    onlooker.lose("u0", 4.0)
+
+    assert onlooker.story[1:] == ["u0 takes no further part"]
+    assert onlooker.observer.lost == []
+
+
+def test_a_token_that_blinks_and_a_cut_of_the_own_link_are_no_losses() -> None:
+    onlooker = Onlooker().running()
+    onlooker.happen(PeerGone("u0"), 1.0)
+    onlooker.happen(PeerSeen("u0"))
+    onlooker.happen(LinkChanged(False), 2.0)
+    onlooker.happen(PeerGone("u1"))
+    onlooker.happen(Tick(), 50.0)
+
+    assert onlooker.story[1:] == []
+    assert onlooker.observer.present == {COORDINATOR, "u0", "u1"}
+
+
+@pytest.mark.parametrize(
+    ("phase", "told"),
+    [
+        (None, ["coordinator lost before the mission began"]),
+        (EpochPhase.RUNNING, ["coordinator lost; the fleet goes on with the last epoch"]),
+        (EpochPhase.ENDED, []),
+    ],
+)
+def test_the_loss_of_the_coordinator_is_told_for_what_it_means(
+    phase: EpochPhase | None, told: list[str]
+) -> None:
+    onlooker = Onlooker()
+    onlooker.happen(PeerSeen(COORDINATOR))
+    if phase is not None:
+        onlooker.hear(COORDINATOR, epoch("u0", phase=phase), 0.0)
+    before = len(onlooker.story)
+    onlooker.lose(COORDINATOR, 1.0)
+
+    assert onlooker.story[before:] == told
+    assert onlooker.observer.lost == []
+
+
+# -- joining ----------------------------------------------------------------------------
+
+
+def test_it_asks_until_it_knows_the_brief_and_then_only_for_losses() -> None:
+    observer = Observer(FLOWN, TIMING)
+    assert observer.start(100.0) == [Ask()]
+    assert observer.step(Learned(()), 100.5) == []
+    due_s = observer.next_deadline_s()
+    assert due_s == 100.0 + TIMING.ask_s
+
+    assert observer.step(Tick(), due_s) == [Ask()]
+    observer.step(Heard(message(COORDINATOR, brief_of(FLOWN))), 101.5)
+    assert observer.next_deadline_s() is None
+    assert observer.step(Tick(), 200.0) == []
+    assert observer.step(LinkChanged(True), 200.0) == [Ask()]
+
+
+def test_one_who_joins_late_learns_time_and_result_but_tells_no_tales_of_pop_ups() -> None:
+    onlooker = Onlooker()
+    said = [onlooker.statement(COORDINATOR, body) for body in onlooker.posted()]
+    said.append(onlooker.statement(COORDINATOR, epoch("u0", "u1", mission_s=40.0)))
+    said.append(onlooker.statement("u0", done("t0", 5.0)))
+    answer = Snapshot(MISSION, COORDINATOR, 41.0, tuple(said))
+    onlooker.happen(Learned((answer,)))
+
+    assert onlooker.observer.mission_s(onlooker.now_s) == 41.0
+    assert onlooker.observer.result().done == ("t0",)
+    assert not any("appeared" in sentence for sentence in onlooker.story)

@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from coordinator.planner.plan import make_plan
+from coordinator.planner.stop import after_evaluations
+from coordinator.plot import draw_plan, path_looks, plan_figure
+from coordinator.plot_labels import Label, place_labels
+from swarm.clock import SystemClock
+from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
+from tests.problems import table_1_mission
+
+
+def plan_of(mission: Mission) -> Plan:
+    return make_plan(mission, "greedy", clock=SystemClock(), stop=after_evaluations(20))
+
+
+def texts(figure: Figure) -> list[str]:
+    (legend,) = figure.legends
+    return [
+        *(text.get_text() for text in figure.axes[0].texts),
+        legend.get_title().get_text(),
+        *(text.get_text() for text in legend.get_texts()),
+    ]
+
+
+def wide_mission(n_uav: int, n_task: int) -> Mission:
+    rng = np.random.default_rng(4)
+    return Mission(
+        name="wide",
+        horizon_s=600.0,
+        uavs=tuple(Uav(UavId(f"uav{i}"), (0.0, 5.0 * i, 0.0), 12.0) for i in range(n_uav)),
+        tasks=tuple(
+            Task(TaskId(f"task-{i:02d}"), (*rng.uniform(-900.0, 900.0, 2), 0.0), 1.0 + i % 4)
+            for i in range(n_task)
+        ),
+    )
+
+
+def test_figure_names_all_places_and_the_worth() -> None:
+    mission = table_1_mission()
+    figure = plan_figure(mission, plan_of(mission))
+
+    found = texts(figure)
+    for name in ("t1", "t8", "uav1, uav2, uav3", "uav1: t2 t3", "sequence: uav1 uav3 uav2"):
+        assert name in found
+    assert "J = 118.4939\noptimum 120.3335, gap 1.53 %" in found
+    axes = figure.axes[0]
+    assert axes.get_aspect() == 1.0
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("east [m]", "north [m]")
+
+
+def test_uavs_differ_by_colour_or_by_line() -> None:
+    assert len(set(path_looks(28))) == 28
+    assert len({look.dashes for look in path_looks(4)}) == 4
+
+
+def test_legend_counts_the_tasks_of_long_lists() -> None:
+    mission = wide_mission(12, 30)
+
+    found = texts(plan_figure(mission, plan_of(mission)))
+
+    counts = [text for text in found if text.startswith("uav") and "task" in text]
+    assert len(counts) == 12
+    assert sum(int(text.split()[1]) for text in counts) == 30
+
+
+def test_pop_ups_and_late_tasks_have_their_own_look() -> None:
+    mission = replace(table_1_mission(), horizon_s=2.0)
+    late = replace(mission.tasks[0], appears_s=9.0)
+    mission = replace(mission, tasks=(late, *mission.tasks[1:]))
+
+    found = texts(plan_figure(mission, plan_of(mission)))
+
+    assert "completed after the horizon" in found
+    assert "in no list (appears later)" in found
+
+
+@pytest.mark.parametrize("n_task", [15, 60])
+def test_names_do_not_cover_each_other(n_task: int) -> None:
+    mission = wide_mission(4, n_task)
+    figure = Figure(figsize=(10.0, 10.0))
+    axes = figure.add_subplot()
+    axes.set_xlim(-1000.0, 1000.0)
+    axes.set_ylim(-1000.0, 1000.0)
+    labels = [Label(task.id, task.position_enu_m[:2], 5.0, bold=False) for task in mission.tasks]
+
+    boxes = place_labels(axes, labels, 7.0)
+
+    assert len(boxes) == n_task
+    covering = sum(
+        bool((a[:2] < b[2:]).all() and (b[:2] < a[2:]).all()) for a, b in combinations(boxes, 2)
+    )
+    assert covering == 0
+
+
+def test_same_plan_gives_the_same_picture(tmp_path: Path) -> None:
+    mission = table_1_mission()
+    plan = plan_of(mission)
+
+    for name in ("a.png", "b.png"):
+        draw_plan(mission, plan, tmp_path / name)
+
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_unknown_kind_of_picture_is_refused(tmp_path: Path) -> None:
+    mission = table_1_mission()
+
+    with pytest.raises(ValueError, match=r"\.svg"):
+        draw_plan(mission, plan_of(mission), tmp_path / "a.gif")
+
+
+def test_single_place_and_empty_mission_can_be_drawn() -> None:
+    for mission in (wide_mission(1, 0), wide_mission(0, 0), wide_mission(1, 1)):
+        plan_figure(mission, plan_of(mission))

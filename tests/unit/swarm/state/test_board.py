@@ -1,0 +1,169 @@
+"""What became of each task, and the mission that the registers describe."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm.model.ids import COORDINATOR
+from swarm.state.board import TaskBoard, TaskState, doable
+from swarm.state.registers import Replica
+from swarm.wire.messages import Board, Body, Message
+from tests.builders import IDLE, MISSION, OUT, brief, done, entry, epoch, failed, held, message, uav
+from tests.message_strategies import messages
+
+FLEET = (uav("u0"), uav("u1", east_m=5.0, t0=0.5))
+
+
+class Registers:
+    """A replica to which statements are made in order."""
+
+    def __init__(self, *said: tuple[str, Body]) -> None:
+        self.replica = Replica()
+        self.board = TaskBoard(self.replica, MISSION)
+        self._counter = 0
+        self.say(COORDINATOR, brief(*FLEET))
+        for writer, body in said:
+            self.say(writer, body)
+
+    def say(self, writer: str, body: Body) -> None:
+        self._counter += 1
+        self.replica.join(message(writer, body, self._counter))
+
+    def post(self, *entries: Board) -> None:
+        for posted in entries:
+            self.say(COORDINATOR, posted)
+
+    def state(self) -> TaskState:
+        return self.board.states["t0"]
+
+
+def test_a_posted_task_is_open_also_while_it_is_claimed() -> None:
+    registers = Registers((COORDINATOR, entry("t0")), ("u0", held("t0", 0.0)))
+
+    assert registers.state() is TaskState.OPEN
+
+
+def test_a_visit_that_succeeded_makes_a_task_done_for_good() -> None:
+    registers = Registers((COORDINATOR, entry("t0")), ("u0", done("t0")))
+    assert registers.state() is TaskState.DONE
+
+    registers.say("u1", failed("t0"))
+    registers.post(entry("t0", withdrawn=True))
+    assert registers.state() is TaskState.DONE
+
+
+def test_a_failed_attempt_ends_a_task_unless_it_may_be_tried_again() -> None:
+    registers = Registers((COORDINATOR, entry("t0")), ("u0", failed("t0")))
+    assert registers.state() is TaskState.FAILED
+
+    registers.say(COORDINATOR, brief(*FLEET, reattempt_failed=True))
+    assert registers.state() is TaskState.OPEN
+
+    registers.say("u0", done("t0", attempt=2))
+    assert registers.state() is TaskState.DONE
+
+
+def test_a_withdrawn_task_may_come_back() -> None:
+    registers = Registers((COORDINATOR, entry("t0", withdrawn=True)))
+    assert registers.state() is TaskState.WITHDRAWN
+
+    registers.post(entry("t0"))
+    assert registers.state() is TaskState.OPEN
+
+
+def test_outcomes_of_tasks_that_are_not_posted_make_no_task() -> None:
+    registers = Registers(("u0", done("t9")))
+
+    assert registers.board.states == {}
+
+
+def test_tasks_stand_in_the_order_of_their_numbers_then_ids() -> None:
+    registers = Registers()
+    registers.post(entry("t2", number=1), entry("t0", number=1), entry("t1", number=0))
+    problem = registers.board.problem
+
+    assert list(registers.board.states) == ["t1", "t0", "t2"]
+    assert problem is not None
+    assert problem.task_ids == ("t1", "t0", "t2")
+
+
+def test_the_problem_holds_the_brief_and_every_posted_task() -> None:
+    registers = Registers()
+    registers.post(entry("t0", east_m=3.0, value=2.0, service_s=1.5))
+    problem = registers.board.problem
+
+    assert problem is not None
+    assert problem.uav_ids == ("u0", "u1")
+    np.testing.assert_array_equal(problem.success, [[1.0], [0.5]])
+    np.testing.assert_array_equal(problem.task_enu_m, [[3.0, 0.0, 0.0]])
+    np.testing.assert_array_equal((problem.value, problem.service_s), [[2.0], [1.5]])
+
+
+def test_there_is_no_problem_before_the_brief() -> None:
+    board = TaskBoard(Replica(), MISSION)
+    board.replica.join(message(COORDINATOR, entry("t0")))
+
+    assert board.problem is None
+    assert board.states == {"t0": TaskState.OPEN}
+
+
+def test_what_was_worked_out_is_kept_until_something_changes() -> None:
+    registers = Registers((COORDINATOR, entry("t0")))
+    problem, states = registers.board.problem, registers.board.states
+
+    registers.say("u0", held("t0", 0.0))
+    registers.say(COORDINATOR, epoch("u0", "u1"))
+    assert registers.board.problem is problem
+    assert registers.board.states is states
+
+    registers.say("u0", done("t0"))
+    assert registers.board.problem is problem
+    assert registers.board.states == {"t0": TaskState.DONE}
+
+    registers.post(entry("t1"))
+    later = registers.board.problem
+    assert later is not None
+    assert later.task_ids == ("t0", "t1")
+
+    registers.say(COORDINATOR, brief(FLEET[0]))
+    later = registers.board.problem
+    assert later is not None
+    assert later.uav_ids == ("u0",)
+
+
+@given(st.lists(messages(), max_size=10))
+def test_what_is_kept_equals_what_a_fresh_look_finds(said: list[Message]) -> None:
+    replica = Replica()
+    board = TaskBoard(replica, MISSION)
+    for statement in said:
+        replica.join(statement)
+        fresh = TaskBoard(replica, MISSION)
+        assert board.states == fresh.states
+        assert (board.problem is None) == (fresh.problem is None)
+        if board.problem is not None and fresh.problem is not None:
+            assert board.problem.task_ids == fresh.problem.task_ids
+
+
+def test_doable_is_what_someone_who_takes_part_is_capable_of() -> None:
+    fleet = uav("u0", t1=0.0), uav("u1", t0=0.0), uav("u2")
+    registers = Registers((COORDINATOR, brief(*fleet)))
+    registers.post(entry("t0"), entry("t1", number=1), entry("t2", number=2))
+    for name in ("u0", "u1"):
+        registers.say(name, IDLE)
+
+    def found(*present: str) -> list[str]:
+        return doable(registers.board, present)
+
+    assert found("u0", "u1", "u2") == ["t0", "t1", "t2"]
+    assert found("u0") == ["t0", "t2"]
+    assert found("u2") == found() == []  # u2 has said nothing yet
+    registers.say("u2", OUT)
+    assert found("u2") == []
+    registers.say("u1", done("t2"))
+    assert found("u0", "u1") == ["t0", "t1"]
+
+
+def test_nothing_is_doable_before_the_brief() -> None:
+    assert doable(TaskBoard(Replica(), MISSION), ["u0"]) == []

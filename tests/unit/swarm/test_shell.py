@@ -1,0 +1,487 @@
+"""The shell carries facts to its core and wishes out of it, in order, and ends in order."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+import pytest
+
+from swarm.bus.memory import MemoryBus, MemoryNetwork
+from swarm.bus.port import Sample, TokenGone, TokenSeen
+from swarm.errors import BusError
+from swarm.events import (
+    Ask,
+    BusFact,
+    Finish,
+    Heard,
+    Learned,
+    LinkChanged,
+    Note,
+    PeerGone,
+    PeerSeen,
+    Publish,
+    Stop,
+    Tick,
+    Wish,
+)
+from swarm.model.ids import COORDINATOR
+from swarm.shell import Shell, take_seat
+from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.keys import Keys
+from swarm.wire.messages import Message, Snapshot
+from tests.builders import MISSION, brief, done, entry, epoch, held, message, status, uav
+from tests.shell_play import HandClock, play, take_until, until
+
+KEYS = Keys(MISSION)
+REGISTERS = [
+    message(COORDINATOR, brief(uav("u0"), uav("u1"))),
+    message(COORDINATOR, epoch("u0", "u1")),
+    message(COORDINATOR, entry("t0")),
+    message("u1", held("t0", 1.0)),
+    message("u1", done("t0")),
+]
+IDS = [type(said.body).__name__ for said in REGISTERS]
+CLAIM = message("u1", held("t0", 1.0))
+SNAPSHOT = Snapshot(MISSION, "u0", 7.0, (message("u0", held("t1", 2.0)),))
+END = Stop("enough")
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """An action that only this kind of process knows."""
+
+    name: str
+
+
+Action = Wish | Own
+React = Callable[[BusFact], Sequence[Action]]
+
+
+class ScriptedCore:
+    """Remembers what it heard; answers by a function, and ends on `Stop`."""
+
+    def __init__(self, react: React | None = None, first: Sequence[Action] = ()) -> None:
+        self.heard: list[BusFact] = []
+        self.instants_s: list[float] = []
+        self.deadline_s: float | None = None
+        self._react = react
+        self._first = first
+
+    def start(self, now_s: float) -> Sequence[Action]:
+        return self._first
+
+    def step(self, event: BusFact, now_s: float) -> Sequence[Action]:
+        self.heard.append(event)
+        self.instants_s.append(now_s)
+        if isinstance(event, Tick):
+            self.deadline_s = None
+        if event == END:
+            return [Finish(0)]
+        return () if self._react is None else self._react(event)
+
+    def next_deadline_s(self) -> float | None:
+        return self.deadline_s
+
+
+@dataclass(slots=True)
+class Played:
+    """One shell at work beside another seat."""
+
+    shell: Shell[BusFact, Action]
+    running: asyncio.Task[int]
+    network: MemoryNetwork
+    seat: MemoryBus
+    other: MemoryBus
+    clock: HandClock
+    own: list[str]
+
+    async def end(self) -> int:
+        self.shell.step(END)
+        return await self.running
+
+
+def as_event(fact: BusFact) -> BusFact:
+    return fact
+
+
+@asynccontextmanager
+async def at_work(
+    core: ScriptedCore,
+    *,
+    execute: Callable[[Action], None] | None = None,
+    answers: bool = True,
+    capacity: int = 4096,
+) -> AsyncIterator[Played]:
+    """A shell that runs ``core`` on the seat of u0, seen from the seat of u1."""
+    network = MemoryNetwork()
+    other = network.join("u1")
+    seat = network.join("u0", inbox_capacity=capacity)
+    take_seat(other, MISSION, "u1", status=True)
+    take_seat(seat, MISSION, "u0", status=True)
+    clock, own = HandClock(), list[str]()
+
+    def remember(action: Action) -> None:
+        assert isinstance(action, Own)
+        own.append(action.name)
+
+    shell: Shell[BusFact, Action] = Shell(
+        core,
+        seat,
+        clock,
+        mission=MISSION,
+        name="u0",
+        from_bus=as_event,
+        execute=execute or remember,
+        snapshot=(lambda _: SNAPSHOT) if answers else None,
+    )
+    running = asyncio.create_task(shell.run())
+    try:
+        yield Played(shell, running, network, seat, other, clock, own)
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        seat.close()
+        other.close()
+
+
+@pytest.mark.parametrize("said", REGISTERS, ids=IDS)
+def test_every_register_that_is_said_is_heard(said: Message) -> None:
+    async def scenario() -> None:
+        core = ScriptedCore()
+        async with at_work(core) as played:
+            played.other.publish(key_of(said), encode(said))
+            await until(lambda: Heard(said) in core.heard, "hearing it")
+            assert played.shell.dropped == 0
+
+    play(scenario)
+
+
+def test_what_is_malformed_is_counted_and_the_rest_heard() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore()
+        async with at_work(core) as played:
+            bad = [b"", b"\xc1", encode(CLAIM)[:-1], encode(SNAPSHOT), b"\x91" * 100_000]
+            for data in bad:
+                played.other.publish(KEYS.claim("u1"), data)
+            played.other.publish(KEYS.claim("u2"), encode(CLAIM))
+            played.other.publish(key_of(CLAIM), encode(CLAIM))
+            await until(lambda: Heard(CLAIM) in core.heard, "hearing the good one")
+
+            assert [fact for fact in core.heard if isinstance(fact, Heard)] == [Heard(CLAIM)]
+            assert played.shell.dropped == len(bad) + 1
+
+    play(scenario)
+
+
+def test_what_the_inbox_had_no_room_for_is_counted_too() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore()
+        async with at_work(core, capacity=4) as played:
+            for counter in range(20):
+                said = message("u1", held("t0", 1.0), counter=counter)
+                played.other.publish(key_of(said), encode(said))
+            newest = Heard(said)
+            await until(lambda: newest in core.heard, "hearing the newest")
+
+            heard = [fact for fact in core.heard if isinstance(fact, Heard)]
+            assert len(heard) + played.shell.dropped == 20
+
+    play(scenario)
+
+
+def test_peers_and_the_own_link_are_told() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore()
+        async with at_work(core) as played:
+            played.network.cut("u0")
+            played.network.heal("u0")
+            wanted = [
+                LinkChanged(True),
+                PeerSeen("u1"),
+                LinkChanged(False),
+                PeerGone("u1"),
+                LinkChanged(True),
+                PeerSeen("u1"),
+            ]
+            await until(lambda: len(core.heard) >= len(wanted), "all of it")
+            assert core.heard == wanted
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("key", ["swarm/other/alive/u9", f"swarm/{MISSION}/alive/", "x"])
+def test_tokens_that_are_no_writers_of_the_mission_are_nobody(key: str) -> None:
+    async def scenario() -> None:
+        core = ScriptedCore()
+        network = MemoryNetwork()
+        seat = network.join("u0")
+        shell: Shell[BusFact, Action] = Shell(
+            core,
+            seat,
+            HandClock(),
+            mission=MISSION,
+            name="u0",
+            from_bus=as_event,
+            execute=lambda _: None,
+            snapshot=None,
+        )
+        running = asyncio.create_task(shell.run())
+        seat.inbox.offer(TokenSeen(key))
+        seat.inbox.offer(TokenGone(key))
+        seat.inbox.offer(TokenSeen(KEYS.alive("u2")))
+        await until(lambda: PeerSeen("u2") in core.heard, "seeing u2")
+        shell.step(END)
+        await running
+
+        assert core.heard == [LinkChanged(True), PeerSeen("u2"), END]
+
+    play(scenario)
+
+
+def test_queries_are_answered_with_the_cores_snapshot() -> None:
+    async def scenario() -> None:
+        async with at_work(ScriptedCore()) as played:
+            (answer,) = await played.other.query(KEYS.state("*"), timeout_s=5.0)
+
+            assert Codec(MISSION).decode_snapshot(answer.key, answer.payload) == SNAPSHOT
+
+    play(scenario)
+
+
+def test_a_process_without_a_snapshot_answers_nothing() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore()
+        async with at_work(core, answers=False) as played:
+            assert await played.other.query(KEYS.state("*"), timeout_s=0.01) == ()
+            assert await played.end() == 0
+
+    play(scenario)
+
+
+def test_a_question_ends_in_all_good_answers() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Ask()])
+        async with at_work(core) as played:
+            third = played.network.join("u2")
+            third.serve(KEYS.state("u2"))
+            good = Snapshot(MISSION, "u1", None, (CLAIM,))
+
+            def answer(bus: MemoryBus, payload: bytes) -> None:
+                for event in bus.inbox.take():
+                    reply = getattr(event, "reply", None)
+                    if reply is not None:
+                        reply(payload)
+
+            def answered() -> bool:
+                answer(played.other, encode(good))
+                answer(third, b"nonsense")
+                return any(isinstance(fact, Learned) for fact in core.heard)
+
+            await until(answered, "learning")
+            third.close()
+
+            assert Learned((good,)) in core.heard
+            assert played.shell.dropped == 1
+
+    play(scenario)
+
+
+def test_a_question_that_nobody_hears_ends_in_no_answers() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Ask()])
+        async with at_work(core) as played:
+            played.network.cut("u0")
+            await until(lambda: Learned(()) in core.heard, "learning nothing")
+
+    play(scenario)
+
+
+def test_messages_go_out_on_their_keys() -> None:
+    own = [message("u0", held("t0", 1.0)), message("u0", done("t0")), message("u0", status())]
+
+    async def scenario() -> None:
+        async with at_work(ScriptedCore(first=[Publish(said) for said in own])) as played:
+            samples = {Sample(key_of(said), encode(said)) for said in own}
+            await take_until(
+                played.other, lambda seen: samples <= {e for e in seen if isinstance(e, Sample)}
+            )
+
+    play(scenario)
+
+
+def test_a_core_ticks_when_its_deadline_has_come_and_not_before() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore()
+        async with at_work(core) as played:
+            core.deadline_s = 5.0
+            played.shell.step(PeerSeen("u9"))
+            await asyncio.sleep(0)
+            assert Tick() not in core.heard
+
+            played.clock.time_s = 5.0
+            played.shell.step(PeerGone("u9"))
+            await until(lambda: Tick() in core.heard, "the tick")
+            assert core.instants_s[core.heard.index(Tick())] == 5.0
+            assert core.heard.count(Tick()) == 1
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("exit_status", [0, 1])
+def test_the_run_ends_with_the_status_the_core_finished_with(exit_status: int) -> None:
+    async def scenario() -> int:
+        async with at_work(ScriptedCore(first=[Finish(exit_status)])) as played:
+            return await played.running
+
+    assert play(scenario) == exit_status
+
+
+def test_what_was_wanted_beside_the_finish_is_still_done_and_nothing_after_it() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Own("before"), Finish(3), Own("beside"), Finish(4)])
+        async with at_work(core) as played:
+            assert await played.running == 3
+            played.shell.step(PeerSeen("u9"))
+            played.shell.fail(RuntimeError("too late"))
+
+            assert played.own == ["before", "beside"]
+            assert PeerSeen("u9") not in core.heard
+
+    play(scenario)
+
+
+def test_a_question_under_way_does_not_outlive_the_run() -> None:
+    async def scenario() -> None:
+        async with at_work(ScriptedCore(first=[Ask(), Ask()])) as played:
+            await until(lambda: len(asyncio.all_tasks()) == 5, "asking")
+            assert await played.end() == 0
+            assert len(asyncio.all_tasks()) == 1
+
+    play(scenario)
+
+
+def test_cancelling_the_run_ends_everything_it_began() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Ask()])
+        core.deadline_s = 1.0
+        async with at_work(core) as played:
+            await until(lambda: len(asyncio.all_tasks()) == 4, "asking")
+            played.running.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await played.running
+            assert len(asyncio.all_tasks()) == 1
+
+    play(scenario)
+
+
+class OwnError(Exception):
+    """Stands for a bug."""
+
+
+def raise_own(thing: object) -> Sequence[Action]:
+    raise OwnError
+
+
+@pytest.mark.parametrize("where", ["start", "step", "execute", "deadline", "snapshot"])
+def test_a_bug_anywhere_ends_the_run_with_it(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Own("first")] if where == "execute" else ())
+        if where == "start":
+            monkeypatch.setattr(core, "start", raise_own)
+        if where == "step":
+            monkeypatch.setattr(core, "step", lambda event, _: raise_own(event))
+        if where == "deadline":
+            monkeypatch.setattr(core, "next_deadline_s", lambda: raise_own(None))
+
+        def execute(action: Action) -> None:
+            raise OwnError
+
+        async with at_work(core, execute=execute) as played:
+            if where == "snapshot":
+                monkeypatch.setattr(played.shell, "_snapshot", raise_own)
+                await played.other.query(KEYS.state("*"), timeout_s=0.01)
+            with pytest.raises(OwnError):
+                await played.running
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("wish", [Publish(CLAIM), Ask()], ids=["publish", "ask"])
+def test_a_bus_that_was_closed_ends_the_run(wish: Wish) -> None:
+    async def scenario() -> None:
+        async with at_work(ScriptedCore(lambda _: [wish])) as played:
+            played.seat.close()
+            played.shell.step(PeerSeen("u9"))
+            with pytest.raises(BusError):
+                await played.running
+
+    play(scenario)
+
+
+def test_events_that_come_up_during_a_step_follow_it_in_order() -> None:
+    shells: list[Shell[BusFact, Action]] = []
+    steps: list[str] = []
+
+    def react(fact: BusFact) -> Sequence[Action]:
+        match fact:
+            case PeerSeen(writer):
+                steps.append(f"step {writer}")
+                return [Own(f"{writer} one"), Own(f"{writer} two")]
+            case _:
+                return ()
+
+    def execute(action: Action) -> None:
+        assert isinstance(action, Own)
+        steps.append(action.name)
+        if action.name == "a one":
+            shells[0].step(PeerSeen("b"))
+        if action.name == "a two":
+            shells[0].step(PeerSeen("c"))
+
+    async def scenario() -> None:
+        async with at_work(ScriptedCore(react), execute=execute) as played:
+            shells.append(played.shell)
+            played.shell.step(PeerSeen("a"))
+            assert await played.end() == 0
+
+    play(scenario)
+
+    wanted = ["step a", "a one", "a two", "step b", "b one", "b two", "step c", "c one", "c two"]
+    assert steps == wanted
+
+
+def test_events_that_come_up_while_the_core_starts_follow_the_start() -> None:
+    shells: list[Shell[BusFact, Action]] = []
+
+    def execute(action: Action) -> None:
+        shells[0].step(END)
+
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Own("one"), Note("two", {"n": 2})])
+        async with at_work(core, execute=execute) as played:
+            shells.append(played.shell)
+            assert await played.running == 0
+            assert core.heard == [END]
+
+    play(scenario)
+
+
+def test_an_onlooker_takes_a_seat_that_nobody_sees() -> None:
+    async def scenario() -> None:
+        network = MemoryNetwork()
+        there, onlooker = network.join("u1"), network.join("onlooker")
+        take_seat(there, MISSION, "u1", status=False)
+        take_seat(onlooker, MISSION, None, status=True)
+        there.inbox.take()
+        there.publish(KEYS.status("u1"), b"s")
+        onlooker.publish(KEYS.status("u2"), b"s")
+
+        assert TokenSeen(KEYS.alive("u1")) in (seen := onlooker.inbox.take())
+        assert Sample(KEYS.status("u1"), b"s") in seen
+        assert there.inbox.take() == []
+        assert await there.query(KEYS.state("*"), timeout_s=5.0) == ()
+
+    play(scenario)

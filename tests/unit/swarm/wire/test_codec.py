@@ -1,0 +1,487 @@
+"""Bytes <-> messages: what is said comes through, and nothing else does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import msgpack
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm.model.ids import COORDINATOR
+from swarm.wire.codec import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, Codec, encode, key_of
+from swarm.wire.keys import Keys
+from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
+from tests.builders import (
+    MISSION,
+    brief,
+    done,
+    entry,
+    epoch,
+    held,
+    message,
+    status,
+    uav,
+)
+from tests.message_strategies import messages
+
+BRIEF = message(COORDINATOR, brief(uav("u0"), uav("u1", t0=0.5)))
+EPOCH = message(COORDINATOR, epoch("u1", "u0"))
+BOARD = message(COORDINATOR, entry("t0"))
+CLAIM = message("u0", held("t0", 1.0))
+OUTCOME = message("u0", done("t0"))
+STATUS = message("u0", status())
+EVERY_KIND = [BRIEF, EPOCH, BOARD, CLAIM, OUTCOME, STATUS]
+EVERY_KIND_IDS = [type(said.body).__name__ for said in EVERY_KIND]
+
+Parts = list[Any]
+
+
+def drop_reason(key: str, data: bytes) -> str:
+    """Why ``data`` was dropped; fails when it was not, or was counted otherwise than once."""
+    codec = Codec(MISSION)
+    assert codec.decode(key, data) is None
+    assert codec.dropped.total() == 1
+    return next(iter(codec.dropped))
+
+
+def parts_of(said: Message) -> Parts:
+    parts: Parts = msgpack.unpackb(encode(said))
+    return parts
+
+
+def reason_with(said: Message, change: Callable[[Parts], object]) -> str:
+    """Why ``said`` is dropped once ``change`` has been at its parts."""
+    parts = parts_of(said)
+    change(parts)
+    return drop_reason(key_of(said), msgpack.packb(parts))
+
+
+def reason_with_field(said: Message, **fields: object) -> str:
+    return reason_with(said, lambda parts: parts[6].update(fields))
+
+
+# -- what is said comes through -------------------------------------------------------
+
+
+@given(messages())
+def test_every_message_comes_back_as_it_was_said(said: Message) -> None:
+    codec = Codec(MISSION)
+
+    assert codec.decode(key_of(said), encode(said)) == said
+    assert codec.dropped.total() == 0
+
+
+@given(st.lists(messages(), max_size=5).map(tuple), st.none() | st.floats(-1e9, 1e9))
+def test_every_snapshot_comes_back_as_it_was_said(
+    said: tuple[Message, ...], mission_s: float | None
+) -> None:
+    codec, snapshot = Codec(MISSION), Snapshot(MISSION, "u0", mission_s, said)
+
+    assert codec.decode_snapshot(Keys(MISSION).state("u0"), encode(snapshot)) == snapshot
+    assert codec.dropped.total() == 0
+
+
+def test_whole_numbers_are_taken_for_measures() -> None:
+    said = message(COORDINATOR, entry("t0", value=3, service_s=0))
+
+    assert Codec(MISSION).decode(key_of(said), encode(said)) == said
+
+
+def test_a_fleet_of_a_thousand_fits_into_brief_and_epoch() -> None:
+    names = [f"uav-{n}" for n in range(1000)]
+    for said in (
+        message(COORDINATOR, brief(*(uav(name, t0=0.5, t1=0.5) for name in names))),
+        message(COORDINATOR, epoch(*names)),
+    ):
+        assert Codec(MISSION).decode(key_of(said), encode(said)) == said
+
+
+# -- nothing else does ----------------------------------------------------------------
+
+
+@given(st.sampled_from(EVERY_KIND), st.binary(max_size=200))
+def test_random_bytes_are_dropped_and_counted(said: Message, data: bytes) -> None:
+    assert drop_reason(key_of(said), data)
+
+
+@given(st.sampled_from(EVERY_KIND), st.data())
+def test_truncated_bytes_are_dropped_as_malformed(said: Message, data: st.DataObject) -> None:
+    whole = encode(said)
+    length = data.draw(st.integers(0, len(whole) - 1))
+
+    assert drop_reason(key_of(said), whole[:length]) == "malformed"
+
+
+@given(st.sampled_from(EVERY_KIND), st.binary(min_size=1, max_size=9))
+def test_bytes_after_the_end_are_dropped_as_malformed(said: Message, tail: bytes) -> None:
+    assert drop_reason(key_of(said), encode(said) + tail) == "malformed"
+
+
+@settings(max_examples=500)
+@given(st.sampled_from(EVERY_KIND), st.data())
+def test_flipped_bits_never_raise_and_never_change_who_speaks(
+    said: Message, data: st.DataObject
+) -> None:
+    flipped = bytearray(encode(said))
+    for _ in range(data.draw(st.integers(1, 3))):
+        flipped[data.draw(st.integers(0, len(flipped) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    codec = Codec(MISSION)
+
+    heard = codec.decode(key_of(said), bytes(flipped))
+
+    assert (heard is None) == (codec.dropped.total() == 1)
+    if heard is not None:
+        assert (heard.mission, key_of(heard)) == (MISSION, key_of(said))
+
+
+plain = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**64 - 1)
+    | st.floats()
+    | st.text(max_size=5)
+    | st.binary(max_size=5)
+    | st.just(msgpack.ExtType(5, b"")),
+    lambda inner: (
+        st.lists(inner, max_size=8)
+        | st.dictionaries(st.text(max_size=5) | st.binary(max_size=3), inner, max_size=4)
+    ),
+    max_leaves=20,
+)
+
+
+@settings(max_examples=300)
+@given(st.sampled_from(EVERY_KIND), st.integers(0, 6), plain)
+def test_anything_in_the_place_of_a_part_never_raises(
+    said: Message, place: int, instead: object
+) -> None:
+    parts = parts_of(said)
+    parts[place] = instead
+    codec = Codec(MISSION)
+
+    heard = codec.decode(key_of(said), msgpack.packb(parts))
+
+    assert (heard is None) == (codec.dropped.total() == 1)
+
+
+@settings(max_examples=300)
+@given(st.sampled_from(EVERY_KIND), plain, st.data())
+def test_anything_in_the_place_of_a_field_never_raises(
+    said: Message, instead: object, data: st.DataObject
+) -> None:
+    parts = parts_of(said)
+    parts[6][data.draw(st.sampled_from(sorted(parts[6])))] = instead
+    codec = Codec(MISSION)
+
+    heard = codec.decode(key_of(said), msgpack.packb(parts))
+
+    assert (heard is None) == (codec.dropped.total() == 1)
+
+
+@given(plain)
+def test_anything_that_is_messagepack_never_raises(thing: object) -> None:
+    assert drop_reason(key_of(CLAIM), msgpack.packb(thing))
+
+
+@pytest.mark.parametrize("said", EVERY_KIND, ids=EVERY_KIND_IDS)
+def test_another_schema_version_is_dropped_under_its_own_reason(said: Message) -> None:
+    def newer(parts: Parts) -> None:
+        parts[0] = 2
+
+    assert reason_with(said, newer) == "unknown version"
+
+
+@pytest.mark.parametrize("said", EVERY_KIND, ids=EVERY_KIND_IDS)
+def test_another_mission_is_dropped_under_its_own_reason(said: Message) -> None:
+    def elsewhere(parts: Parts) -> None:
+        parts[1] = "other"
+
+    assert reason_with(said, elsewhere) == "another mission"
+
+
+@pytest.mark.parametrize("kind", ["order", "", 7, None, ["claim"], {"claim": 1}])
+def test_unknown_kinds_are_dropped_under_their_own_reason(kind: object) -> None:
+    def unknown(parts: Parts) -> None:
+        parts[5] = kind
+
+    assert reason_with(CLAIM, unknown) == "unknown kind"
+
+
+@pytest.mark.parametrize("writer", ["", "../x", "a/b", "u0\n", "*", "x" * 65, 5, None, b"u0"])
+def test_writers_without_a_valid_id_are_malformed(writer: object) -> None:
+    def bad(parts: Parts) -> None:
+        parts[2] = writer
+
+    assert reason_with(CLAIM, bad) == "malformed"
+
+
+@pytest.mark.parametrize("place", [3, 4])
+@pytest.mark.parametrize("count", [-1, 2**63, 1.0, "1", True, None])
+def test_stamps_that_are_no_counts_are_malformed(place: int, count: object) -> None:
+    def bad(parts: Parts) -> None:
+        parts[place] = count
+
+    assert reason_with(CLAIM, bad) == "malformed"
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, "1", True, None, [1.0]])
+@pytest.mark.parametrize(
+    ("said", "field"),
+    [
+        (BRIEF, "horizon_s"),
+        (EPOCH, "mission_s"),
+        (BOARD, "value"),
+        (CLAIM, "decided_s"),
+        (CLAIM, "completion_s"),
+        (OUTCOME, "completed_s"),
+    ],
+)
+def test_numbers_that_are_none_are_malformed(said: Message, field: str, number: object) -> None:
+    assert reason_with_field(said, **{field: number}) == "malformed"
+
+
+@pytest.mark.parametrize(
+    "point", [[0.0, 0.0], [0.0] * 4, [0.0, 0.0, math.nan], ["0", 0.0, 0.0], "000", None, 0.0]
+)
+def test_points_that_are_none_are_malformed(point: object) -> None:
+    assert reason_with_field(BOARD, position_enu_m=point) == "malformed"
+
+
+@pytest.mark.parametrize("text", ["", "*", "a/b", "a b", "x" * 65, 5, b"t0", None])
+@pytest.mark.parametrize("said", [BOARD, OUTCOME], ids=["Board", "Outcome"])
+def test_task_ids_that_are_none_are_malformed(said: Message, text: object) -> None:
+    assert reason_with_field(said, task=text) == "malformed"
+
+
+@pytest.mark.parametrize(
+    ("said", "field", "value"),
+    [
+        (BRIEF, "horizon_s", 0.0),
+        (BRIEF, "success_default", 1.1),
+        (BRIEF, "survival_default", -0.1),
+        (BRIEF, "reattempt_failed", 1),
+        (BRIEF, "origin", [90.0, 0.0, 0.0]),
+        (BRIEF, "uavs", "u0"),
+        (EPOCH, "number", -1),
+        (EPOCH, "phase", "paused"),
+        (EPOCH, "rule", "no such rule"),
+        (EPOCH, "sequence", ["u0", 1]),
+        (EPOCH, "reason", "x" * 201),
+        (BOARD, "value", -1.0),
+        (BOARD, "service_s", -1.0),
+        (BOARD, "withdrawn", "no"),
+        (CLAIM, "phase", "wanted"),
+        (CLAIM, "phase", "idle"),
+        (CLAIM, "task", None),
+        (OUTCOME, "result", "maybe"),
+        (OUTCOME, "attempt", 0),
+        (OUTCOME, "attempt", 2**64 - 1),
+        (STATUS, "battery_frac", 1.5),
+        (STATUS, "note", "x" * 201),
+        (STATUS, "dropped", -1),
+    ],
+)
+def test_values_out_of_bounds_are_malformed(said: Message, field: str, value: object) -> None:
+    assert reason_with_field(said, **{field: value}) == "malformed"
+
+
+@pytest.mark.parametrize("said", EVERY_KIND, ids=EVERY_KIND_IDS)
+def test_unknown_fields_are_malformed(said: Message) -> None:
+    assert reason_with_field(said, surprise=1) == "malformed"
+
+
+@pytest.mark.parametrize("said", EVERY_KIND, ids=EVERY_KIND_IDS)
+def test_every_field_is_needed(said: Message) -> None:
+    for field in parts_of(said)[6]:
+        parts = parts_of(said)
+        del parts[6][field]
+        assert drop_reason(key_of(said), msgpack.packb(parts)) == "malformed"
+
+
+def test_a_brief_that_describes_one_uav_twice_is_malformed() -> None:
+    assert reason_with(BRIEF, _name_uavs("u0", "u0")) == "malformed"
+
+
+def test_a_brief_that_calls_a_uav_like_the_coordinator_is_malformed() -> None:
+    """A replica could make no mission of it."""
+    assert reason_with(BRIEF, _name_uavs("u0", COORDINATOR)) == "malformed"
+
+
+def _name_uavs(*names: str) -> Callable[[Parts], object]:
+    def rename(parts: Parts) -> None:
+        for described, name in zip(parts[6]["uavs"], names, strict=True):
+            described["id"] = name
+
+    return rename
+
+
+@pytest.mark.parametrize("said", EVERY_KIND, ids=EVERY_KIND_IDS)
+def test_what_is_said_on_anothers_key_is_dropped(said: Message) -> None:
+    keys = Keys(MISSION)
+    others = [keys.brief, keys.plan, keys.board("t0"), keys.board("t9"), keys.claim("u0")]
+    others += [keys.claim("u1"), keys.outcome("u0", "t0"), keys.outcome("u0", "t1")]
+    others += [keys.outcome("u1", "t0"), keys.status("u0"), keys.status("u1"), keys.state("u0")]
+    for key in set(others) - {key_of(said)}:
+        assert drop_reason(key, encode(said)) == "said on another's key"
+
+
+@pytest.mark.parametrize("said", [BRIEF, EPOCH, BOARD], ids=["Brief", "Epoch", "Board"])
+def test_what_only_the_coordinator_may_say_is_dropped_from_a_uav(said: Message) -> None:
+    by_uav = replace(said, writer="u0")
+
+    assert drop_reason(key_of(said), encode(by_uav)) == "said on another's key"
+
+
+@pytest.mark.parametrize("said", [CLAIM, OUTCOME, STATUS], ids=["Claim", "Outcome", "Status"])
+def test_what_only_a_uav_may_say_is_dropped_from_the_coordinator(said: Message) -> None:
+    by_coordinator = replace(said, writer=COORDINATOR)
+
+    assert drop_reason(key_of(by_coordinator), encode(by_coordinator)) == "said on another's key"
+
+
+def test_small_kinds_end_at_the_small_limit() -> None:
+    key = key_of(BOARD)
+    padding = b"\x00" * SMALL_LIMIT_BYTES
+
+    assert drop_reason(key, encode(BOARD) + padding) == "malformed"
+    long_number = reason_with(BOARD, lambda parts: parts[6].update(kind="x" * SMALL_LIMIT_BYTES))
+    assert long_number == "malformed"
+
+
+def test_large_kinds_end_at_the_large_limit() -> None:
+    names = [f"{n:064d}" for n in range(LARGE_LIMIT_BYTES // 60)]
+    said = message(COORDINATOR, Epoch(1, EpochPhase.RUNNING, "greedy", tuple(names), 0.0, "", {}))
+
+    assert drop_reason(key_of(said), encode(said)) == "too large"
+
+
+def test_deep_nesting_is_malformed() -> None:
+    for depth in (100, 1000, 100_000):
+        assert drop_reason(key_of(CLAIM), b"\x91" * depth + b"\xc0") == "malformed"
+        nested = encode(CLAIM)[:-1] + b"\x91" * depth + b"\xc0"
+        assert drop_reason(key_of(CLAIM), nested) == "malformed"
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\xdd\xff\xff\xff\xff",  # an array of four thousand million
+        b"\xdf\xff\xff\xff\xff",  # a map of as many
+        b"\xdb\xff\xff\xff\xff",  # a string
+        b"\xc9\xff\xff\xff\xff\x05",  # an extension
+        b"\xd6\xff\x00\x00\x00\x00",  # a timestamp
+        b"\xc7\x00\xff",  # a timestamp of no bytes
+        b"\xc1",  # never used
+        b"\x81\x90\x01",  # a map with an array as key
+        b"\xa1\xff",  # a string that is not UTF-8
+    ],
+)
+def test_hostile_messagepack_is_malformed(data: bytes) -> None:
+    assert drop_reason(key_of(CLAIM), data) == "malformed"
+
+
+# -- snapshots ------------------------------------------------------------------------
+
+STATE_KEY = Keys(MISSION).state("u0")
+
+
+def snapshot_parts(*said: Message) -> Parts:
+    parts: Parts = msgpack.unpackb(encode(Snapshot(MISSION, "u0", 1.0, said)))
+    return parts
+
+
+def snapshot_drop_reason(data: bytes, key: str = STATE_KEY) -> str:
+    codec = Codec(MISSION)
+    assert codec.decode_snapshot(key, data) is None
+    assert codec.dropped.total() == 1
+    return next(iter(codec.dropped))
+
+
+@given(st.binary(max_size=200) | plain.map(msgpack.packb))
+def test_what_is_no_snapshot_never_raises(data: bytes) -> None:
+    assert snapshot_drop_reason(data)
+
+
+@given(st.data())
+def test_truncated_snapshots_are_malformed(data: st.DataObject) -> None:
+    whole = encode(Snapshot(MISSION, "u0", 1.0, (CLAIM, OUTCOME)))
+    length = data.draw(st.integers(0, len(whole) - 1))
+
+    assert snapshot_drop_reason(whole[:length]) == "malformed"
+
+
+@settings(max_examples=300)
+@given(st.data())
+def test_snapshots_with_flipped_bits_never_raise(data: st.DataObject) -> None:
+    flipped = bytearray(encode(Snapshot(MISSION, "u0", 1.0, (CLAIM, OUTCOME, BRIEF))))
+    flipped[data.draw(st.integers(0, len(flipped) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+
+    Codec(MISSION).decode_snapshot(STATE_KEY, bytes(flipped))
+
+
+@pytest.mark.parametrize(
+    ("place", "instead", "reason"),
+    [
+        (0, 2, "unknown version"),
+        (1, "other", "another mission"),
+        (2, "u1", "said on another's key"),
+        (2, "a/b", "malformed"),
+        (2, 5, "malformed"),
+        (3, math.nan, "malformed"),
+        (3, math.inf, "malformed"),
+        (3, "1", "malformed"),
+        (3, True, "malformed"),
+        (4, "claims", "malformed"),
+        (4, None, "malformed"),
+        (4, {}, "malformed"),
+    ],
+)
+def test_snapshots_with_a_wrong_part_are_dropped(place: int, instead: object, reason: str) -> None:
+    parts = snapshot_parts(CLAIM)
+    parts[place] = instead
+
+    assert snapshot_drop_reason(msgpack.packb(parts)) == reason
+
+
+def test_a_snapshot_answered_on_anothers_key_is_dropped() -> None:
+    data = encode(Snapshot(MISSION, "u0", 1.0, ()))
+
+    assert snapshot_drop_reason(data, Keys(MISSION).state("u1")) == "said on another's key"
+    assert snapshot_drop_reason(data, "state/u0") == "said on another's key"
+
+
+def test_a_snapshot_may_be_as_large_as_large_kinds_and_no_larger() -> None:
+    data = encode(Snapshot(MISSION, "u0", 1.0, (BRIEF,) * (LARGE_LIMIT_BYTES // 200)))
+    assert len(data) > LARGE_LIMIT_BYTES
+
+    assert snapshot_drop_reason(data) == "too large"
+
+
+def test_bad_registers_in_a_snapshot_are_left_out_and_the_others_kept() -> None:
+    parts = snapshot_parts(CLAIM, OUTCOME, BOARD)
+    parts[4][0][0] = 2
+    parts[4][1][6]["completed_s"] = math.nan
+    parts[4] += ["nonsense", None, [], parts[4][2][:5]]
+    codec = Codec(MISSION)
+
+    heard = codec.decode_snapshot(STATE_KEY, msgpack.packb(parts))
+
+    assert heard == Snapshot(MISSION, "u0", 1.0, (BOARD,))
+    assert codec.dropped == {"unknown version": 1, "malformed": 5}
+
+
+def test_a_snapshot_may_hold_registers_of_others_but_not_swap_the_roles() -> None:
+    theirs, forged = replace(CLAIM, writer="u1"), replace(BOARD, writer="u0")
+    codec = Codec(MISSION)
+
+    heard = codec.decode_snapshot(STATE_KEY, encode(Snapshot(MISSION, "u0", 1.0, (theirs, forged))))
+
+    assert heard is not None
+    assert heard.messages == (theirs,)
+    assert codec.dropped == {"said on another's key": 1}

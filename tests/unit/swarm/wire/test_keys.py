@@ -1,0 +1,43 @@
+"""Keys: one writer each, and tokens that are recognised as such."""
+
+from __future__ import annotations
+
+import pytest
+
+from swarm.wire.codec import key_of
+from swarm.wire.keys import Keys
+from tests.builders import MISSION, brief, done, entry, epoch, held, message, status, uav
+
+
+def test_keys_are_those_that_access_control_is_written_for() -> None:
+    said = [
+        (message("coordinator", brief(uav("u0"))), "swarm/test/brief"),
+        (message("coordinator", epoch("u0")), "swarm/test/plan"),
+        (message("coordinator", entry("t0")), "swarm/test/board/t0"),
+        (message("u0", held("t0", 0.0)), "swarm/test/uav/u0/claim"),
+        (message("u0", done("t0")), "swarm/test/uav/u0/outcome/t0"),
+        (message("u0", status()), "swarm/test/uav/u0/status"),
+    ]
+    for statement, key in said:
+        assert key_of(statement) == key
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "*", "**", "a b", "é", "x" * 65, "$*"])
+def test_a_mission_that_is_no_id_has_no_keys(name: str) -> None:
+    with pytest.raises(ValueError, match="mission name"):
+        Keys(name)
+
+
+def test_the_writer_is_read_off_its_token() -> None:
+    keys = Keys(MISSION)
+
+    assert keys.writer_of_token(keys.alive("u0")) == "u0"
+    assert keys.writer_of_token(keys.alive("coordinator")) == "coordinator"
+
+
+@pytest.mark.parametrize(
+    "key",
+    ["", "swarm/test/alive/", "swarm/test/alive", "swarm/test/alive/u0/x", "swarm/other/alive/u0"],
+)
+def test_other_keys_are_no_tokens(key: str) -> None:
+    assert Keys(MISSION).writer_of_token(key) is None
