@@ -68,22 +68,23 @@ def comparison_figure(bench: PlanBench) -> Figure:
 
 
 def scaling_figure(bench: PlanBench) -> Figure:
-    """Time to a first plan and peak memory against UAVs × tasks."""
+    """Time to a first plan and peak memory by size, in the order measured."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10.4, 4.4), layout="constrained")
     names = list(dict.fromkeys(row.method for row in bench.measured))
+    cases = list(dict.fromkeys(row.case for row in bench.measured))
     for i, (title, of) in enumerate((("first plan [s]", _first_s), ("peak memory [MiB]", _mib))):
         axes = figure.add_subplot(1, 2, i + 1)
         for name in names:
             rows = [r for r in bench.measured if r.method == name and r.objective is not None]
-            points = sorted((_size(row), of(row)) for row in rows)
+            points = [(cases.index(row.case), of(row)) for row in rows]
             if points:
                 xs, ys = zip(*points, strict=True)
                 axes.plot(xs, ys, label=name, color=_colour(name), marker=_marker(name))
-        axes.set_xscale("log")
+        axes.set_xticks(range(len(cases)), cases, rotation=30)
         axes.set_yscale("log")
-        axes.set_xlabel("UAVs · tasks")
+        axes.set_xlabel("UAVs × tasks")
         axes.set_title(title, loc="left")
         axes.grid(visible=True, which="both", color="#e4e4e4", linewidth=0.6)
     _legend(figure)
@@ -127,11 +128,6 @@ def _legend(figure: Figure) -> None:
         entries.update(zip(labels, handles, strict=True))
     if entries:
         figure.legend(list(entries.values()), list(entries), loc="outside right upper")
-
-
-def _size(row: Measured) -> int:
-    n_uav, _, n_task = row.case.partition("×")
-    return int(n_uav) * int(n_task) if n_uav.isdigit() and n_task.isdigit() else 1
 
 
 def _first_s(row: Measured) -> float:

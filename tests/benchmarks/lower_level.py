@@ -73,12 +73,16 @@ def case(n_uav: int, n_task: int, lowest_survival: float = 0.9) -> Problem:
 
 
 def decision_s(rule: str, n_uav: int, n_task: int) -> float:
-    """One decision of an agent, from its state to a `Decision`, with everything open [s]."""
-    problem = case(n_uav, n_task)
-    state, rank = TeamState.at_start(problem), rank_of(range(n_uav))
-    chosen = rule_by_name(rule)
-    runs = 2000 if rule == "greedy" else 2
-    return best_s(lambda: chosen.decide(problem, state, rank, n_uav // 2), 5, runs)
+    """One decision of an agent, from its state to a `Decision`, with everything open [s].
+
+    Lookahead decides on a new problem every time, so that it finds no tables of tours.
+    """
+    chosen, rank = rule_by_name(rule), rank_of(range(n_uav))
+    problems = [case(n_uav, n_task) for _ in range(1 if rule == "greedy" else 5)]
+    state = TeamState.at_start(problems[0])
+    if rule == "greedy":
+        return best_s(lambda: chosen.decide(problems[0], state, rank, n_uav // 2), 5, 2000)
+    return best_s(lambda: chosen.decide(problems.pop(), state, rank, n_uav // 2), len(problems))
 
 
 def exact_s(n_uav: int, n_task: int, lowest_survival: float = 1.0) -> float:
