@@ -135,7 +135,7 @@ def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float
 
     console, pressed = Console(stderr=True), False
 
-    def on_interrupt(number: int, frame: FrameType | None) -> None:
+    def on_interrupt(_number: int, _frame: FrameType | None) -> None:
         nonlocal pressed
         pressed = True
         signal.signal(signal.SIGINT, before)

@@ -33,11 +33,11 @@ def plan_as_json(plan: Plan) -> dict[str, object]:
         "completion_s": dict(plan.completion_s),
         "optimum": plan.optimum,
         "gap": plan.gap,
-        "bound": plan.bound,
-        "basis": plan.basis,
         "evaluations": plan.evaluations,
         "elapsed_s": plan.elapsed_s,
         "seed": plan.seed,
+        "bound": plan.bound,
+        "basis": plan.basis,
     }
 
 

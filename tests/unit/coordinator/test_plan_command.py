@@ -40,7 +40,7 @@ def test_json_is_one_object_with_the_fixed_keys(capsys: pytest.CaptureFixture[st
     out = capsys.readouterr().out
     found = json.loads(out)
     assert out.count("\n") == 1
-    assert list(found) == [
+    assert list(found)[:11] == [
         "scenario",
         "method",
         "objective",
@@ -53,6 +53,8 @@ def test_json_is_one_object_with_the_fixed_keys(capsys: pytest.CaptureFixture[st
         "elapsed_s",
         "seed",
     ]
+    assert found["basis"] == "gap to the proven optimum"
+    assert found["bound"] is None
     assert found["scenario"] == "table-1"
     assert found["method"] == "greedy"
     assert found["sequence"] == ["uav1", "uav3", "uav2"]
@@ -127,7 +129,7 @@ def test_mission_too_large_for_a_proof_is_one_line_and_status_2(
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert "10 UAVs × 60 tasks" in captured.err
-    assert "--method greedy" in captured.err
+    assert "--method guided, greedy or lookahead" in captured.err
 
 
 def test_time_limit_ends_the_search_of_a_large_fleet(capsys: pytest.CaptureFixture[str]) -> None:
@@ -163,3 +165,25 @@ def test_plot_that_cannot_be_written_is_one_line_and_status_2(
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert "nowhere" in captured.err
+
+
+def test_large_mission_is_bounded_unless_told_otherwise(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert plan("valley-survey", "--method", "guided", "--json") == 0
+    bounded = json.loads(capsys.readouterr().out)
+    assert plan("valley-survey", "--method", "guided", "--no-bound", "--json") == 0
+    unbounded = json.loads(capsys.readouterr().out)
+
+    assert bounded["basis"] == "gap to an upper bound"
+    assert bounded["objective"] < bounded["bound"] < 1.1 * bounded["objective"]
+    assert unbounded["basis"] == "best known"
+    assert unbounded["bound"] is None
+
+
+def test_guided_finds_the_optimum_of_table_1(capsys: pytest.CaptureFixture[str]) -> None:
+    assert plan("table-1", "--method", "guided", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+
+    assert found["objective"] == pytest.approx(120.3335, abs=5e-5)
+    assert found["basis"] == "proven optimal"
