@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 from agent.core import AgentCore
 from agent.events import Action as AgentAction
@@ -146,7 +147,7 @@ class World:
                 plan = self._make_plan(action.mission, action.method, action.seed)
                 self.observer.plan = plan
                 made = PlanMade(action.request, plan)
-                self._queue.at(self._queue.now_s(), lambda made=made: self._step(COORDINATOR, made))  # type: ignore[misc]
+                self._queue.at(self._queue.now_s(), partial(self._step, COORDINATOR, made))
             else:
                 self._execute_common(COORDINATOR, action)
         self._wake(COORDINATOR, self._coordinator.next_deadline_s())
@@ -193,7 +194,7 @@ class World:
             return
         self._faults_scheduled = True
         for uav, lost_at_s in self._faults.lost_at_s.items():
-            self._queue.at(zero_s + lost_at_s, lambda uav=uav: self._lose(uav))  # type: ignore[misc]
+            self._queue.at(zero_s + lost_at_s, partial(self._lose, uav))
         if (lost_at := self._faults.coordinator_lost_at_s) is not None:
             self._queue.at(zero_s + lost_at, lambda: self._lose(COORDINATOR))
 

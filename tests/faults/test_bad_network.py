@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ class BadNetworkWorld(WatchedWorld):
                 copies = int(self._rng.random() >= self._drop_frac) + int(self._rng.random() < 0.1)
             for _ in range(copies if name != sender else 0):
                 delay_s = float(self._rng.uniform(0.0, self._delay_s))
-                self._later(delay_s, lambda name=name: self._step(name, fact))  # type: ignore[misc]
+                self._later(delay_s, partial(self._step, name, fact))
 
 
 @cache
