@@ -4,7 +4,7 @@ The offline lower level (swarm.allocation.lower_level) is continued from the sta
 the registers describe until this UAV's turn comes. So UAVs that are free at the
 same time and of better rank decide first in everyone's picture, and a faultless
 run repeats the offline plan decision for decision (section III.C of the paper).
-Leaves out: what is done with the decision (agent.core).
+Leaves out: what is done with the decision (agent.tasking).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What one agent makes of the others: whose claims count, and who may yet decide first.
 
 Leaves out: what they said (swarm.state.registers) and what follows for the own task
-(agent.core).
+(agent.tasking).
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from swarm.config import Timing
+from swarm.state.claims import winner
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
-from swarm.wire.messages import Claim, ClaimPhase
+from swarm.wire.messages import Body, Claim, ClaimPhase, Outcome
 
 __all__ = ["Peers"]
 
@@ -35,9 +36,11 @@ class Peers:
         """``writer`` itself has just said what it claims."""
         self.membership.spoke(writer)
 
-    def turned_idle(self, writer: str, now_s: float) -> None:
-        """``writer`` has become free."""
-        self._idle_since_s[writer] = now_s
+    def stated(self, writer: str, body: Body, now_s: float) -> None:
+        """There is news of ``writer``: by an outcome or an idle claim it has become free."""
+        idle = isinstance(body, Claim) and body.phase is ClaimPhase.IDLE
+        if idle or isinstance(body, Outcome):
+            self._idle_since_s[writer] = now_s
 
     def awake(self, now_s: float) -> None:
         """A task may have opened: from now on everyone who is free may decide anew."""
@@ -53,6 +56,12 @@ class Peers:
             and _is_free(uav, claim, replica)
             and now_s < self._patience_ends_s(uav)
         }
+
+    def winner(self, replica: Replica, task: str) -> str | None:
+        """Whose claim on ``task`` is the strongest that counts, the own among them."""
+        rivals = {*self.credible, self._uav}
+        claims = replica.claims.items()
+        return winner((uav, c) for uav, c in claims if c.task == task and uav in rivals)
 
     def patience_ends_s(self, replica: Replica, now_s: float) -> float | None:
         """When the first of those awaited will be awaited no longer; None if nobody is."""

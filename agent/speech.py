@@ -26,6 +26,8 @@ class Speech:
     """
 
     def __init__(self, voice: Voice, replica: Replica, timing: Timing) -> None:
+        self.note = ""
+        """What the status tells a reader about the state of affairs."""
         self._voice = voice
         self._replica = replica
         self._timing = timing

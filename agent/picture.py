@@ -1,0 +1,130 @@
+"""The mission as one agent sees it: its UAV's entry and place, the clock, what is open.
+
+Leaves out: what follows from a change (agent.core), and whose claims count
+(agent.peers).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from agent.vehicle import Telemetry
+from swarm.state.board import TaskBoard, TaskState
+from swarm.state.registers import Replica
+from swarm.wire.messages import (
+    Board,
+    Brief,
+    Claim,
+    Epoch,
+    EpochPhase,
+    Fleet,
+    Message,
+    Outcome,
+    Point,
+    Result,
+)
+
+__all__ = ["News", "Picture"]
+
+
+class News(Enum):
+    """What a statement changes for an agent that is free to take a task."""
+
+    OPENING = "a task may have opened"
+    CLAIM = "somebody's claim, which opens nothing"
+    OTHER = "anything else"
+
+
+class Picture:
+    """The mission in the eyes of the agent of ``uav``.
+
+    Args:
+        mission: mission name.
+        uav: id of the UAV.
+        replica: the shared registers.
+    """
+
+    def __init__(self, mission: str, uav: str, replica: Replica) -> None:
+        self.board = TaskBoard(replica, mission)
+        self.telemetry: Telemetry | None = None
+        """The newest of the own vehicle."""
+        self.place_enu_m: Point | None = None
+        """Where the UAV is [m; mission origin], without its height layer."""
+        self._uav = uav
+        self._replica = replica
+        self._zero_s: float | None = None
+
+    # -- the registers --------------------------------------------------------------
+
+    def take_in(self, message: Message) -> News | None:
+        """Join another's statement; gives what it changes, None if it was known."""
+        before, epoch = self._replica.claims.get(message.writer), self._replica.epoch
+        if not self._replica.join(message):
+            return None
+        match message.body:
+            case Brief() | Board() | Outcome(result=Result.FAILED):
+                return News.OPENING
+            case Claim(task=task):
+                left = before is not None and before.task != task and self.is_open(before.task)
+                return News.OPENING if left else News.CLAIM
+            case Epoch(number=number) if epoch is None or number != epoch.number:
+                return News.OPENING
+            case _:
+                return News.OTHER
+
+    def is_open(self, task: str | None) -> bool:
+        """Whether that is a task which is still to be done."""
+        return task is not None and self.board.states.get(task) is TaskState.OPEN
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether any task is open."""
+        return TaskState.OPEN in self.board.states.values()
+
+    @property
+    def running(self) -> bool:
+        """Whether the mission has begun, at a known time, and has not ended."""
+        epoch = self._replica.epoch
+        over = epoch is None or epoch.phase is EpochPhase.ENDED
+        return self._zero_s is not None and not over
+
+    # -- the mission clock ------------------------------------------------------------
+
+    def set_clock(self, mission_s: float, now_s: float) -> bool:
+        """It is ``mission_s`` now; False if the clock was set before, and so stays."""
+        if self._zero_s is not None:
+            return False
+        self._zero_s = now_s - mission_s
+        return True
+
+    def known_mission_s(self, now_s: float) -> float | None:
+        """Mission time [s]; None while it is not known."""
+        return None if self._zero_s is None else now_s - self._zero_s
+
+    def mission_s(self, now_s: float) -> float:
+        """Mission time [s]; 0 as long as the mission is not known to have begun."""
+        return 0.0 if self._zero_s is None else now_s - self._zero_s
+
+    # -- the UAV ----------------------------------------------------------------------
+
+    @property
+    def me(self) -> Fleet | None:
+        """The UAV's entry in the brief."""
+        brief = self._replica.brief
+        fleet = () if brief is None else brief.uavs
+        return next((uav for uav in fleet if uav.id == self._uav), None)
+
+    def move(self, telemetry: Telemetry) -> None:
+        """The vehicle has told where it is."""
+        east_m, north_m, up_m = telemetry.position_enu_m
+        self.telemetry = telemetry
+        self.place_enu_m = east_m, north_m, up_m - self._layer_m
+
+    def in_layer(self, point: Point) -> Point:
+        """That point in the UAV's own height layer, where it flies."""
+        return point[0], point[1], point[2] + self._layer_m
+
+    @property
+    def _layer_m(self) -> float:
+        me = self.me
+        return 0.0 if me is None else me.layer_m

@@ -1,0 +1,271 @@
+"""The tasks of one airborne UAV, one after the other: from the decision to the outcome.
+
+Decides whenever the UAV is free, claims and flies at once, gives way to stronger
+claims and waits idle while there is nothing for it. Leaves out: which task is best
+(agent.deciding), getting airborne and going home (agent.core).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from agent.deciding import Turn, decide, ranks, rule_of
+from agent.events import Action, Order
+from agent.peers import Peers
+from agent.picture import Picture
+from agent.speech import Speech
+from agent.vehicle import GoTo
+from swarm.allocation.lower_level import Decision, Rule
+from swarm.config import Timing
+from swarm.events import Note
+from swarm.state.board import TaskState
+from swarm.state.registers import Replica
+from swarm.wire.messages import Board, Claim, ClaimPhase, Epoch, Outcome, Result, StatusPhase
+
+__all__ = ["Tasking"]
+
+
+class Tasking:
+    """What one UAV does about tasks, and its claim.
+
+    Args:
+        uav: id of the UAV.
+        replica: the shared registers.
+        picture: the mission.
+        peers: the others.
+        speech: says what this UAV claims and has done.
+        timing: timers.
+    """
+
+    def __init__(
+        self,
+        uav: str,
+        replica: Replica,
+        picture: Picture,
+        peers: Peers,
+        speech: Speech,
+        timing: Timing,
+    ) -> None:
+        self.phase: StatusPhase | None = None
+        """Idle, flying or serving; None while the UAV takes no tasks."""
+        self._uav = uav
+        self._replica = replica
+        self._picture = picture
+        self._peers = peers
+        self._speech = speech
+        self._timing = timing
+        self._rule: Rule | None = None
+        self._rule_epoch: tuple[int, str] | None = None
+        self._free_since_s = 0.0
+        self._leg = 0
+        self._excluded: set[str] = set()
+        self._adrift = False
+        self._to_decide = False
+        self._awaits_peers = False
+        self._held_at_s: float | None = None
+        self._served_at_s: float | None = None
+        self._retry_at_s: float | None = None
+
+    # -- from without ---------------------------------------------------------------
+
+    @property
+    def claim(self) -> Claim | None:
+        """The UAV's claim register; None while it takes no tasks."""
+        return None if self.phase is None else self._replica.claims.get(self._uav)
+
+    @property
+    def undecided(self) -> bool:
+        """Whether, being idle, it may yet find a task."""
+        return self._to_decide or self._awaits_peers
+
+    def begin(self, now_s: float) -> list[Action]:
+        """The UAV is airborne."""
+        self._become_free(self._picture.mission_s(now_s))
+        return [self._say_idle()]
+
+    def end(self, now_s: float) -> list[Action]:
+        """The UAV takes no tasks any more."""
+        mission_s = self._picture.mission_s(now_s)
+        self._become_free(mission_s)
+        self.phase = None
+        return [self._speech.say(Claim(ClaimPhase.OUT, None, mission_s, 0, mission_s))]
+
+    def wake(self, now_s: float) -> None:
+        """Decide anew when free; who found nothing before takes no precedence from that."""
+        self._retry_at_s = None
+        if self.phase is StatusPhase.IDLE and not self._to_decide:
+            self._to_decide = True
+            if self._picture.running:
+                self._free_since_s = self._picture.mission_s(now_s)
+
+    def peer_claimed(self, now_s: float) -> None:
+        """Somebody has said what it claims; it may be whom this UAV waits for."""
+        if self._awaits_peers:
+            self.wake(now_s)
+
+    def arrive(self, leg: int, now_s: float) -> None:
+        """The vehicle is where that leg ends."""
+        task = self._task()
+        if leg != self._leg or task is None or self.phase is not StatusPhase.FLYING:
+            return
+        self.phase = StatusPhase.SERVING
+        self._picture.place_enu_m = task.position_enu_m
+        self._served_at_s = now_s + task.service_s
+
+    def refuse(self, leg: int, reason: str, now_s: float) -> list[Action]:
+        """The vehicle will not fly that leg: never choose its task again."""
+        task = self._task()
+        if leg != self._leg or task is None:
+            return []
+        self._excluded.add(task.task)
+        return self._release(f"vehicle refused: {reason}", now_s)
+
+    def advance(self, now_s: float) -> list[Action]:
+        """What follows from the registers and the time, in a running mission."""
+        actions = self._serve(now_s) + self._keep_or_lose_claim(now_s)
+        if self._retry_at_s is not None and self._retry_at_s <= now_s:
+            self.wake(now_s)
+        if self.phase is StatusPhase.IDLE and self._to_decide:
+            actions += self._decide(now_s)
+        return actions
+
+    def next_deadline_s(self) -> float | None:
+        """When `advance` will next have something to do."""
+        times_s = (self._held_at_s, self._served_at_s, self._retry_at_s)
+        return min((time_s for time_s in times_s if time_s is not None), default=None)
+
+    # -- with a task ----------------------------------------------------------------
+
+    def _serve(self, now_s: float) -> list[Action]:
+        task = self._task()
+        if self._served_at_s is None or task is None or self._served_at_s > now_s:
+            return []
+        self._served_at_s = None
+        mission_s = self._picture.mission_s(now_s)
+        earlier = self._replica.outcomes.get((self._uav, task.task))
+        attempt = 1 if earlier is None else earlier.attempt + 1
+        outcome = Outcome(task.task, Result.DONE, attempt, mission_s)
+        # The next claim, made in this same step, replaces the old one on the bus.
+        self._become_free(mission_s)
+        return [
+            self._speech.say(outcome),
+            Note("task done", {"task": task.task, "mission_s": mission_s}),
+        ]
+
+    def _keep_or_lose_claim(self, now_s: float) -> list[Action]:
+        claim, task = self.claim, self._task()
+        if claim is None or task is None or self.phase is StatusPhase.IDLE:
+            return []
+        state = self._picture.board.states.get(task.task)
+        if state is not TaskState.OPEN:
+            return self._release(f"task is {state}", now_s)
+        rival = self._peers.winner(self._replica, task.task)
+        if rival != self._uav:
+            return self._release(f"{rival} has the stronger claim", now_s)
+        if self._held_at_s is not None and self._held_at_s <= now_s:
+            self._held_at_s = None
+            return [self._speech.say(replace(claim, phase=ClaimPhase.HELD))]
+        return []
+
+    def _release(self, reason: str, now_s: float) -> list[Action]:
+        """Give the task up; a claim lost while only proposed keeps its place in the order."""
+        claim = self.claim
+        if claim is None:
+            return []
+        proposed = claim.phase is ClaimPhase.PROPOSED
+        self._become_free(claim.decided_s if proposed else self._picture.mission_s(now_s))
+        self._adrift = True
+        return [Note("released", {"task": claim.task, "reason": reason})]
+
+    def _become_free(self, free_since_s: float) -> None:
+        self.phase, self._to_decide = StatusPhase.IDLE, True
+        self._free_since_s = free_since_s
+        self._held_at_s = self._served_at_s = self._retry_at_s = None
+
+    # -- without one ----------------------------------------------------------------
+
+    def _decide(self, now_s: float) -> list[Action]:
+        epoch, place = self._replica.epoch, self._picture.place_enu_m
+        problem = self._picture.board.problem
+        if epoch is None or problem is None or place is None or self._uav not in problem.uav_ids:
+            return []
+        rule, actions = self._rule_of(epoch)
+        if rule is None:
+            return actions + self._stay_idle(now_s)
+        turn = Turn(
+            uav=self._uav,
+            now_s=self._picture.mission_s(now_s),
+            decided_s=self._free_since_s,
+            place_enu_m=place,
+            credible=self._peers.credible,
+            awaited=self._peers.awaited(self._replica, now_s),
+            patience_s=self._timing.patience_s,
+            excluded=self._excluded,
+        )
+        decision = decide(problem, self._picture.board, rule, turn)
+        if decision is None:
+            return self._stay_idle(now_s)
+        task = self._replica.board[problem.task_ids[decision.task]]
+        rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
+        return self._set_off(task, decision, rank, now_s)
+
+    def _rule_of(self, epoch: Epoch) -> tuple[Rule | None, list[Action]]:
+        """The rule in force, and what to say about it when it is new."""
+        if self._rule_epoch == (epoch.number, epoch.rule):
+            return self._rule, []
+        self._rule, self._rule_epoch = rule_of(epoch), (epoch.number, epoch.rule)
+        if self._rule is not None:
+            return self._rule, []
+        self._speech.note = f"cannot decide by rule {epoch.rule}"
+        return None, [Note("unknown rule", {"rule": epoch.rule})]
+
+    def _set_off(self, task: Board, decision: Decision, rank: int, now_s: float) -> list[Action]:
+        self.phase = StatusPhase.FLYING
+        self._retry_at_s, self._adrift = None, False
+        self._held_at_s = now_s + self._timing.objection_window_s
+        claim = Claim(
+            ClaimPhase.PROPOSED, task.task, self._free_since_s, rank, decision.completion_s
+        )
+        why = {
+            "task": task.task,
+            "score": decision.score,
+            "second_score": decision.second_score,
+            "certificate": decision.certificate,
+            "completion_s": decision.completion_s,
+        }
+        leg = self._next_leg()
+        return [
+            Order(GoTo(leg, self._picture.in_layer(task.position_enu_m))),
+            self._speech.say(claim),
+            Note("decided", why),
+        ]
+
+    def _stay_idle(self, now_s: float) -> list[Action]:
+        actions: list[Action] = []
+        claim, telemetry = self.claim, self._picture.telemetry
+        if claim is not None and claim.phase is not ClaimPhase.IDLE:
+            actions.append(self._say_idle())
+        if self._adrift and telemetry is not None:
+            # Nothing to fly to any more: stop here rather than at a lost target.
+            actions.append(Order(GoTo(self._next_leg(), telemetry.position_enu_m)))
+        self._adrift = self._to_decide = False
+        patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
+        self._awaits_peers = patience_ends_s is not None
+        # Look again by and by while anything is open, lest a lost message strand it.
+        again_s = now_s + self._timing.announce_s if self._picture.unfinished else None
+        self._retry_at_s = patience_ends_s if patience_ends_s is not None else again_s
+        return actions
+
+    # -- pieces ---------------------------------------------------------------------
+
+    def _task(self) -> Board | None:
+        claim = self.claim
+        return None if claim is None or claim.task is None else self._replica.board.get(claim.task)
+
+    def _next_leg(self) -> int:
+        self._leg += 1
+        return self._leg
+
+    def _say_idle(self) -> Action:
+        since_s = self._free_since_s
+        return self._speech.say(Claim(ClaimPhase.IDLE, None, since_s, 0, since_s))
