@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -31,6 +31,9 @@ from swarm.options import (
     SpeedupOption,
     TimeLimitOption,
 )
+
+if TYPE_CHECKING:
+    from rich.status import Status
 
 __all__ = ["coordinator", "plan"]
 
@@ -124,6 +127,15 @@ def plan(
     return EXIT_INTERRUPTED if told_to_stop else 0
 
 
+def _status_line() -> contextlib.AbstractContextManager[Status | None]:
+    """A line on standard error that can be updated; nothing off a terminal."""
+    if not sys.stderr.isatty():
+        return contextlib.nullcontext()
+    from rich.console import Console
+
+    return Console(stderr=True).status("planning")
+
+
 @contextlib.contextmanager
 def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float], None]]]:
     """Whether Ctrl-C was pressed, and a place to show how far a search is.
@@ -131,9 +143,7 @@ def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float
     The first Ctrl-C asks for the best so far; a second one interrupts. Progress shows on a
     terminal only.
     """
-    from rich.console import Console
-
-    console, pressed = Console(stderr=True), False
+    pressed = False
 
     def on_interrupt(_number: int, _frame: FrameType | None) -> None:
         nonlocal pressed
@@ -143,9 +153,7 @@ def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float
     before = signal.getsignal(signal.SIGINT)
     signal.signal(signal.SIGINT, on_interrupt)
     try:
-        with (
-            console.status("planning") if console.is_terminal else contextlib.nullcontext() as show
-        ):
+        with _status_line() as show:
 
             def progress(evaluations: int, worth: float) -> None:
                 if show is not None:

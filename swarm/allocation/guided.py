@@ -21,8 +21,8 @@ from swarm.kernels.routes import RouteArrays, Routes, TeamArrays
 
 __all__ = ["GuidedRule", "route_arrays", "team_arrays"]
 
-_REPAIR_ITERATIONS = 300
-"""Steps of the search after a disturbance; some 2 ms."""
+_REPAIR_ITERATIONS = 200
+"""Steps of the search after a disturbance; some 3 ms in all at 50 UAVs × 500 tasks."""
 
 
 class GuidedRule:
