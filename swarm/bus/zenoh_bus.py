@@ -11,6 +11,7 @@ and is no faster into asyncio (measured). Leaves out: the session's configuratio
 from __future__ import annotations
 
 import asyncio
+import atexit
 import contextlib
 import math
 import threading
@@ -173,6 +174,8 @@ class ZenohBus:
         self._watched: set[str] = set()
         self._served: set[str] = set()
         self._tokens: dict[str, zenoh.LivelinessToken | None] = {}
+        # A thread that comes back from Zenoh while the interpreter ends aborts the process.
+        atexit.register(self.close)
         self._replies: weakref.WeakSet[_Reply] = weakref.WeakSet()
         self._links = _LinkWatch(session, inbox)
         self._call(
@@ -279,6 +282,7 @@ class ZenohBus:
 
     def close(self) -> None:
         """Send what is published, undeclare everything and leave, within 2 s."""
+        atexit.unregister(self.close)
         if self._closed:
             return
         self._closed = True
