@@ -128,7 +128,7 @@ class AgentCore:
         writers = {self.uav} | (self.replica.writers() - self._peers.membership.steady)
         messages = tuple(self.replica.messages(writers))
         mission_s = self._picture.known_mission_s(now_s)
-        return Snapshot(self._mission, self.uav, mission_s, messages)
+        return Snapshot(self._mission, self.uav, self._speech.incarnation, mission_s, messages)
 
     @property
     def phase(self) -> StatusPhase:

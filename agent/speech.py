@@ -35,6 +35,11 @@ class Speech:
         self._announce_at_s: float | None = None
         self._status_at_s: float | None = None
 
+    @property
+    def incarnation(self) -> int:
+        """Of this life of the agent."""
+        return self._voice.incarnation
+
     def say(self, body: Body) -> Publish:
         """State the new content of an own register, or the status."""
         message = self._voice.say(body)

@@ -33,6 +33,8 @@ class Prepare:
     """Where to hover before the mission starts [m; mission origin, height included]."""
     speed_m_s: float
     """Cruise ground speed to set [m/s]."""
+    resume: bool = False
+    """A vehicle that flies already is ready where it is, and flies on meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -121,7 +121,7 @@ class CoordinatorCore:
         """Brief the fleet, post the tasks known at the start and begin to plan."""
         self._start_by_s = now_s + self._start_timeout_s
         self._announce_at_s = now_s + self._timing.announce_s
-        self._say(_brief(self._mission, self._layers))
+        self._say(_brief(self._mission, self._layers, self._voice.incarnation))
         self._post(now_s)
         self._make_plan(tuple(uav.id for uav in self._mission.uavs))
         return self._drain()
@@ -180,7 +180,8 @@ class CoordinatorCore:
         writers = {COORDINATOR} | (self.replica.writers() - self._membership.steady)
         mission_s = None if self._zero_s is None else now_s - self._zero_s
         messages = tuple(self.replica.messages(writers))
-        return Snapshot(self._mission.name, COORDINATOR, mission_s, messages)
+        incarnation = self._voice.incarnation
+        return Snapshot(self._mission.name, COORDINATOR, incarnation, mission_s, messages)
 
     # -- phases ---------------------------------------------------------------------
 
@@ -342,13 +343,14 @@ class CoordinatorCore:
         return actions
 
 
-def _brief(mission: Mission, layers: FlightLayers) -> Brief:
+def _brief(mission: Mission, layers: FlightLayers, run: int) -> Brief:
     origin: Origin = mission.origin or DEFAULT_ORIGIN
     return Brief(
         horizon_s=mission.horizon_s,
         success_default=mission.success_default,
         survival_default=mission.survival_default,
         reattempt_failed=mission.reattempt_failed,
+        run=run,
         origin=(origin.lat_deg, origin.lon_deg, origin.alt_m),
         uavs=tuple(
             Fleet(

@@ -33,7 +33,9 @@ from swarm.events import (
     PeerGone,
     PeerSeen,
     Publish,
+    Save,
     Tick,
+    Wish,
 )
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
@@ -160,13 +162,13 @@ class World:
                 self._execute_common(uav, action)
         self._wake(uav, self._agents[uav].next_deadline_s())
 
-    def _execute_common(self, name: str, action: Publish | Ask | Note | Finish) -> None:
+    def _execute_common(self, name: str, action: Wish) -> None:
         match action:
             case Publish(message):
                 self._publish(name, message)
             case Ask():
                 self._later(self._latency_s, lambda: self._answer(name))
-            case Note():
+            case Note() | Save():
                 pass
             case Finish(status):
                 self.finished[name] = status

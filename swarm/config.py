@@ -29,6 +29,12 @@ class Timing:
     loss_delay_s: float = 0.2
     """A process whose token has been gone for this long is lost; bridges the moment in
     which a router's end makes all tokens blink."""
+    silence_s: float = 5.0
+    """A process that has said nothing for this long is lost, even while its token lives: it
+    hangs. Must be well above `announce_s`, at which the living repeat themselves."""
+    pause_s: float = 1.0
+    """A process whose own deadline has passed this long ago has itself been held up: what it
+    believes of others is old, and it learns before it decides."""
     relink_grace_s: float = 2.0
     """After the own link is back, others get this long to show their tokens again."""
     patience_s: float = 0.5
@@ -43,6 +49,16 @@ class Timing:
     """Without a coordinator: how long after the last task agents wait before going home."""
     abandon_s: float = 60.0
     """Without a coordinator: how long airborne agents wait for a mission to start."""
+    ask_gap_s: float = 0.2
+    """Shortest interval between two questions to everyone."""
+    takeover_s: float = 1.0
+    """How long a coordinator that stands by waits before it takes a lost one's place."""
+    replan_interval_s: float = 5.0
+    """Shortest interval between two epochs of a running mission."""
+    recall_s: float = 60.0
+    """An agent that starts anew and finds nobody trusts its own memory up to this age."""
+    reconsider_s: float = 30.0
+    """A task that the vehicle refused is considered again after this time."""
     stalemate_s: float = 30.0
     """How long a fleet may leave open tasks to themselves before the mission ends."""
 

@@ -20,6 +20,7 @@ __all__ = [
     "PeerGone",
     "PeerSeen",
     "Publish",
+    "Save",
     "Stop",
     "Tick",
     "Wish",
@@ -89,6 +90,11 @@ class Ask:
 
 
 @dataclass(frozen=True, slots=True)
+class Save:
+    """Keep the core's `memory` where a new life of this process finds it."""
+
+
+@dataclass(frozen=True, slots=True)
 class Note:
     """A line for the log."""
 
@@ -103,4 +109,4 @@ class Finish:
     status: int
 
 
-Wish = Publish | Ask | Note | Finish
+Wish = Publish | Ask | Save | Note | Finish

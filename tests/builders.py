@@ -62,6 +62,7 @@ def brief(*uavs: Uav, reattempt_failed: bool = False, layer_m: float = 10.0) -> 
         success_default=1.0,
         survival_default=1.0,
         reattempt_failed=reattempt_failed,
+        run=1,
         origin=(47.0, 8.0, 400.0),
         uavs=tuple(
             Fleet(

@@ -109,7 +109,7 @@ class LoneAgent:
 
     def learn(self, *messages: Message, mission_s: float | None = None) -> list[Action]:
         """One answer to the agent's question."""
-        return self.happen(Learned((Snapshot(MISSION, "other", mission_s, messages),)))
+        return self.happen(Learned((Snapshot(MISSION, "other", 1, mission_s, messages),)))
 
     def post(self, *entries: Board) -> list[Action]:
         return [action for e in entries for action in self.hear(COORDINATOR, e)]

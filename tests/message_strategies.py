@@ -43,6 +43,7 @@ briefs = st.builds(
     probabilities,
     probabilities,
     st.booleans(),
+    counts,
     origins,
     st.lists(fleets, max_size=4, unique_by=lambda fleet: fleet.id).map(tuple),
 )

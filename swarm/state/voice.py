@@ -15,6 +15,11 @@ class Voice:
         self.writer = writer
         self._stamp = Stamp(incarnation, 0)
 
+    @property
+    def incarnation(self) -> int:
+        """Of this life of the writer."""
+        return self._stamp.incarnation
+
     def say(self, body: Body) -> Message:
         """``body`` as this writer's newest statement."""
         self._stamp = Stamp(self._stamp.incarnation, self._stamp.counter + 1)

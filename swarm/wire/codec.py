@@ -80,6 +80,7 @@ def _packable(message: Message | Snapshot) -> list[Any]:
             SCHEMA_VERSION,
             message.mission,
             message.writer,
+            message.incarnation,
             message.mission_s,
             [_packable(each) for each in message.messages],
         ]
@@ -130,20 +131,21 @@ class Codec:
         try:
             _require(len(data) <= LARGE_LIMIT_BYTES, "too large")
             parts = _unpack(data)
-            if not isinstance(parts, tuple) or len(parts) != 5:
+            if not isinstance(parts, tuple) or len(parts) != 6:
                 raise _UnacceptableError("malformed")
-            version, mission, writer, mission_s, registers = parts
+            version, mission, writer, incarnation, mission_s, registers = parts
             _require(version == SCHEMA_VERSION, "unknown version")
             _require(mission == self._mission, "another mission")
             _require(isinstance(writer, str) and valid_id(writer), "malformed")
             _require(key == Keys(mission).state(writer), "said on another's key")
+            _require(type(incarnation) is int and 0 <= incarnation < 2**63, "malformed")
             finite = isinstance(mission_s, float) and math.isfinite(mission_s)
             _require(finite or mission_s is None, "malformed")
             _require(isinstance(registers, tuple), "malformed")
         except _UnacceptableError as fault:
             self.dropped[fault.reason] += 1
             return None
-        return Snapshot(mission, writer, mission_s, tuple(self._acceptable(registers)))
+        return Snapshot(mission, writer, incarnation, mission_s, tuple(self._acceptable(registers)))
 
     def _acceptable(self, registers: Iterable[object]) -> Iterator[Message]:
         for register in registers:

@@ -89,6 +89,8 @@ class Brief:
     success_default: Probability
     survival_default: Probability
     reattempt_failed: Flag
+    run: Count
+    """Tells this flight of the mission from earlier ones: stays when a coordinator resumes it."""
     origin: Point
     """Latitude [deg], longitude [deg], height above mean sea level [m]."""
     uavs: tuple[Fleet, ...]
@@ -244,5 +246,7 @@ class Snapshot:
 
     mission: str
     writer: str
+    incarnation: Count
+    """Of the process that answers."""
     mission_s: Number | None
     messages: tuple[Message, ...]

@@ -178,7 +178,8 @@ class Storm:
         if self.rng.random() < 0.3:
             said.append(own)
         mission_s = self.pick(None, float(self.rng.uniform(0.0, 9.0)))
-        return self.pick(Learned(()), Learned((Snapshot(MISSION, "u1", mission_s, tuple(said)),)))  # type: ignore[no-any-return]
+        answer = Snapshot(MISSION, "u1", 1, mission_s, tuple(said))
+        return Learned(self.pick((), (answer,)))
 
     def report(self) -> Event:
         legs = [order.leg for order in self.ordered if isinstance(order, GoTo)] or [0]
@@ -222,7 +223,7 @@ def test_in_the_quiet_it_wakes_only_for_status_and_repetition() -> None:
     storm = Storm(0)
     storm.step(PeerSeen(COORDINATOR))
     known = (message(COORDINATOR, BRIEF), message(COORDINATOR, entry("t2"), 2))
-    storm.step(Learned((Snapshot(MISSION, COORDINATOR, None, known),)))
+    storm.step(Learned((Snapshot(MISSION, COORDINATOR, 1, None, known),)))
     storm.step(VehicleReady())
     storm.step(Heard(message(COORDINATOR, epoch("u0"), 9)))
     begin_s, wakes = storm.now_s, 0

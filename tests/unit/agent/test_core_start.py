@@ -127,8 +127,8 @@ def test_it_decides_at_once_when_it_gets_airborne_in_a_running_mission() -> None
 def test_mission_time_is_learned_from_the_answer_that_is_furthest() -> None:
     agent = LoneAgent(uav("u0"))
     running = agent.statement(COORDINATOR, epoch("u0", mission_s=0.0))
-    slow, fresh = Snapshot(MISSION, "u1", 9.0, ()), Snapshot(MISSION, "u2", 10.0, (running,))
-    agent.happen(Learned((slow, fresh, Snapshot(MISSION, "u3", None, ()))))
+    slow, fresh = Snapshot(MISSION, "u1", 1, 9.0, ()), Snapshot(MISSION, "u2", 1, 10.0, (running,))
+    agent.happen(Learned((slow, fresh, Snapshot(MISSION, "u3", 1, None, ()))))
 
     assert agent.core.snapshot(agent.now_s + 1.0).mission_s == 11.0
 

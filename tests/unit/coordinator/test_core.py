@@ -237,7 +237,7 @@ def test_it_ends_when_all_who_could_go_on_are_lost() -> None:
 def test_it_asks_the_others_for_the_last_words_of_the_lost() -> None:
     coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
     asked = coordinator.lose("u0", 110.0).count(Ask())
-    witness = Snapshot(MISSION, "u1", 11.0, (message("u0", done("t0"), 9),))
+    witness = Snapshot(MISSION, "u1", 1, 11.0, (message("u0", done("t0"), 9),))
     coordinator.happen(Learned((witness,)))
     coordinator.hear("u1", done("t1"))
 
@@ -394,7 +394,7 @@ def test_its_answer_tells_the_mission_time() -> None:
 def test_what_it_learns_counts_like_what_it_hears() -> None:
     coordinator = LoneCoordinator(mission([U0], [T0])).started()
     outcome = message("u0", done("t0"), 99)
-    coordinator.happen(Learned((Snapshot(MISSION, "u0", None, (outcome,)),)))
+    coordinator.happen(Learned((Snapshot(MISSION, "u0", 1, None, (outcome,)),)))
 
     assert coordinator.reason == "every task has ended"
     assert coordinator.happen(Heard(outcome)) == []

@@ -295,7 +295,7 @@ def test_one_who_joins_late_learns_time_and_result_but_tells_no_tales_of_pop_ups
     said = [onlooker.statement(COORDINATOR, body) for body in onlooker.posted()]
     said.append(onlooker.statement(COORDINATOR, epoch("u0", "u1", mission_s=40.0)))
     said.append(onlooker.statement("u0", done("t0", 5.0)))
-    answer = Snapshot(MISSION, COORDINATOR, 41.0, tuple(said))
+    answer = Snapshot(MISSION, COORDINATOR, 1, 41.0, tuple(said))
     onlooker.happen(Learned((answer,)))
 
     assert onlooker.observer.mission_s(onlooker.now_s) == 41.0

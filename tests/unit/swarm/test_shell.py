@@ -45,7 +45,7 @@ REGISTERS = [
 ]
 IDS = [type(said.body).__name__ for said in REGISTERS]
 CLAIM = message("u1", held("t0", 1.0))
-SNAPSHOT = Snapshot(MISSION, "u0", 7.0, (message("u0", held("t1", 2.0)),))
+SNAPSHOT = Snapshot(MISSION, "u0", 1, 7.0, (message("u0", held("t1", 2.0)),))
 END = Stop("enough")
 
 
@@ -267,7 +267,7 @@ def test_a_question_ends_in_all_good_answers() -> None:
         async with at_work(core) as played:
             third = played.network.join("u2")
             third.serve(KEYS.state("u2"))
-            good = Snapshot(MISSION, "u1", None, (CLAIM,))
+            good = Snapshot(MISSION, "u1", 1, None, (CLAIM,))
 
             def answer(bus: MemoryBus, payload: bytes) -> None:
                 for event in bus.inbox.take():

@@ -80,7 +80,7 @@ def test_every_message_comes_back_as_it_was_said(said: Message) -> None:
 def test_every_snapshot_comes_back_as_it_was_said(
     said: tuple[Message, ...], mission_s: float | None
 ) -> None:
-    codec, snapshot = Codec(MISSION), Snapshot(MISSION, "u0", mission_s, said)
+    codec, snapshot = Codec(MISSION), Snapshot(MISSION, "u0", 1, mission_s, said)
 
     assert codec.decode_snapshot(Keys(MISSION).state("u0"), encode(snapshot)) == snapshot
     assert codec.dropped.total() == 0
@@ -392,7 +392,7 @@ STATE_KEY = Keys(MISSION).state("u0")
 
 
 def snapshot_parts(*said: Message) -> Parts:
-    parts: Parts = msgpack.unpackb(encode(Snapshot(MISSION, "u0", 1.0, said)))
+    parts: Parts = msgpack.unpackb(encode(Snapshot(MISSION, "u0", 1, 1.0, said)))
     return parts
 
 
@@ -410,7 +410,7 @@ def test_what_is_no_snapshot_never_raises(data: bytes) -> None:
 
 @given(st.data())
 def test_truncated_snapshots_are_malformed(data: st.DataObject) -> None:
-    whole = encode(Snapshot(MISSION, "u0", 1.0, (CLAIM, OUTCOME)))
+    whole = encode(Snapshot(MISSION, "u0", 1, 1.0, (CLAIM, OUTCOME)))
     length = data.draw(st.integers(0, len(whole) - 1))
 
     assert snapshot_drop_reason(whole[:length]) == "malformed"
@@ -419,7 +419,7 @@ def test_truncated_snapshots_are_malformed(data: st.DataObject) -> None:
 @settings(max_examples=300)
 @given(st.data())
 def test_snapshots_with_flipped_bits_never_raise(data: st.DataObject) -> None:
-    flipped = bytearray(encode(Snapshot(MISSION, "u0", 1.0, (CLAIM, OUTCOME, BRIEF))))
+    flipped = bytearray(encode(Snapshot(MISSION, "u0", 1, 1.0, (CLAIM, OUTCOME, BRIEF))))
     flipped[data.draw(st.integers(0, len(flipped) - 1))] ^= 1 << data.draw(st.integers(0, 7))
 
     Codec(MISSION).decode_snapshot(STATE_KEY, bytes(flipped))
@@ -433,13 +433,17 @@ def test_snapshots_with_flipped_bits_never_raise(data: st.DataObject) -> None:
         (2, "u1", "said on another's key"),
         (2, "a/b", "malformed"),
         (2, 5, "malformed"),
-        (3, math.nan, "malformed"),
-        (3, math.inf, "malformed"),
-        (3, "1", "malformed"),
+        (3, -1, "malformed"),
+        (3, 2**63, "malformed"),
         (3, True, "malformed"),
-        (4, "claims", "malformed"),
-        (4, None, "malformed"),
-        (4, {}, "malformed"),
+        (3, 1.0, "malformed"),
+        (4, math.nan, "malformed"),
+        (4, math.inf, "malformed"),
+        (4, "1", "malformed"),
+        (4, True, "malformed"),
+        (5, "claims", "malformed"),
+        (5, None, "malformed"),
+        (5, {}, "malformed"),
     ],
 )
 def test_snapshots_with_a_wrong_part_are_dropped(place: int, instead: object, reason: str) -> None:
@@ -450,14 +454,14 @@ def test_snapshots_with_a_wrong_part_are_dropped(place: int, instead: object, re
 
 
 def test_a_snapshot_answered_on_anothers_key_is_dropped() -> None:
-    data = encode(Snapshot(MISSION, "u0", 1.0, ()))
+    data = encode(Snapshot(MISSION, "u0", 1, 1.0, ()))
 
     assert snapshot_drop_reason(data, Keys(MISSION).state("u1")) == "said on another's key"
     assert snapshot_drop_reason(data, "state/u0") == "said on another's key"
 
 
 def test_a_snapshot_may_be_as_large_as_large_kinds_and_no_larger() -> None:
-    data = encode(Snapshot(MISSION, "u0", 1.0, (BRIEF,) * (LARGE_LIMIT_BYTES // 200)))
+    data = encode(Snapshot(MISSION, "u0", 1, 1.0, (BRIEF,) * (LARGE_LIMIT_BYTES // 200)))
     assert len(data) > LARGE_LIMIT_BYTES
 
     assert snapshot_drop_reason(data) == "too large"
@@ -465,14 +469,14 @@ def test_a_snapshot_may_be_as_large_as_large_kinds_and_no_larger() -> None:
 
 def test_bad_registers_in_a_snapshot_are_left_out_and_the_others_kept() -> None:
     parts = snapshot_parts(CLAIM, OUTCOME, BOARD)
-    parts[4][0][0] = 2
-    parts[4][1][6]["completed_s"] = math.nan
-    parts[4] += ["nonsense", None, [], parts[4][2][:5]]
+    parts[5][0][0] = 2
+    parts[5][1][6]["completed_s"] = math.nan
+    parts[5] += ["nonsense", None, [], parts[5][2][:5]]
     codec = Codec(MISSION)
 
     heard = codec.decode_snapshot(STATE_KEY, msgpack.packb(parts))
 
-    assert heard == Snapshot(MISSION, "u0", 1.0, (BOARD,))
+    assert heard == Snapshot(MISSION, "u0", 1, 1.0, (BOARD,))
     assert codec.dropped == {"unknown version": 1, "malformed": 5}
 
 
@@ -480,7 +484,9 @@ def test_a_snapshot_may_hold_registers_of_others_but_not_swap_the_roles() -> Non
     theirs, forged = replace(CLAIM, writer="u1"), replace(BOARD, writer="u0")
     codec = Codec(MISSION)
 
-    heard = codec.decode_snapshot(STATE_KEY, encode(Snapshot(MISSION, "u0", 1.0, (theirs, forged))))
+    heard = codec.decode_snapshot(
+        STATE_KEY, encode(Snapshot(MISSION, "u0", 1, 1.0, (theirs, forged)))
+    )
 
     assert heard is not None
     assert heard.messages == (theirs,)
