@@ -145,6 +145,7 @@ class AgentCore:
     def _handle(self, event: Event, now_s: float) -> None:
         match event:
             case Heard(message):
+                self._peers.membership.heard(message.writer, now_s)
                 self._take_in(message, now_s)
                 if isinstance(message.body, Claim | Epoch):
                     self._peers.spoke(message.writer)
@@ -153,7 +154,11 @@ class AgentCore:
             case Learned(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
-                if self._peers.membership.seen(writer) and self._learned and writer != self.uav:
+                if (
+                    self._peers.membership.seen(writer, now_s)
+                    and self._learned
+                    and writer != self.uav
+                ):
                     self._actions += self._speech.announce(now_s)
                     if writer == COORDINATOR:
                         self._ask(now_s)

@@ -135,6 +135,7 @@ class CoordinatorCore:
         """
         match event:
             case Heard(message):
+                self._membership.heard(message.writer, now_s)
                 self.replica.join(message)
                 if isinstance(message.body, Claim):
                     self._membership.spoke(message.writer)
@@ -142,7 +143,7 @@ class CoordinatorCore:
                 for snapshot in snapshots:
                     self.replica.join_all(snapshot.messages)
             case PeerSeen(writer):
-                self._membership.seen(writer)
+                self._membership.seen(writer, now_s)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
             case LinkChanged(up):

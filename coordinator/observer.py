@@ -107,6 +107,7 @@ class Observer:
         wishes: list[Wish] = []
         match fact:
             case Heard(message):
+                self._membership.heard(message.writer, now_s)
                 self._hear(message, now_s)
             case Learned(snapshots):
                 for snapshot in snapshots:
@@ -115,7 +116,7 @@ class Observer:
                     for message in snapshot.messages:
                         self._hear(message, now_s)
             case PeerSeen(writer):
-                self._membership.seen(writer)
+                self._membership.seen(writer, now_s)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
             case LinkChanged(up):

@@ -43,7 +43,7 @@ from swarm.wire.messages import Epoch, EpochPhase, Message, Status
 
 __all__ = ["QUIET", "Faults", "World"]
 
-QUIET = Timing(announce_s=60.0, status_s=60.0)
+QUIET = Timing(announce_s=60.0, status_s=60.0, silence_s=150.0)
 """Timers for an ideal bus, on which nothing need be said twice."""
 
 

@@ -21,7 +21,8 @@ class Timing:
     them `scaled` by the speed-up.
 
     Raises:
-        ValueError: a duration is not positive and finite.
+        ValueError: a duration is not positive and finite, or `silence_s` is less than
+            twice `announce_s`, so that one lost announcement would pass for a loss.
     """
 
     objection_window_s: float = 0.3
@@ -67,6 +68,10 @@ class Timing:
             value = getattr(self, field.name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{field.name} must be > 0 s, not {value}")
+        if self.silence_s < 2.0 * self.announce_s:
+            raise ValueError(
+                f"silence_s must be >= 2 announce_s = {2.0 * self.announce_s}, not {self.silence_s}"
+            )
 
     def scaled(self, speedup: float) -> Timing:
         """The same wall durations in seconds of a clock that runs ``speedup`` times as fast."""

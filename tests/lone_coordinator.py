@@ -16,7 +16,7 @@ from tests.builders import IDLE, OUT, message
 
 T = TypeVar("T")
 
-TIMING = Timing(announce_s=1e6)
+TIMING = Timing(announce_s=1e6, silence_s=2e6)
 START_TIMEOUT_S = 60.0
 
 

@@ -1,8 +1,10 @@
-"""Who is there: liveliness tokens with hysteresis.
+"""Who is there: liveliness tokens and speech, judged with hysteresis.
 
-A writer is present from the first sign of its token until the token has been
-gone for a while *and* the own link was up all that time: without a link of one's
-own, the silence of others proves nothing. Each process judges for itself.
+A writer is present from the first sign of its token until either the token has been
+gone for a while, or it has said nothing for long although the token lives: a token
+proves the transport, speech proves the program. Both count only while the own link is
+up and this process itself has not been held up: without that, the silence of others
+proves nothing. Each process judges for itself. Leaves out: what follows from a loss.
 """
 
 from __future__ import annotations
@@ -17,8 +19,15 @@ class Membership:
 
     def __init__(self, timing: Timing) -> None:
         self._timing = timing
-        self._doubted_until_s: dict[str, float] = {}
         self._linked = True
+        self._heard: set[str] = set()
+        """Who has ever said something; silence means nothing of others."""
+        self._gone_until_s: dict[str, float] = {}
+        """Present writers without a token, and when each is lost unless it is seen again."""
+        self._silent_at_s: dict[str, float] = {}
+        """Present writers that have been heard, and when each is lost unless it speaks again."""
+        self._mute: set[str] = set()
+        """Lost by silence, with a living token."""
         self._interrupted: set[str] = set()
         self._ghosts: set[str] = set()
         self.present: set[str] = set()
@@ -41,48 +50,95 @@ class Membership:
         """
         return self.present - self._interrupted
 
-    def seen(self, writer: str) -> bool:
-        """``writer``'s token is there; whether it was not present before."""
-        self._doubted_until_s.pop(writer, None)
-        new = writer not in self.present
-        self.present.add(writer)
-        return new
+    # -- what is observed -------------------------------------------------------------
+
+    def seen(self, writer: str, now_s: float) -> bool:
+        """``writer``'s token is there; whether the writer is thereby present anew.
+
+        A token that is told again does not bring back who was lost by silence.
+        """
+        self._gone_until_s.pop(writer, None)
+        if writer in self.present or writer in self._mute:
+            return False
+        self._enter(writer, now_s)
+        return True
+
+    def gone(self, writer: str, now_s: float) -> None:
+        """``writer``'s token has disappeared."""
+        if self._linked:
+            self._mute.discard(writer)  # the next token may be a new process's
+        if writer not in self.present:
+            return
+        self._gone_until_s[writer] = now_s + self._timing.loss_delay_s
+        if self._linked:
+            self._interrupted.add(writer)
+
+    def heard(self, writer: str, now_s: float) -> bool:
+        """``writer`` itself has just said something; whether that brings it back.
+
+        It does so for a writer that was lost by silence. Words of one whose token has
+        gone may have been long under way: those bring nobody back.
+        """
+        self._heard.add(writer)
+        if writer in self._mute:
+            self._mute.discard(writer)
+            self._enter(writer, now_s)
+            return True
+        if writer in self.present:
+            self._silent_at_s[writer] = now_s + self._timing.silence_s
+        return False
 
     def spoke(self, writer: str) -> None:
         """``writer`` itself has just said what it claims."""
         self._ghosts.discard(writer)
-        if writer not in self._doubted_until_s:
+        if writer not in self._gone_until_s:
             self._interrupted.discard(writer)
-
-    def gone(self, writer: str, now_s: float) -> None:
-        """``writer``'s token has disappeared."""
-        if writer not in self.present:
-            return
-        self._doubted_until_s[writer] = now_s + self._timing.loss_delay_s
-        if self._linked:
-            self._interrupted.add(writer)
 
     def link(self, up: bool, now_s: float) -> None:
         """The own link came up or went down."""
         if up and not self._linked:
-            grace_s = now_s + self._timing.relink_grace_s
-            self._doubted_until_s = dict.fromkeys(self._doubted_until_s, grace_s)
+            self._grant_grace(now_s)
         self._linked = up
+
+    def held_up(self, now_s: float) -> None:
+        """This process was stopped or starved: what the others did meanwhile is yet to be read."""
+        self._grant_grace(now_s)
+
+    # -- what follows -------------------------------------------------------------------
 
     def lost(self, now_s: float) -> list[str]:
         """Writers given up by now, each told once, in id order."""
         if not self._linked:
             return []
-        lost = sorted(w for w, until_s in self._doubted_until_s.items() if until_s <= now_s)
+        gone = {w for w, until_s in self._gone_until_s.items() if until_s <= now_s}
+        silent = {w for w, at_s in self._silent_at_s.items() if at_s <= now_s}
+        self._mute |= silent - self._gone_until_s.keys()
+        lost = gone | silent
         for writer in lost:
-            del self._doubted_until_s[writer]
-            self.present.discard(writer)
-            self._ghosts.add(writer)
-            self._interrupted.add(writer)
-        return lost
+            self._gone_until_s.pop(writer, None)
+            self._silent_at_s.pop(writer, None)
+        self.present -= lost
+        self._ghosts |= lost
+        self._interrupted |= lost
+        return sorted(lost)
 
     def next_deadline_s(self) -> float | None:
-        """When `lost` may next have something to tell."""
+        """When `lost` may next have something to tell; once it has been asked, in the future."""
         if not self._linked:
             return None
-        return min(self._doubted_until_s.values(), default=None)
+        deadlines = (*self._gone_until_s.values(), *self._silent_at_s.values())
+        return min(deadlines, default=None)
+
+    # -- pieces -------------------------------------------------------------------------
+
+    def _enter(self, writer: str, now_s: float) -> None:
+        self.present.add(writer)
+        if writer in self._heard:
+            self._silent_at_s[writer] = now_s + self._timing.silence_s
+
+    def _grant_grace(self, now_s: float) -> None:
+        """Everyone gets the time to show its token, and to speak, that it would need anew."""
+        gone_s = now_s + self._timing.relink_grace_s
+        silent_s = now_s + self._timing.silence_s
+        self._gone_until_s = dict.fromkeys(self._gone_until_s, gone_s)
+        self._silent_at_s = dict.fromkeys(self._silent_at_s, silent_s)

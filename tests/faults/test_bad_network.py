@@ -31,7 +31,7 @@ class BadNetworkWorld(WatchedWorld):
         mission = random_mission(rng, n_uav=n_uav, n_task=n_task, popup_frac=0.2)
         lost = [uav.id for uav in mission.uavs if rng.random() < 0.25]
         faults = Faults({uav: float(rng.uniform(1.0, 100.0)) for uav in lost})
-        timing = Timing(status_s=60.0)
+        timing = Timing(status_s=60.0, silence_s=60.0)
         super().__init__(mission, seed=seed, faults=faults, timing=timing, latency_s=0.02)
         self._rng = rng
         self._drop_frac = float(rng.choice([0.05, 0.2, 0.4]))

@@ -301,7 +301,9 @@ def test_as_long_as_one_is_at_work_there_is_no_stalemate() -> None:
 
 def test_it_repeats_the_epoch_with_the_time_of_now_and_the_rest_in_turns() -> None:
     tasks = [task(f"t{n}", float(n)) for n in range(20)]
-    coordinator = LoneCoordinator(mission([U0], tasks), timing=Timing(announce_s=2.0)).started()
+    coordinator = LoneCoordinator(
+        mission([U0], tasks), timing=Timing(announce_s=2.0, silence_s=1e6)
+    ).started()
     actions = coordinator.run_until(100.0 + 6.0)
 
     assert [e.mission_s for e in said(actions, Epoch)] == [2.0, 4.0, 6.0]

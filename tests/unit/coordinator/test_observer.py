@@ -41,7 +41,7 @@ from tests.builders import (
     uav,
 )
 
-TIMING = Timing()
+TIMING = Timing(silence_s=1e6)
 FLEET = uav("u0"), uav("u1", east_m=10.0, t1=0.5)
 T0, T1, POPUP = task("t0", 5.0, 2.0), task("t1", 9.0, 4.0), task("popup", 7.0, appears_s=30.0)
 FLOWN = mission(FLEET, [T0, T1, POPUP], horizon_s=100.0)
