@@ -10,6 +10,8 @@ and transport (agent.runner).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from agent.ending import Ending
 from agent.events import Action, Event, Order
 from agent.peers import Peers
@@ -71,8 +73,8 @@ class AgentCore:
     def __init__(self, mission: str, uav: str, incarnation: int, timing: Timing) -> None:
         self.uav = uav
         self.replica = Replica()
-        self.dropped = 0
-        """Messages the shell has dropped so far; goes out with the status."""
+        self.dropped: Mapping[str, int] = {}
+        """Messages the shell has dropped so far, by reason; goes out with the status."""
         self._mission = mission
         self._timing = timing
         self._speech = Speech(Voice(mission, uav, incarnation), self.replica, timing)
@@ -321,6 +323,7 @@ class AgentCore:
 
     def _status(self, now_s: float) -> Status:
         claim, telemetry = self.claim, self._picture.telemetry
+        stale = self.replica.stale
         return Status(
             phase=self.phase,
             task=None if claim is None else claim.task,
@@ -328,7 +331,7 @@ class AgentCore:
             velocity_enu_m_s=None if telemetry is None else telemetry.velocity_enu_m_s,
             battery_frac=None if telemetry is None else telemetry.battery_frac,
             mission_s=self._picture.known_mission_s(now_s),
-            dropped=self.dropped + self.replica.stale,
+            dropped={**self.dropped, **({"stale": stale} if stale else {})},
             note=self._speech.note[:200],
         )
 

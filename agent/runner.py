@@ -120,7 +120,6 @@ async def run_agent(
             loop.call_soon(report, Home())
 
     def report(news: Report) -> None:
-        core.dropped = shell.dropped
         shell.step(news)
 
     def failed(task: asyncio.Task[None]) -> None:
@@ -146,6 +145,7 @@ async def run_agent(
         execute=execute,
         snapshot=core.snapshot,
     )
+    core.dropped = shell.dropped
     take_seat(bus, mission, core.uav, status=False)
     flying, leaving = loop.create_task(shell.run()), loop.create_task(farewell())
     try:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, Protocol, TypeVar
 
 from swarm.bus.port import (
@@ -112,9 +112,9 @@ class Shell(Generic[E, A]):
         self._busy = False
 
     @property
-    def dropped(self) -> int:
-        """Messages dropped so far, malformed or too many."""
-        return self._codec.dropped.total() + self._bus.inbox.dropped
+    def dropped(self) -> Mapping[str, int]:
+        """Messages dropped so far, by reason; goes on counting."""
+        return self._codec.dropped
 
     async def run(self) -> int:
         """Run the core to its end; its exit status."""
@@ -201,7 +201,10 @@ class Shell(Generic[E, A]):
     async def _read(self) -> None:
         while True:
             await self._bus.inbox.wait()
-            for event in self._bus.inbox.take():
+            events = self._bus.inbox.take()
+            if self._bus.inbox.dropped:
+                self._codec.dropped["too many"] = self._bus.inbox.dropped
+            for event in events:
                 fact = self._fact(event)
                 if fact is not None:
                     self.step(self._from_bus(fact))

@@ -134,7 +134,7 @@ def failed(name: str, completed_s: float = 1.0, attempt: int = 1) -> Outcome:
 
 
 def status(phase: StatusPhase = StatusPhase.IDLE, position_enu_m: Point | None = None) -> Status:
-    return Status(phase, None, position_enu_m, None, None, None, 0, "")
+    return Status(phase, None, position_enu_m, None, None, None, {}, "")
 
 
 def posts(*entries: Board) -> list[Message]:

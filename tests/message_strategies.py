@@ -94,7 +94,7 @@ statuses = st.builds(
     st.none() | points,
     st.none() | probabilities,
     st.none() | numbers,
-    counts,
+    st.dictionaries(st.sampled_from(["malformed", "stale", "too many"]), counts),
     notes,
 )
 by_coordinator = briefs | epochs | boards

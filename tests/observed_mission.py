@@ -134,7 +134,7 @@ class Teller:
         battery_frac: float | None = None,
         note: str = "",
     ) -> None:
-        body = Status(phase, None, position_enu_m, None, battery_frac, now_s, 0, note)
+        body = Status(phase, None, position_enu_m, None, battery_frac, now_s, {}, note)
         self.say(uav, body, now_s)
 
     def lose(self, writer: str, now_s: float) -> None:

@@ -48,6 +48,7 @@ Probability = Annotated[float, Strict(), Ge(0.0), Le(1.0)]
 Positive = Annotated[float, Strict(), Gt(0.0)]
 NotNegative = Annotated[float, Strict(), Ge(0.0)]
 Count = Annotated[int, Strict(), Ge(0), Le(2**63 - 1)]
+Reason = Annotated[str, Strict(), Len(1, 40)]
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -221,8 +222,9 @@ class Status:
     velocity_enu_m_s: Point | None
     battery_frac: Probability | None
     mission_s: Number | None
-    dropped: Count
-    """Messages this process has dropped as malformed, stale or too many."""
+    dropped: Annotated[Mapping[Reason, Count], Len(0, 20)]
+    """Messages this process has dropped, by reason: those of `swarm.wire.codec`, "too many"
+    where the inbox was full, "stale" for registers older than known."""
     note: Annotated[str, Strict(), Len(0, 200)]
     """What it waits for, in words."""
 

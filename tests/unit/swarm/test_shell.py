@@ -154,7 +154,7 @@ def test_every_register_that_is_said_is_heard(said: Message) -> None:
         async with at_work(core) as played:
             played.other.publish(key_of(said), encode(said))
             await until(lambda: Heard(said) in core.heard, "hearing it")
-            assert played.shell.dropped == 0
+            assert played.shell.dropped == {}
 
     play(scenario)
 
@@ -171,7 +171,10 @@ def test_what_is_malformed_is_counted_and_the_rest_heard() -> None:
             await until(lambda: Heard(CLAIM) in core.heard, "hearing the good one")
 
             assert [fact for fact in core.heard if isinstance(fact, Heard)] == [Heard(CLAIM)]
-            assert played.shell.dropped == len(bad) + 1
+            assert played.shell.dropped == {
+                "malformed": len(bad),
+                "said on another's key": 1,
+            }
 
     play(scenario)
 
@@ -187,7 +190,7 @@ def test_what_the_inbox_had_no_room_for_is_counted_too() -> None:
             await until(lambda: newest in core.heard, "hearing the newest")
 
             heard = [fact for fact in core.heard if isinstance(fact, Heard)]
-            assert len(heard) + played.shell.dropped == 20
+            assert len(heard) + played.shell.dropped["too many"] == 20
 
     play(scenario)
 
@@ -284,7 +287,7 @@ def test_a_question_ends_in_all_good_answers() -> None:
             third.close()
 
             assert Learned((good,)) in core.heard
-            assert played.shell.dropped == 1
+            assert played.shell.dropped == {"malformed": 1}
 
     play(scenario)
 

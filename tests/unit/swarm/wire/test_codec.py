@@ -283,7 +283,11 @@ def test_task_ids_that_are_none_are_malformed(said: Message, text: object) -> No
         (OUTCOME, "attempt", 2**64 - 1),
         (STATUS, "battery_frac", 1.5),
         (STATUS, "note", "x" * 201),
-        (STATUS, "dropped", -1),
+        (STATUS, "dropped", 1),
+        (STATUS, "dropped", {"malformed": -1}),
+        (STATUS, "dropped", {"": 1}),
+        (STATUS, "dropped", {"x" * 41: 1}),
+        (STATUS, "dropped", {f"reason {n}": 1 for n in range(21)}),
     ],
 )
 def test_values_out_of_bounds_are_malformed(said: Message, field: str, value: object) -> None:
