@@ -48,6 +48,17 @@ def run(
             help="How the processes reach each other; auto takes a mesh for small fleets.",
         ),
     ] = "auto",
+    routers: Annotated[
+        int,
+        typer.Option(
+            "--routers",
+            min=1,
+            max=8,
+            metavar="N",
+            help="Where routers are used: so many, linked to each other. With two or more the "
+            "fleet keeps a router when one dies.",
+        ),
+    ] = 1,
     position_rate_hz: Annotated[
         float | None,
         typer.Option(
@@ -123,6 +134,7 @@ def run(
         position_rate_hz=position_rate_hz or default_position_rate_hz(len(mission.uavs)),
         acceptance_radius_m=acceptance_radius_m,
         start_timeout_s=start_timeout_s,
+        routers=routers,
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.

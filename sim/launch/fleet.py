@@ -17,7 +17,15 @@ from swarm.bus.endpoints import free_loopback_endpoints
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 
-__all__ = ["AUTO_MESH_LIMIT", "BusKind", "LaunchOptions", "Layout", "autopilot_groups"]
+__all__ = [
+    "AUTO_MESH_LIMIT",
+    "BusKind",
+    "LaunchOptions",
+    "Layout",
+    "Link",
+    "autopilot_groups",
+    "default_position_rate_hz",
+]
 
 AUTO_MESH_LIMIT = 16
 """Largest fleet for which peers link up directly by default (README of swarm.bus)."""
@@ -26,6 +34,7 @@ OWN_AUTOPILOT_LIMIT = 20
 VEHICLES_PER_PROCESS = 25
 """Simulated autopilots in one process of a larger fleet."""
 ONLOOKER = "onlooker"
+MAX_ROUTERS = 8
 
 
 class BusKind(StrEnum):
@@ -56,42 +65,85 @@ class LaunchOptions:
     acceptance_radius_m: float
     start_timeout_s: float
     """Until UAVs that are not airborne are given up [s of mission or wall, whichever is slower]."""
+    routers: int = 1
+    """How many routers there are, where there are any."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.routers <= MAX_ROUTERS:
+            raise ValueError(f"routers must be within 1..{MAX_ROUTERS}, not {self.routers}")
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A connection that one process of a run dials and another accepts."""
+
+    dialer: str
+    listener: str
 
 
 class Layout:
     """Endpoints and arguments of all processes of one run.
 
+    Processes are called ``coordinator``, by the id of their UAV, or ``router 1`` and so
+    on. Of every two that are linked, one dials. All endpoints are chosen beforehand and
+    stay, so that a process can be started again with the same arguments.
+
     Args:
         options: of the run.
         mission: the scenario.
-        router: endpoint of the router; None in a mesh.
         rng: chooses free ports.
+        onlookers: who else has a place in a mesh, besides the launcher.
     """
 
     def __init__(
         self,
         options: LaunchOptions,
         mission: Mission,
-        router: str | None,
         rng: np.random.Generator,
+        *,
+        onlookers: Sequence[str] = (),
     ) -> None:
         self._options = options
         self._mission = mission
-        self._router = router
-        names = [COORDINATOR, *(uav.id for uav in mission.uavs), ONLOOKER]
-        endpoints = () if router is not None else free_loopback_endpoints(len(names), rng)
-        self._endpoints = dict(zip(names, endpoints, strict=False))
+        self._seats = [COORDINATOR, *(uav.id for uav in mission.uavs)]
+        self._onlookers = [ONLOOKER, *onlookers]
+        kind = options.bus.for_fleet(len(mission.uavs))
+        count = options.routers if kind is BusKind.ROUTER else 0
+        self.routers = tuple(f"router {number}" for number in range(1, count + 1))
+        """Names of the routers; none in a mesh."""
+        listeners = self.routers or (*self._seats, *self._onlookers)
+        endpoints = free_loopback_endpoints(len(listeners), rng)
+        self._endpoints = dict(zip(listeners, endpoints, strict=True))
+        self._diverted: dict[Link, str] = {}
 
-    def bus_of_onlooker(self) -> BusConfig:
-        """Seat of the launcher itself."""
-        if self._router is not None:
-            return BusConfig(ClientTopology((self._router,)))
-        listen, dial = self._mesh_place(ONLOOKER)
-        return BusConfig(MeshTopology(listen, dial))
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """All links but those of onlookers."""
+        dialers = (*self.routers, *self._seats)
+        return tuple(Link(dialer, to) for dialer in dialers for to in self._listeners(dialer))
+
+    def endpoint(self, name: str) -> str:
+        """Where a process listens."""
+        return self._endpoints[name]
+
+    def divert(self, link: Link, endpoint: str) -> None:
+        """Let a link be dialed at ``endpoint``, where somebody passes it on."""
+        self._diverted[link] = endpoint
+
+    def seat_of_onlooker(self, name: str = ONLOOKER) -> BusConfig:
+        """Seat of the launcher itself, or of another onlooker."""
+        if self.routers:
+            return BusConfig(ClientTopology(self._dialed(name)))
+        return BusConfig(MeshTopology(self._endpoints[name], self._dialed(name)))
+
+    def router(self, name: str) -> list[str]:
+        """Arguments of a router's process."""
+        dialed = _repeated("--connect", self._dialed(name))
+        return ["router", "--json", "--listen", self._endpoints[name], *dialed]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
-        chosen = [argument for uav in uavs for argument in ("--uav", uav)]
+        chosen = _repeated("--uav", uavs)
         listen = ["--listen", "tcp:127.0.0.1:0"]
         return ["autopilot", str(self._options.scenario), *chosen, *listen, *self._speed()]
 
@@ -125,17 +177,33 @@ class Layout:
         return ["--speedup", repr(self._options.speedup)]
 
     def _bus(self, name: str) -> list[str]:
-        if self._router is not None:
-            return ["--bus", "router", "--connect", self._router]
-        listen, dial = self._mesh_place(name)
-        dialed = [argument for endpoint in dial for argument in ("--connect", endpoint)]
-        return ["--bus", "mesh", "--listen", listen, *dialed]
+        dialed = _repeated("--connect", self._dialed(name))
+        if self.routers:
+            return ["--bus", "router", *dialed]
+        return ["--bus", "mesh", "--listen", self._endpoints[name], *dialed]
 
-    def _mesh_place(self, name: str) -> tuple[str, tuple[str, ...]]:
-        """Own endpoint, and those of all before it in the list: of every two, one dials."""
-        names = list(self._endpoints)
-        before = names[: names.index(name)]
-        return self._endpoints[name], tuple(self._endpoints[each] for each in before)
+    def _dialed(self, name: str) -> tuple[str, ...]:
+        """Endpoints that a process is told to dial."""
+        links = [Link(name, listener) for listener in self._listeners(name)]
+        return tuple(self._diverted.get(link, self._endpoints[link.listener]) for link in links)
+
+    def _listeners(self, name: str) -> tuple[str, ...]:
+        """Whom a process dials: in a list of all, those before it.
+
+        A client dials one router at a time. Clients take turns in which router they
+        prefer, so that each serves its part of the fleet while all are there.
+        """
+        if not self.routers or name in self.routers:
+            listeners = list(self._endpoints)
+            return tuple(listeners[: listeners.index(name)])
+        if name not in self._seats:
+            return self.routers
+        first = self._seats.index(name) % len(self.routers)
+        return self.routers[first:] + self.routers[:first]
+
+
+def _repeated(option: str, values: Sequence[str]) -> list[str]:
+    return [word for value in values for word in (option, value)]
 
 
 def default_position_rate_hz(n_uav: int) -> float:

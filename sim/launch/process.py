@@ -25,6 +25,8 @@ READY_TIMEOUT_S = 30.0
 """Wall time a child may take to say that it is ready."""
 TERMINATE_TIMEOUT_S = 4.0
 """Wall time a child may take to leave after SIGTERM; then it is killed."""
+KILL_TIMEOUT_S = 4.0
+"""Wall time the kernel may take to end it and close its pipes after SIGKILL; then it is left."""
 KEPT_LINES = 200
 """Lines of a child's log that are kept to explain its end."""
 LINE_LIMIT_BYTES = 4 * 1024 * 1024
@@ -58,7 +60,7 @@ class Child:
         self.log: deque[str] = deque(maxlen=KEPT_LINES)
         """Newest lines of its standard error."""
         self.stopped = False
-        """Whether we ended it ourselves."""
+        """Whether we ended it, or told it to end, ourselves."""
         self._on_line = on_line
         self._on_log = on_log
         self._process: asyncio.subprocess.Process | None = None
@@ -149,18 +151,47 @@ class Child:
             return
         if self.returncode is None:
             self.stopped = True
-            with contextlib.suppress(ProcessLookupError):
-                self._process.terminate()
+            self._signal(signal.SIGTERM)
             try:
                 async with asyncio.timeout(TERMINATE_TIMEOUT_S):
                     await self._process.wait()
             except TimeoutError:
-                with contextlib.suppress(ProcessLookupError):
-                    self._process.kill()
-                await self._process.wait()
-        await asyncio.gather(*self._readers, return_exceptions=True)
+                self._signal(signal.SIGKILL)
+        await self._gone()
         if self._process.stdin is not None:
             self._process.stdin.close()
+
+    async def kill(self) -> None:
+        """End it at once, by SIGKILL, as a crash would. Its log is complete then."""
+        if self.returncode is None:
+            self.stopped = True
+            self._signal(signal.SIGKILL)
+        await self._gone()
+
+    def pause(self) -> None:
+        """Stop it in its tracks, by SIGSTOP: it hangs, and all its connections stay open."""
+        self._signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let it go on after `pause`."""
+        self._signal(signal.SIGCONT)
+
+    def _signal(self, number: signal.Signals) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            self._started.send_signal(number)
+
+    async def _gone(self) -> None:
+        """Wait for its end and its last words, but not for ever.
+
+        A process that waits for a device in the kernel dies only when that answers, and a
+        grandchild may hold its pipes open.
+        """
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(KILL_TIMEOUT_S):
+                await self.ended()
+        for reader in self._readers:
+            reader.cancel()
+        await asyncio.gather(*self._readers, return_exceptions=True)
 
     def last_words(self) -> str:
         """The last line of its log."""

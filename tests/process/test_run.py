@@ -76,15 +76,31 @@ def test_dead_autopilot_costs_its_uav_and_no_task(tmp_path: Path) -> None:
         run.assert_nothing_left()
 
 
-def test_dead_router_ends_the_run_and_leaves_nothing(tmp_path: Path) -> None:
-    with SwarmRun(["valley-survey", "--bus", "router"], tmp_path) as run:
-        run.wait_for_line("epoch 1")
+def test_dead_router_is_started_again_and_the_mission_goes_on(tmp_path: Path) -> None:
+    with SwarmRun([*LARGE, "--bus", "router"], tmp_path) as run:
+        run.wait_for_line(" ended ", count=5)
         kill(run.child("router"))
         status, told = run.result()
 
-        assert status == 1
-        assert told["open"]
-        assert any("router: killed by SIGKILL" in line for line in told["processes"])
+        assert status == 0, run.story()
+        assert len(told["done"]) == 60
+        assert told["lost_uavs"] == []
+        assert told["processes"] == ["router 1: killed by SIGKILL"]
+        assert any("router 1 killed by SIGKILL; started again" in line for line in run.lines)
+        run.assert_nothing_left()
+
+
+def test_fleet_with_two_routers_keeps_one_when_the_other_dies(tmp_path: Path) -> None:
+    with SwarmRun([*LARGE, "--bus", "router", "--routers", "2"], tmp_path) as run:
+        run.wait_for_line(" ended ", count=5)
+        routers = {words: pid for words, pid in run.children().items() if words.startswith("rou")}
+        assert len(routers) == 2
+        kill(max(routers.values()))
+        status, told = run.result()
+
+        assert status == 0, run.story()
+        assert len(told["done"]) == 60
+        assert told["lost_uavs"] == []
         run.assert_nothing_left()
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -34,11 +36,13 @@ OPTIONS = LaunchOptions(
 )
 UAVS = ("u0", "u1", "u2")
 FLEET = mission([uav(name) for name in UAVS], [task("t0", 1.0)])
-ROUTER = "tcp/127.0.0.1:7447"
 
 
-def layout(router: str | None = None) -> Layout:
-    return Layout(OPTIONS, FLEET, router, np.random.default_rng(0))
+def layout(routers: int = 0, onlookers: Sequence[str] = ()) -> Layout:
+    """In a mesh, or with so many routers."""
+    kind = BusKind.ROUTER if routers else BusKind.MESH
+    options = replace(OPTIONS, bus=kind, routers=max(1, routers))
+    return Layout(options, FLEET, np.random.default_rng(0), onlookers=onlookers)
 
 
 def values(arguments: list[str], option: str) -> list[str]:
@@ -59,7 +63,7 @@ def places(made: Layout) -> dict[str, tuple[str, list[str]]]:
         name: (value(arguments, "--listen"), values(arguments, "--connect"))
         for name, arguments in commands.items()
     }
-    topology = made.bus_of_onlooker().topology
+    topology = made.seat_of_onlooker().topology
     assert isinstance(topology, MeshTopology)
     return found | {ONLOOKER: (topology.listen, list(topology.dial))}
 
@@ -101,17 +105,82 @@ def test_asked_twice_a_layout_says_the_same() -> None:
 
 
 def test_with_a_router_everybody_dials_it_and_nobody_listens() -> None:
-    made = layout(ROUTER)
+    made = layout(routers=1)
+    endpoint = made.endpoint("router 1")
 
+    assert made.routers == ("router 1",)
+    assert values(made.router("router 1"), "--listen") == [endpoint]
+    assert values(made.router("router 1"), "--connect") == []
     for arguments in (made.coordinator(), made.agent("u0", "tcp:127.0.0.1:5760", 1)):
         assert value(arguments, "--bus") == "router"
-        assert value(arguments, "--connect") == ROUTER
+        assert value(arguments, "--connect") == endpoint
         assert values(arguments, "--listen") == []
-    assert made.bus_of_onlooker().topology == ClientTopology((ROUTER,))
+    assert made.seat_of_onlooker().topology == ClientTopology((endpoint,))
+
+
+def test_of_every_two_routers_one_dials_the_other() -> None:
+    made = layout(routers=3)
+    endpoints = [made.endpoint(name) for name in made.routers]
+
+    assert len(set(endpoints)) == 3
+    dialed = [values(made.router(name), "--connect") for name in made.routers]
+    assert dialed == [[], endpoints[:1], endpoints[:2]]
+
+
+def test_clients_take_turns_in_the_router_they_prefer_and_know_all() -> None:
+    made = layout(routers=2)
+    first, second = (made.endpoint(name) for name in made.routers)
+
+    assert values(made.coordinator(), "--connect") == [first, second]
+    agents = [values(made.agent(name, "tcp:127.0.0.1:5760", 1), "--connect") for name in UAVS]
+    assert agents == [[second, first], [first, second], [second, first]]
+    assert made.seat_of_onlooker().topology == ClientTopology((first, second))
+
+
+@pytest.mark.parametrize("routers", [0, 9])
+def test_no_run_has_fewer_than_one_router_or_too_many(routers: int) -> None:
+    with pytest.raises(ValueError, match=r"routers must be within 1\.\.8"):
+        replace(OPTIONS, routers=routers)
+
+
+@pytest.mark.parametrize("routers", [0, 1, 2])
+def test_a_diverted_link_is_dialed_elsewhere_and_no_other(routers: int) -> None:
+    made = layout(routers)
+    before = {name: values(made.agent(name, "tcp:127.0.0.1:1", 1), "--connect") for name in UAVS}
+    link = next(link for link in made.links if link.dialer == "u1")
+    made.divert(link, "tcp/127.0.0.1:1")
+    after = {name: values(made.agent(name, "tcp:127.0.0.1:1", 1), "--connect") for name in UAVS}
+
+    real = made.endpoint(link.listener)
+    expected = ["tcp/127.0.0.1:1" if each == real else each for each in before["u1"]]
+    assert after == before | {"u1": expected}
+    assert before["u1"] != expected
+
+
+def test_links_are_those_that_are_dialed_by_others_than_onlookers() -> None:
+    mesh, routers = layout(), layout(routers=2)
+    seats = [COORDINATOR, *UAVS]
+
+    assert {frozenset((link.dialer, link.listener)) for link in mesh.links} == {
+        frozenset(pair) for pair in combinations(seats, 2)
+    }
+    assert Counter(link.dialer for link in routers.links) == {
+        "router 2": 1,
+        **dict.fromkeys(seats, 2),
+    }
+
+
+def test_further_onlookers_have_a_place_in_a_mesh() -> None:
+    made = layout(onlookers=("recorder",))
+    topology = made.seat_of_onlooker("recorder").topology
+
+    assert isinstance(topology, MeshTopology)
+    assert len(topology.dial) == len(UAVS) + 2
+    assert topology.listen not in topology.dial
 
 
 def test_an_agent_is_told_its_mission_its_vehicle_and_the_pace() -> None:
-    arguments = layout(ROUTER).agent("u1", "tcp:127.0.0.1:5771", 2)
+    arguments = layout(routers=1).agent("u1", "tcp:127.0.0.1:5771", 2)
 
     assert arguments[0] == "agent"
     assert value(arguments, "--mission") == MISSION
@@ -123,14 +192,14 @@ def test_an_agent_is_told_its_mission_its_vehicle_and_the_pace() -> None:
 
 
 def test_position_reports_are_asked_for_at_their_wall_rate_in_vehicle_time() -> None:
-    arguments = layout(ROUTER).agent("u1", "tcp:127.0.0.1:5771", 2)
+    arguments = layout(routers=1).agent("u1", "tcp:127.0.0.1:5771", 2)
 
     rate_hz = float(value(arguments, "--position-rate-hz"))
     assert rate_hz * OPTIONS.speedup == OPTIONS.position_rate_hz
 
 
 def test_the_coordinator_is_told_scenario_method_seed_and_patience() -> None:
-    arguments = layout(ROUTER).coordinator()
+    arguments = layout(routers=1).coordinator()
 
     assert arguments[:2] == ["coordinator", str(OPTIONS.scenario)]
     assert value(arguments, "--method") == "lookahead"

@@ -1,0 +1,161 @@
+"""The processes of one run, by name: started, killed, paused, resumed and restarted.
+
+Leaves out: which processes there are and with which arguments (sim.launch.fleet),
+one process (sim.launch.process), and the mission they fly (sim.launch.run).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from sim.launch.fleet import LaunchOptions, Layout, Link, autopilot_groups
+from sim.launch.process import Child
+from swarm.model import Mission
+from swarm.model.ids import COORDINATOR
+
+__all__ = ["Launch", "OnLog", "Through"]
+
+OnLog = Callable[[str, str], None]
+"""Called with the name of a process and a line of its log."""
+Through = Callable[[Link, str], Awaitable[str]]
+"""Given a link and the endpoint where it is accepted, where it is to be dialed instead."""
+
+
+class Launch:
+    """The processes of one run.
+
+    They are called ``router 1`` and so on, ``coordinator``, ``autopilot of …``, and by the
+    id of their UAV. Use from one asyncio loop; `stop` in ``finally`` ends whatever is left::
+
+        launch = Launch(mission, options)
+        try:
+            await launch.start()
+            await launch.kill("uav03")
+            await launch.restart("uav03")
+        finally:
+            await launch.stop()
+
+    Args:
+        mission: the scenario of ``options``.
+        options: of the run.
+        on_log: called for everything the processes log.
+        on_plan: called with the JSON of each plan the coordinator makes.
+        through: puts something between the two ends of each link, such as a relay that
+            delays, loses and cuts; links of onlookers stay direct.
+        onlookers: who else needs a place in a mesh, besides the launcher.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        options: LaunchOptions,
+        *,
+        on_log: OnLog | None = None,
+        on_plan: Callable[[dict[str, Any]], None] | None = None,
+        through: Through | None = None,
+        onlookers: Sequence[str] = (),
+    ) -> None:
+        self.mission = mission
+        self.options = options
+        self.layout = Layout(options, mission, np.random.default_rng(), onlookers=onlookers)
+        self.lives: list[Child] = []
+        """Every process ever started, in that order; a restarted one more than once."""
+        self._on_log = on_log
+        self._on_plan = on_plan
+        self._through = through
+        self._current: dict[str, Child] = {}
+
+    async def start(self) -> None:
+        """Start everything, in the order in which one needs the other.
+
+        Returns when all have been started; routers and autopilots serve by then.
+
+        Raises:
+            ChildFailedError: a router or an autopilot did not come up.
+        """
+        layout = self.layout
+        if self._through is not None:
+            for link in layout.links:
+                layout.divert(link, await self._through(link, layout.endpoint(link.listener)))
+        for router in layout.routers:
+            await self._start(router, layout.router(router))
+            await self.child(router).ready()
+        groups = autopilot_groups([uav.id for uav in self.mission.uavs])
+        autopilots = [
+            await self._start(f"autopilot of {', '.join(group)}", layout.autopilot(group))
+            for group in groups
+        ]
+        await self._start(COORDINATOR, layout.coordinator())
+        for child, group in zip(autopilots, groups, strict=True):
+            for said in await child.ready(len(group)):
+                uav, url, system_id = said["uav"], said["url"], int(said["system_id"])
+                await self._start(uav, layout.agent(uav, url, system_id))
+
+    async def stop(self) -> None:
+        """End every process that is left; paused ones too."""
+        for child in self._current.values():
+            if child.returncode is None:
+                child.resume()
+        await asyncio.gather(*(child.stop() for child in self.lives))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the processes started so far."""
+        return tuple(self._current)
+
+    def child(self, name: str) -> Child:
+        """The newest process of that name.
+
+        Raises:
+            ValueError: none of that name has been started.
+        """
+        if name not in self._current:
+            raise ValueError(f"no process is called {name!r}; there are {', '.join(self.names)}")
+        return self._current[name]
+
+    def runs(self, name: str) -> bool:
+        """Whether there is a process of that name, paused ones included."""
+        return name in self._current and self._current[name].returncode is None
+
+    async def kill(self, name: str) -> None:
+        """End a process at once, by SIGKILL; returns when it is gone."""
+        await self.child(name).kill()
+
+    def pause(self, name: str) -> None:
+        """Stop a process in its tracks, by SIGSTOP: it hangs, and its connections stay open."""
+        self.child(name).pause()
+
+    def resume(self, name: str) -> None:
+        """Let a paused process go on, by SIGCONT."""
+        self.child(name).resume()
+
+    async def restart(self, name: str) -> Child:
+        """Start a process anew with its arguments and endpoints; kills it first if it runs.
+
+        A router serves when this returns; others have only been started.
+
+        Raises:
+            ValueError: there is no process of that name, or it simulates autopilots: those
+                would be other vehicles, back on the ground.
+            ChildFailedError: a router did not come up.
+        """
+        former = self.child(name)
+        if former.arguments[0] == "autopilot":
+            raise ValueError(f"{name} cannot be restarted: its vehicles would be back at the start")
+        await former.kill()
+        child = await self._start(name, list(former.arguments))
+        if name in self.layout.routers:
+            await child.ready()
+        return child
+
+    async def _start(self, name: str, arguments: list[str]) -> Child:
+        on_line = self._on_plan if name == COORDINATOR else None
+        child = Child(name, arguments, on_line=on_line, on_log=self._on_log)
+        self.lives.append(child)
+        await child.start()
+        self._current[name] = child
+        return child
