@@ -27,7 +27,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Prepare:
-    """Get airborne at the start: wait until ready, arm, take off, reach the place."""
+    """Get airborne and under command: wait until ready, arm, take off, reach the place."""
 
     position_enu_m: tuple[float, float, float]
     """Where to hover before the mission starts [m; mission origin, height included]."""
@@ -52,6 +52,8 @@ class Return:
     """Return to launch and land."""
 
     reason: str
+    resume: bool = False
+    """An earlier life of this agent flew the vehicle: look whether it is in the air."""
 
 
 Orders = Prepare | GoTo | Return
@@ -59,7 +61,7 @@ Orders = Prepare | GoTo | Return
 
 @dataclass(frozen=True, slots=True)
 class VehicleReady:
-    """The vehicle is airborne and hovers at its start."""
+    """The vehicle is airborne and takes targets; unless it was resumed, it hovers at its start."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
 """A vehicle of the virtual-time world: flies ideally, reports like a real one.
 
 Speaks agent.vehicle, so the agent's core cannot tell it from a MAVLink autopilot.
-It is airborne at its start at once: take-off is no part of mission time.
+It is airborne at its start at once: take-off is no part of mission time. Like a real one
+it outlives its agent: resumed by the next, it flies on to where it was sent.
 Leaves out: the autopilot's protocol (sim.autopilot).
 """
 
@@ -35,27 +36,39 @@ class VirtualVehicle:
         """Obey ``order``; ``ready`` is what it says once it is prepared."""
         self._orders += 1
         match order:
-            case Prepare(position_enu_m=start, speed_m_s=speed_m_s):
-                self._motion, self._speed_m_s = IdealMotion(start), speed_m_s
-                self._later(self._queue.now_s(), ready)
+            case Prepare():
+                self._prepare(order, ready)
             case GoTo(leg=leg, position_enu_m=target) if self._motion is not None:
                 self._motion.fly_to(target, self._speed_m_s, self._queue.now_s())
                 arrives_s = self._motion.arrives_s
                 if arrives_s is not None:
                     self._later(arrives_s, Arrived(leg))
             case Return():
+                self._motion = None
                 self._later(self._queue.now_s(), Home())
             case _:
                 pass
 
+    def _prepare(self, order: Prepare, ready: Report) -> None:
+        now_s, motion = self._queue.now_s(), self._motion
+        self._speed_m_s = order.speed_m_s
+        if motion is None:
+            self._motion = IdealMotion(order.position_enu_m)
+            self._later(now_s, ready)
+        elif order.resume:
+            self._later(now_s, self._telemetry(motion))
+            self._later(now_s, ready)
+        else:
+            motion.fly_to(order.position_enu_m, self._speed_m_s, now_s)
+            self._later(max(now_s, motion.arrives_s or now_s), ready)
+
     def telemetry(self) -> Telemetry | None:
-        """Where it is now; None before it was prepared."""
-        if self._motion is None:
-            return None
+        """Where it is now; None on the ground."""
+        return None if self._motion is None else self._telemetry(self._motion)
+
+    def _telemetry(self, motion: IdealMotion) -> Telemetry:
         now_s = self._queue.now_s()
-        return Telemetry(
-            self._motion.position_enu_m(now_s), self._motion.velocity_enu_m_s(now_s), None
-        )
+        return Telemetry(motion.position_enu_m(now_s), motion.velocity_enu_m_s(now_s), None)
 
     def _later(self, time_s: float, report: Report) -> None:
         """Say ``report`` then, unless another order has come in between."""

@@ -108,6 +108,18 @@ class BridgeFlight:
         self.run(1.0)
         return self
 
+    def restart(self, down_s: float = 2.0) -> BridgeFlight:
+        """The same with a new bridge; the old one died earlier, and the vehicle flew on."""
+        end_s = self.now_s + down_s
+        while self.now_s < end_s:
+            self.now_s += STEP_S
+            self.copter.advance(self.now_s)
+        self.bridge = Bridge(self.bridge.config)
+        self.reports.clear()
+        self._read = 0
+        self.happen(LinkUp())
+        return self
+
     def reasons(self) -> list[str]:
         """What the vehicle was waited for."""
         return [r.reason for r in self.reports if isinstance(r, NotReady)]

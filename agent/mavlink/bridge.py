@@ -55,6 +55,8 @@ __all__ = ["Bridge", "Phase"]
 _AUTOPILOT_COMPONENT = 1
 _POLL_S = 0.25
 """While something is waited for, look that often even if nothing is heard."""
+_UNHEARD_TIMEOUTS = 3.0
+"""A vehicle that may be in the air has that many silence timeouts to be heard at all."""
 
 
 class Phase(Enum):
@@ -90,6 +92,9 @@ class Bridge:
         self._prepare: Prepare | None = None
         self._preparation: Preparation | None = None
         self._returning: Returning | None = None
+        self._to_return: Return | None = None
+        """Ordered before the vehicle was heard, which may be in the air."""
+        self._to_return_until_s = 0.0
         self._order: GoTo | None = None
         self._leg: Leg | None = None
         self._link_up = False
@@ -126,7 +131,7 @@ class Bridge:
         deadlines_s = [self._heartbeat_at_s]
         if (commands_s := self._commands.next_deadline_s()) is not None:
             deadlines_s.append(commands_s)
-        if self.phase in (Phase.PREPARING, Phase.RETURNING):
+        if self.phase in (Phase.PREPARING, Phase.RETURNING) or self._to_return is not None:
             deadlines_s.append(self._now_s + _POLL_S)
         heard_s = self._vehicle.heartbeat_at_s
         if heard_s is not None and self._in_our_hands() and not self._silent():
@@ -298,7 +303,13 @@ class Bridge:
         self._drop_work()
         self.phase = Phase.IDLE
         if flavour is None or heartbeat is None:
-            self._actions.append(Home())
+            if order.resume:
+                self._to_return, self._told_not_ready = order, None
+                self._to_return_until_s = self._now_s + (
+                    _UNHEARD_TIMEOUTS * self.config.silence_timeout_s
+                )
+            else:
+                self._actions.append(Home())
             return
         commanded = flavour.is_commanded(heartbeat.custom_mode)
         aloft = heartbeat.armed and (took_off or flavour.airborne(self._vehicle))
@@ -340,6 +351,8 @@ class Bridge:
             self._advance_preparation()
         elif self.phase is Phase.RETURNING:
             self._advance_return()
+        elif self._to_return is not None:
+            self._look_for_vehicle(self._to_return)
 
     def _advance_preparation(self) -> None:
         heartbeat, order = self._vehicle.heartbeat, self._prepare
@@ -386,6 +399,16 @@ class Bridge:
             self._told_not_ready = reason
             self._actions.append(NotReady(reason))
 
+    def _look_for_vehicle(self, order: Return) -> None:
+        """Return the vehicle once it is heard; it has this long to be."""
+        if (reason := self._unheard()) is None:
+            self._return(order)
+        elif self._now_s < self._to_return_until_s:
+            self._tell_not_ready(reason)
+        else:
+            self._drop_work()
+            self._refuse_return(order, reason)
+
     def _advance_return(self) -> None:
         returning, heartbeat = self._returning, self._vehicle.heartbeat
         if returning is None or heartbeat is None:
@@ -429,7 +452,7 @@ class Bridge:
     def _drop_work(self) -> None:
         """Give up whatever is under way; nothing is sent about it any more."""
         self._leg = self._order = None
-        self._prepare = self._preparation = self._returning = None
+        self._prepare = self._preparation = self._returning = self._to_return = None
         self._commands.cancel_all()
 
     def _say(self, *messages: Outbound) -> None:

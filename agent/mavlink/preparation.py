@@ -1,8 +1,9 @@
-"""From a silent box to a vehicle that hovers at its start.
+"""From a silent box to a vehicle that takes targets, at its start or where it flies already.
 
 No script: every time something is heard, the next step follows from the state *seen*,
 so an overwritten mode, an automatic disarming on the ground or a vehicle that flies
-already need no cases of their own. Every step has a limit. Leaves out: who may give
+already need no cases of their own. Every step has a limit. A vehicle that is resumed in
+the air keeps its old target meanwhile: only its speed is set. Leaves out: who may give
 the vehicle orders (agent.mavlink.bridge).
 """
 
@@ -15,7 +16,7 @@ from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, resu
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.leg import Leg
-from agent.mavlink.messages import Heartbeat, Inbound, Outbound, Position
+from agent.mavlink.messages import Heartbeat, Inbound, Landed, Outbound, Position
 from agent.mavlink.speed import SpeedSetting
 from agent.mavlink.state import VehicleState
 from agent.vehicle import Prepare
@@ -71,7 +72,7 @@ class Preparation:
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
         self.done = False
-        """The vehicle hovers at its start, with its cruise speed set."""
+        """The vehicle is where it should be, with its cruise speed set."""
         self.failure: str | None = None
         """Why it will not get there; None while it may."""
 
@@ -145,7 +146,7 @@ class Preparation:
         if self._climbing and not self._high_enough(position, now_s):
             return []
         self._climbing = False
-        return self._fly_to_start(now_s)
+        return self._settle(vehicle, now_s)
 
     def _start_motors(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
         if self._flew:
@@ -196,23 +197,29 @@ class Preparation:
             self._wait(f"climbing to {height_m:.0f} m")
         return False
 
-    def _fly_to_start(self, now_s: float) -> list[Outbound]:
+    def _settle(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
+        """Fly to the start, unless the vehicle is resumed in the air, and set the speed."""
         out: list[Outbound] = []
-        if self._leg is None:
+        if self._leg is None and not self._resumes(vehicle):
             place = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
             message = self._flavour.reposition(*place)
             self._leg = Leg(self._order.position_enu_m, message, self._config)
             out += self._leg.start(self._commands, now_s)
+        leg = self._leg
         # ArduPilot forgets a speed set before the first target after takeoff.
-        if self._leg.accepted and not self._speed.begun:
+        if (leg is None or leg.accepted) and not self._speed.begun:
             out += self._speed.start(self._commands, now_s)
         out += self._speed.on_time(now_s)
-        failure = self._leg.failure or self._speed.failure
+        failure = self._speed.failure if leg is None else leg.failure or self._speed.failure
         if failure is not None:
             return out + self._fail(failure)
-        self.done = self._leg.arrived and self._speed.done
-        self._wait("flying to the start")
+        self.done = (leg is None or leg.arrived) and self._speed.done
+        self._wait("setting the cruise speed" if leg is None else "flying to the start")
         return out
+
+    def _resumes(self, vehicle: VehicleState) -> bool:
+        """Whether it flies on orders of an earlier life, beyond its takeoff."""
+        return self._order.resume and not self.took_off and vehicle.landed is not Landed.TAKEOFF
 
     def _ask(
         self, step: _Step, command: Command, vehicle: VehicleState, now_s: float

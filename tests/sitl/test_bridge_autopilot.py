@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -54,6 +55,8 @@ class JoinedFlight:
         self.vehicle = Vehicle(VEHICLE, flavour or ArduCopter(), self.now_s)
         self.codec = ChannelCodec(1, COMPONENT_ID, datagrams=False)
         self.reports: list[tuple[float, Report]] = []
+        self.track_enu_m: list[tuple[float, float, float]] = []
+        """Where the vehicle was, whenever anything happened."""
         self._read = 0
         self.to_vehicle(autopilot.Connected(0))
         self.to_bridge(LinkUp())
@@ -70,6 +73,35 @@ class JoinedFlight:
         for send in self.vehicle.step(event, self.now_s):
             self.to_bridge(Received(self.codec.encode(send.message)))
 
+    def wait(self, duration_s: float) -> None:
+        """Let time go on, whatever is reported."""
+        end_s = self.now_s + duration_s
+        while self.now_s < end_s:
+            self._leap()
+
+    def restart_bridge(self, dead_s: float) -> None:
+        """Kill the bridge, let the vehicle fly on alone, and start a new one on a new link."""
+        self.to_vehicle(autopilot.Disconnected(0))
+        end_s = self.now_s + dead_s
+        while (vehicle_s := self.vehicle.next_deadline_s()) < end_s:
+            self.now_s = max(self.now_s, vehicle_s)
+            self.vehicle.step(autopilot.Tick(), self.now_s)
+        self.now_s = end_s
+        self.bridge = Bridge(self.bridge.config)
+        self.codec = ChannelCodec(1, COMPONENT_ID, datagrams=False)
+        self.to_vehicle(autopilot.Connected(0))
+        self.to_bridge(LinkUp())
+
+    def _leap(self) -> None:
+        """On to the next deadline of either machine."""
+        vehicle_s, bridge_s = self.vehicle.next_deadline_s(), self.bridge.next_deadline_s()
+        self.now_s = max(self.now_s, min(vehicle_s, bridge_s))
+        if vehicle_s <= self.now_s:
+            self.to_vehicle(autopilot.Tick())
+        if self.bridge.next_deadline_s() <= self.now_s:
+            self.to_bridge(Tick())
+        self.track_enu_m.append(self.vehicle.pilot.position_enu_m(self.now_s))
+
     def run_until(self, report: Report | type, limit_s: float = 300.0) -> float:
         """Vehicle time at which that report came."""
         end_s = self.now_s + limit_s
@@ -79,12 +111,7 @@ class JoinedFlight:
                 self._read += 1
                 if new == report or (isinstance(report, type) and isinstance(new, report)):
                     return at_s
-            vehicle_s, bridge_s = self.vehicle.next_deadline_s(), self.bridge.next_deadline_s()
-            self.now_s = max(self.now_s, min(vehicle_s, bridge_s))
-            if vehicle_s <= self.now_s:
-                self.to_vehicle(autopilot.Tick())
-            if self.bridge.next_deadline_s() <= self.now_s:
-                self.to_bridge(Tick())
+            self._leap()
         raise AssertionError(f"no {report} within {limit_s} s, only {self.reports}")
 
 
@@ -128,6 +155,27 @@ def test_pilot_takes_over_the_simulated_vehicle() -> None:
     with pytest.raises(AssertionError, match="no"):
         flight.run_until(Arrived(1), limit_s=60.0)
     assert flight.vehicle.pilot.mode is Mode.LOITER
+
+
+def test_killed_in_mid_leg_and_started_anew_it_arrives_without_turning_back() -> None:
+    flight = JoinedFlight()
+    flight.to_bridge(START)
+    flight.run_until(VehicleReady())
+    target, left_s = (5.0, 60.0, 10.0), flight.now_s
+    flight.to_bridge(GoTo(3, target))
+    flight.track_enu_m.clear()
+    flight.wait(5.0)
+    flight.restart_bridge(dead_s=4.0)
+    flight.to_bridge(replace(START, resume=True))
+    flight.run_until(VehicleReady())
+    assert flight.now_s - left_s < 12.0
+    flight.to_bridge(GoTo(1, target))
+    arrived_s = flight.run_until(Arrived(1))
+
+    away_m = [math.dist(place_enu_m, target) for place_enu_m in flight.track_enu_m]
+    assert all(after <= before + 0.05 for before, after in itertools.pairwise(away_m))
+    undisturbed_s = math.dist(START.position_enu_m, target) / START.speed_m_s
+    assert arrived_s - left_s == pytest.approx(undisturbed_s, rel=0.05)
 
 
 def test_reboot_of_the_simulated_vehicle_is_noticed() -> None:

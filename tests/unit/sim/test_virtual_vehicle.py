@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from agent.vehicle import Arrived, GoTo, Home, Prepare, Report, Return, VehicleReady
+from dataclasses import replace
+
+from agent.vehicle import Arrived, GoTo, Home, Prepare, Report, Return, Telemetry, VehicleReady
 from sim.event_queue import EventQueue
 from sim.virtual_vehicle import VirtualVehicle
+
+PREPARE = Prepare((0.0, 0.0, 10.0), 10.0)
 
 
 class Flight:
@@ -17,7 +21,7 @@ class Flight:
             self.queue, lambda report: self.reports.append((self.queue.now_s(), report))
         )
         assert self.vehicle.telemetry() is None
-        self.vehicle.order(Prepare((0.0, 0.0, 10.0), 10.0), VehicleReady())
+        self.vehicle.order(PREPARE, VehicleReady())
         self.queue.run(0.0)
 
     def fly(self, leg: int, east_m: float) -> None:
@@ -60,6 +64,38 @@ def test_a_target_before_it_is_prepared_is_ignored() -> None:
 
     assert queue.run(10.0)
     assert reports == []
+
+
+def test_it_outlives_its_agent_and_is_resumed_where_it_flies() -> None:
+    flight = Flight()
+    flight.fly(7, 50.0)
+    resume = replace(PREPARE, resume=True)
+    flight.queue.at(2.0, lambda: flight.vehicle.order(resume, VehicleReady()))
+    flight.queue.run(100.0)
+
+    there = Telemetry((20.0, 0.0, 10.0), (10.0, 0.0, 0.0), None)
+    assert flight.reports[1:] == [(2.0, there), (2.0, VehicleReady())]
+    assert flight.vehicle.telemetry() == Telemetry((50.0, 0.0, 10.0), (0.0, 0.0, 0.0), None)
+
+
+def test_prepared_anew_in_the_air_it_flies_to_its_start_first() -> None:
+    flight = Flight()
+    flight.fly(7, 50.0)
+    flight.queue.at(2.0, lambda: flight.vehicle.order(PREPARE, VehicleReady()))
+    flight.queue.run(100.0)
+
+    assert flight.reports[1:] == [(4.0, VehicleReady())]
+
+
+def test_once_home_it_begins_at_its_start_again() -> None:
+    flight = Flight()
+    flight.fly(1, 50.0)
+    flight.vehicle.order(Return("over"), VehicleReady())
+    assert flight.vehicle.telemetry() is None
+    flight.vehicle.order(replace(PREPARE, resume=True), VehicleReady())
+    flight.queue.run(100.0)
+
+    assert flight.reports[1:] == [(0.0, VehicleReady())]
 
 
 def test_the_queue_runs_in_order_of_time_and_then_of_scheduling() -> None:
