@@ -6,12 +6,14 @@ from typing import Annotated
 
 import typer
 
+from swarm.config import Link
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
     BusOption,
     ConnectOption,
     LeaseOption,
     LifelineOption,
+    LinkOption,
     ListenOption,
     LogFormatOption,
     LogLevelOption,
@@ -67,7 +69,8 @@ def agent(
     bus: BusOption = "router",
     listen: ListenOption = "",
     connect: ConnectOption = None,
-    lease_s: LeaseOption = 1.0,
+    link: LinkOption = Link.NORMAL,
+    lease_s: LeaseOption = None,
     speedup: SpeedupOption = 1.0,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
@@ -96,13 +99,14 @@ def agent(
     from swarm.bus.config import bus_config
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, incarnation
-    from swarm.config import Timing
+    from swarm.config import preset
     from swarm.log import configure_logging, get_logger
     from swarm.model import Origin
     from swarm.process import stop_requests
 
     configure_logging(log_level, log_format)
-    config = bus_config(bus, listen, connect or (), lease_s)
+    network = preset(link, lease_s)
+    config = bus_config(bus, listen, connect or (), network.lease_s)
     _check_ids(mission, uav)
     parse_link(mavlink)
     log = get_logger(uav, mission=mission)
@@ -119,7 +123,7 @@ def agent(
             ).for_speedup(speedup)
             return MavlinkVehicle(settings, mavlink, clock, report)
 
-        core = AgentCore(mission, uav, incarnation(), Timing().scaled(speedup))
+        core = AgentCore(mission, uav, incarnation(), network.timing.scaled(speedup))
         async with stop_requests(lifeline=lifeline) as stop:
             seat = await seat_or_stop(
                 lambda: open_zenoh_bus(config),

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
@@ -23,6 +24,7 @@ from swarm.options import (
     JsonOption,
     LeaseOption,
     LifelineOption,
+    LinkOption,
     ListenOption,
     LogFormatOption,
     LogLevelOption,
@@ -204,7 +206,8 @@ def coordinator(
     bus: BusOption = "router",
     listen: ListenOption = "",
     connect: ConnectOption = None,
-    lease_s: LeaseOption = 1.0,
+    link: LinkOption = Link.NORMAL,
+    lease_s: LeaseOption = None,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
@@ -230,7 +233,7 @@ def coordinator(
     from swarm.bus.config import bus_config
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, SystemClock, incarnation
-    from swarm.config import Timing
+    from swarm.config import preset
     from swarm.log import configure_logging
     from swarm.model import Mission, Plan
     from swarm.process import run_until_stopped
@@ -238,7 +241,8 @@ def coordinator(
 
     configure_logging(log_level, log_format)
     check_online_method(method)
-    config = bus_config(bus, listen, connect or (), lease_s)
+    network = preset(link, lease_s)
+    config = bus_config(bus, listen, connect or (), network.lease_s)
     mission = load_scenario(scenario)
 
     def planner(what: Mission, how: str, planner_seed: int) -> Plan:
@@ -253,7 +257,7 @@ def coordinator(
             method=method,
             seed=seed,
             incarnation=incarnation(),
-            timing=Timing().scaled(speedup),
+            timing=network.timing.scaled(speedup),
             start_timeout_s=start_timeout_s * max(1.0, speedup),
             layers=FlightLayers(lowest_layer_m, layer_spacing_m),
         )

@@ -1,4 +1,4 @@
-"""Timers of the runtime, validated.
+"""Timers of the runtime, validated, and which of them suit which kind of link.
 
 Leaves out: what belongs to one transport (swarm.bus) or one autopilot
 (agent.mavlink).
@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
 
-__all__ = ["Timing"]
+__all__ = ["PRESETS", "Link", "LinkPreset", "Timing", "preset"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,3 +80,70 @@ class Timing:
     def scaled(self, speedup: float) -> Timing:
         """The same wall durations in seconds of a clock that runs ``speedup`` times as fast."""
         return Timing(*(value * speedup for value in dataclasses.astuple(self)))
+
+
+class Link(StrEnum):
+    """What kind of network the processes of a fleet reach each other by."""
+
+    CLEAN = "clean"
+    """One machine or a wired network: nothing is lost."""
+    NORMAL = "normal"
+    """Good radio: up to 5 % loss and 30 ms each way."""
+    BAD = "bad"
+    """Poor radio: up to 20 % loss and 100 ms each way."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkPreset:
+    """Settings that belong together on one kind of link; all in wall seconds.
+
+    Raises:
+        ValueError: a duration is not positive and finite.
+    """
+
+    lease_s: float
+    """Silence of a transport after which the other side takes it for broken."""
+    answer_s: float
+    """How long a question to everyone waits for the slowest answer."""
+    timing: Timing
+
+    def __post_init__(self) -> None:
+        for name, value in (("lease_s", self.lease_s), ("answer_s", self.answer_s)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} must be > 0 s, not {value}")
+
+
+PRESETS: Final[Mapping[Link, LinkPreset]] = MappingProxyType(
+    {
+        Link.CLEAN: LinkPreset(
+            lease_s=1.0,
+            answer_s=1.0,
+            timing=Timing(objection_window_s=0.2, silence_s=3.0, announce_s=1.0),
+        ),
+        Link.NORMAL: LinkPreset(lease_s=1.5, answer_s=1.0, timing=Timing()),
+        Link.BAD: LinkPreset(
+            lease_s=8.0,
+            answer_s=5.0,
+            timing=Timing(
+                objection_window_s=2.0,
+                loss_delay_s=3.0,
+                silence_s=20.0,
+                relink_grace_s=8.0,
+                patience_s=2.5,
+                announce_s=4.0,
+                status_s=0.5,
+                ask_s=5.0,
+                linger_s=8.0,
+                ask_gap_s=1.0,
+                takeover_s=4.0,
+                replan_interval_s=10.0,
+            ),
+        ),
+    }
+)
+
+
+def preset(link: Link, lease_s: float | None = None) -> LinkPreset:
+    """Settings for that kind of link; a lease given by hand takes the place of the preset's."""
+    chosen = PRESETS[link]
+    return chosen if lease_s is None else dataclasses.replace(chosen, lease_s=lease_s)

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.bus.config import DEFAULT_LEASE_S, DEFAULT_ROUTER
-from swarm.options import JsonOption, LeaseOption, LifelineOption
+from swarm.bus.config import DEFAULT_ROUTER
+from swarm.config import Link, preset
+from swarm.options import JsonOption, LeaseOption, LifelineOption, LinkOption
 
 if TYPE_CHECKING:
     from swarm.bus.config import RouterConfig
@@ -48,7 +49,8 @@ def router(
             show_default=False,
         ),
     ] = None,
-    lease_s: LeaseOption = DEFAULT_LEASE_S,
+    link: LinkOption = Link.NORMAL,
+    lease_s: LeaseOption = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
 ) -> int:
@@ -67,6 +69,7 @@ def router(
 
     listens = tuple(listen or (() if config else (DEFAULT_ROUTER,)))
     try:
+        lease_s = preset(link, lease_s).lease_s
         settings = RouterConfig(listens, tuple(connect or ()), config, lease_s)
     except ValueError as fault:
         problem, _, remedy = str(fault).partition("; ")

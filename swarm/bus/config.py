@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from swarm.config import PRESETS, Link
 from swarm.errors import Fault, InputError
 
 __all__ = [
+    "DEFAULT_LEASE_S",
     "BusConfig",
     "ClientTopology",
     "FileTopology",
@@ -24,7 +26,7 @@ __all__ = [
 
 MIN_LEASE_S = 0.2
 MAX_LEASE_S = 60.0
-DEFAULT_LEASE_S = 1.0
+DEFAULT_LEASE_S = PRESETS[Link.NORMAL].lease_s
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 
 # udp is left out: over it, Zenoh's "reliable" does not retransmit.

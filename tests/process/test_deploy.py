@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from swarm.bus.config import DEFAULT_LEASE_S
 from swarm.bus.zenoh_session import session_config
 from tests.process.mission import wait_until
 from tests.process.router_processes import HOLDER, router, started
@@ -33,7 +34,7 @@ SETTINGS = (
 @pytest.mark.parametrize("mode", ["router", "client"])
 def test_file_says_what_the_runtime_does_by_itself(mode: str) -> None:
     file = zenoh.Config.from_file(FOLDER / f"{mode}.json5")
-    own = session_config(mode, listen=[], connect=[], lease_s=1.0)
+    own = session_config(mode, listen=[], connect=[], lease_s=DEFAULT_LEASE_S)
 
     assert json.loads(file.get_json("mode")) == mode
     for setting in SETTINGS:

@@ -7,7 +7,8 @@ import math
 
 import pytest
 
-from swarm.config import Timing
+from swarm.bus.config import MAX_LEASE_S, MIN_LEASE_S
+from swarm.config import PRESETS, Link, LinkPreset, Timing, preset
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan])
@@ -26,3 +27,34 @@ def test_scaling_keeps_the_wall_durations() -> None:
     scaled = dataclasses.astuple(Timing().scaled(8.0))
 
     assert scaled == tuple(8.0 * value for value in dataclasses.astuple(Timing()))
+
+
+def test_every_kind_of_link_has_a_preset_and_the_normal_one_is_the_default() -> None:
+    assert set(PRESETS) == set(Link)
+    assert preset(Link.NORMAL).timing == Timing()
+
+
+def test_a_worse_link_gets_no_shorter_timer_that_waits_for_others() -> None:
+    waits = ("objection_window_s", "loss_delay_s", "silence_s", "relink_grace_s", "patience_s")
+    clean, normal, bad = (PRESETS[link] for link in (Link.CLEAN, Link.NORMAL, Link.BAD))
+
+    for name in waits:
+        assert getattr(clean.timing, name) <= getattr(normal.timing, name), name
+        assert getattr(normal.timing, name) < getattr(bad.timing, name), name
+    assert clean.lease_s < normal.lease_s < bad.lease_s
+    assert clean.answer_s <= normal.answer_s < bad.answer_s
+
+
+def test_a_lease_given_by_hand_wins_and_changes_nothing_else() -> None:
+    assert preset(Link.BAD, 3.0) == dataclasses.replace(PRESETS[Link.BAD], lease_s=3.0)
+
+
+@pytest.mark.parametrize("link", Link)
+def test_a_bus_takes_the_lease_of_every_preset(link: Link) -> None:
+    assert MIN_LEASE_S <= PRESETS[link].lease_s <= MAX_LEASE_S
+
+
+@pytest.mark.parametrize("durations", [(0.0, 1.0), (1.0, math.nan)])
+def test_a_preset_of_no_duration_is_refused(durations: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="_s must be > 0 s"):
+        LinkPreset(*durations, Timing())

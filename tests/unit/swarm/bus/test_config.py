@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from swarm.bus.config import (
+    DEFAULT_LEASE_S,
     DEFAULT_ROUTER,
     BusConfig,
     ClientTopology,
@@ -66,7 +67,7 @@ def test_wrong_settings_are_refused(make: Callable[[], object]) -> None:
 
 def test_peers_and_routers_may_listen_on_any_port() -> None:
     assert MeshTopology("tcp/127.0.0.1:0", (A,)).dial == (A,)
-    assert RouterConfig(("tcp/127.0.0.1:0",)).lease_s == 1.0
+    assert RouterConfig(("tcp/127.0.0.1:0",)).lease_s == DEFAULT_LEASE_S
     assert RouterConfig(path=Path("router.json5")).listen == ()
 
 
