@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm.config import Link
 from swarm.errors import Fault, InputError
-from swarm.options import JsonOption, ScenarioArgument, SeedOption, SpeedupOption
+from swarm.options import JsonOption, LinkOption, ScenarioArgument, SeedOption, SpeedupOption
 
 if TYPE_CHECKING:
     from sim.launch.fleet import BusKind
@@ -59,6 +60,7 @@ def run(
             "fleet keeps a router when one dies.",
         ),
     ] = 1,
+    link: LinkOption = Link.NORMAL,
     position_rate_hz: Annotated[
         float | None,
         typer.Option(
@@ -135,6 +137,7 @@ def run(
         acceptance_radius_m=acceptance_radius_m,
         start_timeout_s=start_timeout_s,
         routers=routers,
+        link=link,
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.

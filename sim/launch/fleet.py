@@ -14,15 +14,16 @@ import numpy as np
 
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
 from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.config import Link, preset
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 
 __all__ = [
     "AUTO_MESH_LIMIT",
     "BusKind",
+    "DialedLink",
     "LaunchOptions",
     "Layout",
-    "Link",
     "autopilot_groups",
     "default_position_rate_hz",
 ]
@@ -67,6 +68,8 @@ class LaunchOptions:
     """Until UAVs that are not airborne are given up [s of mission or wall, whichever is slower]."""
     routers: int = 1
     """How many routers there are, where there are any."""
+    link: Link = Link.NORMAL
+    """What the network is like: sets lease and timers."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -74,7 +77,7 @@ class LaunchOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class DialedLink:
     """A connection that one process of a run dials and another accepts."""
 
     dialer: str
@@ -114,32 +117,33 @@ class Layout:
         listeners = self.routers or (*self._seats, *self._onlookers)
         endpoints = free_loopback_endpoints(len(listeners), rng)
         self._endpoints = dict(zip(listeners, endpoints, strict=True))
-        self._diverted: dict[Link, str] = {}
+        self._diverted: dict[DialedLink, str] = {}
 
     @property
-    def links(self) -> tuple[Link, ...]:
+    def links(self) -> tuple[DialedLink, ...]:
         """All links but those of onlookers."""
         dialers = (*self.routers, *self._seats)
-        return tuple(Link(dialer, to) for dialer in dialers for to in self._listeners(dialer))
+        return tuple(DialedLink(dialer, to) for dialer in dialers for to in self._listeners(dialer))
 
     def endpoint(self, name: str) -> str:
         """Where a process listens."""
         return self._endpoints[name]
 
-    def divert(self, link: Link, endpoint: str) -> None:
+    def divert(self, link: DialedLink, endpoint: str) -> None:
         """Let a link be dialed at ``endpoint``, where somebody passes it on."""
         self._diverted[link] = endpoint
 
     def seat_of_onlooker(self, name: str = ONLOOKER) -> BusConfig:
         """Seat of the launcher itself, or of another onlooker."""
+        dialed, lease_s = self._dialed(name), preset(self._options.link).lease_s
         if self.routers:
-            return BusConfig(ClientTopology(self._dialed(name)))
-        return BusConfig(MeshTopology(self._endpoints[name], self._dialed(name)))
+            return BusConfig(ClientTopology(dialed), lease_s)
+        return BusConfig(MeshTopology(self._endpoints[name], dialed), lease_s)
 
     def router(self, name: str) -> list[str]:
         """Arguments of a router's process."""
         dialed = _repeated("--connect", self._dialed(name))
-        return ["router", "--json", "--listen", self._endpoints[name], *dialed]
+        return ["router", "--json", "--listen", self._endpoints[name], *dialed, *self._link()]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
@@ -176,15 +180,18 @@ class Layout:
     def _speed(self) -> list[str]:
         return ["--speedup", repr(self._options.speedup)]
 
+    def _link(self) -> list[str]:
+        return ["--link", self._options.link]
+
     def _bus(self, name: str) -> list[str]:
-        dialed = _repeated("--connect", self._dialed(name))
+        dialed = [*_repeated("--connect", self._dialed(name)), *self._link()]
         if self.routers:
             return ["--bus", "router", *dialed]
         return ["--bus", "mesh", "--listen", self._endpoints[name], *dialed]
 
     def _dialed(self, name: str) -> tuple[str, ...]:
         """Endpoints that a process is told to dial."""
-        links = [Link(name, listener) for listener in self._listeners(name)]
+        links = [DialedLink(name, listener) for listener in self._listeners(name)]
         return tuple(self._diverted.get(link, self._endpoints[link.listener]) for link in links)
 
     def _listeners(self, name: str) -> tuple[str, ...]:

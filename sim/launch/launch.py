@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.launch.fleet import LaunchOptions, Layout, Link, autopilot_groups
+from sim.launch.fleet import DialedLink, LaunchOptions, Layout, autopilot_groups
 from sim.launch.process import Child
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
@@ -21,7 +21,7 @@ __all__ = ["Launch", "OnLog", "Through"]
 
 OnLog = Callable[[str, str], None]
 """Called with the name of a process and a line of its log."""
-Through = Callable[[Link, str], Awaitable[str]]
+Through = Callable[[DialedLink, str], Awaitable[str]]
 """Given a link and the endpoint where it is accepted, where it is to be dialed instead."""
 
 

@@ -21,7 +21,7 @@ from sim.launch.launch import Launch, OnLog, Through
 from sim.launch.process import Child, ChildFailedError
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.clock import ScaledClock
-from swarm.config import Timing
+from swarm.config import preset
 from swarm.events import BusFact, Wish
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
@@ -81,7 +81,8 @@ class Run:
             onlookers=onlookers,
         )
         self.clock = ScaledClock(options.speedup)
-        self.observer = Observer(mission, Timing().scaled(options.speedup))
+        timing = preset(options.link).timing
+        self.observer = Observer(mission, timing.scaled(options.speedup))
         self.fates: list[str] = []
         """How processes ended that should not have, in words."""
         self._on_frame = on_frame or (lambda _observer, _now_s: None)

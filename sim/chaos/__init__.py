@@ -1,0 +1,1 @@
+"""Faults for real processes: relays between them, a recorder of what they say, and checks of it."""

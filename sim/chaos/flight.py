@@ -1,0 +1,194 @@
+"""A mission flown by real processes while faults are done to them, and the verdict on it.
+
+Puts together a run (sim.launch.run), relays on its links (sim.chaos.network), a
+recorder (sim.chaos.recorder) and the checks of its recording (sim.chaos.checks).
+Leaves out: which faults, and when (tests/process, sim.chaos.moments).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import AsyncIterator, Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from sim.chaos.checks import (
+    Fate,
+    Trouble,
+    Visit,
+    agreement_s,
+    counter_faults,
+    disagreements,
+    rivalries,
+    visits,
+)
+from sim.chaos.network import RelayNetwork
+from sim.chaos.recorder import RECORDER, Recorder, recorder_seats
+from sim.launch.fleet import LaunchOptions
+from sim.launch.run import Flight, Run, open_run
+from swarm.clock import SystemClock
+from swarm.model import Mission
+
+__all__ = ["ChaosFlight", "Verdict", "open_chaos_flight"]
+
+CUT = "the network"
+DONE_LINE = re.compile(r'event="task done".* task=(\S+)')
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What came of a flight under faults."""
+
+    flight: Flight
+    faults: tuple[str, ...]
+    """Invariants that did not hold, in words; none when all is well."""
+    visits: tuple[Visit, ...]
+    """Visits that ended done, as recorded; duplicates included."""
+    agreement_s: float
+    """Longest time from a healing to agreement on all claims [wall s]."""
+    released: tuple[str, ...]
+    """Tasks given up on the way, one line of a log each."""
+
+    @property
+    def duplicates(self) -> int:
+        """Recorded visits to tasks that had been done."""
+        return len(self.visits) - len({visit.task for visit in self.visits})
+
+
+class ChaosFlight:
+    """A flight to which faults are done; made by `open_chaos_flight`."""
+
+    def __init__(self, run: Run, network: RelayNetwork, recorder: Recorder) -> None:
+        self.run = run
+        self.network = network
+        self.recorder = recorder
+        self.lines: list[tuple[str, str]] = []
+        """Everything the processes have logged: name and line."""
+        self._clock = SystemClock()
+        self._fates: list[Fate] = []
+        self._troubles: list[Trouble] = []
+        self._begun_s: dict[str, float] = {}
+
+    @property
+    def done(self) -> int:
+        """Tasks done so far, as far as the onlooker knows."""
+        return len(self.run.observer.result().done)
+
+    async def until(self, condition: Callable[[], bool], what: str, limit_s: float = 60.0) -> None:
+        """Wait for ``condition``; see `Run.until`."""
+        await self.run.until(condition, limit_s=limit_s, what=what)
+
+    async def until_done(self, count: int) -> None:
+        """Wait until so many tasks are done."""
+        await self.until(lambda: self.done >= count, f"{count} tasks done")
+
+    async def kill(self, name: str) -> None:
+        """End a process at once."""
+        await self.run.launch.kill(name)
+        self._silence(name)
+
+    async def restart(self, name: str) -> None:
+        """Start a killed process anew."""
+        await self.run.launch.restart(name)
+        self._end_trouble(name)
+
+    def pause(self, name: str) -> None:
+        """Let a process hang."""
+        self.run.launch.pause(name)
+        self._silence(name)
+
+    def resume(self, name: str) -> None:
+        """Let it go on."""
+        self.run.launch.resume(name)
+        self._end_trouble(name)
+
+    def isolate(self, group: Collection[str]) -> None:
+        """Cut ``group`` off; see `RelayNetwork.isolate`."""
+        self._begun_s.setdefault(CUT, self._clock.now_s())
+        self.network.isolate(group)
+
+    def heal(self) -> None:
+        """End all cuts."""
+        self.network.heal()
+        self._end_trouble(CUT)
+
+    def _silence(self, name: str) -> None:
+        self._fates.append(Fate(self._clock.now_s(), name))
+        self._begun_s[name] = self._clock.now_s()
+
+    def _end_trouble(self, name: str) -> None:
+        begun_s = self._begun_s.pop(name, self._clock.now_s())
+        self._troubles.append(Trouble(begun_s, self._clock.now_s()))
+
+    def log_of(self, name: str) -> list[str]:
+        """What the processes of that name have logged."""
+        return [line for who, line in self.lines if who == name]
+
+    def verdict(self) -> Verdict:
+        """Check everything; complete once all processes are gone."""
+        flight = self.run.flight()
+        entries = self.recorder.entries
+        found = rivalries(entries, flight.observer.mission.name, self._fates)
+        seen = visits(entries)
+        return Verdict(
+            flight=flight,
+            faults=(
+                *counter_faults(entries),
+                *self._lost_outcomes(flight),
+                *self._miscounted(flight, seen),
+                *disagreements(found, self._troubles),
+            ),
+            visits=tuple(seen),
+            agreement_s=max((agreement_s(found, each) for each in self._troubles), default=0.0),
+            released=tuple(line for _, line in self.lines if "event=released" in line),
+        )
+
+    def _lost_outcomes(self, flight: Flight) -> list[str]:
+        """Tasks a UAV says it has done, of which the fleet knows nothing in the end."""
+        said = {(m[1], who) for who, line in self.lines if (m := DONE_LINE.search(line))}
+        done = set(flight.result.done)
+        return [f"{task} is lost, though {who} did it" for task, who in said if task not in done]
+
+    def _miscounted(self, flight: Flight, seen: list[Visit]) -> list[str]:
+        recorded = len(seen) - len({visit.task for visit in seen})
+        told = flight.result.duplicate_visits
+        return [] if told >= recorded else [f"{recorded} duplicate visits, {told} in the report"]
+
+
+@contextlib.asynccontextmanager
+async def open_chaos_flight(
+    mission: Mission,
+    options: LaunchOptions,
+    *,
+    relayed: bool = False,
+    seed: int = 0,
+    record: Path | None = None,
+) -> AsyncIterator[ChaosFlight]:
+    """Start to fly ``mission``; do faults to it, then `ChaosFlight.run` ``.finish()``.
+
+    Args:
+        mission: the scenario of ``options``.
+        options: how to fly it.
+        relayed: put a relay on every link, so that links can be degraded and cut.
+        seed: of the relays' chance.
+        record: also write the recording there.
+    """
+    lines: list[tuple[str, str]] = []
+    async with contextlib.AsyncExitStack() as stack:
+        network = await stack.enter_async_context(RelayNetwork(seed=seed))
+        run = await stack.enter_async_context(
+            open_run(
+                mission,
+                options,
+                on_log=lambda name, line: lines.append((name, line)),
+                through=network.through if relayed else None,
+                onlookers=(RECORDER,),
+            )
+        )
+        recorder = await stack.enter_async_context(
+            Recorder(mission.name, recorder_seats(run.launch.layout), SystemClock(), file=record)
+        )
+        flight = ChaosFlight(run, network, recorder)
+        flight.lines = lines
+        yield flight
