@@ -83,6 +83,8 @@ class Observer:
         self.board = TaskBoard(self.replica, mission.name)
         self.statuses: dict[str, Status] = {}
         """Newest status by UAV id."""
+        self.heard_s: dict[str, float] = {}
+        """When each writer last said something itself [s of ``now_s``]."""
         self.present: set[str] = set()
         """Writers believed to be there."""
         self.lost: list[UavId] = []
@@ -107,6 +109,7 @@ class Observer:
         wishes: list[Wish] = []
         match fact:
             case Heard(message):
+                self.heard_s[message.writer] = now_s
                 self._membership.heard(message.writer, now_s)
                 self._hear(message, now_s)
             case Learned(snapshots):
@@ -130,6 +133,11 @@ class Observer:
             self._lose(writer, now_s)
         self.present = self._membership.present
         return wishes
+
+    def revise(self, mission: Mission) -> None:
+        """Take ``mission`` for the one being flown: it was unknown, or the board has changed."""
+        self.mission = mission
+        self._problem = Problem.from_mission(mission)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""

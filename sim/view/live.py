@@ -23,7 +23,7 @@ from sim.view.story import clean, is_trouble, shown_value, story_line, story_sty
 from swarm.state.board import TaskState
 from swarm.wire.messages import EpochPhase
 
-__all__ = ["LiveView", "picture"]
+__all__ = ["LiveView", "picture", "task_counts", "title"]
 
 _WIDE = 104
 """Columns from which on the story stands beside the map and not below."""
@@ -61,7 +61,7 @@ def picture(
     signs = signs_for(ascii_only)
     scene = scene_of(observer, now_s)
     body = _wide if width >= _WIDE else _narrow
-    lines = [_title(scene, width, speedup, signs)]
+    lines = [title(scene, width, speedup, signs)]
     lines += body(observer, scene, width, height - 1, signs)
     lines += [Text() for _ in range(height - len(lines))]
     for line in lines:
@@ -189,27 +189,28 @@ def _beside(left: list[Text], right: list[Text]) -> list[Text]:
 # -- parts --------------------------------------------------------------------------
 
 
-def _title(scene: Scene, width: int, speedup: float, signs: Signs) -> Text:
-    title = Text().append(clean(scene.mission.name), "bold")
+def title(scene: Scene, width: int, speedup: float, signs: Signs) -> Text:
+    """One line: mission, phase, time and pecking order."""
+    line = Text().append(clean(scene.mission.name), "bold")
     between = f" {signs.dot} "
-    title.append(between)
-    title.append(scene.phase.upper(), _PHASE_STYLE[scene.phase])
+    line.append(between)
+    line.append(scene.phase.upper(), _PHASE_STYLE[scene.phase])
     if scene.mission_s is not None:
         horizon_s = scene.mission.horizon_s
-        title.append(f"{between}mission time {scene.mission_s:.1f} s")
+        line.append(f"{between}mission time {scene.mission_s:.1f} s")
         late = scene.phase is EpochPhase.RUNNING and scene.mission_s > horizon_s
-        title.append(f" (D = {horizon_s:g} s)", BAD if late else "dim")
+        line.append(f" (D = {horizon_s:g} s)", BAD if late else "dim")
     if speedup != 1.0:
-        title.append(f"{between}{signs.times}{speedup:.3g}")
+        line.append(f"{between}{signs.times}{speedup:.3g}")
     if scene.rule is not None:
         order = " > ".join(scene.sequence)
         text = f"{between}{scene.rule}" + (f": {order}" if order else "")
-        title.append(fit(text, max(0, width - title.cell_len), signs).rstrip())
-    return title
+        line.append(fit(text, max(0, width - line.cell_len), signs).rstrip())
+    return line
 
 
-def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
-    """Tasks by state, which is also the key to their signs, and J against plan and optimum."""
+def task_counts(scene: Scene, signs: Signs) -> Text:
+    """Tasks by state, which is also the key to their signs."""
     n_task = len(scene.tasks) - scene.count(TaskState.WITHDRAWN)
     parts = [
         (signs.done, f"{scene.count(TaskState.DONE)} of {n_task} done", ""),
@@ -220,10 +221,16 @@ def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
         parts.append((signs.failed, f"{failed} failed", BAD))
     if withdrawn := len(scene.tasks) - n_task:
         parts.append((" ", f"{withdrawn} withdrawn", "dim"))
-    counts = Text().append("tasks  ", "bold")
+    counts = Text()
     for sign, text, style in parts:
         counts.append(f"{sign} ", f"bold {style}")
         counts.append(f"{text}  ", style)
+    return counts
+
+
+def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
+    """Tasks by state, and J against plan and optimum."""
+    counts = Text().append("tasks  ", "bold").append_text(task_counts(scene, signs))
     value = Text().append("J      ", "bold")
     value.append(shown_value(scene.objective), "bold")
     if scene.plan is not None:

@@ -9,9 +9,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from swarm.model.ids import require_id
+from swarm.model.ids import require_id, valid_id
 
-__all__ = ["Keys"]
+__all__ = ["ANY_TOKEN", "Keys", "mission_of_token"]
+
+ANY_TOKEN = "swarm/*/alive/*"  # noqa: S105 - a key expression, nothing secret
+"""Liveliness tokens of all missions on the bus."""
+
+
+def mission_of_token(key: str) -> str | None:
+    """The mission that the token ``key`` shows somebody to fly; None if it is no token."""
+    match key.split("/"):
+        case ["swarm", mission, "alive", _] if valid_id(mission):
+            return mission
+        case _:
+            return None
 
 
 @dataclass(frozen=True, slots=True)

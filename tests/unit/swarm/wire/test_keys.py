@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from swarm.bus.keyexpr import intersects
 from swarm.wire.codec import key_of
-from swarm.wire.keys import Keys
+from swarm.wire.keys import ANY_TOKEN, Keys, mission_of_token
 from tests.builders import MISSION, brief, done, entry, epoch, held, message, status, uav
 
 
@@ -41,3 +42,13 @@ def test_the_writer_is_read_off_its_token() -> None:
 )
 def test_other_keys_are_no_tokens(key: str) -> None:
     assert Keys(MISSION).writer_of_token(key) is None
+
+
+def test_a_mission_is_found_by_any_of_its_tokens() -> None:
+    assert intersects(ANY_TOKEN, Keys(MISSION).alive("u0"))
+    assert mission_of_token(Keys(MISSION).alive("u0")) == MISSION
+
+
+@pytest.mark.parametrize("key", ["", "swarm/test", "swarm/test/alive/u0/x", "swarm/*/alive/u0"])
+def test_other_keys_show_no_mission(key: str) -> None:
+    assert mission_of_token(key) is None

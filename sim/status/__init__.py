@@ -1,0 +1,1 @@
+"""`swarm status`: a look at a mission that is being flown elsewhere."""

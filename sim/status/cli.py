@@ -1,0 +1,150 @@
+"""The command `swarm status`.
+
+Leaves out: looking (sim.status.onlooker) and showing (sim.status.table).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm.config import Link
+from swarm.errors import Fault, InputError, SwarmError
+from swarm.options import (
+    BusOption,
+    ConnectOption,
+    JsonOption,
+    LeaseOption,
+    LinkOption,
+    ListenOption,
+    SpeedupOption,
+)
+
+if TYPE_CHECKING:
+    from sim.status.table import MissionStatus
+    from swarm.bus.config import BusConfig
+    from swarm.bus.port import Bus
+    from swarm.clock import ScaledClock
+    from swarm.config import Timing
+
+__all__ = ["status"]
+
+
+def status(
+    mission: Annotated[
+        str | None,
+        typer.Option(
+            "--mission",
+            metavar="NAME",
+            help="Name of the mission. Default: the only one on the bus.",
+            show_default=False,
+        ),
+    ] = None,
+    timeout_s: Annotated[
+        float,
+        typer.Option(
+            "--timeout-s",
+            min=0.1,
+            max=600.0,
+            metavar="S",
+            help="How long to wait for the bus, and for what is still unknown; wall seconds.",
+        ),
+    ] = 4.0,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+    connect: ConnectOption = None,
+    link: LinkOption = Link.NORMAL,
+    lease_s: LeaseOption = None,
+    speedup: SpeedupOption = 1.0,
+    json: JsonOption = False,
+) -> int:
+    """Show how a running mission stands: phase, tasks, and what each UAV does.
+
+    Joins the mission as an onlooker, learns, prints and leaves; nobody flies any
+    differently for it. Exit status 1: nobody flies the mission.
+
+    Examples:
+        swarm status
+        swarm status --mission table-1 --json
+        swarm status --connect tcp/192.168.1.2:7447
+    """
+    import asyncio
+    from json import dumps
+
+    from rich.console import Console
+
+    from sim.status.table import status_as_json, status_table
+    from sim.view.signs import signs_for
+    from swarm.bus.config import bus_config
+    from swarm.clock import ScaledClock
+    from swarm.config import preset
+    from swarm.log import LogLevel, configure_logging
+    from swarm.model.ids import ID_RULE, valid_id
+    from swarm.process import run_until_stopped
+
+    configure_logging(LogLevel.ERROR)
+    settings = preset(link, lease_s)
+    config = bus_config(bus, listen, connect or (), settings.lease_s)
+    timing = settings.timing.scaled(speedup)
+    if mission is not None and not valid_id(mission):
+        raise InputError(Fault("--mission", "", f"{mission!r} is no id", f"give {ID_RULE}"))
+
+    async def work() -> int:
+        found = await _look(mission, config, timing, ScaledClock(speedup), timeout_s)
+        if json:
+            print(dumps(status_as_json(found), allow_nan=False))
+        else:
+            console = Console(highlight=False)
+            signs = signs_for(console.options.ascii_only)
+            console.print(status_table(found, console.width, signs))
+        return 0
+
+    return asyncio.run(run_until_stopped(work()))
+
+
+async def _look(
+    name: str | None, config: BusConfig, timing: Timing, clock: ScaledClock, patience_s: float
+) -> MissionStatus:
+    """Learn how a mission stands."""
+    from sim.status.onlooker import Onlooker
+    from sim.status.table import mission_status
+    from swarm.bus.zenoh_bus import open_zenoh_bus
+    from swarm.events import BusFact, Wish
+    from swarm.shell import Shell, take_seat
+
+    seat = await open_zenoh_bus(config, timeout_s=patience_s)
+    try:
+        mission = name or await _only_mission(seat, patience_s)
+        onlooker = Onlooker(mission, timing, patience_s * clock.speedup)
+        shell: Shell[BusFact, Wish] = Shell(
+            onlooker,
+            seat,
+            clock,
+            mission=mission,
+            name="status",
+            from_bus=lambda fact: fact,
+            execute=lambda _: None,
+            snapshot=None,
+        )
+        take_seat(seat, mission, None, status=True)
+        if await shell.run() != 0:
+            there = sorted(onlooker.observer.present)
+            who = f"{', '.join(there)} cannot tell it yet" if there else "nobody is there"
+            raise SwarmError(f"nothing is known of mission {mission}: {who}")
+        return mission_status(onlooker.observer, clock.now_s())
+    finally:
+        seat.close()
+
+
+async def _only_mission(seat: Bus, patience_s: float) -> str:
+    """The mission that is meant when none is named."""
+    from sim.status.onlooker import find_missions
+
+    missions = await find_missions(seat, patience_s)
+    if not missions:
+        raise SwarmError(f"nobody on the bus flies a mission (looked for {patience_s:g} s)")
+    if len(missions) > 1:
+        problem = f"there are several missions: {', '.join(missions)}"
+        raise InputError(Fault("--mission", "", problem, "name one of them"))
+    return missions[0]

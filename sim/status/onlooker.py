@@ -1,0 +1,99 @@
+"""An onlooker that knows only a mission's name and learns the rest from the bus.
+
+Leaves out: what it makes of what it hears (coordinator.observer), and how that is
+shown (sim.status.table).
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+from coordinator.observer import Observer
+from swarm.bus.port import Bus, TokenSeen
+from swarm.config import Timing
+from swarm.events import BusFact, Finish, Learned, Wish
+from swarm.model import Mission
+from swarm.state.board import mission_of
+from swarm.wire.keys import ANY_TOKEN, mission_of_token
+
+__all__ = ["Onlooker", "find_missions"]
+
+SETTLE_S = 0.4
+"""Wall time after the first token of a mission in which those of others come too."""
+
+
+async def find_missions(bus: Bus, patience_s: float) -> list[str]:
+    """Names of all missions that somebody on ``bus`` flies, once there is one.
+
+    Args:
+        bus: open; its inbox is read.
+        patience_s: how long to wait for the first [wall s].
+    """
+    bus.watch_tokens(ANY_TOKEN)
+    found: set[str] = set()
+    wait_s = patience_s
+    try:
+        while True:
+            async with asyncio.timeout(wait_s):
+                await bus.inbox.wait()
+            tokens = [event.key for event in bus.inbox.take() if isinstance(event, TokenSeen)]
+            new = {mission for token in tokens if (mission := mission_of_token(token))} - found
+            found |= new
+            wait_s = SETTLE_S if new else wait_s
+    except TimeoutError:
+        return sorted(found)
+
+
+class Onlooker:
+    """A core that feeds an `Observer` until that knows how the mission stands.
+
+    Args:
+        mission: name of the mission.
+        timing: timers, in the seconds of ``now_s``.
+        patience_s: how long to wait for what is missing [s of ``now_s``]; None to look on
+            for ever.
+    """
+
+    def __init__(self, mission: str, timing: Timing, patience_s: float | None) -> None:
+        self.observer = Observer(Mission(mission, horizon_s=1.0, uavs=(), tasks=()), timing)
+        self._patience_s = patience_s
+        self._leave_at_s: float | None = None
+        self._version = self.observer.replica.board_version
+        self._learned = False
+
+    def start(self, now_s: float) -> list[Wish]:
+        """Ask what has happened so far."""
+        if self._patience_s is not None:
+            self._leave_at_s = now_s + self._patience_s
+        return self.observer.start(now_s)
+
+    def step(self, fact: BusFact, now_s: float) -> list[Wish]:
+        """Take note of one fact."""
+        wishes = self.observer.step(fact, now_s)
+        replica = self.observer.replica
+        if replica.brief is not None and replica.board_version != self._version:
+            self._version = replica.board_version
+            self.observer.revise(mission_of(replica, self.observer.mission.name, replica.brief))
+        if isinstance(fact, Learned):
+            self._learned = self.known
+        if self._leave_at_s is not None and (self.informed or self._leave_at_s <= now_s):
+            wishes.append(Finish(0 if self.known else 1))
+        return wishes
+
+    def next_deadline_s(self) -> float | None:
+        """When `step` wants a tick."""
+        deadlines = (self.observer.next_deadline_s(), self._leave_at_s)
+        return min((at_s for at_s in deadlines if at_s is not None), default=None)
+
+    @property
+    def known(self) -> bool:
+        """Whether there is anything to show."""
+        return self.observer.replica.brief is not None
+
+    @property
+    def informed(self) -> bool:
+        """Whether nothing more is to be waited for: what all know, and a word of each UAV there."""
+        observer = self.observer
+        fleet = {uav.id for uav in observer.mission.uavs}
+        told = fleet & observer.present <= observer.statuses.keys()
+        return self._learned and bool(observer.present) and told
