@@ -12,17 +12,21 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
+from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import FloatArray, Problem
 
 __all__ = ["evaluate", "executed_objective"]
 
 
-def evaluate(problem: Problem, routes: Sequence[Sequence[int]]) -> tuple[float, FloatArray]:
-    """Objective and completion times of lists flown from the starts at mission time 0.
+def evaluate(
+    problem: Problem, routes: Sequence[Sequence[int]], state: TeamState | None = None
+) -> tuple[float, FloatArray]:
+    """Objective and completion times of lists.
 
     Args:
         problem: the mission.
         routes: task indices per UAV in order of execution; tasks on no list count 0.
+        state: from which the lists are flown; the starts at mission time 0 when None.
 
     Returns:
         J [value·s] and (n_task,) completion times [s], NaN for tasks on no list.
@@ -31,10 +35,12 @@ def evaluate(problem: Problem, routes: Sequence[Sequence[int]]) -> tuple[float, 
         ValueError: a list too many or too few, an unknown task, or a task taken twice.
     """
     _require_lists(problem, routes)
+    state = TeamState.at_start(problem) if state is None else state
     objective = 0.0
     completion_s = np.full(problem.n_task, np.nan)
     for uav, route in enumerate(routes):
-        free_s, survived, place = 0.0, 1.0, problem.start_enu_m[uav].tolist()
+        free_s, survived = float(state.free_s[uav]), float(state.survived[uav])
+        place = state.place_enu_m[uav].tolist()
         speed_m_s = float(problem.speed_m_s[uav])
         for task in route:
             if not np.isnan(completion_s[task]):

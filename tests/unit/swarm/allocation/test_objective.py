@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.allocation import evaluate, executed_objective, reference
+from swarm.allocation import TeamState, evaluate, executed_objective, reference
+from swarm.allocation.reference_routes import team_worth
 from tests.problems import any_problem, random_problem, table_1
 
 
@@ -25,6 +26,24 @@ def test_objective_and_times_equal_the_definition(seed: int, n_uav: int, n_task:
 
     assert objective == pytest.approx(reference.objective(problem, routes), abs=1e-9)
     assert dict(enumerate(completion_s)) == reference.completion_s(problem, routes)
+
+
+@given(seed=st.integers(0, 2**32 - 1), n_uav=st.integers(1, 4), n_task=st.integers(0, 8))
+def test_lists_may_go_on_from_where_the_team_stands(seed: int, n_uav: int, n_task: int) -> None:
+    rng = np.random.default_rng(seed)
+    problem = any_problem(seed, n_uav, n_task)
+    routes = random_routes(rng, n_uav, n_task)
+    state = TeamState.at_start(problem)
+    state.free_s[:] = rng.uniform(0.0, 9.0, n_uav)
+    state.survived[:] = rng.uniform(0.0, 1.0, n_uav)
+    state.place_enu_m[:] = rng.uniform(0.0, 10.0, (n_uav, 3))
+
+    objective, completion_s = evaluate(problem, routes, state)
+
+    assert objective == pytest.approx(team_worth(problem, state, routes), abs=1e-9)
+    for uav, route in enumerate(routes):
+        times_s = [state.free_s[uav], *(completion_s[task] for task in route)]
+        assert times_s == sorted(times_s)
 
 
 @given(seed=st.integers(0, 2**32 - 1), n_task=st.integers(0, 8))

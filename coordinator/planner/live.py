@@ -1,0 +1,249 @@
+"""Planning in a mission that runs: where it stands, where it is heading, and what would be better.
+
+A claimed task is finished first by the UAV that claims it; only what nobody has claimed is
+planned. Old and new plan are predicted alike: by letting the fleet decide by them until nothing
+is left. Leaves out: when to plan anew and whether a new plan is worth an epoch
+(`coordinator.replanning`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordinator.planner.routes import guided_plan
+from coordinator.planner.sequence import best_sequence
+from coordinator.planner.stop import ShouldStop, never
+from swarm.allocation.guided import GuidedRule, route_arrays, team_arrays
+from swarm.allocation.lower_level import TeamState, run
+from swarm.allocation.objective import evaluate
+from swarm.allocation.problem import Problem
+from swarm.allocation.rules import rule_by_name
+from swarm.kernels.rollout import guided_choice
+from swarm.state.board import TaskBoard, TaskState
+from swarm.state.claims import holders
+from swarm.state.team import after_outcomes, finish_claim, ranks, rule_of
+from swarm.wire.messages import ClaimPhase, Epoch, Outcome, Result
+
+__all__ = ["Course", "Lists", "NewPlan", "Prediction", "Situation", "predicted", "replan", "worth"]
+
+Lists = Mapping[str, tuple[str, ...]]
+"""Task ids by UAV id, in order of execution."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Situation:
+    """Where a running mission stands."""
+
+    problem: Problem
+    """Every UAV of the brief and every task posted so far."""
+    state: TeamState
+    """Open is what nobody has ended or claims; active is who takes part."""
+    now_s: float
+    """Mission time [s]."""
+    visited: Mapping[str, tuple[str, ...]]
+    """Tasks that each UAV has ended, in order; a task that two have ended is the first one's."""
+    under_way: Mapping[str, str]
+    """UAV id -> id of the open task that it is going to end."""
+    withdrawn: frozenset[str]
+    failures: int
+    """Attempts that failed so far."""
+
+    @classmethod
+    def of(cls, board: TaskBoard, credible: Collection[str], mission_s: float) -> Situation | None:
+        """The situation as the registers of one replica show it; None before the brief.
+
+        Args:
+            board: of the mission.
+            credible: writers believed alive whose claims count.
+            mission_s: mission time of now [s].
+        """
+        problem = board.problem
+        if problem is None:
+            return None
+        states, replica = board.states, board.replica
+        claims = {uav: claim for uav, claim in replica.claims.items() if uav in credible}
+        under_way = {
+            uav: task
+            for task, uav in holders(claims).items()
+            if uav in problem.uav_ids and states.get(task) is TaskState.OPEN
+        }
+        state = after_outcomes(problem, board)
+        rows: dict[str, int] = {uav: index for index, uav in enumerate(problem.uav_ids)}
+        columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+        for uav, task in under_way.items():
+            finish_claim(problem, state, rows[uav], columns[task], claims[uav])
+        state.active[:] = [
+            uav in claims and claims[uav].phase is not ClaimPhase.OUT for uav in problem.uav_ids
+        ]
+        # Who is late may be there any moment, and who waits may decide at once.
+        np.maximum(state.free_s, mission_s, out=state.free_s)
+        return cls(
+            problem,
+            state,
+            mission_s,
+            _visited(replica.outcomes),
+            under_way,
+            frozenset(task for task, what in states.items() if what is TaskState.WITHDRAWN),
+            sum(outcome.result is Result.FAILED for outcome in replica.outcomes.values()),
+        )
+
+    @property
+    def taking_part(self) -> frozenset[str]:
+        """UAVs that can be given tasks."""
+        ids, active = self.problem.uav_ids, self.state.active
+        return frozenset(uav for uav, is_active in zip(ids, active, strict=True) if is_active)
+
+    @property
+    def is_settled(self) -> bool:
+        """Nothing is left that a plan could decide."""
+        capable = self.problem.capable[self.state.active][:, self.state.open]
+        return not bool(capable.any())
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What an epoch has the fleet decide by."""
+
+    rule: str
+    sequence: tuple[str, ...]
+    routes: Lists
+
+    @classmethod
+    def of(cls, epoch: Epoch) -> Course:
+        """That of ``epoch``."""
+        return cls(epoch.rule, epoch.sequence, epoch.routes)
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What becomes of the open tasks."""
+
+    lists: Lists
+    """What each UAV is going to do, after what it is doing now."""
+    completion_s: Mapping[str, float]
+    """Predicted completion of the tasks on the lists [s mission time]."""
+    objective: float
+    """Σ of eq. 1 over the lists [value·s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class NewPlan:
+    """What may become the next epoch, beside what comes of the one that runs."""
+
+    rule: str
+    sequence: tuple[str, ...]
+    """Of the UAVs taking part."""
+    prediction: Prediction
+    going_on: Prediction
+    """What happens without the new plan."""
+
+
+def predicted(situation: Situation, course: Course) -> Prediction:
+    """Let the fleet go on by ``course``, everybody deciding in turn, until nothing is left."""
+    problem = situation.problem
+    rule = rule_of(course.rule, course.routes)
+    lists: list[list[int]] = [[] for _ in problem.uav_ids]
+    if rule is not None:
+        rank = ranks(course.sequence, problem.uav_ids)
+        places = np.array([rank[uav] for uav in problem.uav_ids], dtype=np.int64)
+        lists, _ = run(problem, situation.state, places, rule)
+    objective, completion_s = evaluate(problem, lists, situation.state)
+    return Prediction(
+        lists=_by_id(problem, lists),
+        completion_s={
+            problem.task_ids[task]: float(completion_s[task]) for route in lists for task in route
+        },
+        objective=objective,
+    )
+
+
+def replan(
+    situation: Situation,
+    course: Course,
+    method: str,
+    *,
+    seed: int = 0,
+    stop: ShouldStop = never,
+    threads: int | None = None,
+) -> NewPlan:
+    """The best plan found for what is open, from where everybody is.
+
+    Args:
+        situation: to plan from.
+        course: by which the fleet goes on until there is another one.
+        method: one of the online methods.
+        seed: >= 0.
+        stop: ends the search; see `coordinator.planner.stop`.
+        threads: as many as there are processors when None; changes nothing but speed.
+
+    Raises:
+        ValueError: there is no such rule.
+    """
+    problem, state = situation.problem, situation.state
+    going_on = predicted(situation, course)
+    routes: Lists = {}
+    if method == GuidedRule.name:
+        plan = guided_plan(
+            problem,
+            seed=seed,
+            stop=stop,
+            state=state,
+            lists=_by_index(problem, going_on.lists),
+            threads=threads,
+        )
+        order, routes = plan.sequence, _by_id(problem, plan.routes)
+    else:
+        order = best_sequence(
+            problem,
+            rule_by_name(method),
+            np.random.default_rng(seed),
+            stop,
+            state,
+            threads=threads,
+        ).sequence
+    sequence = tuple(str(problem.uav_ids[uav]) for uav in order if state.active[uav])
+    prediction = predicted(situation, Course(method, sequence, routes))
+    return NewPlan(method, sequence, prediction, going_on)
+
+
+def worth(situation: Situation, lists: Lists) -> float:
+    """J of what is open if UAVs keep to ``lists`` from here on [value·s].
+
+    Closed tasks are skipped; tasks of no UAV taking part are put where J gains most. Far cheaper
+    than `predicted`.
+    """
+    state = situation.state
+    if situation.is_settled:
+        return 0.0
+    next_s = np.where(state.active, state.free_s, np.inf)
+    arrays = route_arrays(situation.problem)
+    team = team_arrays(arrays, state, state.active, situation.now_s)
+    indices = _by_index(situation.problem, lists)
+    return guided_choice(team, indices, int(next_s.argmin())).worth
+
+
+def _visited(outcomes: Mapping[tuple[str, str], Outcome]) -> dict[str, tuple[str, ...]]:
+    visited: dict[str, list[str]] = {}
+    seen: set[str] = set()
+    for (uav, task), _ in sorted(outcomes.items(), key=lambda item: (item[1].completed_s, item[0])):
+        if task not in seen:
+            seen.add(task)
+            visited.setdefault(uav, []).append(task)
+    return {uav: tuple(tasks) for uav, tasks in visited.items()}
+
+
+def _by_id(problem: Problem, lists: Sequence[Sequence[int]]) -> Lists:
+    return {
+        str(uav): tuple(str(problem.task_ids[task]) for task in route)
+        for uav, route in zip(problem.uav_ids, lists, strict=True)
+    }
+
+
+def _by_index(problem: Problem, lists: Lists) -> list[list[int]]:
+    columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+    return [
+        [columns[task] for task in lists.get(uav, ()) if task in columns] for uav in problem.uav_ids
+    ]

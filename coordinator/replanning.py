@@ -1,0 +1,181 @@
+"""When to plan a running mission anew, and when a new plan becomes the next epoch.
+
+Reasons are differences between the situation that the epoch in force answers to and the
+situation of now, so a reason that comes at a bad moment is not forgotten. Leaves out: planning
+(`coordinator.planner.live`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordinator.planner.live import Lists, NewPlan, Situation, worth
+
+__all__ = ["DRIFT_FRAC", "MARGIN_FRAC", "NextEpoch", "Replanning"]
+
+MARGIN_FRAC = 0.005
+"""Of the value still to be won; a new plan that promises less more is not worth an epoch."""
+DRIFT_FRAC = 0.05
+"""Of the time the plan still takes; UAVs that are later by more make a new plan worth a try."""
+
+
+@dataclass(frozen=True, slots=True)
+class NextEpoch:
+    """What the next epoch says."""
+
+    rule: str
+    sequence: tuple[str, ...]
+    routes: Lists
+    """What each UAV has visited and is on its way to, and then its new list: every posted task
+    is on a list."""
+    reason: str
+
+
+class Replanning:
+    """The decision to plan anew, and to adopt or to discard what comes of it.
+
+    Args:
+        interval_s: shortest time between two epochs, in the seconds of ``now_s``.
+        margin_frac: see `MARGIN_FRAC`.
+        drift_frac: see `DRIFT_FRAC`.
+    """
+
+    def __init__(
+        self,
+        interval_s: float,
+        *,
+        margin_frac: float = MARGIN_FRAC,
+        drift_frac: float = DRIFT_FRAC,
+    ) -> None:
+        self._interval_s = interval_s
+        self._margin_frac = margin_frac
+        self._drift_frac = drift_frac
+        self._answered: Situation | None = None
+        self._expected_s: Mapping[str, float] = {}
+        self._planning: tuple[Situation, str] | None = None
+        self._quiet_until_s: float | None = None
+        self._waits = False
+
+    def begin(
+        self, situation: Situation | None, completion_s: Mapping[str, float], now_s: float
+    ) -> None:
+        """An epoch has come into force that was not made here.
+
+        Args:
+            situation: the one it answers to; None if unknown, which is a reason to plan anew.
+            completion_s: when its tasks are expected to be done [s mission time].
+            now_s: now.
+        """
+        self._answered, self._expected_s, self._planning = situation, completion_s, None
+        self._quiet_until_s = now_s + self._interval_s
+
+    def wanted(self, situation: Situation, now_s: float) -> bool:
+        """Whether to plan anew from ``situation``; if so, `judge` or `discard` must follow."""
+        self._waits = False
+        if self._planning is not None or situation.is_settled:
+            return False
+        reasons = self._reasons(situation)
+        if not reasons:
+            return False
+        if self._quiet_until_s is not None and now_s < self._quiet_until_s:
+            self._waits = True
+            return False
+        self._planning = situation, ", ".join(reasons)
+        return True
+
+    def judge(self, plan: NewPlan, situation: Situation, now_s: float) -> NextEpoch | None:
+        """What to publish of the plan that was wanted; None if going on is about as good.
+
+        Both are valued from ``situation``, which is the one of now and not of when planning began.
+        """
+        if self._planning is None:
+            return None
+        planned_for, reasons = self._planning
+        new, old = plan.prediction, plan.going_on
+        new_worth, old_worth = worth(situation, new.lists), worth(situation, old.lists)
+        gain = new_worth - old_worth
+        adopted = gain > self._margin_frac * abs(old_worth) and not situation.is_settled
+        self._answered, self._planning = planned_for, None
+        self._expected_s = new.completion_s if adopted else old.completion_s
+        if not adopted:
+            return None
+        self._quiet_until_s = now_s + self._interval_s
+        return NextEpoch(
+            plan.rule,
+            plan.sequence,
+            _whole_lists(situation, new.lists),
+            f"{reasons}: worth {gain:.4g} more than {old_worth:.4g} value·s",
+        )
+
+    def discard(self) -> None:
+        """The plan that was wanted has failed; only a further change makes another one wanted."""
+        if self._planning is not None:
+            self._answered, self._planning = self._planning[0], None
+
+    def next_deadline_s(self) -> float | None:
+        """When `wanted` will answer otherwise though nothing happens."""
+        return self._quiet_until_s if self._waits else None
+
+    def _reasons(self, now: Situation) -> list[str]:
+        before = self._answered
+        if before is None:
+            return ["the epoch's situation is unknown"]
+        tasks, tasks_before = set(now.problem.task_ids), set(before.problem.task_ids)
+        changes = {
+            "lost": before.taking_part - now.taking_part,
+            "back": now.taking_part - before.taking_part,
+            "appeared": tasks - tasks_before,
+            "withdrawn": now.withdrawn - before.withdrawn,
+        }
+        reasons = [f"{_some(sorted(ids))} {what}" for what, ids in changes.items() if ids]
+        if now.failures > before.failures:
+            reasons.append("an attempt failed")
+        if self._lateness_frac(now) > self._drift_frac:
+            reasons.append("the fleet is late")
+        return reasons
+
+    def _lateness_frac(self, now: Situation) -> float:
+        """Mean delay of what UAVs are doing, as a share of the time all was expected to take."""
+        left_s = max(self._expected_s.values(), default=now.now_s) - now.now_s
+        if left_s <= 0.0:
+            return 0.0
+        rows: dict[str, int] = {uav: index for index, uav in enumerate(now.problem.uav_ids)}
+        late_s = [
+            max(0.0, float(now.state.free_s[rows[uav]]) - self._expected_s[task])
+            for uav, task in now.under_way.items()
+            if task in self._expected_s
+        ]
+        return float(np.mean(late_s)) / left_s if late_s else 0.0
+
+
+def _whole_lists(situation: Situation, new: Lists) -> dict[str, tuple[str, ...]]:
+    """New lists with all that is closed before them, so that no task is on no list."""
+    problem = situation.problem
+    lists: dict[str, list[str]] = {}
+    listed: set[str] = set()
+
+    def add(uav: str, task: str) -> None:
+        if task not in listed:
+            listed.add(task)
+            lists.setdefault(uav, []).append(task)
+
+    for uav, tasks in situation.visited.items():
+        for task in tasks:
+            add(uav, task)
+    for uav, task in situation.under_way.items():
+        add(uav, task)
+    for uav, tasks in new.items():
+        for task in tasks:
+            add(uav, task)
+    # Withdrawn, or beyond all who take part: whose list it is on makes no difference now.
+    for task, able in zip(problem.task_ids, problem.capable.T, strict=True):
+        if able.any():
+            add(problem.uav_ids[int(able.argmax())], task)
+    return {uav: tuple(tasks) for uav, tasks in lists.items()}
+
+
+def _some(ids: list[str]) -> str:
+    return ", ".join(ids) if len(ids) <= 3 else f"{', '.join(ids[:3])} and {len(ids) - 3} more"
