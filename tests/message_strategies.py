@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import (
+    MAX_COUNT,
     Board,
     Brief,
     Claim,
@@ -31,7 +32,7 @@ not_negatives = st.floats(0.0, 1e6)
 probabilities = st.floats(0.0, 1.0)
 points = st.tuples(numbers, numbers, numbers)
 tables = st.dictionaries(ids, probabilities, max_size=3)
-counts = st.integers(0, 2**63 - 1)
+counts = st.integers(0, MAX_COUNT)
 notes = st.text(max_size=20) | st.just("x" * 200)
 stamps = st.builds(Stamp, counts, counts)
 
@@ -85,7 +86,7 @@ claims = st.one_of(
         numbers,
     ),
 )
-outcomes = st.builds(Outcome, task_ids, st.sampled_from(Result), st.integers(1, 2**63 - 1), numbers)
+outcomes = st.builds(Outcome, task_ids, st.sampled_from(Result), st.integers(1, MAX_COUNT), numbers)
 statuses = st.builds(
     Status,
     st.sampled_from(StatusPhase),

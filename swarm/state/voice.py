@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swarm.wire.messages import Body, Message, Stamp
+from swarm.wire.messages import MAX_COUNT, Body, Message, Stamp
 
 __all__ = ["Voice"]
 
@@ -22,10 +22,21 @@ class Voice:
 
     def say(self, body: Body) -> Message:
         """``body`` as this writer's newest statement."""
-        self._stamp = Stamp(self._stamp.incarnation, self._stamp.counter + 1)
+        incarnation, counter = self._stamp.incarnation, self._stamp.counter
+        if counter < MAX_COUNT:
+            self._stamp = Stamp(incarnation, counter + 1)
+        elif incarnation < MAX_COUNT:
+            self._stamp = Stamp(incarnation + 1, 1)
         return Message(self.mission, self.writer, self._stamp, body)
 
     def outdo(self, heard: Stamp) -> None:
-        """Speak above ``heard``, which others remember of an earlier life of this writer."""
+        """Speak above ``heard``, which others remember of an earlier life of this writer.
+
+        The incarnation keeps its last three digits, so that two processes under one name
+        which outdo the same stamp do not come out alike. Only the largest stamp there is
+        cannot be outdone; it takes a forger, against whom access control helps.
+        """
         if heard > self._stamp:
-            self._stamp = Stamp(heard.incarnation + 1, 0)
+            own, least = self._stamp.incarnation, heard.incarnation + 1
+            above = least + (own - least) % 1000
+            self._stamp = Stamp(above, 0) if above <= MAX_COUNT else heard

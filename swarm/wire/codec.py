@@ -8,9 +8,9 @@ counted under a reason. Leaves out: whether a message is news (swarm.state).
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from functools import cache
 from typing import Any, Final
 
@@ -20,6 +20,8 @@ from pydantic import TypeAdapter, ValidationError
 from swarm.model.ids import COORDINATOR, valid_id
 from swarm.wire.keys import Keys
 from swarm.wire.messages import (
+    LATEST_S,
+    MAX_COUNT,
     SCHEMA_VERSION,
     Board,
     Body,
@@ -33,10 +35,20 @@ from swarm.wire.messages import (
     Status,
 )
 
-__all__ = ["LARGE_LIMIT_BYTES", "SMALL_LIMIT_BYTES", "Codec", "encode", "key_of"]
+__all__ = [
+    "LARGE_LIMIT_BYTES",
+    "SMALL_LIMIT_BYTES",
+    "SNAPSHOT_LIMIT_BYTES",
+    "Codec",
+    "encode",
+    "fit",
+    "key_of",
+]
 
 SMALL_LIMIT_BYTES: Final = 4 * 1024
 LARGE_LIMIT_BYTES: Final = 1024 * 1024
+SNAPSHOT_LIMIT_BYTES: Final = 4 * 1024 * 1024
+"""As much as a bus carries at once."""
 
 _KINDS: Final[dict[str, type[Body]]] = {
     "brief": Brief,
@@ -72,6 +84,23 @@ def encode(message: Message | Snapshot) -> bytes:
     """The bytes of a message or snapshot."""
     packed: bytes = msgpack.packb(_packable(message))
     return packed
+
+
+def fit(snapshot: Snapshot, limit_bytes: int = SNAPSHOT_LIMIT_BYTES) -> Snapshot:
+    """``snapshot``, without some of the registers when there is no room for all.
+
+    Those of its own writer stay before those of others, for which others answer too.
+    """
+    if len(encode(snapshot)) <= limit_bytes:
+        return snapshot
+    room = limit_bytes - len(encode(replace(snapshot, messages=()))) - 4  # a longer array head
+    kept = []
+    for message in sorted(snapshot.messages, key=lambda each: each.writer != snapshot.writer):
+        size_bytes = len(encode(message))
+        if size_bytes <= room:
+            room -= size_bytes
+            kept.append(message)
+    return replace(snapshot, messages=tuple(kept))
 
 
 def _packable(message: Message | Snapshot) -> list[Any]:
@@ -129,7 +158,7 @@ class Codec:
     def decode_snapshot(self, key: str, data: bytes) -> Snapshot | None:
         """The snapshot in ``data``, answered on ``key``; bad registers in it are left out."""
         try:
-            _require(len(data) <= LARGE_LIMIT_BYTES, "too large")
+            _require(len(data) <= SNAPSHOT_LIMIT_BYTES, "too large")
             parts = _unpack(data)
             if not isinstance(parts, tuple) or len(parts) != 6:
                 raise _UnacceptableError("malformed")
@@ -138,9 +167,9 @@ class Codec:
             _require(mission == self._mission, "another mission")
             _require(isinstance(writer, str) and valid_id(writer), "malformed")
             _require(key == Keys(mission).state(writer), "said on another's key")
-            _require(type(incarnation) is int and 0 <= incarnation < 2**63, "malformed")
-            finite = isinstance(mission_s, float) and math.isfinite(mission_s)
-            _require(finite or mission_s is None, "malformed")
+            _require(type(incarnation) is int and 0 <= incarnation <= MAX_COUNT, "malformed")
+            known = isinstance(mission_s, float) and abs(mission_s) <= LATEST_S
+            _require(known or mission_s is None, "malformed")
             _require(isinstance(registers, tuple), "malformed")
         except _UnacceptableError as fault:
             self.dropped[fault.reason] += 1

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
 from annotated_types import Ge, Gt, Le, Len, Predicate
 from pydantic import Strict
@@ -18,6 +18,8 @@ from swarm.model import Origin, valid_id
 from swarm.model.ids import COORDINATOR
 
 __all__ = [
+    "LATEST_S",
+    "MAX_COUNT",
     "SCHEMA_VERSION",
     "Board",
     "Body",
@@ -40,14 +42,23 @@ SCHEMA_VERSION = 1
 
 _CHECKED = {"extra": "forbid", "allow_inf_nan": False}
 
+MAX_COUNT: Final = 2**53
+"""Largest count; whoever counts on from what it heard stays within."""
+LATEST_S: Final = 1e15
+"""Farthest instant from mission time 0 [s]."""
+
+# The bounds admit whatever a scenario may hold and keep every computation finite.
 Id = Annotated[str, Strict(), Predicate(valid_id)]
-Number = Annotated[float, Strict()]
 Flag = Annotated[bool, Strict()]
-Point = tuple[Number, Number, Number]
+Metres = Annotated[float, Strict(), Ge(-1e8), Le(1e8)]
+Point = tuple[Metres, Metres, Metres]
+Instant = Annotated[float, Strict(), Ge(-LATEST_S), Le(LATEST_S)]
+Duration = Annotated[float, Strict(), Ge(0.0), Le(1e9)]
+Horizon = Annotated[float, Strict(), Gt(0.0), Le(1e9)]
+Speed = Annotated[float, Strict(), Ge(1e-6), Le(1e6)]
+Value = Annotated[float, Strict(), Ge(0.0), Le(1e12)]
 Probability = Annotated[float, Strict(), Ge(0.0), Le(1.0)]
-Positive = Annotated[float, Strict(), Gt(0.0)]
-NotNegative = Annotated[float, Strict(), Ge(0.0)]
-Count = Annotated[int, Strict(), Ge(0), Le(2**63 - 1)]
+Count = Annotated[int, Strict(), Ge(0), Le(MAX_COUNT)]
 Reason = Annotated[str, Strict(), Len(1, 40)]
 
 
@@ -72,11 +83,11 @@ class Fleet:
     id: Id
     position_enu_m: Point
     """Start [m; mission origin], without the height layer."""
-    speed_m_s: Positive
+    speed_m_s: Speed
     success: Mapping[str, Probability]
     survival: Mapping[str, Probability]
     kind: Id | None
-    layer_m: Number
+    layer_m: Metres
     """Height layer this UAV flies at [m], added to every place it flies to."""
 
 
@@ -86,7 +97,7 @@ class Brief:
 
     __pydantic_config__: ClassVar = _CHECKED
 
-    horizon_s: Positive
+    horizon_s: Horizon
     success_default: Probability
     survival_default: Probability
     reattempt_failed: Flag
@@ -121,7 +132,7 @@ class Epoch:
     rule: Id
     sequence: tuple[Id, ...]
     """Best rank first."""
-    mission_s: Number
+    mission_s: Instant
     """Mission time at which this statement was made [s]."""
     reason: Annotated[str, Strict(), Len(0, 200)]
     """Why this epoch, in words."""
@@ -139,8 +150,8 @@ class Board:
     number: Count
     """Position on the board; ties between equally good tasks go to the smaller."""
     position_enu_m: Point
-    value: NotNegative
-    service_s: NotNegative
+    value: Value
+    service_s: Duration
     kind: Id | None
     withdrawn: Flag
 
@@ -165,13 +176,17 @@ class Claim:
     phase: ClaimPhase
     task: Id | None
     """None exactly when idle or out: the tombstone of an earlier claim."""
-    decided_s: Number
+    decided_s: Instant
     """Mission time at which the UAV was free to decide [s]."""
     rank: Count
-    completion_s: Number
+    completion_s: Instant
     """Predicted completion [s mission time]."""
+    handed_over: Flag = False
+    """Out because somebody else has the vehicle: no later life of this agent commands it."""
 
     def __post_init__(self) -> None:
+        if self.handed_over and self.phase is not ClaimPhase.OUT:
+            raise ValueError(f"handed over, but {self.phase}")
         if (self.task is None) != (self.phase in (ClaimPhase.IDLE, ClaimPhase.OUT)):
             raise ValueError(f"a claim that is {self.phase} names {self.task}")
 
@@ -191,8 +206,8 @@ class Outcome:
 
     task: Id
     result: Result
-    attempt: Annotated[int, Strict(), Ge(1), Le(2**63 - 1)]
-    completed_s: Number
+    attempt: Annotated[int, Strict(), Ge(1), Le(MAX_COUNT)]
+    completed_s: Instant
     """Mission time [s]."""
 
 
@@ -221,7 +236,7 @@ class Status:
     """[m; mission origin], without the height layer."""
     velocity_enu_m_s: Point | None
     battery_frac: Probability | None
-    mission_s: Number | None
+    mission_s: Instant | None
     dropped: Annotated[Mapping[Reason, Count], Len(0, 20)]
     """Messages this process has dropped, by reason: those of `swarm.wire.codec`, "too many"
     where the inbox was full, "stale" for registers older than known."""
@@ -250,5 +265,5 @@ class Snapshot:
     writer: str
     incarnation: Count
     """Of the process that answers."""
-    mission_s: Number | None
+    mission_s: Instant | None
     messages: tuple[Message, ...]

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from hypothesis import given
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from swarm.state.voice import Voice
-from swarm.wire.messages import Stamp
+from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.messages import MAX_COUNT, Stamp
 from tests.builders import IDLE, MISSION
 from tests.message_strategies import stamps
+
+LARGEST = Stamp(MAX_COUNT, MAX_COUNT)
+large_counts = st.integers(MAX_COUNT - 2000, MAX_COUNT)
+large_stamps = st.builds(Stamp, large_counts, large_counts) | st.just(LARGEST)
 
 
 def test_every_statement_is_later_than_the_one_before() -> None:
@@ -19,10 +25,31 @@ def test_every_statement_is_later_than_the_one_before() -> None:
 
 @given(stamps)
 def test_what_others_remember_is_outdone(remembered: Stamp) -> None:
+    assume(remembered != LARGEST)
     voice = Voice(MISSION, "u0", 7)
     voice.outdo(remembered)
 
     assert voice.say(IDLE).stamp > max(remembered, Stamp(7, 0))
+
+
+@given(large_stamps)
+def test_whatever_is_outdone_what_follows_can_be_said(remembered: Stamp) -> None:
+    """A forged stamp near the largest must neither raise nor make anyone drop what follows."""
+    voice, codec = Voice(MISSION, "u0", 7), Codec(MISSION)
+    voice.outdo(remembered)
+    said = [voice.say(IDLE) for _ in range(3)]
+
+    assert [codec.decode(key_of(message), encode(message)) for message in said] == said
+    assert (said[0].stamp > remembered) == (remembered != LARGEST)
+    assert said[0].stamp <= said[1].stamp <= said[2].stamp
+
+
+def test_two_lives_that_outdo_the_same_do_not_come_out_alike() -> None:
+    one, other = Voice(MISSION, "u0", 7_001), Voice(MISSION, "u0", 7_002)
+    for voice in (one, other):
+        voice.outdo(Stamp(9_500, 3))
+
+    assert one.incarnation != other.incarnation
 
 
 def test_older_memories_change_nothing() -> None:

@@ -12,10 +12,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarm.bus.port import MAX_PAYLOAD_BYTES
 from swarm.model.ids import COORDINATOR
-from swarm.wire.codec import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, Codec, encode, key_of
+from swarm.wire.codec import (
+    LARGE_LIMIT_BYTES,
+    SMALL_LIMIT_BYTES,
+    SNAPSHOT_LIMIT_BYTES,
+    Codec,
+    encode,
+    fit,
+    key_of,
+)
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
+from swarm.wire.messages import MAX_COUNT, Epoch, EpochPhase, Message, Snapshot
 from tests.builders import (
     MISSION,
     brief,
@@ -221,7 +230,7 @@ def test_writers_without_a_valid_id_are_malformed(writer: object) -> None:
 
 
 @pytest.mark.parametrize("place", [3, 4])
-@pytest.mark.parametrize("count", [-1, 2**63, 1.0, "1", True, None])
+@pytest.mark.parametrize("count", [-1, MAX_COUNT + 1, 2**63, 1.0, "1", True, None])
 def test_stamps_that_are_no_counts_are_malformed(place: int, count: object) -> None:
     def bad(parts: Parts) -> None:
         parts[place] = count
@@ -262,6 +271,7 @@ def test_task_ids_that_are_none_are_malformed(said: Message, text: object) -> No
     ("said", "field", "value"),
     [
         (BRIEF, "horizon_s", 0.0),
+        (BRIEF, "horizon_s", 1e10),
         (BRIEF, "success_default", 1.1),
         (BRIEF, "survival_default", -0.1),
         (BRIEF, "reattempt_failed", 1),
@@ -273,7 +283,16 @@ def test_task_ids_that_are_none_are_malformed(said: Message, text: object) -> No
         (EPOCH, "sequence", ["u0", 1]),
         (EPOCH, "reason", "x" * 201),
         (BOARD, "value", -1.0),
+        (BOARD, "value", 1e13),
         (BOARD, "service_s", -1.0),
+        (BOARD, "service_s", 1e10),
+        (BOARD, "position_enu_m", [0.0, 1e9, 0.0]),
+        (CLAIM, "decided_s", -1e200),
+        (CLAIM, "completion_s", 1e200),
+        (OUTCOME, "completed_s", 1e16),
+        (EPOCH, "mission_s", 1e300),
+        (STATUS, "mission_s", 1e200),
+        (STATUS, "velocity_enu_m_s", [1e200, 0.0, 0.0]),
         (BOARD, "withdrawn", "no"),
         (CLAIM, "phase", "wanted"),
         (CLAIM, "phase", "idle"),
@@ -281,6 +300,7 @@ def test_task_ids_that_are_none_are_malformed(said: Message, text: object) -> No
         (OUTCOME, "result", "maybe"),
         (OUTCOME, "attempt", 0),
         (OUTCOME, "attempt", 2**64 - 1),
+        (OUTCOME, "attempt", MAX_COUNT + 1),
         (STATUS, "battery_frac", 1.5),
         (STATUS, "note", "x" * 201),
         (STATUS, "dropped", 1),
@@ -305,6 +325,11 @@ def test_every_field_is_needed(said: Message) -> None:
         parts = parts_of(said)
         del parts[6][field]
         assert drop_reason(key_of(said), msgpack.packb(parts)) == "malformed"
+
+
+@pytest.mark.parametrize(("field", "value"), [("speed_m_s", 1e-300), ("layer_m", 1e200)])
+def test_a_brief_with_a_uav_out_of_bounds_is_malformed(field: str, value: float) -> None:
+    assert reason_with(BRIEF, lambda p: p[6]["uavs"][0].update({field: value})) == "malformed"
 
 
 def test_a_brief_that_describes_one_uav_twice_is_malformed() -> None:
@@ -438,11 +463,12 @@ def test_snapshots_with_flipped_bits_never_raise(data: st.DataObject) -> None:
         (2, "a/b", "malformed"),
         (2, 5, "malformed"),
         (3, -1, "malformed"),
-        (3, 2**63, "malformed"),
+        (3, MAX_COUNT + 1, "malformed"),
         (3, True, "malformed"),
         (3, 1.0, "malformed"),
         (4, math.nan, "malformed"),
         (4, math.inf, "malformed"),
+        (4, 1e200, "malformed"),
         (4, "1", "malformed"),
         (4, True, "malformed"),
         (5, "claims", "malformed"),
@@ -464,11 +490,35 @@ def test_a_snapshot_answered_on_anothers_key_is_dropped() -> None:
     assert snapshot_drop_reason(data, "state/u0") == "said on another's key"
 
 
-def test_a_snapshot_may_be_as_large_as_large_kinds_and_no_larger() -> None:
-    data = encode(Snapshot(MISSION, "u0", 1, 1.0, (BRIEF,) * (LARGE_LIMIT_BYTES // 200)))
-    assert len(data) > LARGE_LIMIT_BYTES
+def test_a_snapshot_may_be_as_large_as_the_bus_carries_and_no_larger() -> None:
+    assert SNAPSHOT_LIMIT_BYTES <= MAX_PAYLOAD_BYTES
+    data = encode(Snapshot(MISSION, "u0", 1, 1.0, (BRIEF,) * (SNAPSHOT_LIMIT_BYTES // 200)))
+    assert len(data) > SNAPSHOT_LIMIT_BYTES
 
     assert snapshot_drop_reason(data) == "too large"
+
+
+def test_a_snapshot_that_fits_is_answered_whole() -> None:
+    snapshot = Snapshot(MISSION, "u0", 1, 1.0, (BRIEF, CLAIM))
+
+    assert fit(snapshot) is snapshot
+    assert fit(snapshot, len(encode(snapshot))) is snapshot
+
+
+@given(st.lists(messages(), max_size=30).map(tuple), st.integers(100, 5000))
+def test_of_a_snapshot_too_large_there_stays_what_fits_the_own_first(
+    said: tuple[Message, ...], limit_bytes: int
+) -> None:
+    snapshot = Snapshot(MISSION, "u0", 1, 1.0, said)
+    fitted = fit(snapshot, limit_bytes)
+
+    assert len(encode(fitted)) <= limit_bytes
+    assert set(fitted.messages) <= set(said)
+    left_out = [m for m in said if m not in fitted.messages]
+    for message_out in left_out:
+        if message_out.writer == "u0":  # no stranger's register took its room
+            own = sum(len(encode(m)) for m in fitted.messages if m.writer == "u0")
+            assert own + len(encode(message_out)) > limit_bytes - 60
 
 
 def test_bad_registers_in_a_snapshot_are_left_out_and_the_others_kept() -> None:
