@@ -130,6 +130,11 @@ def _bodies(kind: str) -> TypeAdapter[Body]:
 
 
 @cache
+def _field_names(kind: str) -> frozenset[str]:
+    return frozenset(field.name for field in dataclasses.fields(_KINDS[kind]))
+
+
+@cache
 def _stamps() -> TypeAdapter[Stamp]:
     return TypeAdapter(Stamp)
 
@@ -192,6 +197,9 @@ class Codec:
         _require(isinstance(writer, str) and valid_id(writer), "malformed")
         if not isinstance(kind, str) or kind not in _KINDS:
             raise _UnacceptableError("unknown kind")
+        # Defaults are for those who write messages: on the wire every field is needed.
+        complete = isinstance(fields, dict) and fields.keys() == _field_names(kind)
+        _require(complete, "malformed")
         try:
             stamp = _stamps().validate_python({"incarnation": incarnation, "counter": counter})
             body = _bodies(kind).validate_python(fields)
