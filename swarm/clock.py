@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-__all__ = ["Clock", "ScaledClock", "SystemClock", "incarnation"]
+__all__ = ["Clock", "ScaledClock", "SystemClock", "incarnation", "unix_s"]
 
 
 class Clock(Protocol):
@@ -61,3 +61,8 @@ class ScaledClock:
 def incarnation() -> int:
     """Milliseconds of wall time: grows from one life of a process to the next."""
     return time.time_ns() // 1_000_000
+
+
+def unix_s() -> float:
+    """Wall time: the one clock that goes on from one life of a process to the next."""
+    return time.time()

@@ -1,7 +1,8 @@
 """The asyncio shell that all processes on the bus share: it runs one pure core.
 
 It decodes what the bus brings, steps the core, publishes what the core says,
-answers queries with the core's snapshot and ticks at the core's deadlines. Leaves
+answers queries with the core's snapshot and ticks at the core's deadlines. A question
+goes out with a digest of what the core knows, and the answer leaves that out. Leaves
 out: what only one kind of process does (agent.runner, coordinator.daemon,
 sim.launch), through `Shell.execute`.
 """
@@ -10,7 +11,8 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
 from swarm.bus.port import (
@@ -24,6 +26,7 @@ from swarm.bus.port import (
     TokenSeen,
 )
 from swarm.clock import Clock
+from swarm.config import PRESETS, Link
 from swarm.events import (
     Ask,
     BusFact,
@@ -35,17 +38,16 @@ from swarm.events import (
     PeerGone,
     PeerSeen,
     Publish,
+    Save,
     Tick,
 )
 from swarm.log import get_logger
-from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.codec import Codec, encode, fit, key_of
+from swarm.wire.digest import decode_digest, digest, encode_digest, unknown
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Snapshot, Status
+from swarm.wire.messages import Message, Snapshot, Status
 
 __all__ = ["Core", "Shell", "take_seat"]
-
-ASK_TIMEOUT_S = 1.0
-"""Wall time after which an unanswered question counts as answered by nobody."""
 
 E_contra = TypeVar("E_contra", contravariant=True)
 A_co = TypeVar("A_co", covariant=True)
@@ -81,6 +83,9 @@ class Shell(Generic[E, A]):
         from_bus: makes the core's event of a fact from the bus.
         execute: carries out an action that is not common to all processes.
         snapshot: answers a query; None for a process that answers none.
+        known: all registers the core knows, which answers to it need not repeat.
+        save: keeps the core's memory, given ``now_s``; None to keep nothing.
+        answer_s: how long a question waits for the slowest answer [wall s].
     """
 
     def __init__(
@@ -94,6 +99,9 @@ class Shell(Generic[E, A]):
         from_bus: Callable[[BusFact], E],
         execute: Callable[[A], None],
         snapshot: Callable[[float], Snapshot] | None,
+        known: Callable[[], Iterable[Message]] = tuple,
+        save: Callable[[float], None] | None = None,
+        answer_s: float = PRESETS[Link.NORMAL].answer_s,
     ) -> None:
         self._core = core
         self._bus = bus
@@ -104,6 +112,9 @@ class Shell(Generic[E, A]):
         self._from_bus = from_bus
         self._execute = execute
         self._snapshot = snapshot
+        self._known = known
+        self._save = save
+        self._answer_s = answer_s
         self._loop = asyncio.get_running_loop()
         self._done: asyncio.Future[int] = self._loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
@@ -176,6 +187,9 @@ class Shell(Generic[E, A]):
                 self._asking.add(task)
                 task.add_done_callback(self._asking.discard)
                 task.add_done_callback(self._fail)
+            case Save():
+                if self._save is not None:
+                    self._save(self._clock.now_s())
             case Note(text, fields):
                 self._log.info(text, **fields)
             case Finish(status):
@@ -224,16 +238,45 @@ class Shell(Generic[E, A]):
                 return LinkChanged(True)
             case LinkDown():
                 return LinkChanged(False)
-            case Query(reply=reply):
-                if self._snapshot is not None:
-                    reply(encode(self._snapshot(self._clock.now_s())))
+            case Query(reply=reply, payload=payload):
+                self._answer(reply, payload)
                 return None
 
+    def _answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
+        if self._snapshot is None:
+            return
+        known = decode_digest(payload)
+        if known is None:
+            self._codec.dropped["malformed"] += 1
+            return
+        whole = self._snapshot(self._clock.now_s())
+        news = replace(whole, messages=unknown(whole.messages, known))
+        fitted = fit(news)
+        if len(fitted.messages) < len(news.messages):
+            left_out = len(news.messages) - len(fitted.messages)
+            self._log.warning("an answer has no room for all registers", left_out=left_out)
+        reply(encode(fitted))
+
     async def _ask(self) -> None:
-        answers = await self._bus.query(self._keys.state("*"), timeout_s=ASK_TIMEOUT_S)
-        snapshots = [self._codec.decode_snapshot(a.key, a.payload) for a in answers]
-        learned = Learned(tuple(snapshot for snapshot in snapshots if snapshot is not None))
-        self.step(self._from_bus(learned))
+        asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
+        known = encode_digest(digest(self._known()))
+        answers = await self._bus.query(self._keys.state("*"), known, timeout_s=self._answer_s)
+        now_s, wall_s = self._clock.now_s(), self._loop.time()
+        pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
+        snapshots = []
+        for answer in answers:
+            snapshot = self._codec.decode_snapshot(answer.key, answer.payload)
+            if snapshot is not None:
+                age_s = pace * (wall_s - answer.arrived_s)
+                snapshots.append(_aged(snapshot, age_s))
+        self.step(self._from_bus(Learned(tuple(snapshots))))
+
+
+def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:
+    """``snapshot`` with the mission time to which its own has grown meanwhile."""
+    if snapshot.mission_s is None:
+        return snapshot
+    return replace(snapshot, mission_s=snapshot.mission_s + age_s)
 
 
 def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None:

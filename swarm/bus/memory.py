@@ -47,6 +47,7 @@ class _Question:
 
     loop: asyncio.AbstractEventLoop
     asker: _Seat
+    payload: bytes
     missing: list[tuple[_Seat, str]] = field(default_factory=list)
     """Seats and their served keys that have not answered yet."""
     answers: list[Answer] = field(default_factory=list)
@@ -58,9 +59,9 @@ class _Question:
         def reply(payload: bytes) -> None:
             check_payload(payload)
             if not self.loop.is_closed():
-                self.loop.call_soon_threadsafe(self._arrive, seat, Answer(key, bytes(payload)))
+                self.loop.call_soon_threadsafe(self._arrive, seat, key, bytes(payload))
 
-        return Query(key, reply)
+        return Query(key, reply, self.payload)
 
     def forget(self, seat: _Seat) -> None:
         """Wait no longer for a seat that left."""
@@ -68,10 +69,10 @@ class _Question:
         if not self.missing:
             self.complete.set()
 
-    def _arrive(self, seat: _Seat, answer: Answer) -> None:
-        place = (seat, answer.key)
+    def _arrive(self, seat: _Seat, key: str, payload: bytes) -> None:
+        place = (seat, key)
         if place in self.missing and seat.linked and self.asker.linked:
-            self.answers.append(answer)
+            self.answers.append(Answer(key, payload, self.loop.time()))
             self.missing.remove(place)
             if not self.missing:
                 self.complete.set()
@@ -132,8 +133,10 @@ class _Hub:
             if intersects(key_expr, key):
                 seat.inbox.offer(TokenSeen(key))
 
-    def ask(self, seat: _Seat, key_expr: str, loop: asyncio.AbstractEventLoop) -> _Question:
-        question = _Question(loop, seat)
+    def ask(
+        self, seat: _Seat, key_expr: str, payload: bytes, loop: asyncio.AbstractEventLoop
+    ) -> _Question:
+        question = _Question(loop, seat, payload)
         question.missing = [
             (other, key)
             for other in self._reached_from(seat)
@@ -241,10 +244,13 @@ class MemoryBus:
         self._check_open()
         self._seat.served.add(check_key(key))
 
-    async def query(self, key_expr: str, *, timeout_s: float) -> Sequence[Answer]:
+    async def query(
+        self, key_expr: str, payload: bytes = b"", *, timeout_s: float
+    ) -> Sequence[Answer]:
         """Ask all others who serve a key matching ``key_expr``."""
         self._check_open()
-        question = self._hub.ask(self._seat, check_key_expr(key_expr), self._loop)
+        asked = check_key_expr(key_expr), bytes(check_payload(payload))
+        question = self._hub.ask(self._seat, *asked, self._loop)
         try:
             async with asyncio.timeout(timeout_s):
                 await question.complete.wait()

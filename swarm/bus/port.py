@@ -14,7 +14,7 @@ import asyncio
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 __all__ = [
@@ -84,6 +84,8 @@ class Query:
     key: str
     """The served key."""
     reply: Callable[[bytes], None]
+    payload: bytes = b""
+    """What came with the question."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,8 @@ class Answer:
     key: str
     """Concrete key of the one that answered."""
     payload: bytes
+    arrived_s: float = field(compare=False)
+    """When it came, in the time of the asker's loop; others may have been waited for since."""
 
 
 BusEvent = Sample | TokenSeen | TokenGone | LinkUp | LinkDown | Query
@@ -251,11 +255,18 @@ class Bus(Protocol):
         """Receive a `Query` whenever somebody else asks on ``key``."""
         ...
 
-    async def query(self, key_expr: str, *, timeout_s: float) -> Sequence[Answer]:
+    async def query(
+        self, key_expr: str, payload: bytes = b"", *, timeout_s: float
+    ) -> Sequence[Answer]:
         """Ask all others who serve a key matching ``key_expr``; never later than the timeout.
 
         Answers that came in time are returned, in order of arrival; whoever is too
         late is left out.
+
+        Args:
+            key_expr: whom to ask.
+            payload: goes with the question, no longer than `MAX_PAYLOAD_BYTES`.
+            timeout_s: how long to wait for the slowest.
         """
         ...
 

@@ -250,10 +250,13 @@ class ZenohBus:
             remote = zenoh.Locality.REMOTE
             self._call(lambda: declare(key, on_query, allowed_origin=remote))
 
-    async def query(self, key_expr: str, *, timeout_s: float) -> Sequence[Answer]:
+    async def query(
+        self, key_expr: str, payload: bytes = b"", *, timeout_s: float
+    ) -> Sequence[Answer]:
         """Ask all others who serve a key matching ``key_expr``."""
         self._check_open()
         check_key_expr(key_expr)
+        check_payload(payload)
         if not 0.0 < timeout_s < math.inf:
             raise ValueError(f"timeout_s must be positive and finite, not {timeout_s}")
         answers: list[Answer] = []
@@ -261,20 +264,22 @@ class ZenohBus:
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                answer = Answer(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+                key, data = str(reply.ok.key_expr), reply.ok.payload.to_bytes()
+                answer = Answer(key, data, self._loop.time())
                 self._hand_over(lambda: answers.append(answer))
 
         get = partial(
             self._session.get,
             key_expr,
             Callback(on_reply, lambda: self._hand_over(complete.set), indirect=False),
+            payload=bytes(payload),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             congestion_control=zenoh.CongestionControl.BLOCK,
             allowed_destination=zenoh.Locality.REMOTE,
             timeout=timeout_s,
         )
-        self._writer.submit(partial(self._try, get))
+        self._writer.submit(partial(self._try, get), size_bytes=len(payload))
         with contextlib.suppress(TimeoutError):  # what has come until then is the answer
             async with asyncio.timeout(timeout_s):
                 await complete.wait()
@@ -334,7 +339,8 @@ class ZenohBus:
         given_up = weakref.WeakMethod(reply.drop)
         self._hand_over(lambda: self._loop.call_later(REPLY_WITHIN_S, _call_if_alive, given_up))
         self._hand_over(partial(self._replies.add, reply))
-        self._inbox.offer_threadsafe(Query(key, reply))
+        payload = b"" if query.payload is None else query.payload.to_bytes()
+        self._inbox.offer_threadsafe(Query(key, reply, payload))
 
     def _hand_over(self, call: Callable[[], object]) -> None:
         """Make a call on the loop's thread; an ended loop needs it no more."""

@@ -144,7 +144,7 @@ def test_payloads_up_to_the_limit_arrive_whole(seats: Seats, size_bytes: int) ->
 
         asking = asyncio.create_task(a.bus.query("board/*", timeout_s=LIMIT_S))
         (await b.next_of(Query)).reply(payload)
-        assert await asking == (Answer("board/kept", payload),)
+        assert await asking == (Answer("board/kept", payload, 0.0),)
 
     run(seats, scenario)
 
@@ -154,6 +154,8 @@ def test_payload_beyond_the_limit_is_refused(seats: Seats) -> None:
         bus = await join()
         with pytest.raises(ValueError, match="bytes are more than"):
             bus.publish("board", bytes(MAX_PAYLOAD_BYTES + 1))
+        with pytest.raises(ValueError, match="bytes are more than"):
+            await bus.query("board", bytes(MAX_PAYLOAD_BYTES + 1), timeout_s=LIMIT_S)
 
     run(seats, scenario)
 
@@ -276,10 +278,28 @@ def test_query_gets_the_answers_of_all_who_serve(seats: Seats) -> None:
         answers = await asking
 
         assert sorted(answers, key=lambda answer: answer.key) == [
-            Answer("state/b", b"of state/b"),
-            Answer("state/c", b"of state/c"),
+            Answer("state/b", b"of state/b", 0.0),
+            Answer("state/c", b"of state/c", 0.0),
         ]
         assert asker.bus.inbox.take() == []
+
+    run(seats, scenario)
+
+
+def test_query_carries_a_payload(seats: Seats) -> None:
+    async def scenario(join: Join) -> None:
+        asker, server = [Reader(await join()) for _ in range(2)]
+        server.bus.serve("state/server")
+        await settle(asker, server)
+
+        for payload in (b"", b"tell"):
+            asking = asyncio.create_task(
+                asker.bus.query("state/server", payload, timeout_s=LIMIT_S)
+            )
+            query = await server.next_of(Query)
+            assert query.payload == payload
+            query.reply(b"told")
+            await asking
 
     run(seats, scenario)
 
@@ -294,7 +314,7 @@ def test_reply_may_come_from_any_thread(seats: Seats) -> None:
         query = await server.next_of(Query)
         thread = threading.Thread(target=query.reply, args=(b"from a thread",))
         thread.start()
-        assert await asking == (Answer("state/server", b"from a thread"),)
+        assert await asking == (Answer("state/server", b"from a thread", 0.0),)
         thread.join()
 
     run(seats, scenario)
@@ -325,11 +345,12 @@ def test_answers_in_time_are_kept_when_others_are_late(seats: Seats) -> None:
         took_s = asyncio.get_running_loop().time() - begin_s
         too_late.reply(b"sorry")
 
-        assert answers == (Answer("state/prompt", b"here"),)
+        assert answers == (Answer("state/prompt", b"here", 0.0),)
         assert 0.25 < took_s < 2.0
+        assert 0.0 < answers[0].arrived_s - begin_s < took_s - 0.02, "it waited for the late"
         asking = asyncio.create_task(asker.bus.query("state/prompt", timeout_s=LIMIT_S))
         (await prompt.next_of(Query)).reply(b"again")
-        assert await asking == (Answer("state/prompt", b"again"),)
+        assert await asking == (Answer("state/prompt", b"again", 0.0),)
 
     run(seats, scenario)
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from swarm.clock import ScaledClock, SystemClock, incarnation
+from swarm.clock import ScaledClock, SystemClock, incarnation, unix_s
 
 
 @pytest.mark.parametrize("clock", [SystemClock(), ScaledClock(50.0)], ids=["system", "scaled"])
@@ -45,3 +45,10 @@ def test_incarnations_do_not_decrease_and_fit_a_stamp() -> None:
 
     assert lives == sorted(lives)
     assert 0 < lives[-1] < 2**63
+
+
+def test_wall_time_and_incarnations_are_read_off_one_clock() -> None:
+    earlier = incarnation()
+    wall_s = unix_s()
+
+    assert earlier - 1 <= wall_s * 1000.0 <= incarnation() + 1

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 
 from swarm.bus.memory import MemoryBus, MemoryNetwork
-from swarm.bus.port import Sample, TokenGone, TokenSeen
+from swarm.bus.port import Query, Sample, TokenGone, TokenSeen
 from swarm.errors import BusError
 from swarm.events import (
     Ask,
@@ -23,6 +23,7 @@ from swarm.events import (
     PeerGone,
     PeerSeen,
     Publish,
+    Save,
     Stop,
     Tick,
     Wish,
@@ -30,8 +31,9 @@ from swarm.events import (
 from swarm.model.ids import COORDINATOR
 from swarm.shell import Shell, take_seat
 from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.digest import decode_digest, digest, encode_digest
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Message, Snapshot
+from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
 from tests.builders import MISSION, brief, done, entry, epoch, held, message, status, uav
 from tests.shell_play import HandClock, play, take_until, until
 
@@ -113,6 +115,9 @@ async def at_work(
     *,
     execute: Callable[[Action], None] | None = None,
     answers: bool = True,
+    snapshot: Snapshot = SNAPSHOT,
+    known: Sequence[Message] = (),
+    save: Callable[[float], None] | None = None,
     capacity: int = 4096,
 ) -> AsyncIterator[Played]:
     """A shell that runs ``core`` on the seat of u0, seen from the seat of u1."""
@@ -135,7 +140,9 @@ async def at_work(
         name="u0",
         from_bus=as_event,
         execute=execute or remember,
-        snapshot=(lambda _: SNAPSHOT) if answers else None,
+        snapshot=(lambda _: snapshot) if answers else None,
+        known=lambda: known,
+        save=save,
     )
     running = asyncio.create_task(shell.run())
     try:
@@ -254,6 +261,50 @@ def test_queries_are_answered_with_the_cores_snapshot() -> None:
     play(scenario)
 
 
+def test_an_answer_leaves_out_what_the_asker_knows() -> None:
+    async def scenario() -> None:
+        async with at_work(ScriptedCore()) as played:
+            known = encode_digest(digest(SNAPSHOT.messages))
+            (answer,) = await played.other.query(KEYS.state("*"), known, timeout_s=5.0)
+
+            shortened = Codec(MISSION).decode_snapshot(answer.key, answer.payload)
+            assert shortened == replace(SNAPSHOT, messages=())
+
+    play(scenario)
+
+
+def test_a_question_with_a_malformed_digest_is_counted_and_not_answered() -> None:
+    async def scenario() -> None:
+        async with at_work(ScriptedCore()) as played:
+            asked = played.other.query(KEYS.state("*"), b"nonsense", timeout_s=0.05)
+            assert await asked == ()
+            assert played.shell.dropped == {"malformed": 1}
+
+    play(scenario)
+
+
+def test_a_snapshot_too_large_is_answered_in_part_and_reported(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    names = [f"{n:064d}" for n in range(14_000)]
+    epochs = [
+        message(COORDINATOR, Epoch(1, EpochPhase.RUNNING, "greedy", tuple(names), 0.0, "", {}))
+    ]
+    snapshot = Snapshot(MISSION, "u0", 1, 7.0, (*epochs * 6, CLAIM, *SNAPSHOT.messages))
+
+    async def scenario() -> None:
+        async with at_work(ScriptedCore(), snapshot=snapshot) as played:
+            (answer,) = await played.other.query(KEYS.state("*"), timeout_s=5.0)
+
+            shortened = Codec(MISSION).decode_snapshot(answer.key, answer.payload)
+            assert shortened is not None
+            assert shortened.messages[0] == SNAPSHOT.messages[0]
+            assert 2 <= len(shortened.messages) < len(snapshot.messages)
+
+    play(scenario)
+    assert "no room for all registers" in "".join(capsys.readouterr())
+
+
 def test_a_process_without_a_snapshot_answers_nothing() -> None:
     async def scenario() -> None:
         core = ScriptedCore()
@@ -288,6 +339,79 @@ def test_a_question_ends_in_all_good_answers() -> None:
 
             assert Learned((good,)) in core.heard
             assert played.shell.dropped == {"malformed": 1}
+
+    play(scenario)
+
+
+def test_mission_time_in_an_answer_does_not_age_while_others_are_waited_for() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Ask()])
+        async with at_work(core) as played:
+            late = played.network.join("u2")
+            late.serve(KEYS.state("u2"))
+            answers: list[float | None] = []
+
+            def reply(bus: MemoryBus, name: str) -> bool:
+                for event in bus.inbox.take():
+                    if isinstance(event, Query):
+                        event.reply(encode(Snapshot(MISSION, name, 1, 100.0, ())))
+                        return True
+                return False
+
+            def learned() -> bool:
+                for fact in core.heard:
+                    if isinstance(fact, Learned):
+                        answers.extend(snapshot.mission_s for snapshot in fact.snapshots)
+                return bool(answers)
+
+            await until(lambda: reply(played.other, "u1"), "asking u1")
+            for _ in range(100):
+                await asyncio.sleep(0)
+            played.clock.time_s += 4.0
+            await until(lambda: reply(late, "u2"), "asking u2")
+            await until(learned, "learning")
+            late.close()
+
+            early_s, late_s = answers
+            assert early_s is not None
+            assert late_s is not None
+            assert 100.0 <= late_s < early_s <= 104.0
+
+    play(scenario)
+
+
+def test_a_question_tells_what_the_core_knows() -> None:
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Ask()])
+        async with at_work(core, known=REGISTERS) as played:
+            queries: list[Query] = []
+
+            def asked() -> bool:
+                taken = played.other.inbox.take()
+                queries.extend(event for event in taken if isinstance(event, Query))
+                return bool(queries)
+
+            await until(asked, "being asked")
+            assert decode_digest(queries[0].payload) == digest(REGISTERS)
+
+    play(scenario)
+
+
+def test_memory_is_kept_when_the_core_wishes_it() -> None:
+    async def scenario() -> None:
+        kept: list[float] = []
+        core = ScriptedCore(first=[Save()])
+        async with at_work(core, save=kept.append) as played:
+            await until(lambda: kept == [0.0], "saving")
+            assert await played.end() == 0
+
+    play(scenario)
+
+
+def test_a_process_that_keeps_nothing_goes_on_when_told_to() -> None:
+    async def scenario() -> None:
+        async with at_work(ScriptedCore(first=[Save()])) as played:
+            assert await played.end() == 0
 
     play(scenario)
 
