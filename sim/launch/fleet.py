@@ -160,7 +160,7 @@ class Layout:
             *("--method", options.method, "--seed", str(options.seed), "--json"),
             *("--start-timeout-s", repr(options.start_timeout_s)),
             *self._speed(),
-            *self._bus(COORDINATOR),
+            *self.seat_arguments(COORDINATOR),
         ]
 
     def agent(self, uav: str, url: str, system_id: int) -> list[str]:
@@ -174,7 +174,7 @@ class Layout:
             *("--position-rate-hz", repr(rate_hz)),
             *("--acceptance-radius-m", repr(options.acceptance_radius_m)),
             *self._speed(),
-            *self._bus(uav),
+            *self.seat_arguments(uav),
         ]
 
     def _speed(self) -> list[str]:
@@ -183,7 +183,8 @@ class Layout:
     def _link(self) -> list[str]:
         return ["--link", self._options.link]
 
-    def _bus(self, name: str) -> list[str]:
+    def seat_arguments(self, name: str) -> list[str]:
+        """Arguments with which a process, or an onlooker by that name, finds the bus."""
         dialed = [*_repeated("--connect", self._dialed(name)), *self._link()]
         if self.routers:
             return ["--bus", "router", *dialed]
