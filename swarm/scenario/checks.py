@@ -7,13 +7,12 @@ ranges of single values (swarm.scenario.shapes).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 
 from swarm.model.frames import Origin, enu_from_wgs84
-from swarm.scenario.findings import Document, Finding, Path, absent, close_match, shown
+from swarm.scenario.findings import Document, Finding, Path, absent, close_match, number_of, shown
 
-__all__ = ["check"]
+__all__ = ["check", "origin_of"]
 
 _FARTHEST_M = 1e7
 _HINTS = 20
@@ -55,7 +54,7 @@ def _doubled_ids(name: str, entries: list[_Entry]) -> Iterator[Finding]:
 
 def _misplaced(document: Document, name: str, entries: list[_Entry]) -> Iterator[Finding]:
     origin = document.get("origin")
-    frame = _origin(origin)
+    frame = origin_of(origin)
     for index, entry in entries:
         path: Path = (name, index)
         if "position_m" in entry:
@@ -93,17 +92,18 @@ def _not_both(path: Path, entry: Mapping[str, object]) -> Iterator[Finding]:
 
 
 def _too_far(frame: Origin, entry: Mapping[str, object]) -> bool:
-    lat_deg, lon_deg = _number(entry.get("lat_deg")), _number(entry.get("lon_deg"))
+    lat_deg, lon_deg = number_of(entry.get("lat_deg")), number_of(entry.get("lon_deg"))
     if lat_deg is None or lon_deg is None:
         return False
     point_enu_m = enu_from_wgs84(frame, lat_deg, lon_deg, frame.alt_m)
     return max(abs(coordinate_m) for coordinate_m in point_enu_m) > _FARTHEST_M
 
 
-def _origin(table: object) -> Origin | None:
+def origin_of(table: object) -> Origin | None:
+    """The origin that the table ``[origin]`` gives; None unless it is there and right."""
     if not isinstance(table, Mapping):
         return None
-    numbers = [_number(table.get(key)) for key in _DEGREES]
+    numbers = [number_of(table.get(key)) for key in _DEGREES]
     lat_deg, lon_deg, alt_m = numbers
     if lat_deg is None or lon_deg is None or alt_m is None:
         return None
@@ -161,15 +161,4 @@ def _able(table: object, task: Mapping[str, object], by_default: bool) -> bool:
 
 
 def _is_zero(value: object) -> bool:
-    return _number(value) == 0.0
-
-
-def _number(value: object) -> float | None:
-    """``value`` as a finite float; None if it is none."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        number = float(value)
-    except OverflowError:
-        return None
-    return number if math.isfinite(number) else None
+    return number_of(value) == 0.0

@@ -8,6 +8,7 @@ Leaves out: what counts as wrong (swarm.scenario.shapes, swarm.scenario.checks).
 from __future__ import annotations
 
 import datetime as dt
+import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ __all__ = [
     "absent",
     "close_match",
     "faults_of",
+    "number_of",
     "printable",
     "shown",
 ]
@@ -92,6 +94,17 @@ def shown(value: object) -> str:
 def _cut(text: str) -> str:
     """``text``, cut where a line would become unreadable."""
     return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 1]}…"
+
+
+def number_of(value: object) -> float | None:
+    """``value`` as a finite float; None if it is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
 
 
 def printable(name: str) -> str:

@@ -10,23 +10,25 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swarm.errors import Fault, InputError
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.model.frames import enu_from_wgs84
-from swarm.scenario.checks import check
-from swarm.scenario.findings import Document, faults_of, printable
+from swarm.scenario.checks import check, origin_of
+from swarm.scenario.files import decode, read_bytes
+from swarm.scenario.findings import Document, Finding, faults_of, printable
+from swarm.scenario.task_files import SUFFIXES, TaskFile, read_task_file
 
 if TYPE_CHECKING:
     from swarm.scenario.shapes import Scenario, TaskTable, UavTable
 
-__all__ = ["LARGEST_FILE_BYTES", "load_scenario", "parse_scenario"]
+__all__ = ["build_mission", "load_scenario", "parse_scenario"]
 
-LARGEST_FILE_BYTES = 16 * 2**20
-"""Larger files are refused unread: no mission needs them, and they take minutes."""
-
+_WHAT = "scenario file"
 _WHERE = re.compile(r"(?P<problem>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end.*)\)")
 
 
@@ -37,17 +39,14 @@ def load_scenario(path: Path) -> Mission:
         InputError: the file cannot be read, or is wrong; see `parse_scenario`.
     """
     source = printable(str(path))
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else None
-        problem = f"cannot be read: {reason or error}"
-        raise InputError(Fault(source, "", problem, "give a readable scenario file")) from error
-    return parse_scenario(data, source)
+    if path.suffix.lower() in SUFFIXES:
+        problem = "holds tasks and no fleet"
+        remedy = f"make a scenario of it: swarm import {source} --uavs 3 -o {path.stem}.toml"
+        raise InputError(Fault(source, "", problem, remedy))
+    return parse_scenario(read_bytes(path, _WHAT), source, path.parent)
 
 
-def parse_scenario(data: bytes, source: str) -> Mission:
+def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
     """The mission that ``data`` describes.
 
     Places in degrees are converted to the local frame; without ``alt_m`` they
@@ -56,32 +55,74 @@ def parse_scenario(data: bytes, source: str) -> Mission:
     Args:
         data: the bytes of a scenario file.
         source: name of the file, for messages.
+        folder: where a file of tasks named by ``tasks_from`` is looked for.
 
     Raises:
         InputError: with every fault of the file, in the order of the file.
     """
+    document = _document(data, source)
+    if "tasks_from" not in document:
+        return build_mission(document, source)
+    document = {**document, "task": document.get("task", [])}
+    name = document["tasks_from"]
+    if not isinstance(name, str) or not name:
+        return build_mission(document, source)
+    origin = origin_of(document.get("origin"))
+    if "origin" in document and origin is None:
+        return build_mission(document, source)
+    return build_mission(document, source, read_task_file(folder / name, home=origin))
+
+
+def build_mission(document: Document, source: str, tasks: TaskFile | None = None) -> Mission:
+    """The mission of a parsed scenario and of the ``tasks`` that come from elsewhere.
+
+    Tasks of a file follow those of the document and are worth 1 unless the file says
+    otherwise; its home is the origin where the document names none.
+
+    Raises:
+        InputError: with every fault of the document, then those of the tasks.
+    """
     from swarm.scenario.shapes import validate
 
-    document = _document(data, source)
+    own = document.get("task")
+    more = () if tasks is None else tasks.entries
+    if tasks is not None and isinstance(own, list):
+        document = {**document, "task": [*own, *({"value": 1.0, **e.table} for e in more)]}
+        if "origin" not in document and (home := tasks.home) is not None:
+            document["origin"] = asdict(home)
     scenario, findings = validate(document)
     findings += check(document)
-    if findings or scenario is None:
-        raise InputError(*faults_of(document, source, findings))
-    return _mission(scenario)
+    if scenario is not None and not findings:
+        return _mission(scenario)
+    first = len(own) if isinstance(own, list) else 0
+    here = [finding for finding in findings if not _from_file(finding, first)]
+    faults = faults_of(document, source, here)
+    if tasks is not None:
+        there = [finding for finding in findings if _from_file(finding, first)]
+        faults += _faults_of_file(tasks, there, first)
+    raise InputError(*faults)
+
+
+def _faults_of_file(tasks: TaskFile, findings: list[Finding], first: int) -> Iterator[Fault]:
+    """The findings at their places in the file of tasks, in its order."""
+    for finding in sorted(findings, key=lambda finding: int(finding.path[1])):
+        _, index, *key = finding.path
+        entry = tasks.entries[int(index) - first]
+        place = entry.at(str(key[0])) if key else entry.place
+        yield Fault(tasks.source, place, finding.problem, finding.remedy)
+
+
+def _from_file(finding: Finding, first: int) -> bool:
+    """Whether it concerns a task that follows the ``first`` ones of the document."""
+    match finding.path:
+        case ("task", int(index), *_):
+            return index >= first
+        case _:
+            return False
 
 
 def _document(data: bytes, source: str) -> Document:
-    if len(data) > LARGEST_FILE_BYTES:
-        problem = f"is larger than {LARGEST_FILE_BYTES // 2**20} MiB"
-        raise InputError(Fault(source, "", problem, "give a smaller scenario file"))
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        column = error.start - data.rfind(b"\n", 0, error.start)
-        problem = f"byte 0x{data[error.start]:02x} is not UTF-8"
-        place = f"line {line}, column {column}"
-        raise InputError(Fault(source, place, problem, "save the file as UTF-8")) from error
+    text = decode(data, source, _WHAT)
     try:
         return tomllib.loads(text)
     except RecursionError as error:

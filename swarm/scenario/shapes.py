@@ -103,6 +103,7 @@ class Scenario(_Table):
     origin: OriginTable | None = None
     uav: Annotated[list[UavTable], Field(min_length=1)]
     task: list[TaskTable]
+    tasks_from: Annotated[str, Field(min_length=1)] | None = None
 
 
 _TABLES: Mapping[str, type[BaseModel]] = {
@@ -131,6 +132,7 @@ _RIGHT: Mapping[tuple[str, str], str] = {
     ("", "origin"): "a table [origin] with lat_deg, lon_deg and alt_m",
     ("", "uav"): "one table [[uav]] per UAV",
     ("", "task"): "one table [[task]] per task, or task = [] if all come later",
+    ("", "tasks_from"): 'a file of tasks, such as tasks_from = "survey.plan"',
     ("mission", "horizon_s"): "a number > 0 and <= 1e9 [s], such as horizon_s = 600.0",
     ("mission", "success_default"): _PROBABILITY,
     ("mission", "survival_default"): _PROBABILITY,

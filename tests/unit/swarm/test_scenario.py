@@ -9,7 +9,7 @@ import pytest
 from swarm.errors import InputError
 from swarm.model import Mission, Origin
 from swarm.model.frames import enu_from_wgs84
-from swarm.scenario import load_scenario, parse_scenario, read
+from swarm.scenario import files, load_scenario, parse_scenario
 
 VALID = """\
 schema = 1
@@ -61,6 +61,7 @@ VALUE = "give a number >= 0 and <= 1e12, such as value = 5.0"
 HORIZON = "give a number > 0 and <= 1e9 [s], such as horizon_s = 600.0"
 SECONDS = "give a number >= 0 and <= 1e9 [s]"
 ALTITUDE = "give a height above mean sea level within -1e5..1e5 [m], such as 488.0"
+TOP_KEYS = "schema, name, mission, origin, uav, task, tasks_from"
 TASK_KEYS = "id, position_m, lat_deg, lon_deg, alt_m, value, service_s, kind, appears_s"
 
 # What is replaced in VALID, by what, and the lines it takes.
@@ -95,12 +96,12 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
     "unknown key": (
         "schema = 1",
         "colour = 3\nschema = 1",
-        ["colour: unknown key; the keys here are schema, name, mission, origin, uav, task"],
+        [f"colour: unknown key; the keys here are {TOP_KEYS}"],
     ),
     "key that is no bare key": (
         "schema = 1",
         '"a\\nb" = 3\nschema = 1',
-        ['"a\\nb": unknown key; the keys here are schema, name, mission, origin, uav, task'],
+        [f'"a\\nb": unknown key; the keys here are {TOP_KEYS}'],
     ),
     "misspelled table": (
         "[mission]",
@@ -116,7 +117,7 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         "[origin]",
         "[orbit]\na = 1\n[origin]",
         [
-            "orbit: unknown key; the keys here are schema, name, mission, origin, uav, task",
+            f"orbit: unknown key; the keys here are {TOP_KEYS}",
         ],
     ),
     # [mission]
@@ -672,7 +673,7 @@ def test_dos_line_ends_are_fine() -> None:
 
 
 def test_huge_file_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(read, "LARGEST_FILE_BYTES", 2**20)
+    monkeypatch.setattr(files, "LARGEST_FILE_BYTES", 2**20)
     path = tmp_path / "huge.toml"
     path.write_bytes(b"#" * (2**20 + 1))
 

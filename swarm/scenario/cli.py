@@ -1,0 +1,191 @@
+"""The command ``swarm import``.
+
+Leaves out: reading files of tasks (swarm.scenario.task_files), and the text of
+the scenario (swarm.scenario.draft).
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from swarm.model import Origin
+    from swarm.scenario.task_files import TaskFile
+
+__all__ = ["import_tasks"]
+
+
+def import_tasks(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="File of tasks: .plan, .waypoints, .geojson or .csv.",
+            show_default=False,
+        ),
+    ],
+    uavs: Annotated[
+        int, typer.Option("--uavs", min=1, max=1000, metavar="N", help="Size of the fleet.")
+    ] = 3,
+    speed_m_s: Annotated[
+        float | None,
+        typer.Option(
+            "--speed-m-s",
+            min=0.01,
+            max=1000.0,
+            metavar="V",
+            help="Cruise speed of every UAV. Default: the plan's, else 5.",
+            show_default=False,
+        ),
+    ] = None,
+    home: Annotated[
+        str | None,
+        typer.Option(
+            "--home",
+            metavar="LAT,LON,ALT",
+            help="Where the UAVs start: degrees, and height above mean sea level. "
+            "Default: the plan's home.",
+            show_default=False,
+        ),
+    ] = None,
+    below_m: Annotated[
+        float | None,
+        typer.Option(
+            "--below-m",
+            min=-1000.0,
+            max=1000.0,
+            metavar="M",
+            help="How far tasks lie below waypoints. Default: 10, the lowest height layer, so "
+            "that the first UAV flies at the height planned.",
+            show_default=False,
+        ),
+    ] = None,
+    horizon_s: Annotated[
+        float | None,
+        typer.Option(
+            "--horizon-s",
+            min=1.0,
+            max=1e9,
+            metavar="D",
+            help="Horizon D. Default: about what a single UAV would need for all tasks.",
+            show_default=False,
+        ),
+    ] = None,
+    value: Annotated[
+        float,
+        typer.Option(
+            "--value", min=0.0, max=1e12, metavar="V", help="Of tasks the file gives none."
+        ),
+    ] = 1.0,
+    service_s: Annotated[
+        float,
+        typer.Option(
+            "--service-s",
+            min=0.0,
+            max=1e9,
+            metavar="S",
+            help="Time on the spot, for tasks the file gives none.",
+        ),
+    ] = 0.0,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name",
+            metavar="NAME",
+            help="Name of the mission. Default: that of the file.",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="SCENARIO",
+            help="Write the scenario there. Default: standard output.",
+            show_default=False,
+        ),
+    ] = None,
+) -> int:
+    """Make a scenario of tasks in a QGroundControl plan, a waypoint file, GeoJSON or CSV.
+
+    Every waypoint or point becomes a task, also those within surveys and corridor scans; hold
+    times become service times. Take-off, landing, cameras and the like are left out, and told.
+    The scenario is commented, to be looked over and flown.
+
+    A CSV has columns lat_deg, lon_deg and maybe alt_m, or east_m, north_m and maybe up_m, and
+    any of id, value, service_s, kind and appears_s; GeoJSON has the latter as properties.
+
+    Examples:
+        swarm import survey.plan --uavs 3 -o survey.toml && swarm run survey.toml
+        swarm import mission.waypoints --uavs 5 --speed-m-s 8 --service-s 10 > mission.toml
+        swarm import trees.geojson --home 47.3977,8.5456,488 -o trees.toml
+        swarm import grid.csv --uavs 10 -o grid.toml
+    """
+    from swarm.errors import Fault, InputError
+    from swarm.model.ids import ID_RULE, valid_id
+    from swarm.scenario.draft import Fleet, draft_scenario
+    from swarm.scenario.task_files import read_task_file
+
+    if name is not None and not valid_id(name):
+        raise InputError(Fault("--name", "", f"{name!r} is not an id", f"give {ID_RULE}"))
+    tasks = read_task_file(file, home=None if home is None else _origin(home), below_m=below_m)
+    fleet = Fleet(name or _id_of(file.stem), uavs, speed_m_s, horizon_s, value, service_s)
+    text = draft_scenario(tasks, fleet)
+    if output is None:
+        print(text, end="")
+    else:
+        _write(output, text)
+    print(_story(tasks, fleet.uavs, output), file=sys.stderr)
+    return 0
+
+
+def _origin(text: str) -> Origin:
+    from swarm.errors import Fault, InputError
+    from swarm.model import Origin
+
+    try:
+        lat_deg, lon_deg, alt_m = (float(part) for part in text.split(","))
+        return Origin(lat_deg, lon_deg, alt_m)
+    except ValueError as error:
+        remedy = "give LAT,LON,ALT in degrees and metres, such as 47.397742,8.545594,488"
+        raise InputError(Fault("--home", "", f"{text!r} is no place", remedy)) from error
+
+
+def _id_of(stem: str) -> str:
+    """A mission name close to the name of a file."""
+    words = re.sub(r"[^A-Za-z0-9_.-]+", "-", stem).strip("-_.")
+    return words[:64] or "mission"
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a new file; one that is there may have been worked on."""
+    from swarm.errors import Fault, InputError
+
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        fault = Fault("--output", str(path), "is there already", "remove it, or name another file")
+        raise InputError(fault) from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else None
+        problem = f"cannot be written: {reason or error}"
+        raise InputError(
+            Fault("--output", str(path), problem, "name a file that can be")
+        ) from error
+
+
+def _story(tasks: TaskFile, uavs: int, output: Path | None) -> str:
+    """What has been made of the file, and how to go on."""
+    count = len(tasks.entries)
+    story = f"{tasks.source}: {count} task{'s' if count > 1 else ''} for {uavs} UAVs"
+    if tasks.left_out:
+        parts = (f"{n} × {what}" if n > 1 else what for what, n in tasks.left_out.items())
+        story += f"; left out: {', '.join(parts)}"
+    return story if output is None else f"{story}\nfly it with: swarm run {output}"

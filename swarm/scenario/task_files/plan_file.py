@@ -1,0 +1,187 @@
+"""QGroundControl's plans (``.plan``): waypoints, and those that surveys and scans contain.
+
+Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html.
+Of a complex item the mission items that QGroundControl has stored with it are
+taken; without them, the corners of its transects. Leaves out: geofence, rally
+points, and what a vehicle does on the way (cameras, regions of interest).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+from swarm.errors import Fault, InputError
+from swarm.model import Origin
+from swarm.scenario.findings import number_of, shown
+from swarm.scenario.task_files.entries import Request, TaskFile, gather
+from swarm.scenario.task_files.json_text import member, parse_object
+from swarm.scenario.task_files.mission_items import (
+    BELOW_M,
+    Command,
+    Frame,
+    Item,
+    left_out_of,
+    stops_of,
+    whole_of,
+)
+
+__all__ = ["LAYER_KEY", "read_plan"]
+
+LAYER_KEY = "peckorder"
+"""Top-level key under which an exported plan keeps its height layer, for the way back."""
+
+_WHAT = "a plan saved by QGroundControl"
+_HOME = "mission.plannedHomePosition"
+_LANDINGS = {"fwLandingPattern", "vtolLandingPattern"}
+_TRANSECTS = "TransectStyleComplexItem"
+_FIXED_WING = 1
+
+
+def read_plan(text: str, request: Request) -> TaskFile:
+    """The tasks of a plan.
+
+    Raises:
+        InputError: with every fault of the plan.
+    """
+    document = parse_object(text, request.source, _WHAT)
+    mission = _mission(document, request.source)
+    home = request.home or _home(mission)
+    below_m = request.below_m
+    if below_m is None:
+        layer_m = number_of(member(document, LAYER_KEY, "layer_m"))
+        below_m = BELOW_M if layer_m is None else layer_m
+    items: list[Item] = []
+    faults: list[Fault] = []
+    landings: Counter[str] = Counter()
+    for place, value in _numbered("mission.items", mission["items"]):
+        if member(value, "complexItemType") in _LANDINGS:
+            landings["landing pattern"] += 1
+            continue
+        for item in _items(place, value, request.source):
+            if isinstance(item, Item):
+                items.append(item)
+            else:
+                faults.append(item)
+    homeless = Fault(
+        request.source,
+        _HOME,
+        "is no place with a height, and heights are counted from it",
+        "give the home in QGroundControl, or --home LAT,LON,ALT, or [origin] in the scenario",
+    )
+    return gather(
+        request,
+        [*faults, *stops_of(items, home, below_m, homeless)],
+        "add waypoints or a survey in QGroundControl",
+        home=home,
+        speed_m_s=_speed_m_s(mission),
+        below_m=below_m,
+        left_out=left_out_of(items) + landings,
+    )
+
+
+def _mission(document: Mapping[str, object], source: str) -> Mapping[str, object]:
+    mission = document.get("mission")
+    if document.get("fileType") != "Plan":
+        problem = f"{shown(document.get('fileType', 'nothing'))} is not 'Plan'"
+        fault = Fault(source, "fileType", problem, f"give {_WHAT}")
+    elif document.get("version") != 1:
+        problem = f"version {shown(document.get('version', 'missing'))} of the format is not known"
+        fault = Fault(source, "version", problem, "give version 1, as QGroundControl writes")
+    elif not isinstance(mission, Mapping):
+        fault = Fault(source, "mission", "is not an object", f"give {_WHAT}")
+    elif mission.get("version", 2) != 2:
+        problem = f"version {shown(mission['version'])} of the format is not known"
+        fault = Fault(
+            source, "mission.version", problem, "give version 2, as QGroundControl writes"
+        )
+    elif not isinstance(mission.get("items"), list):
+        fault = Fault(source, "mission.items", "is not an array", f"give {_WHAT}")
+    else:
+        return mission
+    raise InputError(fault)
+
+
+def _home(mission: Mapping[str, object]) -> Origin | None:
+    """The planned home; None unless it is a place with a height."""
+    place = mission.get("plannedHomePosition")
+    numbers = [number_of(value) for value in place] if isinstance(place, list) else []
+    match numbers:
+        case [float(lat_deg), float(lon_deg), float(alt_m)]:
+            try:
+                return Origin(lat_deg, lon_deg, alt_m)
+            except ValueError:
+                return None
+        case _:
+            return None
+
+
+def _speed_m_s(mission: Mapping[str, object]) -> float | None:
+    fixed_wing = mission.get("vehicleType") == _FIXED_WING
+    speed_m_s = number_of(mission.get("cruiseSpeed" if fixed_wing else "hoverSpeed"))
+    return speed_m_s if speed_m_s is not None and speed_m_s > 0.0 else None
+
+
+def _numbered(place: str, values: object) -> Iterator[tuple[str, object]]:
+    for index, value in enumerate(values if isinstance(values, list) else ()):
+        yield f"{place}[{index}]", value
+
+
+def _items(place: str, value: object, source: str) -> Iterator[Item | Fault]:
+    """The mission items of one entry of ``items``."""
+    match member(value, "type"):
+        case "SimpleItem":
+            yield _simple(place, value, source)
+        case "ComplexItem":
+            yield from _complex(place, value, source)
+        case other:
+            problem = f"{shown(other)} is no type of item" if other else "has no type"
+            yield Fault(source, place, problem, "give 'SimpleItem' or 'ComplexItem'")
+
+
+def _simple(place: str, value: object, source: str) -> Item | Fault:
+    command, frame = whole_of(member(value, "command")), whole_of(member(value, "frame"))
+    params = member(value, "params")
+    if command is None or frame is None:
+        return Fault(source, place, "has no command or no frame", "give both as whole numbers")
+    if not isinstance(params, list) or len(params) != 7:
+        found = f"has {len(params)} params" if isinstance(params, list) else "has no params"
+        return Fault(
+            source, place, f"{found} instead of 7", "save the plan again in QGroundControl"
+        )
+    return Item(
+        command, frame, params, place, alt_m=number_of(member(value, "AMSLAltAboveTerrain"))
+    )
+
+
+def _complex(place: str, value: object, source: str) -> Iterator[Item | Fault]:
+    stored = member(value, _TRANSECTS, "Items")
+    corners = member(value, _TRANSECTS, "VisualTransectPoints")
+    if isinstance(stored, list) and stored:
+        for inner, item in _numbered(f"{place}.{_TRANSECTS}.Items", stored):
+            yield _simple(inner, item, source)
+    elif isinstance(corners, list) and corners:
+        camera = member(value, _TRANSECTS, "CameraCalc")
+        frame = _camera_frame(camera)
+        height_m = member(camera, "DistanceToSurface")
+        for inner, corner in _numbered(f"{place}.{_TRANSECTS}.VisualTransectPoints", corners):
+            pair = corner[:2] if isinstance(corner, list) and len(corner) >= 2 else [None, None]
+            params = [0.0, 0.0, 0.0, None, *pair, height_m]
+            yield Item(Command.WAYPOINT, frame, params, inner)
+    else:
+        kind = shown(member(value, "complexItemType") or "complex item")
+        remedy = "replace it by waypoints, a survey or a corridor scan"
+        yield Fault(source, place, f"{kind} holds no waypoints", remedy)
+
+
+def _camera_frame(camera: object) -> Frame:
+    """What a survey's height counts from: a mode since QGroundControl 4.2, a flag before."""
+    if member(camera, "DistanceToSurfaceRelative") is False:
+        return Frame.GLOBAL
+    match whole_of(member(camera, "DistanceMode")):
+        case 2:
+            return Frame.GLOBAL
+        case 3 | 4:
+            return Frame.GLOBAL_TERRAIN
+        case _:
+            return Frame.GLOBAL_RELATIVE
