@@ -50,6 +50,10 @@ class Membership:
         """
         return self.present - self._interrupted
 
+    def mute(self, writer: str) -> bool:
+        """Whether ``writer`` was lost by its silence, with a living token."""
+        return writer in self._mute
+
     # -- what is observed -------------------------------------------------------------
 
     def seen(self, writer: str, now_s: float) -> bool:

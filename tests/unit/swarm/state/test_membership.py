@@ -171,6 +171,17 @@ def test_who_has_been_heard_and_falls_silent_is_lost_although_its_token_lives(
     assert members.lost(1000.0) == []
 
 
+def test_a_loss_by_silence_can_be_told_from_one_by_the_token(members: Membership) -> None:
+    members.seen("u2", 0.0)
+    members.heard("u1", 0.0)
+    members.gone("u2", 0.0)
+    assert members.lost(SILENCE_S) == ["u1", "u2"]
+
+    assert (members.mute("u1"), members.mute("u2")) == (True, False)
+    members.heard("u1", 60.0)
+    assert not members.mute("u1")
+
+
 def test_everything_said_puts_silence_off(members: Membership) -> None:
     members.heard("u1", 10.0)
     members.heard("u1", 12.0)

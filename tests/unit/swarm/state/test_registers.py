@@ -9,15 +9,32 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.model.ids import COORDINATOR
+from swarm.state.board import TaskBoard
+from swarm.state.claims import holders
 from swarm.state.registers import Replica
-from swarm.wire.codec import key_of
-from swarm.wire.messages import Message, Stamp
-from tests.builders import IDLE, brief, done, entry, epoch, held, message, status, uav
+from swarm.state.voice import Voice
+from swarm.wire.codec import encode, key_of
+from swarm.wire.messages import Body, Claim, Message, Stamp
+from tests.builders import (
+    IDLE,
+    MISSION,
+    OUT,
+    brief,
+    done,
+    entry,
+    epoch,
+    held,
+    message,
+    proposed,
+    status,
+    uav,
+)
 from tests.message_strategies import messages
 
 # Few stamps, so that many statements meet of the same age, with other contents too.
-few_stamps = st.builds(Stamp, st.integers(0, 1), st.integers(0, 2))
-crowds = st.lists(messages(few_stamps), max_size=12)
+few_stamps = st.builds(Stamp, st.integers(0, 2), st.integers(0, 2))
+crowds = st.lists(messages(few_stamps), max_size=10)
+few = st.lists(messages(few_stamps), max_size=4)
 
 
 def joined(said: list[Message]) -> Replica:
@@ -48,7 +65,7 @@ def test_any_order_gives_the_same_registers(said: list[Message], random: Random)
 
 
 @settings(max_examples=50)
-@given(crowds, crowds, crowds)
+@given(few, few, few)
 def test_any_grouping_gives_the_same_registers(
     one: list[Message], two: list[Message], three: list[Message]
 ) -> None:
@@ -81,6 +98,78 @@ def test_no_register_ever_goes_back(said: list[Message]) -> None:
         assert known.stamp >= max(newest.get(key, known.stamp), statement.stamp)
         assert not was_news or known == statement
         newest[key] = known.stamp
+
+
+@given(crowds, st.randoms(use_true_random=False))
+def test_equal_registers_name_one_winner_whatever_order_they_came_in(
+    said: list[Message], random: Random
+) -> None:
+    shuffled = said * 2
+    random.shuffle(shuffled)
+    one, other = joined(said), joined(shuffled)
+
+    assert holders(one.claims) == holders(other.claims)
+    assert TaskBoard(one, MISSION).states == TaskBoard(other, MISSION).states
+
+
+@given(few, few, st.randoms(use_true_random=False))
+def test_two_halves_of_a_fleet_agree_once_each_has_the_others_registers(
+    one: list[Message], two: list[Message], random: Random
+) -> None:
+    """As after a partition; answers come whole, in any order and more than once."""
+    left, right = joined(one), joined(two)
+    to_left, to_right = list(right.messages()) * 2, list(left.messages()) * 2
+    random.shuffle(to_left)
+    random.shuffle(to_right)
+    left.join_all(to_left)
+    right.join_all(to_right)
+
+    assert contents(left) == contents(right)
+
+
+# -- several lives of one writer ----------------------------------------------------------
+
+bodies = st.sampled_from(
+    [IDLE, OUT, proposed("t0", 1.0), held("t0", 1.0), held("t1", 2.0), done("t0"), done("t1")]
+)
+lives = st.lists(st.lists(bodies, min_size=1, max_size=4), min_size=1, max_size=4)
+
+
+@given(lives, st.randoms(use_true_random=False))
+def test_the_last_word_of_the_last_life_stands_whatever_else_arrives(
+    lives: list[list[Body]], random: Random
+) -> None:
+    """Each life outdoes what it is told of the one before, whatever its own clock says."""
+    said: list[Message] = []
+    for life in lives:
+        voice = Voice(MISSION, "u0", random.randrange(5))
+        if said:
+            voice.outdo(max(message.stamp for message in said))
+        said += [voice.say(body) for body in life]
+    last_words = {key_of(message): message for message in said}
+    heard = [message for message in said if random.random() < 0.7] + list(last_words.values())
+    random.shuffle(heard)
+    replica = joined(heard)
+
+    assert {key_of(m): m for m in replica.messages()} == last_words
+
+
+@given(st.permutations([1, 2, 3, 4]))
+def test_a_claim_of_nothing_is_the_tombstone_of_those_before(order: list[int]) -> None:
+    said = [proposed("t0", 0.0), held("t0", 0.0), held("t1", 1.0), IDLE]
+    replica = joined([message("u0", said[counter - 1], counter) for counter in order])
+
+    assert replica.claims == {"u0": IDLE}
+    assert holders(replica.claims) == {}
+
+
+@given(st.permutations([held("t0", 0.0), held("t1", 0.0), IDLE, OUT]))
+def test_of_equal_stamps_the_same_statement_stands_everywhere(order: list[Claim]) -> None:
+    """It takes two processes under one name; then at least the others agree."""
+    said = [message("u0", claim) for claim in order]
+
+    assert joined(said).claims["u0"] == joined(sorted(said, key=encode)).claims["u0"]
+    assert encode(next(joined(said).messages())) == max(encode(each) for each in said)
 
 
 def test_a_new_life_of_a_writer_beats_any_count_of_the_old_one() -> None:

@@ -505,7 +505,7 @@ def test_a_snapshot_that_fits_is_answered_whole() -> None:
     assert fit(snapshot, len(encode(snapshot))) is snapshot
 
 
-@given(st.lists(messages(), max_size=30).map(tuple), st.integers(100, 5000))
+@given(st.lists(messages(), max_size=8).map(tuple), st.integers(100, 1500))
 def test_of_a_snapshot_too_large_there_stays_what_fits_the_own_first(
     said: tuple[Message, ...], limit_bytes: int
 ) -> None:
