@@ -1,0 +1,276 @@
+"""A mission of real processes while a hostile peer floods its bus with malformed messages.
+
+The mission is the paper's, drawn out so that it lasts: a larger map and a longer horizon
+make the same decisions, none of which is nearly a tie. Leaves out: what is said
+(sim.chaos.hostile) and how the result is shown (sim.bench.flood).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import AsyncIterator, Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coordinator.observer import MissionResult
+from sim.chaos.hostile import REASONS, Hostile, Kind
+from sim.launch.fleet import BusKind, LaunchOptions, default_position_rate_hz
+from sim.launch.run import Run, open_run
+from swarm.bus.port import Bus, Query, Sample
+from swarm.bus.zenoh_bus import open_zenoh_bus
+from swarm.clock import Clock, SystemClock
+from swarm.errors import SwarmError
+from swarm.model import Mission, UavId
+from swarm.scenario import load_scenario
+from swarm.scenario.shipped import shipped_scenarios
+from swarm.scenario.write import format_scenario
+from swarm.wire.codec import Codec
+from swarm.wire.keys import Keys
+
+__all__ = ["RATE_HZ", "Flood", "fly_flooded", "long_mission"]
+
+RATE_HZ = 24.0
+"""Messages of each kind per second."""
+HOSTILE = "hostile"
+STATUS = "status"
+GHOSTS = 8
+"""Liveliness tokens of processes that do not exist, shown one after the other."""
+SETTLE_S = 0.6
+"""Until what was sent last has been counted and told [wall s]."""
+READY_S, LOOK_S = 60.0, 20.0
+"""Limits for the fleet to be there and for `swarm status` to answer [wall s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flood:
+    """What came of a flooded mission."""
+
+    result: MissionResult
+    planned: dict[UavId, tuple[str, ...]]
+    """The lists of the offline plan, which a mission without a flood flies."""
+    sent: Mapping[Kind, int]
+    """Malformed messages sent, by kind."""
+    answers: int
+    """Malformed answers given to questions."""
+    flood_s: float
+    """How long the flood lasted [wall s]."""
+    before: Mapping[str, Any]
+    """What `swarm status --json` told before the flood..."""
+    after: Mapping[str, Any]
+    """...and at its end, while the mission still ran."""
+    fates: tuple[str, ...]
+    """How processes ended that should not have."""
+
+    @property
+    def expected(self) -> Mapping[str, int]:
+        """What each UAV should have dropped of what was sent, by reason."""
+        total: Counter[str] = Counter()
+        for kind, count in self.sent.items():
+            total[REASONS[kind]] += count
+        return total
+
+    @property
+    def counted(self) -> Mapping[str, Mapping[str, int]]:
+        """What `swarm status` says each UAV has dropped during the flood, by reason."""
+        before = {uav["id"]: uav["dropped"] for uav in self.before["uavs"]}
+        return {
+            uav["id"]: {
+                reason: count - before[uav["id"]].get(reason, 0)
+                for reason, count in uav["dropped"].items()
+            }
+            for uav in self.after["uavs"]
+        }
+
+    @property
+    def decisions_kept(self) -> bool:
+        """Whether every list flown is the one planned."""
+        return self.result.executed_routes == self.planned
+
+
+def long_mission(times: float) -> Mission:
+    """The paper's mission, ``times`` as long: every way and the horizon are that much longer."""
+    paper = load_scenario(shipped_scenarios()["table-1"])
+
+    def away(point: tuple[float, float, float]) -> tuple[float, float, float]:
+        return point[0] * times, point[1] * times, point[2]
+
+    return replace(
+        paper,
+        name="flooded",
+        horizon_s=paper.horizon_s * times,
+        uavs=tuple(replace(uav, position_enu_m=away(uav.position_enu_m)) for uav in paper.uavs),
+        tasks=tuple(replace(t, position_enu_m=away(t.position_enu_m)) for t in paper.tasks),
+    )
+
+
+async def fly_flooded(
+    times: float,
+    *,
+    seed: int = 0,
+    bus: BusKind = BusKind.ROUTER,
+    on_progress: Callable[[str], None] | None = None,
+) -> Flood:
+    """Fly a mission of some ``4.4 times`` seconds under a flood that lasts almost to its end.
+
+    The flood begins when all agents are there, before they take off, and ends when all
+    tasks but the last two are done, so that `swarm status` can be asked about it.
+
+    Args:
+        times: how long the mission is; see `long_mission`.
+        seed: of what the hostile peer says.
+        bus: how the processes reach each other; `BusKind.ROUTER` or `BusKind.MESH`.
+        on_progress: told what is being done.
+
+    Raises:
+        SwarmError: something did not start, or `swarm status` failed.
+        TimeoutError: the mission did not get on.
+    """
+    tell = on_progress or (lambda _: None)
+    mission = long_mission(times)
+    rng = np.random.default_rng(seed)
+    with tempfile.TemporaryDirectory() as folder:
+        scenario = Path(folder) / "flooded.toml"
+        scenario.write_text(format_scenario(mission), encoding="utf-8")
+        options = LaunchOptions(
+            scenario=scenario,
+            method="greedy",
+            seed=0,
+            speedup=1.0,
+            bus=bus,
+            position_rate_hz=default_position_rate_hz(len(mission.uavs)),
+            acceptance_radius_m=0.5,
+            start_timeout_s=120.0,
+        )
+        async with open_run(mission, options, onlookers=(HOSTILE, STATUS)) as run:
+            tell("waiting for the mission to begin")
+            async with _hostile(run, mission, rng) as peer:
+                await run.until(
+                    lambda: (
+                        run.observer.replica.brief is not None
+                        and len(run.observer.statuses) == len(mission.uavs)
+                    ),
+                    limit_s=READY_S,
+                    what="all agents there",
+                )
+                before = await _status(run, mission.name)
+                tell("flooding")
+                seconds = await peer.flood_until(
+                    lambda: len(run.observer.result().done) >= len(mission.tasks) - 2,
+                    limit_s=READY_S + 10.0 * times,
+                )
+                await asyncio.sleep(SETTLE_S)
+                after = await _status(run, mission.name)
+                tell("waiting for the end")
+                await run.finish()
+        flight = run.flight()
+    if flight.plan is None:
+        raise SwarmError("the coordinator has told no plan")
+    return Flood(
+        result=flight.result,
+        planned={uav: tuple(route) for uav, route in flight.plan.routes.items()},
+        sent=dict(peer.sent),
+        answers=peer.answers,
+        flood_s=seconds,
+        before=before,
+        after=after,
+        fates=flight.fates,
+    )
+
+
+class _Peer:
+    """The hostile peer: floods, shows ghosts, and answers whoever asks."""
+
+    def __init__(self, bus: Bus, mission: Mission, clock: Clock, rng: np.random.Generator) -> None:
+        uavs = [uav.id for uav in mission.uavs]
+        self.sent: Counter[Kind] = Counter()
+        self.answers = 0
+        self._bus = bus
+        self._clock = clock
+        self._keys = Keys(mission.name)
+        self._codec = Codec(mission.name)
+        self._forger = Hostile(mission.name, uavs, [task.id for task in mission.tasks], rng)
+        for key_expr in (self._keys.brief, self._keys.plan, self._keys.board("*")):
+            bus.subscribe(key_expr)
+        bus.subscribe(self._keys.claim("*"))
+        bus.subscribe(self._keys.outcome("*", "*"))
+        bus.serve(self._keys.state(HOSTILE))
+
+    async def listen(self) -> None:
+        """Note what is said, to replay it later, and answer questions, until cancelled."""
+        while True:
+            await self._bus.inbox.wait()
+            for event in self._bus.inbox.take():
+                match event:
+                    case Sample(key, payload):
+                        message = self._codec.decode(key, payload)
+                        if message is not None:
+                            self._forger.hear(message, self._clock.now_s())
+                    case Query(reply=reply):
+                        self.answers += 1
+                        reply(self._forger.answer(HOSTILE))
+                    case _:
+                        pass
+
+    async def flood_until(self, enough: Callable[[], bool], *, limit_s: float) -> float:
+        """Say `RATE_HZ` messages of each kind a second; how long it lasted [s]."""
+        begin_s = self._clock.now_s()
+        turn = 0
+        while not enough():
+            now_s = self._clock.now_s()
+            if now_s - begin_s > limit_s:
+                raise TimeoutError(f"the mission has not got on within {limit_s:g} s of flood")
+            if turn % RATE_HZ == 0 and turn / RATE_HZ < GHOSTS:
+                self._bus.declare_token(self._keys.alive(f"ghost{turn}"))
+            for forged in self._forger.batch(now_s):
+                self._bus.publish(forged.key, forged.payload)
+                self.sent[forged.kind] += 1
+            turn += 1
+            await asyncio.sleep(max(0.0, begin_s + turn / RATE_HZ - self._clock.now_s()))
+        return self._clock.now_s() - begin_s
+
+
+@contextlib.asynccontextmanager
+async def _hostile(run: Run, mission: Mission, rng: np.random.Generator) -> AsyncIterator[_Peer]:
+    bus = await open_zenoh_bus(run.launch.layout.seat_of_onlooker(HOSTILE))
+    try:
+        peer = _Peer(bus, mission, SystemClock(), rng)
+        listening = asyncio.get_running_loop().create_task(peer.listen())
+        try:
+            yield peer
+        finally:
+            listening.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await listening
+    finally:
+        bus.close()
+
+
+async def _status(run: Run, mission: str) -> Mapping[str, Any]:
+    """What `swarm status` tells."""
+    words = ["status", "--mission", mission, "--json"]
+    words += run.launch.layout.seat_arguments(STATUS)
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        *("-m", "swarm", *words),
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    try:
+        async with asyncio.timeout(LOOK_S):
+            out, err = await process.communicate()
+    finally:
+        if process.returncode is None:
+            process.kill()
+    if process.returncode != 0:
+        raise SwarmError(f"swarm status: {err.decode(errors='replace').strip()}")
+    told: dict[str, Any] = json.loads(out)
+    return told

@@ -1,0 +1,36 @@
+"""A hostile peer floods the bus of a mission that is flown by real processes."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from sim.chaos.flood import RATE_HZ, fly_flooded, long_mission
+from sim.chaos.hostile import Kind
+from tests.observed_mission import watch
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+
+
+def test_malformed_messages_change_no_decision_and_are_all_counted() -> None:
+    flood = asyncio.run(fly_flooded(1.5))
+
+    assert flood.flood_s > 5.0
+    for kind in Kind:
+        assert flood.sent[kind] >= 0.7 * RATE_HZ * flood.flood_s, kind
+    assert flood.answers > 0
+    # The same mission in virtual time, where nobody is hostile.
+    assert flood.result.executed_routes == watch(long_mission(1.5)).result().executed_routes
+    assert flood.decisions_kept
+    assert len(flood.result.done) == 8
+    assert flood.fates == ()
+    assert len(flood.counted) == 3
+    for counted in flood.counted.values():
+        for reason, expected in flood.expected.items():
+            if reason == "stale":
+                # A UAV that has not heard of something newer yet finds nothing old.
+                assert counted[reason] >= 0.8 * expected
+            else:
+                assert counted[reason] >= expected
+    assert any(other.startswith("ghost") for other in flood.after["others"])

@@ -1,0 +1,81 @@
+"""`swarm status` beside a mission that is flown by real processes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swarm.bus.endpoints import free_loopback_endpoints
+from tests.process.mission import SwarmRun
+from tests.process.router_processes import router
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+
+
+def status(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "swarm", "status", *words],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def router_of(run: SwarmRun) -> str:
+    """Endpoint of the router that the run has started."""
+    (words,) = [words for words in run.children() if words.startswith("coordinator ")]
+    return words.split("--connect ")[1].split()[0]
+
+
+def test_a_running_mission_is_found_and_told(tmp_path: Path) -> None:
+    with SwarmRun(["valley-survey", "--bus", "router", "--method", "greedy"], tmp_path) as run:
+        run.wait_for_line("epoch 1")
+        table = status("--connect", router_of(run))
+        told = json.loads(status("--connect", router_of(run), "--json").stdout)
+
+        assert (table.returncode, table.stderr) == (0, "")
+        assert table.stdout.startswith("valley-survey · RUNNING · mission time ")
+        assert max(len(line) for line in table.stdout.splitlines()) <= 80
+        assert (told["mission"], told["phase"], told["epoch"]) == ("valley-survey", "running", 1)
+        assert told["coordinator"]
+        assert len(told["uavs"]) == 10
+        assert all(uav["does"] == "flying" for uav in told["uavs"])
+        assert all(uav["position_enu_m"] and uav["link_age_s"] < 3.0 for uav in told["uavs"])
+        assert sum(told["tasks"][state] for state in ("open", "done", "failed")) == 60
+        assert told["mission_s"] > 0.0
+
+
+def test_a_bus_without_a_mission_is_told_in_one_line() -> None:
+    with router("--listen", "tcp/127.0.0.1:0") as (_, endpoint):
+        any_mission = status("--connect", endpoint, "--timeout-s", "0.5")
+        one = status("--connect", endpoint, "--timeout-s", "0.5", "--mission", "table-1")
+
+    assert any_mission.returncode == one.returncode == 1
+    assert any_mission.stdout == one.stdout == ""
+    assert any_mission.stderr == "swarm: nobody on the bus flies a mission (looked for 0.5 s)\n"
+    assert one.stderr == "swarm: nothing is known of mission table-1: nobody is there\n"
+
+
+def test_no_bus_at_all_is_told_in_one_line() -> None:
+    (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
+
+    told = status("--connect", endpoint, "--timeout-s", "0.5")
+
+    assert told.returncode == 1
+    assert told.stderr.startswith("swarm: cannot reach the bus within 0.5 s")
+    assert len(told.stderr.splitlines()) == 1
+
+
+def test_a_mission_that_can_have_no_keys_is_refused() -> None:
+    told = status("--mission", "a/b")
+
+    assert told.returncode == 2
+    assert "--mission" in told.stderr
+    assert len(told.stderr.splitlines()) == 1
