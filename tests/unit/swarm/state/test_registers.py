@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from random import Random
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.model.ids import COORDINATOR
@@ -29,12 +29,34 @@ from tests.builders import (
     status,
     uav,
 )
-from tests.message_strategies import messages
 
-# Few stamps, so that many statements meet of the same age, with other contents too.
+# Few stamps and contents, so that many statements meet of the same age, or with other contents.
 few_stamps = st.builds(Stamp, st.integers(0, 2), st.integers(0, 2))
-crowds = st.lists(messages(few_stamps), max_size=10)
-few = st.lists(messages(few_stamps), max_size=4)
+claims_and_outcomes = st.sampled_from(
+    [IDLE, OUT, proposed("t0", 1.0), held("t0", 1.0), held("t1", 2.0), done("t0"), done("t1")]
+)
+briefs_and_tasks = st.sampled_from(
+    [
+        brief(uav("u0")),
+        brief(uav("u0"), uav("u1", t0=0.5)),
+        epoch("u0", "u1"),
+        epoch("u1", "u0"),
+        entry("t0"),
+        entry("t0", value=7.0),
+        entry("t1"),
+    ]
+)
+statements = st.one_of(
+    st.builds(Message, st.just(MISSION), st.just(COORDINATOR), few_stamps, briefs_and_tasks),
+    st.builds(
+        Message,
+        st.just(MISSION),
+        st.sampled_from(["u0", "u1", "u2"]),
+        few_stamps,
+        claims_and_outcomes | st.just(status()),
+    ),
+)
+crowds = st.lists(statements, max_size=12)
 
 
 def joined(said: list[Message]) -> Replica:
@@ -64,8 +86,7 @@ def test_any_order_gives_the_same_registers(said: list[Message], random: Random)
     assert contents(joined(said)) == contents(joined(shuffled))
 
 
-@settings(max_examples=50)
-@given(few, few, few)
+@given(crowds, crowds, crowds)
 def test_any_grouping_gives_the_same_registers(
     one: list[Message], two: list[Message], three: list[Message]
 ) -> None:
@@ -112,7 +133,7 @@ def test_equal_registers_name_one_winner_whatever_order_they_came_in(
     assert TaskBoard(one, MISSION).states == TaskBoard(other, MISSION).states
 
 
-@given(few, few, st.randoms(use_true_random=False))
+@given(crowds, crowds, st.randoms(use_true_random=False))
 def test_two_halves_of_a_fleet_agree_once_each_has_the_others_registers(
     one: list[Message], two: list[Message], random: Random
 ) -> None:
@@ -129,10 +150,7 @@ def test_two_halves_of_a_fleet_agree_once_each_has_the_others_registers(
 
 # -- several lives of one writer ----------------------------------------------------------
 
-bodies = st.sampled_from(
-    [IDLE, OUT, proposed("t0", 1.0), held("t0", 1.0), held("t1", 2.0), done("t0"), done("t1")]
-)
-lives = st.lists(st.lists(bodies, min_size=1, max_size=4), min_size=1, max_size=4)
+lives = st.lists(st.lists(claims_and_outcomes, min_size=1, max_size=4), min_size=1, max_size=4)
 
 
 @given(lives, st.randoms(use_true_random=False))
