@@ -19,6 +19,7 @@ from swarm.options import (
     LogLevelOption,
     MissionOption,
     SpeedupOption,
+    StateOption,
 )
 
 __all__ = ["agent"]
@@ -66,6 +67,15 @@ def agent(
             help="Within this distance of a task, and stopped, the UAV has arrived.",
         ),
     ] = 1.0,
+    state: StateOption = None,
+    rejoin: Annotated[
+        bool,
+        typer.Option(
+            "--rejoin",
+            help="Take part again although this UAV left the mission under way, sent home or "
+            "taken over by its pilot.",
+        ),
+    ] = False,
     bus: BusOption = "router",
     listen: ListenOption = "",
     connect: ConnectOption = None,
@@ -85,7 +95,7 @@ def agent(
       swarm agent --mission table-1 --uav uav1 --mavlink tcp:127.0.0.1:5760
 
       swarm agent --mission valley-survey --uav quad-2 --mavlink serial:/dev/ttyAMA0:921600
-      --connect tcp/192.168.1.2:7447
+      --connect tcp/192.168.1.2:7447 --state /var/lib/peckorder
     """
     import asyncio
     from collections.abc import Callable
@@ -103,6 +113,7 @@ def agent(
     from swarm.log import configure_logging, get_logger
     from swarm.model import Origin
     from swarm.process import stop_requests
+    from swarm.store import Store
 
     configure_logging(log_level, log_format)
     network = preset(link, lease_s)
@@ -123,7 +134,6 @@ def agent(
             ).for_speedup(speedup)
             return MavlinkVehicle(settings, mavlink, clock, report)
 
-        core = AgentCore(mission, uav, incarnation(), network.timing.scaled(speedup))
         async with stop_requests(lifeline=lifeline) as stop:
             seat = await seat_or_stop(
                 lambda: open_zenoh_bus(config),
@@ -132,12 +142,38 @@ def agent(
             )
             if seat is None:
                 return stop.exit_status or 0
+            # Only now: waiting for a seat may have taken long.
+            memory = None if store is None else store.load()
+            core = AgentCore(
+                mission,
+                uav,
+                incarnation(),
+                network.timing.scaled(speedup),
+                None if memory is None else memory.snapshot,
+                0.0 if memory is None else memory.age_s,
+                rejoin=rejoin,
+            )
+            save = None if store is None else store.save
             try:
-                return await run_agent(core, mission, seat, clock, vehicle, stop)
+                return await run_agent(
+                    core,
+                    mission,
+                    seat,
+                    clock,
+                    vehicle,
+                    stop,
+                    save=save,
+                    answer_s=network.answer_s,
+                )
             finally:
                 seat.close()
 
-    return asyncio.run(run())
+    store = None if state is None else Store(state, mission, uav, speedup=speedup)
+    try:
+        return asyncio.run(run())
+    finally:
+        if store is not None:
+            store.close()
 
 
 def _check_ids(mission: str, uav: str) -> None:

@@ -1,21 +1,24 @@
 """The life of one UAV's agent, from learning to landing: events in, actions out.
 
 The core owns one replica of the shared registers. It learns before it prepares its
-vehicle, takes tasks while that is airborne in a running mission, and goes home when
-the mission has ended. Leaves out: tasks and claims (agent.tasking), when the mission
-is over (agent.ending), the mission as such (agent.picture), what it makes of the
-others (agent.peers), when it repeats itself (agent.speech), flying (agent.vehicle)
-and transport (agent.runner).
+vehicle, or goes on where an earlier life stopped; it takes tasks while the vehicle is
+airborne in a running mission, and goes home when the mission has ended. Leaves out:
+tasks and claims (agent.tasking), when the mission is over (agent.ending), the mission
+as such (agent.picture), what it makes of the others (agent.peers), when it asks them
+(agent.learning) and repeats itself (agent.speech), what counts of an earlier life's
+memory (agent.recall), flying (agent.vehicle) and transport (agent.runner).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from agent.ending import Ending
 from agent.events import Action, Event, Order
+from agent.hearing import Hearing
 from agent.peers import Peers
-from agent.picture import News, Picture
+from agent.picture import Picture
+from agent.recall import Recall
 from agent.speech import Speech
 from agent.tasking import Tasking
 from agent.vehicle import (
@@ -32,7 +35,6 @@ from agent.vehicle import (
 )
 from swarm.config import Timing
 from swarm.events import (
-    Ask,
     Finish,
     Heard,
     Learned,
@@ -40,16 +42,17 @@ from swarm.events import (
     Note,
     PeerGone,
     PeerSeen,
+    Publish,
+    Save,
     Stop,
     Tick,
 )
-from swarm.model.ids import COORDINATOR
+from swarm.pulse import Pulse
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
     Claim,
     ClaimPhase,
-    Epoch,
     EpochPhase,
     Message,
     Snapshot,
@@ -68,32 +71,54 @@ class AgentCore:
         uav: id of the UAV this agent flies.
         incarnation: greater than in any earlier life of this agent.
         timing: timers, in the seconds of ``now_s``.
+        memory: what an earlier life kept, its mission time brought to now; None if there
+            is nothing.
+        memory_age_s: how long ago that was kept.
+        rejoin: take part again, although an earlier life left this flight of the mission.
     """
 
-    def __init__(self, mission: str, uav: str, incarnation: int, timing: Timing) -> None:
+    def __init__(
+        self,
+        mission: str,
+        uav: str,
+        incarnation: int,
+        timing: Timing,
+        memory: Snapshot | None = None,
+        memory_age_s: float = 0.0,
+        *,
+        rejoin: bool = False,
+    ) -> None:
         self.uav = uav
         self.replica = Replica()
         self.dropped: Mapping[str, int] = {}
         """Messages the shell has dropped so far, by reason; goes out with the status."""
         self._mission = mission
-        self._timing = timing
+        self._rejoin = rejoin
         self._speech = Speech(Voice(mission, uav, incarnation), self.replica, timing)
         self._peers = Peers(uav, timing)
         self._picture = Picture(mission, uav, self.replica)
         self._tasking = Tasking(uav, self.replica, self._picture, self._peers, self._speech, timing)
         self._ending = Ending(self.replica, self._picture, self._peers, timing)
+        self._hearing = Hearing(
+            uav, self.replica, self._picture, self._peers, self._speech, self._tasking, timing
+        )
+        self._learning = self._hearing.learning
+        self._recall = Recall(uav, memory, memory_age_s, timing)
+        self._pulse = Pulse(timing.pause_s)
         self._actions: list[Action] = []
         self._stage = StatusPhase.LEARNING
-        self._learned = False
+        self._flew_before = False
         self._finished = False
-        self._ask_at_s: float | None = None
+        self._kept: object = None
 
     # -- the one entry point ------------------------------------------------------
 
     def start(self, now_s: float) -> list[Action]:
         """What to do first."""
-        self._ask(now_s)
-        return self._drain()
+        self._recall.begin(now_s)
+        self._learning.doubt(now_s)
+        self._actions += self._learning.questions(now_s, lacking=True)
+        return self._end_step()
 
     def step(self, event: Event, now_s: float) -> list[Action]:
         """React to one event.
@@ -102,11 +127,13 @@ class AgentCore:
             event: what happened.
             now_s: now, on this process's own clock [s]; never decreases.
         """
+        if not self._finished and self._pulse.late(now_s):
+            self._actions += self._hearing.held_up(now_s)
         if not self._finished:
             self._handle(event, now_s)
         if not self._finished:
             self._advance(now_s)
-        return self._drain()
+        return self._end_step()
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a `Tick` at the latest; None when it has finished.
@@ -121,16 +148,29 @@ class AgentCore:
             self._speech.next_deadline_s(),
             self._tasking.next_deadline_s(),
             self._ending.next_deadline_s(),
-            self._ask_at_s,
+            self._learning.next_deadline_s(),
+            self._recall.next_deadline_s() if self._is_beginning else None,
         )
         return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
     def snapshot(self, now_s: float) -> Snapshot:
-        """What this process answers for: its own registers, and those of who cannot."""
+        """What this process answers for: its own registers, and those of who cannot.
+
+        As long as it is learning itself, it has nothing to tell.
+        """
+        if self._stage is StatusPhase.LEARNING:
+            return self._snapshot_of((), now_s)
         writers = {self.uav} | (self.replica.writers() - self._peers.membership.steady)
-        messages = tuple(self.replica.messages(writers))
+        return self._snapshot_of(self.replica.messages(writers), now_s)
+
+    def memory(self, now_s: float) -> Snapshot:
+        """Everything it knows, for a later life of this agent."""
+        return self._snapshot_of(self.replica.messages(), now_s)
+
+    def _snapshot_of(self, messages: Iterable[Message], now_s: float) -> Snapshot:
         mission_s = self._picture.known_mission_s(now_s)
-        return Snapshot(self._mission, self.uav, self._speech.incarnation, mission_s, messages)
+        incarnation = self._speech.incarnation
+        return Snapshot(self._mission, self.uav, incarnation, mission_s, tuple(messages))
 
     @property
     def phase(self) -> StatusPhase:
@@ -139,7 +179,7 @@ class AgentCore:
 
     @property
     def claim(self) -> Claim | None:
-        """This UAV's claim register; None before the vehicle is airborne."""
+        """This UAV's claim register; None while it takes no tasks."""
         return self._tasking.claim
 
     # -- events -------------------------------------------------------------------
@@ -147,31 +187,18 @@ class AgentCore:
     def _handle(self, event: Event, now_s: float) -> None:
         match event:
             case Heard(message):
-                self._peers.membership.heard(message.writer, now_s)
-                self._take_in(message, now_s)
-                if isinstance(message.body, Claim | Epoch):
-                    self._peers.spoke(message.writer)
-                if isinstance(message.body, Epoch):
-                    self._set_clock(message.body, now_s)
+                self._actions += self._hearing.hear(message, now_s)
             case Learned(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
-                if (
-                    self._peers.membership.seen(writer, now_s)
-                    and self._learned
-                    and writer != self.uav
-                ):
-                    self._actions += self._speech.announce(now_s)
-                    if writer == COORDINATOR:
-                        self._ask(now_s)
+                self._actions += self._hearing.see(writer, now_s)
             case PeerGone(writer):
-                self._peers.membership.gone(writer, now_s)
+                self._hearing.miss(writer, now_s)
             case LinkChanged(up):
-                self._peers.membership.link(up, now_s)
-                if up and self._learned:
-                    self._actions += self._speech.announce(now_s)
-                    self._ask(now_s)
+                self._actions += self._hearing.link(up, now_s)
             case Stop(reason):
+                if self._stage is StatusPhase.LEARNING:
+                    self._recollect(now_s, last_chance=True)
                 self._go_home(reason, now_s)
             case Tick():
                 pass
@@ -187,110 +214,122 @@ class AgentCore:
             case Refused(order, reason):
                 self._give_up_order(order, reason, now_s)
             case HandedOver(reason):
-                self._hand_over(reason, now_s)
+                self._leave_vehicle(reason, now_s, handed_over=True)
             case Home():
                 self._come_home(now_s)
 
-    def _take_in(self, message: Message, now_s: float) -> None:
-        if message.writer == self.uav:
-            self._actions += self._speech.hear_echo(message)
-            return
-        news = self._picture.take_in(message)
-        if news is None:
-            return
-        self._peers.stated(message.writer, message.body, now_s)
-        if news is News.OPENING:
-            self._awake(now_s)
-        elif news is News.CLAIM:
-            self._tasking.peer_claimed(now_s)
-
     def _learn(self, snapshots: tuple[Snapshot, ...], now_s: float) -> None:
-        for snapshot in snapshots:
-            for message in snapshot.messages:
-                self._take_in(message, now_s)
-        known = [s.mission_s for s in snapshots if s.mission_s is not None]
-        if known and self.replica.epoch is not None:
-            self._picture.set_clock(max(known), now_s)
-        self._learned = True
-
-    def _set_clock(self, epoch: Epoch, now_s: float) -> None:
-        runs = epoch.phase is EpochPhase.RUNNING
-        if runs and self._picture.set_clock(epoch.mission_s, now_s):
-            self._awake(now_s)
-            self._actions.append(Note("mission runs", {"mission_s": epoch.mission_s}))
+        if self._hearing.yields_to(snapshots):
+            # Without a word, and without an order: the other speaks for this UAV and flies it.
+            self._actions += [Note("another agent already flies this UAV"), Finish(1)]
+            self._finished = True
+        else:
+            self._actions += self._hearing.learn(snapshots, now_s)
 
     def _become_airborne(self, now_s: float) -> None:
-        if self.phase is not StatusPhase.PREPARING:
+        if self._stage is not StatusPhase.PREPARING or self._tasking.airborne:
             return
         self._speech.note = ""
         me = self._picture.me
         if self._picture.place_enu_m is None and me is not None:
             self._picture.place_enu_m = me.position_enu_m
         self._actions += self._tasking.begin(now_s)
-        self._actions.append(Note("airborne at the start"))
+        self._actions.append(Note("airborne"))
 
     def _give_up_order(self, order: object, reason: str, now_s: float) -> None:
         self._actions.append(Note("vehicle refused", {"order": str(order), "reason": reason}))
         if isinstance(order, GoTo):
             self._actions += self._tasking.refuse(order.leg, reason, now_s)
         elif isinstance(order, Prepare | Return):
-            self._hand_over(reason, now_s)
+            self._leave_vehicle(reason, now_s, handed_over=False)
 
-    def _hand_over(self, reason: str, now_s: float) -> None:
+    def _leave_vehicle(self, reason: str, now_s: float, *, handed_over: bool) -> None:
+        """The vehicle is not to be commanded any more."""
         if self.phase is StatusPhase.OUT:
             return
-        self._actions.append(Note("vehicle handed over", {"reason": reason}))
+        self._actions.append(Note("vehicle given up", {"reason": reason}))
         returning = self.phase is StatusPhase.RETURNING
-        if not returning:
-            self._take_no_more_tasks(now_s)
-        self._stage, self._speech.note = StatusPhase.OUT, reason[:200]
+        self._actions += self._tasking.end(now_s, handed_over=handed_over)
+        self._enter(StatusPhase.OUT, reason)
         if returning:
             # It was told to come home; nobody here can see whether it does.
             self._finish(1, now_s)
 
     def _come_home(self, now_s: float) -> None:
         if self.phase is StatusPhase.RETURNING:
-            self._stage = StatusPhase.HOME
+            self._enter(StatusPhase.HOME, self._speech.note)
             self._actions.append(Note("landed at home"))
-            self._finish(0, now_s)
+            self._finish(1 if self._recall.forlorn else 0, now_s)
 
     # -- what follows from the state ------------------------------------------------
 
     def _advance(self, now_s: float) -> None:
-        for writer in self._peers.membership.lost(now_s):
-            claim = self.replica.claims.get(writer)
-            left = claim is not None and claim.phase is ClaimPhase.OUT
-            self._actions.append(Note("left" if left else "lost", {"writer": writer}))
-            self._awake(now_s)
-            if writer == COORDINATOR and self._learned and not self._picture.running:
-                self._ask(now_s)  # others may have heard its last words
+        self._actions += self._hearing.lose(now_s)
+        if self._is_beginning:
+            self._recollect(now_s)
         self._go_home_if_over(now_s)
-        if self.phase is StatusPhase.LEARNING:
-            self._prepare(now_s)
+        if self._is_beginning:
+            self._begin(now_s)
         if self._tasking.phase is not None and self._picture.running:
-            self._actions += self._tasking.advance(now_s)
+            self._actions += self._tasking.advance(now_s, informed=self._learning.current)
         if not self._finished:
+            lacking = self._stage is StatusPhase.LEARNING
+            self._actions += self._learning.questions(now_s, lacking=lacking)
             self._actions += self._speech.repeat(
-                lambda: self._status(now_s), now_s, learned=self._learned
+                lambda: self._status(now_s), now_s, learned=self._learning.ever
             )
 
-    def _prepare(self, now_s: float) -> None:
+    @property
+    def _is_beginning(self) -> bool:
+        """Whether it knows what others know, and has not acted on it yet."""
+        return self._stage is StatusPhase.LEARNING and self._learning.current
+
+    def _recollect(self, now_s: float, *, last_chance: bool = False) -> None:
+        """Find out where an earlier life stood, from the others or from its own memory."""
+        brief = self.replica.brief
+        memory = self._recall.fitting(brief, now_s, last_chance=last_chance)
+        if memory is not None:
+            self._actions += self._hearing.remember(memory, now_s)
+            self._actions.append(Note("remembers", {"confirmed": brief is not None}))
+        claim = self.replica.claims.get(self.uav)
+        self._flew_before = claim is not None
+        if self._recall.forlorn:
+            self._go_home("nobody knows of a mission", now_s)
+        elif claim is not None and claim.phase is ClaimPhase.OUT and not self._rejoin:
+            self._stay_out(claim, now_s)
+
+    def _stay_out(self, claim: Claim, now_s: float) -> None:
+        """An earlier life took no more part: neither does this one."""
+        if claim.handed_over:
+            self._leave_vehicle("handed over in an earlier life", now_s, handed_over=True)
+        elif self._mission_runs:
+            self._go_home("left the mission in an earlier life", now_s)
+
+    def _begin(self, now_s: float) -> None:
+        """Get the vehicle ready; in a running mission, from where an earlier life left it."""
         me = self._picture.me
-        if self._learned and me is not None:
-            self._stage, self._ask_at_s = StatusPhase.PREPARING, None
-            self._actions.append(
-                Order(Prepare(self._picture.in_layer(me.position_enu_m), me.speed_m_s)),
-            )
-        elif self._ask_at_s is not None and self._ask_at_s <= now_s:
+        if me is None:
             missing = self.replica.brief is None
             waits = "waiting for the coordinator's brief" if missing else "not in the brief"
             if self._speech.note != waits:
                 self._speech.note = waits
                 self._actions.append(Note(waits, {"uav": self.uav}))
-            self._ask(now_s)
+            return
+        self._enter(StatusPhase.PREPARING, "")
+        place_enu_m = self._picture.in_layer(me.position_enu_m)
+        self._actions.append(Order(Prepare(place_enu_m, me.speed_m_s, self._mission_runs)))
+        claim = self.replica.claims.get(self.uav)
+        if claim is not None and self._picture.running:
+            self._actions += self._tasking.resume(claim, now_s)
+
+    @property
+    def _mission_runs(self) -> bool:
+        """Whether that is the last word, be the time of the mission known or not."""
+        epoch = self.replica.epoch
+        return epoch is not None and epoch.phase is EpochPhase.RUNNING
 
     def _go_home_if_over(self, now_s: float) -> None:
-        if self.phase is StatusPhase.RETURNING or not self._learned:
+        if self.phase is StatusPhase.RETURNING or not self._learning.ever:
             return
         reason = self._ending.reason(self.phase, now_s, undecided=self._tasking.undecided)
         if reason is not None:
@@ -298,28 +337,25 @@ class AgentCore:
 
     # -- pieces ---------------------------------------------------------------------
 
-    def _awake(self, now_s: float) -> None:
-        """A task may have opened: everyone who is free decides anew, in sequence order."""
-        self._peers.awake(now_s)
-        self._tasking.wake(now_s)
+    def _enter(self, stage: StatusPhase, note: str) -> None:
+        """A new part of its life begins; ``note`` tells a reader why."""
+        self._stage, self._speech.note = stage, note[:200]
+        self._hearing.at_work = True
 
     def _go_home(self, reason: str, now_s: float) -> None:
         if self.phase is StatusPhase.OUT:
             # The vehicle is not ours to command any more.
             self._finish(0, now_s)
         elif self.phase is not StatusPhase.RETURNING:
-            self._take_no_more_tasks(now_s)
+            self._actions += self._tasking.end(now_s, handed_over=False)
             self._ending.settle()
-            self._stage, self._speech.note = StatusPhase.RETURNING, reason[:200]
-            self._actions += [Note("returning", {"reason": reason}), Order(Return(reason))]
+            self._enter(StatusPhase.RETURNING, reason)
+            order = Return(reason, resume=self._flew_before)
+            self._actions += [Note("returning", {"reason": reason}), Order(order)]
 
     def _finish(self, status: int, now_s: float) -> None:
         self._actions += [self._speech.say(self._status(now_s)), Finish(status)]
         self._finished = True
-
-    def _take_no_more_tasks(self, now_s: float) -> None:
-        self._ask_at_s = None
-        self._actions += self._tasking.end(now_s)
 
     def _status(self, now_s: float) -> Status:
         claim, telemetry = self.claim, self._picture.telemetry
@@ -335,11 +371,18 @@ class AgentCore:
             note=self._speech.note[:200],
         )
 
-    def _ask(self, now_s: float) -> None:
-        if self.phase is StatusPhase.LEARNING:
-            self._ask_at_s = now_s + self._timing.ask_s
-        self._actions.append(Ask())
-
-    def _drain(self) -> list[Action]:
+    def _end_step(self) -> list[Action]:
+        """What came of the step; a change worth it is kept for a later life."""
         actions, self._actions = self._actions, []
+        if self._stage is not StatusPhase.LEARNING and self._worth_keeping(actions):
+            actions.insert(0, Save())
+        self._pulse.promise(self.next_deadline_s())
         return actions
+
+    def _worth_keeping(self, actions: list[Action]) -> bool:
+        """Whether this agent has spoken, or the coordinator has said something new."""
+        epoch = self.replica.epoch
+        plan = None if epoch is None else (epoch.number, epoch.phase)
+        before, self._kept = self._kept, (plan, self.replica.board_version)
+        said = [action.message.body for action in actions if isinstance(action, Publish)]
+        return before != self._kept or not all(isinstance(body, Status) for body in said)

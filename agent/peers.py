@@ -12,7 +12,7 @@ from swarm.config import Timing
 from swarm.state.claims import winner
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
-from swarm.wire.messages import Body, Claim, ClaimPhase, Outcome
+from swarm.wire.messages import Body, Claim, ClaimPhase, Epoch, Outcome
 
 __all__ = ["Peers"]
 
@@ -26,15 +26,31 @@ class Peers:
         self._patience_s = timing.patience_s
         self._idle_since_s: dict[str, float] = {}
         self._awake_since_s = 0.0
+        self._lost: set[str] = set()
 
     @property
     def credible(self) -> Collection[str]:
         """Others whose claims count."""
         return self.membership.credible - {self._uav}
 
-    def spoke(self, writer: str) -> None:
-        """``writer`` itself has just said what it claims."""
-        self.membership.spoke(writer)
+    def heard(self, writer: str, body: Body, now_s: float) -> bool:
+        """``writer`` itself has just said something; whether it is thereby there anew."""
+        anew = self.membership.heard(writer, now_s)
+        if isinstance(body, Claim | Epoch):
+            self.membership.spoke(writer)
+        return anew
+
+    def back(self, writer: str) -> bool:
+        """Whether ``writer`` was lost before; told once for each loss."""
+        lost = writer in self._lost
+        self._lost.discard(writer)
+        return lost
+
+    def lost(self, now_s: float) -> list[tuple[str, str]]:
+        """Writers given up by now, each told once, and by what they were missed."""
+        lost = self.membership.lost(now_s)
+        self._lost.update(lost)
+        return [(w, "silent" if self.membership.mute(w) else "gone") for w in lost]
 
     def stated(self, writer: str, body: Body, now_s: float) -> None:
         """There is news of ``writer``: by an outcome or an idle claim it has become free."""

@@ -17,11 +17,13 @@ from agent.events import Action, Event, Order
 from agent.vehicle import Home, Orders, Report, Return
 from swarm.bus.port import Bus
 from swarm.clock import Clock
+from swarm.config import PRESETS, Link
 from swarm.errors import BusError
 from swarm.events import Stop
 from swarm.model import Origin
 from swarm.process import StopRequest
 from swarm.shell import Shell, take_seat
+from swarm.wire.messages import Snapshot
 
 __all__ = ["Vehicle", "run_agent", "seat_or_stop"]
 
@@ -86,6 +88,9 @@ async def run_agent(
     clock: Clock,
     make_vehicle: Callable[[Origin, Callable[[Report], None]], Vehicle],
     stop: StopRequest,
+    *,
+    save: Callable[[Snapshot], None] | None = None,
+    answer_s: float = PRESETS[Link.NORMAL].answer_s,
 ) -> int:
     """Fly one UAV until the mission has ended and the vehicle is home.
 
@@ -97,6 +102,8 @@ async def run_agent(
         make_vehicle: makes the vehicle once the mission's origin is known, with a
             callback for its reports.
         stop: asks to leave early: the vehicle is told to return first.
+        save: keeps what the core knows for its next life.
+        answer_s: how long a question waits for the slowest answer [wall s].
 
     Returns:
         Exit status.
@@ -109,14 +116,15 @@ async def run_agent(
         nonlocal vehicle, starting
         if not isinstance(action, Order):
             return
-        brief = core.replica.brief
-        if vehicle is None and brief is not None and not isinstance(action.order, Return):
+        brief, order = core.replica.brief, action.order
+        flown = not isinstance(order, Return) or order.resume
+        if vehicle is None and brief is not None and flown:
             vehicle = make_vehicle(Origin(*brief.origin), report)
             starting = loop.create_task(vehicle.start())
             starting.add_done_callback(failed)
         if vehicle is not None:
-            vehicle.order(action.order)
-        elif isinstance(action.order, Return):
+            vehicle.order(order)
+        elif isinstance(order, Return):
             loop.call_soon(report, Home())
 
     def report(news: Report) -> None:
@@ -128,6 +136,10 @@ async def run_agent(
 
     def as_event(fact: Event) -> Event:
         return fact
+
+    def keep(now_s: float) -> None:
+        if save is not None:
+            save(core.memory(now_s))
 
     async def farewell() -> int:
         status = await stop.wait()
@@ -144,6 +156,9 @@ async def run_agent(
         from_bus=as_event,
         execute=execute,
         snapshot=core.snapshot,
+        known=core.replica.messages,
+        save=keep,
+        answer_s=answer_s,
     )
     core.dropped = shell.dropped
     take_seat(bus, mission, core.uav, status=False)

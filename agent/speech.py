@@ -15,6 +15,9 @@ from swarm.wire.messages import Body, Claim, Message, Outcome, Status
 
 __all__ = ["Speech"]
 
+_OUTCOMES_AT_ONCE = 4
+"""Outcomes in one announcement; others that missed more ask when they are back."""
+
 
 class Speech:
     """The statements of one UAV's agent.
@@ -46,6 +49,16 @@ class Speech:
         self._replica.join(message)
         return Publish(message)
 
+    def remember(self, message: Message) -> None:
+        """An earlier life said so, and this one has claimed nothing yet."""
+        self._voice.outdo(message.stamp)
+        self._replica.join(message)
+
+    def is_foreign(self, message: Message) -> bool:
+        """Whether words in this writer's name are newer than any it has said."""
+        said = self._replica.known(message)
+        return said is None or message.stamp > said.stamp
+
     def hear_echo(self, message: Message) -> list[Publish]:
         """Learn what others remember of this writer: it must never say less than that."""
         self._voice.outdo(message.stamp)
@@ -63,7 +76,7 @@ class Speech:
         own = list(self._replica.messages({self._voice.writer}))
         said = [message for message in own if isinstance(message.body, Claim)]
         outcomes = [message for message in own if isinstance(message.body, Outcome)]
-        if outcomes:
+        for _ in range(min(_OUTCOMES_AT_ONCE, len(outcomes))):
             self._turn = (self._turn + 1) % len(outcomes)
             said.append(outcomes[self._turn])
         self._announce_at_s = now_s + self._timing.announce_s

@@ -20,7 +20,7 @@ from swarm.config import Timing
 from swarm.events import Note
 from swarm.state.board import TaskState
 from swarm.state.registers import Replica
-from swarm.wire.messages import Board, Claim, ClaimPhase, Epoch, Outcome, Result, StatusPhase
+from swarm.wire.messages import Board, Claim, ClaimPhase, Epoch, Outcome, Point, Result, StatusPhase
 
 __all__ = ["Tasking"]
 
@@ -48,6 +48,8 @@ class Tasking:
     ) -> None:
         self.phase: StatusPhase | None = None
         """Idle, flying or serving; None while the UAV takes no tasks."""
+        self.airborne = False
+        """Whether the vehicle takes targets."""
         self._uav = uav
         self._replica = replica
         self._picture = picture
@@ -58,13 +60,15 @@ class Tasking:
         self._rule_epoch: tuple[int, str] | None = None
         self._free_since_s = 0.0
         self._leg = 0
-        self._excluded: set[str] = set()
+        self._refusals: dict[str, tuple[int, float]] = {}
+        """How often the vehicle refused a task, and until when it is left alone."""
         self._adrift = False
         self._to_decide = False
         self._awaits_peers = False
         self._held_at_s: float | None = None
         self._served_at_s: float | None = None
         self._retry_at_s: float | None = None
+        self._ready_by_s: float | None = None
 
     # -- from without ---------------------------------------------------------------
 
@@ -78,17 +82,43 @@ class Tasking:
         """Whether, being idle, it may yet find a task."""
         return self._to_decide or self._awaits_peers
 
+    def resume(self, claim: Claim, now_s: float) -> list[Action]:
+        """An earlier life of this agent claimed so: stand by it, if it still counts.
+
+        The vehicle may fly there, but takes no targets before `begin`.
+        """
+        if claim.task is None:
+            return []
+        self.phase = StatusPhase.FLYING
+        if (lost := self._lost()) is not None:
+            return self._release(lost, now_s)
+        if claim.phase is ClaimPhase.PROPOSED:
+            self._held_at_s = now_s + self._timing.objection_window_s
+        # Others keep away from the task only for a vehicle that shows itself.
+        self._ready_by_s = now_s + self._timing.silence_s
+        return [self._speech.say(claim), Note("resumes", {"task": claim.task})]
+
     def begin(self, now_s: float) -> list[Action]:
-        """The UAV is airborne."""
+        """The vehicle takes targets: fly to the resumed task, or be free."""
+        self.airborne, self._ready_by_s = True, None
+        task = self._task()
+        if task is not None:
+            return [self._order_to(self._picture.in_layer(task.position_enu_m))]
         self._become_free(self._picture.mission_s(now_s))
         return [self._say_idle()]
 
-    def end(self, now_s: float) -> list[Action]:
-        """The UAV takes no tasks any more."""
+    def end(self, now_s: float, *, handed_over: bool) -> list[Action]:
+        """The UAV takes no tasks any more.
+
+        Args:
+            now_s: now.
+            handed_over: because somebody else has its vehicle.
+        """
         mission_s = self._picture.mission_s(now_s)
         self._become_free(mission_s)
-        self.phase = None
-        return [self._speech.say(Claim(ClaimPhase.OUT, None, mission_s, 0, mission_s))]
+        self.phase, self.airborne = None, False
+        out = Claim(ClaimPhase.OUT, None, mission_s, 0, mission_s, handed_over)
+        return [self._speech.say(out)]
 
     def wake(self, now_s: float) -> None:
         """Decide anew when free; who found nothing before takes no precedence from that."""
@@ -113,25 +143,34 @@ class Tasking:
         self._served_at_s = now_s + task.service_s
 
     def refuse(self, leg: int, reason: str, now_s: float) -> list[Action]:
-        """The vehicle will not fly that leg: never choose its task again."""
+        """The vehicle will not fly that leg: leave its task alone for a while."""
         task = self._task()
         if leg != self._leg or task is None:
             return []
-        self._excluded.add(task.task)
+        times = 1 + self._refusals.get(task.task, (0, 0.0))[0]
+        # Each time for longer, so that a fleet may find that nobody takes what is left.
+        pause_s = self._timing.reconsider_s * 2.0 ** (times - 1)
+        self._refusals[task.task] = times, now_s + pause_s
         return self._release(f"vehicle refused: {reason}", now_s)
 
-    def advance(self, now_s: float) -> list[Action]:
-        """What follows from the registers and the time, in a running mission."""
+    def advance(self, now_s: float, *, informed: bool) -> list[Action]:
+        """What follows from the registers and the time, in a running mission.
+
+        Args:
+            now_s: now.
+            informed: whether the registers are up to date, so that a decision may rest on them.
+        """
         actions = self._serve(now_s) + self._keep_or_lose_claim(now_s)
         if self._retry_at_s is not None and self._retry_at_s <= now_s:
             self.wake(now_s)
         if self.phase is StatusPhase.IDLE and self._to_decide:
-            actions += self._decide(now_s)
+            ready = informed and self.airborne
+            actions += self._decide(now_s) if ready else self._give_up_claim()
         return actions
 
     def next_deadline_s(self) -> float | None:
         """When `advance` will next have something to do."""
-        times_s = (self._held_at_s, self._served_at_s, self._retry_at_s)
+        times_s = (self._held_at_s, self._served_at_s, self._retry_at_s, self._ready_by_s)
         return min((time_s for time_s in times_s if time_s is not None), default=None)
 
     # -- with a task ----------------------------------------------------------------
@@ -153,19 +192,26 @@ class Tasking:
         ]
 
     def _keep_or_lose_claim(self, now_s: float) -> list[Action]:
-        claim, task = self.claim, self._task()
-        if claim is None or task is None or self.phase is StatusPhase.IDLE:
+        claim = self.claim
+        if claim is None or claim.task is None or self.phase is StatusPhase.IDLE:
             return []
-        state = self._picture.board.states.get(task.task)
-        if state is not TaskState.OPEN:
-            return self._release(f"task is {state}", now_s)
-        rival = self._peers.winner(self._replica, task.task)
-        if rival != self._uav:
-            return self._release(f"{rival} has the stronger claim", now_s)
+        if (lost := self._lost()) is not None:
+            return self._release(lost, now_s)
+        if self._ready_by_s is not None and self._ready_by_s <= now_s:
+            return self._release("the vehicle is not ready", now_s)
         if self._held_at_s is not None and self._held_at_s <= now_s:
             self._held_at_s = None
             return [self._speech.say(replace(claim, phase=ClaimPhase.HELD))]
         return []
+
+    def _lost(self) -> str | None:
+        """Why the claimed task is not this UAV's to do; None if it is."""
+        task = self._task()
+        state = None if task is None else self._picture.board.states.get(task.task)
+        if task is None or state is not TaskState.OPEN:
+            return f"task is {state or 'unknown'}"
+        rival = self._peers.winner(self._replica, task.task)
+        return None if rival == self._uav else f"{rival} has the stronger claim"
 
     def _release(self, reason: str, now_s: float) -> list[Action]:
         """Give the task up; a claim lost while only proposed keeps its place in the order."""
@@ -180,7 +226,7 @@ class Tasking:
     def _become_free(self, free_since_s: float) -> None:
         self.phase, self._to_decide = StatusPhase.IDLE, True
         self._free_since_s = free_since_s
-        self._held_at_s = self._served_at_s = self._retry_at_s = None
+        self._held_at_s = self._served_at_s = self._retry_at_s = self._ready_by_s = None
 
     # -- without one ----------------------------------------------------------------
 
@@ -200,7 +246,7 @@ class Tasking:
             credible=self._peers.credible,
             awaited=self._peers.awaited(self._replica, now_s),
             patience_s=self._timing.patience_s,
-            excluded=self._excluded,
+            excluded={t for t, (_, until_s) in self._refusals.items() if now_s < until_s},
         )
         decision = decide(problem, self._picture.board, rule, turn)
         if decision is None:
@@ -233,21 +279,17 @@ class Tasking:
             "certificate": decision.certificate,
             "completion_s": decision.completion_s,
         }
-        leg = self._next_leg()
         return [
-            Order(GoTo(leg, self._picture.in_layer(task.position_enu_m))),
+            self._order_to(self._picture.in_layer(task.position_enu_m)),
             self._speech.say(claim),
             Note("decided", why),
         ]
 
     def _stay_idle(self, now_s: float) -> list[Action]:
-        actions: list[Action] = []
-        claim, telemetry = self.claim, self._picture.telemetry
-        if claim is not None and claim.phase is not ClaimPhase.IDLE:
-            actions.append(self._say_idle())
+        actions, telemetry = self._give_up_claim(), self._picture.telemetry
         if self._adrift and telemetry is not None:
             # Nothing to fly to any more: stop here rather than at a lost target.
-            actions.append(Order(GoTo(self._next_leg(), telemetry.position_enu_m)))
+            actions.append(self._order_to(telemetry.position_enu_m))
         self._adrift = self._to_decide = False
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         self._awaits_peers = patience_ends_s is not None
@@ -256,15 +298,20 @@ class Tasking:
         self._retry_at_s = patience_ends_s if patience_ends_s is not None else again_s
         return actions
 
+    def _give_up_claim(self) -> list[Action]:
+        """Say that the UAV is free, unless it has."""
+        claim = self.claim
+        return [] if claim is None or claim.phase is ClaimPhase.IDLE else [self._say_idle()]
+
     # -- pieces ---------------------------------------------------------------------
 
     def _task(self) -> Board | None:
         claim = self.claim
         return None if claim is None or claim.task is None else self._replica.board.get(claim.task)
 
-    def _next_leg(self) -> int:
+    def _order_to(self, place_enu_m: Point) -> Action:
         self._leg += 1
-        return self._leg
+        return Order(GoTo(self._leg, place_enu_m))
 
     def _say_idle(self) -> Action:
         since_s = self._free_since_s

@@ -11,7 +11,8 @@ Names: `ScenarioArgument` (a `pathlib.Path`; give it to
 `swarm.log.configure_logging`; defaults `LogLevel.INFO`, `LogFormat.AUTO`), the
 hidden `LifelineOption` (bool), `SpeedupOption` and `MissionOption`; `BusOption`,
 `ListenOption` and `ConnectOption` (for `swarm.bus.config.bus_config`); `LinkOption` and
-`LeaseOption` (for `swarm.config.preset`; defaults `Link.NORMAL` and None).
+`LeaseOption` (for `swarm.config.preset`; defaults `Link.NORMAL` and None); `StateOption`
+(a folder or None, for `swarm.store.Store`).
 Leaves out: what a single command alone has.
 """
 
@@ -40,6 +41,7 @@ __all__ = [
     "ScenarioArgument",
     "SeedOption",
     "SpeedupOption",
+    "StateOption",
     "TimeLimitOption",
 ]
 
@@ -174,6 +176,17 @@ LeaseOption = Annotated[
         max=60.0,
         metavar="S",
         help="Silence after which the others take this process for lost, instead of --link's.",
+        show_default=False,
+    ),
+]
+
+StateOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--state",
+        metavar="DIR",
+        help="Keep what this process knows in a file there, and resume from it when it is "
+        "started anew.",
         show_default=False,
     ),
 ]

@@ -29,8 +29,8 @@ from tests.builders import IDLE, MISSION, brief, epoch, message
 
 T = TypeVar("T")
 
-TIMING = Timing(announce_s=1e6, silence_s=2e6)
-"""Nothing gets lost on the way, so nothing need be said twice."""
+TIMING = Timing(announce_s=1e6, silence_s=2e6, pause_s=1e6)
+"""Nothing gets lost on the way, so nothing need be said twice; and the process never hangs."""
 START_S = 100.0
 """The agent's clock when its process begins."""
 ZERO_S = 200.0

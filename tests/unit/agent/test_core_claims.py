@@ -367,6 +367,8 @@ def test_no_one_is_suspected_while_the_own_link_is_down() -> None:
     agent.run_until(60.0 + 0.9 * agent.timing.relink_grace_s)
     assert agent.phase is ClaimPhase.IDLE
     agent.run_until(60.0 + 1.1 * agent.timing.relink_grace_s)
+    assert agent.phase is ClaimPhase.IDLE
+    agent.learn()
     assert agent.task == "near"
 
 

@@ -1,0 +1,189 @@
+"""What one agent takes from the bus: registers, answers, who is there, and words in its own name.
+
+It keeps the others informed in turn, and asks them when they may know more. Leaves out:
+what follows for the vehicle (agent.core), for tasks (agent.tasking).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from agent.events import Action
+from agent.learning import Learning
+from agent.peers import Peers
+from agent.picture import News, Picture
+from agent.speech import Speech
+from agent.tasking import Tasking
+from swarm.config import Timing
+from swarm.events import Note
+from swarm.model.ids import COORDINATOR
+from swarm.state.registers import Replica
+from swarm.wire.messages import Brief, ClaimPhase, Epoch, EpochPhase, Message, Snapshot
+
+__all__ = ["Hearing"]
+
+
+class Hearing:
+    """The ear of the agent of ``uav``.
+
+    Args:
+        uav: id of the UAV.
+        replica: the shared registers.
+        picture: the mission.
+        peers: the others.
+        speech: what this agent says.
+        tasking: hears of it when a task may have opened.
+        timing: timers.
+    """
+
+    def __init__(
+        self,
+        uav: str,
+        replica: Replica,
+        picture: Picture,
+        peers: Peers,
+        speech: Speech,
+        tasking: Tasking,
+        timing: Timing,
+    ) -> None:
+        self.learning = Learning(timing)
+        self.at_work = False
+        """Whether this life has begun to act; until then, words in its name are of an earlier."""
+        self._uav = uav
+        self._replica = replica
+        self._picture = picture
+        self._peers = peers
+        self._speech = speech
+        self._tasking = tasking
+        self._echoes: list[Message] = []
+        """Heard in the own name, though this life has not said so."""
+
+    # -- what is said -----------------------------------------------------------------
+
+    def hear(self, message: Message, now_s: float) -> list[Action]:
+        """Somebody says so just now."""
+        writer, body = message.writer, message.body
+        if writer == self._uav:
+            if self._speech.is_foreign(message):
+                # A twin lives, or word of an earlier life was long under way: ask which.
+                self._echoes.append(message)
+                self.learning.doubt(now_s)
+            return []
+        actions = self._greet(writer, now_s) if self._peers.heard(writer, body, now_s) else []
+        actions += self._take_in(message, now_s)
+        return actions + (self._start_clock(body, now_s) if isinstance(body, Epoch) else [])
+
+    def learn(self, snapshots: Sequence[Snapshot], now_s: float) -> list[Action]:
+        """The answers to a question."""
+        actions, told = list[Action](), list[Message]()
+        for snapshot in snapshots:
+            told += snapshot.messages
+        for message in told + self._echoes:
+            actions += self._take_in(message, now_s)
+        self._echoes.clear()
+        self._learn_clock([snapshot.mission_s for snapshot in snapshots], now_s)
+        somebody_knows = any(isinstance(message.body, Brief) for message in told)
+        self.learning.take(enough=somebody_knows and not self.at_work)
+        return actions
+
+    def remember(self, memory: Snapshot, now_s: float) -> list[Action]:
+        """An earlier life of this agent knew so."""
+        actions = [a for message in memory.messages for a in self._take_in(message, now_s)]
+        self._learn_clock([memory.mission_s], now_s)
+        return actions
+
+    def yields_to(self, snapshots: Iterable[Snapshot]) -> bool:
+        """Whether one of them is of a twin, another process under this name, that keeps the UAV.
+
+        One at work comes before one that learns, which has nothing to tell; of two at work
+        the newer stays, of two that learn the older.
+        """
+        return any(self._yields_to(twin) for twin in snapshots if twin.writer == self._uav)
+
+    def _yields_to(self, twin: Snapshot) -> bool:
+        newer = twin.incarnation > self._speech.incarnation
+        if self.at_work:
+            return bool(twin.messages) and newer
+        return bool(twin.messages) or not newer
+
+    def _take_in(self, message: Message, now_s: float) -> list[Action]:
+        if message.writer == self._uav:
+            if self.at_work:
+                return [*self._speech.hear_echo(message)]
+            self._speech.remember(message)
+            return []
+        news = self._picture.take_in(message)
+        if news is None:
+            return []
+        self._peers.stated(message.writer, message.body, now_s)
+        if news is News.OPENING:
+            self._awake(now_s)
+        elif news is News.CLAIM:
+            self._tasking.peer_claimed(now_s)
+        return []
+
+    def _start_clock(self, epoch: Epoch, now_s: float) -> list[Action]:
+        runs = epoch.phase is EpochPhase.RUNNING
+        if not (runs and self._picture.set_clock(epoch.mission_s, now_s)):
+            return []
+        self._awake(now_s)
+        return [Note("mission runs", {"mission_s": epoch.mission_s})]
+
+    def _learn_clock(self, told_s: Iterable[float | None], now_s: float) -> None:
+        known_s = [mission_s for mission_s in told_s if mission_s is not None]
+        if known_s and self._replica.epoch is not None:
+            self._picture.set_clock(max(known_s), now_s)
+
+    # -- who is there -----------------------------------------------------------------
+
+    def see(self, writer: str, now_s: float) -> list[Action]:
+        """The token of ``writer`` is there."""
+        if writer == self._uav or not self._peers.membership.seen(writer, now_s):
+            return []
+        return self._greet(writer, now_s)
+
+    def miss(self, writer: str, now_s: float) -> None:
+        """The token of ``writer`` has disappeared."""
+        if writer != self._uav:
+            self._peers.membership.gone(writer, now_s)
+
+    def link(self, up: bool, now_s: float) -> list[Action]:
+        """The own link came up or went down."""
+        self._peers.membership.link(up, now_s)
+        if not up or not self.learning.ever:
+            return []
+        self.learning.doubt(now_s)
+        return [*self._speech.announce(now_s)]
+
+    def held_up(self, now_s: float) -> list[Action]:
+        """This process was stopped or starved; what the others did meanwhile is unread."""
+        self._peers.membership.held_up(now_s)
+        self.learning.doubt(now_s)
+        return [Note("held up")]
+
+    def lose(self, now_s: float) -> list[Action]:
+        """Give up those who have been missing for long enough."""
+        actions: list[Action] = []
+        for writer, why in self._peers.lost(now_s):
+            claim = self._replica.claims.get(writer)
+            left = claim is not None and claim.phase is ClaimPhase.OUT
+            actions.append(Note("left" if left else "lost", {"writer": writer, "why": why}))
+            self._awake(now_s)
+            self.learning.want(now_s)  # others may have heard its last words
+        return actions
+
+    def _greet(self, writer: str, now_s: float) -> list[Action]:
+        """Somebody is there anew: tell it the own registers, and hear what it may know."""
+        actions, back = list[Action](), self._peers.back(writer)
+        if back:
+            actions.append(Note("back", {"writer": writer}))
+        if self.learning.ever:
+            actions += self._speech.announce(now_s)
+            if back or writer == COORDINATOR:
+                self.learning.want(now_s)
+        return actions
+
+    def _awake(self, now_s: float) -> None:
+        """A task may have opened: everyone who is free decides anew, in sequence order."""
+        self._peers.awake(now_s)
+        self._tasking.wake(now_s)
