@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
-.PHONY: demo test lint format kernels sanitize clean help
+.PHONY: demo test lint format kernels sanitize soak clean help
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
@@ -14,6 +14,7 @@ help:
 	@echo "make format  put the sources into shape"
 	@echo "make kernels build the C++ kernels again and write their type stub"
 	@echo "make sanitize  test the kernels under the address and undefined-behaviour sanitizers"
+	@echo "make soak    play 10000 random missions with faults in virtual time (SEEDS=N for more)"
 	@echo "make clean   remove what was built and installed here"
 
 demo: $(VENV)/.installed
@@ -68,6 +69,10 @@ $(VENV)/.installed: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/py
 $(VENV)/.installed-dev: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@ $(VENV)/.installed
+
+SEEDS ?= 10000
+soak: $(VENV)/.installed
+	$(BIN)/swarm soak --seeds $(SEEDS)
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

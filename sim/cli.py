@@ -204,19 +204,36 @@ def simulate(
             help="Delay of every message.",
         ),
     ] = 0.0,
+    faults: Annotated[
+        str | None,
+        typer.Option(
+            "--faults",
+            metavar="KINDS|FILE",
+            help="Let more go wrong: kinds of fault with commas between, all, or a file with a "
+            "schedule of them.",
+            show_default=False,
+        ),
+    ] = None,
     report: ReportOption = None,
     json: JsonOption = False,
 ) -> int:
     """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
 
     Vehicles are ideal. Without losses, pop-ups and delays the lists flown are exactly those
-    planned. Exit status 0: every task was done.
+    planned. With --faults the network and the clocks are like real ones, what goes wrong is told
+    on standard error in lines that a file may hold, and the invariants of a fleet are watched.
+    Exit status 0: every task was done, and no invariant broken.
 
     Examples:
         swarm simulate table-1
         swarm simulate valley-survey --loss 0.3 --popup 0.3 --seed 7
+        swarm simulate valley-survey --faults cut,crash --seed 7
     """
+    import sys
+
     from coordinator.planner.plan import check_online_method
+    from sim.faults.replay import fly_with_faults
+    from sim.faults.schedule import format_schedule
     from sim.simulate import simulate_mission
     from sim.uncertainty import Uncertainty
     from sim.view.report import MissionReport, check_report_path
@@ -226,16 +243,30 @@ def simulate(
     if report is not None:
         check_report_path(report)
     mission = load_scenario(scenario)
-    world = simulate_mission(
-        mission, method=method, seed=seed, uncertainty=Uncertainty(loss, popup), latency_s=latency_s
-    )
+    uncertainty, broken = Uncertainty(loss, popup), None
+    if faults is None:
+        world = simulate_mission(
+            mission, method=method, seed=seed, uncertainty=uncertainty, latency_s=latency_s
+        )
+    else:
+        if latency_s:
+            remedy = "leave it out, or ask for --faults weather"
+            raise InputError(Fault("--latency-s", "", "does not go with --faults", remedy))
+        verdict = fly_with_faults(
+            mission, method=method, seed=seed, uncertainty=uncertainty, faults=faults
+        )
+        world, broken = verdict.world, verdict.broken
+        print(format_schedule(verdict.case.schedule), end="", file=sys.stderr)
+        if broken is not None:
+            print(f"broken: {broken}", file=sys.stderr)
     told = MissionReport(
         mission=world.mission,
         plan=world.observer.plan,
         result=world.observer.result(),
         story=tuple(world.observer.story),
     )
-    return _tell(told, json=json, report=report)
+    status = _tell(told, json=json, report=report)
+    return status if broken is None else 1
 
 
 def _bus_kind(text: str) -> BusKind:

@@ -26,6 +26,8 @@ class VirtualVehicle:
     """
 
     def __init__(self, queue: EventQueue, report: Callable[[Report], None]) -> None:
+        self.speed_frac = 1.0
+        """Share of the ordered speed at which it flies from its next order on."""
         self._queue = queue
         self._report = report
         self._motion: IdealMotion | None = None
@@ -39,7 +41,8 @@ class VirtualVehicle:
             case Prepare():
                 self._prepare(order, ready)
             case GoTo(leg=leg, position_enu_m=target) if self._motion is not None:
-                self._motion.fly_to(target, self._speed_m_s, self._queue.now_s())
+                speed_m_s = self._speed_m_s * self.speed_frac
+                self._motion.fly_to(target, speed_m_s, self._queue.now_s())
                 arrives_s = self._motion.arrives_s
                 if arrives_s is not None:
                     self._later(arrives_s, Arrived(leg))

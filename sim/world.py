@@ -1,55 +1,66 @@
-"""A whole fleet in virtual time: the real cores, ideal vehicles, an ideal bus.
+"""A whole fleet in virtual time: the real cores, their vehicles, and what joins them.
 
-Everything follows from the mission and one seed. Messages arrive after a constant
-delay, in order; UAVs may be lost at given times. Leaves out: sockets, processes and
-autopilots (sim.launch), and how plans are made (passed in).
+Everything follows from the mission and one seed. By itself the world is ideal: messages
+arrive after a constant delay, in order, and UAVs may be lost at given times. `Setting` gives
+it a network on which more goes wrong, and clocks that disagree. Leaves out: sockets,
+processes and autopilots (sim.launch), how plans are made (passed in), and schedules of
+faults (sim.faults).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from functools import partial
+from typing import Protocol
 
 from agent.core import AgentCore
 from agent.events import Action as AgentAction
 from agent.events import Order
-from agent.vehicle import Report, VehicleReady
+from agent.vehicle import GoTo, Orders, Refused, Report, Telemetry, VehicleReady
 from coordinator.core import CoordinatorCore, FlightLayers
 from coordinator.events import Action as CoordinatorAction
 from coordinator.events import MakePlan, PlanMade
 from coordinator.observer import Observer
 from sim.event_queue import EventQueue
+from sim.network import IdealNetwork, Network
+from sim.processes import LocalClock, Process
 from sim.virtual_vehicle import VirtualVehicle
 from swarm.config import Timing
-from swarm.events import (
-    Ask,
-    BusFact,
-    Finish,
-    Heard,
-    Learned,
-    Note,
-    PeerGone,
-    PeerSeen,
-    Publish,
-    Save,
-    Tick,
-    Wish,
-)
+from swarm.events import Ask, Finish, Note, Publish, Save
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Epoch, EpochPhase, Message, Status
+from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
 
-__all__ = ["QUIET", "Faults", "World"]
+__all__ = ["ONLOOKER", "QUIET", "Faults", "Planner", "Recall", "Setting", "Watch", "World"]
 
 QUIET = Timing(announce_s=60.0, status_s=60.0, silence_s=150.0)
 """Timers for an ideal bus, on which nothing need be said twice."""
+ONLOOKER = "onlooker"
+"""Name of the process that only watches."""
+WRITE_S = 0.02
+"""Until what a process wants kept is on its disk."""
+
+Planner = Callable[[Mission, str, int], Plan]
+"""Plans a mission by method and seed."""
+
+
+class Recall(StrEnum):
+    """What a process that starts anew finds of its earlier life."""
+
+    DISK = "disk"
+    """What it had kept."""
+    NONE = "none"
+    """Nothing: its disk is empty."""
+    PAST = "past"
+    """What it had kept, but the machine's calendar clock went back to a time before that."""
 
 
 @dataclass(frozen=True, slots=True)
 class Faults:
-    """What goes wrong, and when.
+    """What is lost, and when.
 
     Raises:
         ValueError: a time is negative.
@@ -66,6 +77,46 @@ class Faults:
             raise ValueError(f"faults happen at mission times >= 0, not {times}")
 
 
+class Watch(Protocol):
+    """Is told all that happens."""
+
+    def said(self, process: Process, message: Message) -> None:
+        """``process`` publishes ``message``."""
+        ...
+
+    def stepped(self, process: Process) -> None:
+        """``process`` has made a step."""
+        ...
+
+    def raised(self, process: Process, fault: Exception) -> None:
+        """The core of ``process`` has raised."""
+        ...
+
+    def refused(self, process: Process, order: GoTo) -> None:
+        """The vehicle of ``process`` will not obey."""
+        ...
+
+    def noted(self, process: Process, note: Note) -> None:
+        """``process`` has written a line into its log."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What makes a world less than ideal."""
+
+    network: Callable[[EventQueue], Network]
+    """Makes the network."""
+    clocks: Mapping[str, LocalClock] = field(default_factory=dict)
+    """By process; the clocks of all others show virtual time."""
+    kept: Collection[str] = ()
+    """Processes whose disks are needed later."""
+    plan_s: float = 0.0
+    """How long planning takes [s]."""
+    telemetry_gap_s: float = 0.0
+    """Shortest interval at which vehicles tell where they are [s]."""
+
+
 class World:
     """One mission in virtual time.
 
@@ -74,181 +125,268 @@ class World:
         make_plan: plans a mission by method and seed.
         method: planning method.
         seed: of the planner.
-        faults: what goes wrong.
+        faults: what is lost.
         timing: timers [virtual s].
-        latency_s: delay of every message [s].
+        latency_s: delay of every message [s], unless the setting has a network of its own.
+        setting: what makes the world less than ideal.
+        watch: is told all that happens.
     """
 
     def __init__(
         self,
         mission: Mission,
-        make_plan: Callable[[Mission, str, int], Plan],
+        make_plan: Planner,
         *,
         method: str,
         seed: int,
         faults: Faults | None = None,
         timing: Timing = QUIET,
         latency_s: float = 0.0,
+        setting: Setting | None = None,
+        watch: Watch | None = None,
     ) -> None:
         self.mission = mission
         self.observer = Observer(mission, timing)
         self.finished: dict[str, int] = {}
         """Exit status of every process that ended by itself."""
+        self.queue = EventQueue()
+        self.zero_s: float | None = None
+        """Virtual time at which the mission began."""
+        self.steps = 0
+        """Of all processes so far."""
+        self.refuses: set[tuple[str, str]] = set()
+        """UAV and task, where the vehicle will not go."""
         self._make_plan = make_plan
+        self._method = method
+        self._seed = seed
+        self._timing = timing
         self._faults = faults or Faults()
-        self._latency_s = latency_s
-        self._queue = EventQueue()
-        self._wakes: dict[str, float] = {}
-        self._faults_scheduled = False
-        self._observer_wakes_s: float | None = None
-        self._coordinator = CoordinatorCore(
-            mission,
-            method=method,
-            seed=seed,
-            incarnation=1,
-            timing=timing,
-            start_timeout_s=60.0,
-            layers=FlightLayers(),
-        )
-        self._agents: dict[str, AgentCore] = {
-            uav.id: AgentCore(mission.name, uav.id, 1, timing) for uav in mission.uavs
-        }
-        self._vehicles = {uav: self._vehicle(uav) for uav in self._agents}
-        self._alive = {COORDINATOR, *self._agents}
+        self._setting = setting or Setting(lambda queue: IdealNetwork(queue, latency_s))
+        self.network = self._setting.network(self.queue)
+        self._watch = watch
+        self._disks: dict[str, tuple[float, Snapshot]] = {}
+        self._writing: dict[str, list[tuple[float, Snapshot]]] = {}
+        names = [ONLOOKER, COORDINATOR, *(uav.id for uav in mission.uavs)]
+        self._clocks = {name: self._setting.clocks.get(name, LocalClock()) for name in names}
+        self.processes = {name: self._process(name, 1_000_000) for name in names}
+        """The latest life of every process, by name."""
+        self._vehicles = {str(uav.id): self._vehicle(uav.id) for uav in mission.uavs}
+        self._commanders: dict[str, Process] = {}
 
     def run(self, limit_s: float = math.inf) -> bool:
         """Fly the mission; False if it was not over by ``limit_s`` of virtual time."""
-        self._execute_coordinator(self._coordinator.start(0.0))
-        for uav, agent in self._agents.items():
-            self._execute_agent(uav, agent.start(0.0))
-        for name in (COORDINATOR, *self._agents):  # a set would have another order in each process
-            self._tell_everyone(PeerSeen(name), sender=None)
-        return self._queue.run(limit_s) and not self._alive
+        for process in self.processes.values():
+            self.network.join(process)
+        for process in self.processes.values():
+            process.start()
+        return self.queue.run(limit_s) and not self.alive
+
+    @property
+    def alive(self) -> list[str]:
+        """Processes that neither ended nor were lost."""
+        return [n for n, process in self.processes.items() if n != ONLOOKER and not process.over]
+
+    @property
+    def agents(self) -> dict[str, AgentCore]:
+        """The latest core of every UAV."""
+        cores = {name: process.core for name, process in self.processes.items()}
+        return {name: core for name, core in cores.items() if isinstance(core, AgentCore)}
+
+    # -- what befalls processes -------------------------------------------------------
+
+    def lose(self, name: str) -> None:
+        """A process disappears, and with it the vehicle it flies."""
+        self.crash(name)
+        self._vehicles.pop(name, None)
+
+    def crash(self, name: str) -> None:
+        """A process dies; its vehicle flies on."""
+        process = self.processes[name]
+        if not process.over:
+            self._settle_disk(name)
+            self._writing.pop(name, None)
+            self._end(process)
+
+    def restart(self, name: str, memory: Recall) -> bool:
+        """Start a process anew that died; False if it did not, or for good."""
+        if not self.processes[name].over or name in self.finished:
+            return False
+        if name != COORDINATOR and name not in self._vehicles:
+            return False
+        wall_ms = 0 if memory is Recall.PAST else 1_000_000
+        kept = None if memory is Recall.NONE else self._disks.get(name)
+        process = self._process(name, wall_ms + round(1e3 * self.queue.now_s()), kept, memory)
+        self.processes[name] = process
+        self.network.join(process)
+        process.start()
+        return True
+
+    def slow(self, uav: str, speed_frac: float) -> None:
+        """Let a vehicle fly at that share of its speed, from its next order on."""
+        if uav in self._vehicles:
+            self._vehicles[uav].speed_frac = speed_frac
+
+    def withdraw(self, task: str) -> None:
+        """Take a task off the board."""
+
+    def skew(self, name: str, by_s: float) -> None:
+        """Let the clock of a process jump forward."""
+        self._clocks[name].offset_s += by_s
+
+    # -- what processes want ----------------------------------------------------------
+
+    def execute(self, process: Process, action: AgentAction | CoordinatorAction) -> None:
+        """Carry out an action of a core."""
+        match action:
+            case Publish(message):
+                self._publish(process, message)
+            case Order(order):
+                self._order(process, order)
+            case Ask():
+                self.network.ask(process)
+            case MakePlan(request, mission, method, seed):
+                plan = self._make_plan(mission, method, seed)
+                if self.observer.plan is None or self.zero_s is None:
+                    self.observer.plan = plan
+                made = partial(process.step, PlanMade(request, plan))
+                self.queue.after(self._setting.plan_s, made)
+            case Save() if process.name in self._setting.kept:
+                self._settle_disk(process.name)
+                memory: Snapshot = process.core.memory(process.now_s())  # type: ignore[attr-defined]  # who saves has one
+                self._writing.setdefault(process.name, []).append((self.queue.now_s(), memory))
+            case Finish(status):
+                self.finished[process.name] = status
+                self._end(process)
+            case Note() if self._watch is not None:
+                self._watch.noted(process, action)
+            case _:
+                pass
+
+    def stepped(self, process: Process) -> None:
+        """A step with all its actions is over."""
+        self.steps += 1
+        if self._watch is not None:
+            self._watch.stepped(process)
+
+    def raised(self, process: Process, fault: Exception) -> None:
+        """A core has raised.
+
+        Raises:
+            Exception: ``fault``, when nobody watches.
+        """
+        if self._watch is None:
+            raise fault
+        self._end(process)
+        self._watch.raised(process, fault)
+
+    def _publish(self, process: Process, message: Message) -> None:
+        running = isinstance(message.body, Epoch) and message.body.phase is EpochPhase.RUNNING
+        if running and self.zero_s is None:
+            self.zero_s = self.queue.now_s()
+            self._schedule_faults(self.zero_s)
+        if self._watch is not None:
+            self._watch.said(process, message)
+        self.network.publish(process, message)
+
+    def _order(self, process: Process, order: Orders) -> None:
+        vehicle = self._vehicles[process.name]
+        task = self._refused_task(process.name, order)
+        if isinstance(order, GoTo) and task is not None:
+            if self._watch is not None:
+                self._watch.refused(process, order)
+            refused = Refused(order, "will not go there")
+            self.queue.after(0.0, lambda: process.step(refused))
+            return
+        self._commanders[process.name] = process
+        vehicle.order(order, VehicleReady())
+
+    def _refused_task(self, uav: str, order: Orders) -> str | None:
+        """The task that ``order`` flies to and the vehicle will not."""
+        if not self.refuses or not isinstance(order, GoTo):
+            return None
+        target = order.position_enu_m[:2]
+        tasks = (task.id for task in self.mission.tasks if task.position_enu_m[:2] == target)
+        return next((task for task in tasks if (uav, task) in self.refuses), None)
+
+    def _vehicle(self, uav: str) -> VirtualVehicle:
+        def report(news: Report) -> None:
+            # A process that starts anew knows nothing of what an earlier one had ordered.
+            commander = self._commanders.get(uav)
+            if uav in self._vehicles and commander is self.processes[uav]:
+                commander.step(news)
+
+        return VirtualVehicle(self.queue, report)
+
+    def _telemetry(self, uav: str) -> Telemetry | None:
+        return self._vehicles[uav].telemetry()
 
     # -- processes --------------------------------------------------------------------
 
-    def _step(self, name: str, event: BusFact | Report | PlanMade) -> None:
-        if name not in self._alive:
-            return
-        now_s = self._queue.now_s()
+    def _process(
+        self,
+        name: str,
+        incarnation: int,
+        kept: tuple[float, Snapshot] | None = None,
+        memory: Recall = Recall.NONE,
+    ) -> Process:
+        new = partial(Process, name, clock=self._clocks[name], queue=self.queue, owner=self)
+        if name == ONLOOKER:
+            return new(None, self.observer)
+        age_s, known = self._recall(kept, memory)
         if name == COORDINATOR:
-            if not isinstance(event, Report):
-                self._execute_coordinator(self._coordinator.step(event, now_s))
-            return
-        if isinstance(event, PlanMade):
-            return
-        agent = self._agents[name]
-        telemetry = self._vehicles[name].telemetry()
-        if isinstance(event, Heard) and telemetry is not None:
-            self._execute_agent(name, agent.step(telemetry, now_s))
-        self._execute_agent(name, agent.step(event, now_s))
+            coordinator = CoordinatorCore(
+                self.mission,
+                method=self._method,
+                seed=self._seed,
+                incarnation=incarnation,
+                timing=self._timing,
+                start_timeout_s=60.0,
+                layers=FlightLayers(),
+                memory=known,
+                memory_age_s=age_s,
+            )
+            return new(name, coordinator, snapshot=coordinator.snapshot)
+        agent = AgentCore(
+            self.mission.name,
+            name,
+            incarnation,
+            self._timing,
+            memory=known,
+            memory_age_s=age_s,
+        )
+        return new(
+            name,
+            agent,
+            snapshot=agent.snapshot,
+            telemetry=partial(self._telemetry, name),
+            telemetry_gap_s=self._setting.telemetry_gap_s,
+        )
 
-    def _execute_coordinator(self, actions: list[CoordinatorAction]) -> None:
-        for action in actions:
-            if isinstance(action, MakePlan):
-                plan = self._make_plan(action.mission, action.method, action.seed)
-                self.observer.plan = plan
-                made = PlanMade(action.request, plan)
-                self._queue.at(self._queue.now_s(), partial(self._step, COORDINATOR, made))
-            else:
-                self._execute_common(COORDINATOR, action)
-        self._wake(COORDINATOR, self._coordinator.next_deadline_s())
+    def _recall(
+        self, kept: tuple[float, Snapshot] | None, memory: Recall
+    ) -> tuple[float, Snapshot | None]:
+        """Age of what was kept, and the memory brought to now, as far as a clock can tell."""
+        if kept is None:
+            return 0.0, None
+        saved_s, snapshot = kept
+        if memory is Recall.PAST:
+            return math.inf, replace(snapshot, mission_s=None)
+        age_s, mission_s = self.queue.now_s() - saved_s, snapshot.mission_s
+        return age_s, replace(snapshot, mission_s=None if mission_s is None else mission_s + age_s)
 
-    def _execute_agent(self, uav: str, actions: list[AgentAction]) -> None:
-        for action in actions:
-            if isinstance(action, Order):
-                self._vehicles[uav].order(action.order, VehicleReady())
-            else:
-                self._execute_common(uav, action)
-        self._wake(uav, self._agents[uav].next_deadline_s())
+    def _settle_disk(self, name: str) -> None:
+        """Whatever has been written long enough ago is on the disk."""
+        written_s, writing = self.queue.now_s() - WRITE_S, self._writing.get(name, [])
+        while writing and writing[0][0] <= written_s:
+            self._disks[name] = writing.pop(0)
 
-    def _execute_common(self, name: str, action: Wish) -> None:
-        match action:
-            case Publish(message):
-                self._publish(name, message)
-            case Ask():
-                self._later(self._latency_s, lambda: self._answer(name))
-            case Note() | Save():
-                pass
-            case Finish(status):
-                self.finished[name] = status
-                self._leave(name)
-
-    def _wake(self, name: str, deadline_s: float | None) -> None:
-        """Tick at the deadline, unless an earlier tick is already under way."""
-        if deadline_s is None or deadline_s >= self._wakes.get(name, math.inf):
-            return
-        self._wakes[name] = deadline_s
-
-        def tick() -> None:
-            if self._wakes.get(name) == deadline_s:
-                del self._wakes[name]
-                self._step(name, Tick())
-                core = self._coordinator if name == COORDINATOR else self._agents[name]
-                if name in self._alive:
-                    self._wake(name, core.next_deadline_s())
-
-        self._queue.at(deadline_s, tick)
+    def _end(self, process: Process) -> None:
+        process.over = True
+        self.network.leave(process)
 
     def _schedule_faults(self, zero_s: float) -> None:
         """Mission time has begun: from now on things may go wrong."""
-        if self._faults_scheduled:
-            return
-        self._faults_scheduled = True
         for uav, lost_at_s in self._faults.lost_at_s.items():
-            self._queue.at(zero_s + lost_at_s, partial(self._lose, uav))
+            self.queue.at(zero_s + lost_at_s, partial(self.lose, uav))
         if (lost_at := self._faults.coordinator_lost_at_s) is not None:
-            self._queue.at(zero_s + lost_at, lambda: self._lose(COORDINATOR))
-
-    def _lose(self, name: str) -> None:
-        if name in self._alive:
-            self._leave(name)
-
-    def _leave(self, name: str) -> None:
-        self._alive.discard(name)
-        self._tell_everyone(PeerGone(name), sender=name)
-
-    def _vehicle(self, uav: str) -> VirtualVehicle:
-        return VirtualVehicle(self._queue, lambda report: self._step(uav, report))
-
-    # -- bus ----------------------------------------------------------------------------
-
-    def _publish(self, sender: str, message: Message) -> None:
-        if isinstance(message.body, Epoch) and message.body.phase is EpochPhase.RUNNING:
-            self._schedule_faults(self._queue.now_s() - message.body.mission_s)
-        if isinstance(message.body, Status):
-            self._later(self._latency_s, lambda: self._observe(Heard(message)))
-            return
-        self._tell_everyone(Heard(message), sender=sender)
-
-    def _tell_everyone(self, fact: BusFact, sender: str | None) -> None:
-        def tell() -> None:
-            self._observe(fact)
-            for name in (COORDINATOR, *self._agents):
-                if name != sender:
-                    self._step(name, fact)
-
-        self._later(self._latency_s, tell)
-
-    def _answer(self, asker: str) -> None:
-        now_s = self._queue.now_s()
-        cores: dict[str, CoordinatorCore | AgentCore] = {
-            COORDINATOR: self._coordinator,
-            **self._agents,
-        }
-        snapshots = tuple(
-            core.snapshot(now_s)
-            for name, core in cores.items()
-            if name in self._alive and name != asker
-        )
-        self._later(self._latency_s, lambda: self._step(asker, Learned(snapshots)))
-
-    def _observe(self, fact: BusFact) -> None:
-        self.observer.step(fact, self._queue.now_s())
-        deadline_s = self.observer.next_deadline_s()
-        if deadline_s is not None and self._observer_wakes_s != deadline_s:
-            self._observer_wakes_s = deadline_s
-            self._queue.at(deadline_s, lambda: self._observe(Tick()))
-
-    def _later(self, delay_s: float, callback: Callable[[], None]) -> None:
-        self._queue.at(self._queue.now_s() + delay_s, callback)
+            self.queue.at(zero_s + lost_at, partial(self.lose, COORDINATOR))

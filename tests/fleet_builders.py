@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 
 import numpy as np
 
-from agent.vehicle import Report
-from coordinator.events import PlanMade
+from agent.events import Action as AgentAction
+from coordinator.events import Action as CoordinatorAction
 from coordinator.planner.plan import make_plan
 from coordinator.planner.stop import after_evaluations
-from sim.world import QUIET, Faults, World
+from sim.processes import Process
+from sim.world import QUIET, Faults, Planner, World
 from swarm.clock import SystemClock
 from swarm.config import Timing
-from swarm.events import BusFact
+from swarm.events import Publish
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
-from swarm.wire.messages import Claim, Message
+from swarm.wire.messages import Claim
 
 __all__ = ["WatchedWorld", "able_uavs", "plan_for", "random_mission"]
 
@@ -86,7 +87,7 @@ class WatchedWorld(World):
     def __init__(
         self,
         mission: Mission,
-        make_plan: Callable[[Mission, str, int], Plan] = plan_for,
+        make_plan: Planner = plan_for,
         *,
         method: str = "greedy",
         seed: int = 0,
@@ -103,35 +104,24 @@ class WatchedWorld(World):
             timing=timing,
             latency_s=latency_s,
         )
+        self.latency_s = latency_s
         self.claimed: list[tuple[float, str, Claim]] = []
         """Every claim as it was made: virtual time, UAV, claim."""
         self.shared_s: dict[tuple[str, str, str], float] = {}
         """Longest time for which two living UAVs claimed one task, by both and the task [s]."""
         self._shared_since_s: dict[tuple[str, str, str], float] = {}
 
-    @property
-    def alive(self) -> set[str]:
-        """Processes that neither ended nor were lost."""
-        return self._alive
+    def execute(self, process: Process, action: AgentAction | CoordinatorAction) -> None:
+        if isinstance(action, Publish) and isinstance(action.message.body, Claim):
+            self.claimed.append((self.queue.now_s(), process.name, action.message.body))
+        super().execute(process, action)
 
-    def lose_at(self, time_s: float, name: str) -> None:
-        """Let a process disappear at that virtual time, also before the mission starts."""
-        self._queue.at(time_s, lambda: self._lose(name))
-
-    def _step(self, name: str, event: BusFact | Report | PlanMade) -> None:
-        super()._step(name, event)
-        self._watch()
-
-    def _publish(self, sender: str, message: Message) -> None:
-        if isinstance(message.body, Claim):
-            self.claimed.append((self._queue.now_s(), sender, message.body))
-        super()._publish(sender, message)
-
-    def _watch(self) -> None:
-        now_s, by_task, shared = self._queue.now_s(), dict[str, list[str]](), set()
-        for uav, agent in self._agents.items():
+    def stepped(self, process: Process) -> None:
+        super().stepped(process)
+        now_s, by_task, shared = self.queue.now_s(), dict[str, list[str]](), set()
+        for uav, agent in self.agents.items():
             claim = agent.claim
-            if uav in self._alive and claim is not None and claim.task is not None:
+            if not self.processes[uav].over and claim is not None and claim.task is not None:
                 for other in by_task.setdefault(claim.task, []):
                     shared.add((other, uav, claim.task))
                 by_task[claim.task].append(uav)

@@ -77,12 +77,12 @@ def watch(
 
     def frame() -> None:
         if see is not None:
-            see(world.observer, world._queue.now_s())
-        if step_s is not None and world._alive:
-            world._queue.at(world._queue.now_s() + step_s, frame)
+            see(world.observer, world.queue.now_s())
+        if step_s is not None and world.alive:
+            world.queue.at(world.queue.now_s() + step_s, frame)
 
     if step_s is not None:
-        world._queue.at(step_s / 10.0, frame)
+        world.queue.at(step_s / 10.0, frame)
     assert world.run(limit_s=100_000.0)
     frame()
     return world.observer

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_tasks_are_done_as_long_as_one_capable_uav_is_left(seed: int) -> None:
 def test_two_living_uavs_share_a_claim_only_while_news_is_under_way(seed: int) -> None:
     world = flown(seed)
 
-    assert all(shared_s <= world._latency_s + 1e-9 for shared_s in world.shared_s.values())
+    assert all(shared_s <= world.latency_s + 1e-9 for shared_s in world.shared_s.values())
     assert world.observer.result().duplicate_visits == 0
 
 
@@ -69,7 +69,7 @@ def test_two_living_uavs_share_a_claim_only_while_news_is_under_way(seed: int) -
 def test_no_task_is_claimed_before_it_appears(seed: int) -> None:
     world = flown(seed)
 
-    zero_s = world._coordinator._zero_s
+    zero_s = world.zero_s
     assert zero_s is not None
     appears_s = {task.id: task.appears_s for task in world.mission.tasks}
     for made_s, _, claim in world.claimed:
@@ -104,7 +104,7 @@ def test_one_who_is_lost_before_the_start_is_planned_around() -> None:
         rng = np.random.default_rng([seed, 5])
         mission = random_mission(rng, n_uav=4, n_task=8, incapable_frac=0.0)
         world = WatchedWorld(mission, latency_s=0.02)
-        world.lose_at(0.03, "u2")
+        world.queue.at(0.03, partial(world.lose, "u2"))
 
         assert world.run(limit_s=1e5)
 

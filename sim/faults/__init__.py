@@ -1,0 +1,1 @@
+"""Faults in virtual time: schedules of them, what must hold all the same, and the search."""

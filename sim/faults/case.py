@@ -1,0 +1,263 @@
+"""One flight with faults: a fleet drawn from a seed or a scenario, and a schedule; played.
+
+Leaves out: how schedules are made up (sim.faults.generator) and made smaller
+(sim.faults.shrink).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from sim.event_queue import EventQueue
+from sim.faults.bugs import BUGS
+from sim.faults.director import Director
+from sim.faults.judge import Judge
+from sim.faults.schedule import Disturbance, Kind, format_schedule, parse_schedule
+from sim.faults.testimony import Broken
+from sim.processes import LocalClock
+from sim.rough_network import Conditions, RoughNetwork, Topology
+from sim.streams import stream
+from sim.world import ONLOOKER, Planner, Setting, World
+from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
+from swarm.config import Timing
+from swarm.errors import Fault as InputFault
+from swarm.errors import InputError
+from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
+from swarm.model.ids import COORDINATOR
+
+__all__ = [
+    "MOST_TASKS",
+    "MOST_UAVS",
+    "Case",
+    "Verdict",
+    "format_case",
+    "parse_case",
+    "play",
+    "quick_plan",
+]
+
+MOST_UAVS: Final = 6
+MOST_TASKS: Final = 15
+TIMING: Final = Timing(status_s=2.0)
+"""The defaults, with a calmer status: nothing but the count of steps depends on it here."""
+CLOCK_PPM: Final = 100.0
+AREA_M: Final = 120.0
+KINDS_OF_TASK: Final = ("look", "lift")
+_HEADER = re.compile(r"fleet((?: [a-z]+=[\w-]+)+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One flight with faults, from which everything else follows.
+
+    Raises:
+        ValueError: too many UAVs or tasks, or an unknown bug.
+    """
+
+    seed: int
+    uavs: int
+    tasks: int
+    popups: int = 0
+    """How many of the tasks appear only during the mission."""
+    topology: Topology = Topology.ROUTER
+    method: str = "greedy"
+    bug: str = ""
+    """A protocol bug put in on purpose; see `sim.faults.bugs`."""
+    schedule: tuple[Disturbance, ...] = ()
+    mission: Mission | None = None
+    """Flown instead of one drawn from the seed."""
+
+    def __post_init__(self) -> None:
+        drawn = self.mission is None
+        if drawn and not (1 <= self.uavs <= MOST_UAVS and 1 <= self.tasks <= MOST_TASKS):
+            raise ValueError(f"1..{MOST_UAVS} UAVs and 1..{MOST_TASKS} tasks")
+        if self.bug and self.bug not in BUGS:
+            raise ValueError(f"{self.bug!r} is none of {', '.join(BUGS)}")
+
+    def flown(self) -> Mission:
+        """The mission."""
+        if self.mission is not None:
+            return self.mission
+        return _random_mission(self.seed, self.uavs, self.tasks, self.popups)
+
+    def processes(self) -> tuple[str, ...]:
+        """Names of all processes that a fault may befall."""
+        return (COORDINATOR, ONLOOKER, *(uav.id for uav in self.flown().uavs))
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What came of a case."""
+
+    case: Case
+    broken: Broken | None
+    """The first invariant that did not hold."""
+    steps: int
+    world: World
+
+
+def quick_plan(mission: Mission, method: str, seed: int) -> Plan:
+    """The greedy lists of a random sequence: how good a plan is does not matter here."""
+    problem = Problem.from_mission(mission.known_at_start())
+    sequence = stream(seed, "sequence").permutation(problem.n_uav).tolist()
+    start, rule = TeamState.at_start(problem), rule_by_name("greedy")
+    routes, _ = run(problem, start, rank_of(sequence), rule)
+    objective, completion_s = evaluate(problem, routes)
+    lists = {
+        uav: tuple(problem.task_ids[task] for task in route)
+        for uav, route in zip(problem.uav_ids, routes, strict=True)
+    }
+    return Plan(
+        scenario=mission.name,
+        method=method,
+        routes=lists,
+        objective=objective,
+        completion_s={t: float(completion_s[i]) for i, t in enumerate(problem.task_ids)},
+        sequence=tuple(problem.uav_ids[uav] for uav in sequence),
+        optimum=None,
+        evaluations=1,
+        elapsed_s=0.0,
+        seed=seed,
+    )
+
+
+def play(case: Case, make_plan: Planner = quick_plan) -> Verdict:
+    """Fly ``case`` to its end, or until an invariant breaks."""
+    network: list[RoughNetwork] = []
+
+    def make_network(queue: EventQueue) -> RoughNetwork:
+        network.append(RoughNetwork(queue, Conditions(case.topology), case.seed))
+        return network[0]
+
+    mission, judge = case.flown(), Judge()
+    bug: AbstractContextManager[None] = BUGS[case.bug]() if case.bug else nullcontext()
+    with bug:
+        world = World(
+            mission,
+            make_plan,
+            method=case.method,
+            seed=case.seed,
+            timing=TIMING,
+            setting=Setting(
+                network=make_network,
+                clocks=_clocks(case),
+                kept={each.names[0] for each in case.schedule if each.kind is Kind.CRASH},
+                plan_s=0.05,
+                telemetry_gap_s=0.2,
+            ),
+            watch=judge,
+        )
+        director = Director(world, network[0], case.schedule)
+        judge.attend(world, network[0], director)
+        world.run(limit_s(case))
+        judge.conclude()
+    return Verdict(case, judge.broken, world.steps, world)
+
+
+def limit_s(case: Case) -> float:
+    """By then every living agent must be home: one UAV alone could have done it all.
+
+    The slowest flies from task to task across the area; refusals, a missing coordinator and
+    a stalemate take their time.
+    """
+    mission = case.flown()
+    last_s = max((each.ends_s for each in case.schedule), default=0.0)
+    slow = min((e.amount or 1.0 for e in case.schedule if e.kind is Kind.SLOW), default=1.0)
+    starts = [uav.position_enu_m for uav in mission.uavs]
+    places = np.array([*starts, *(task.position_enu_m for task in mission.tasks)])
+    across_m = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
+    speed_m_s = slow * min(uav.speed_m_s for uav in mission.uavs)
+    appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
+    work_s = sum(task.service_s + across_m / speed_m_s for task in mission.tasks)
+    waits_s = TIMING.abandon_s + TIMING.stalemate_s + 2.0 * TIMING.reconsider_s + 60.0
+    return max(last_s, appears_s) + work_s + waits_s
+
+
+def format_case(case: Case) -> str:
+    """Lines that `parse_case` reads: the fleet, unless it is a scenario's, then the schedule."""
+    facts = {"seed": case.seed, "uavs": case.uavs, "tasks": case.tasks, "popups": case.popups}
+    words = {**facts, "topology": case.topology.value, "method": case.method, "bug": case.bug}
+    header = " ".join(f"{key}={value}" for key, value in words.items() if value != "")
+    return f"fleet {header}\n{format_schedule(case.schedule)}"
+
+
+def parse_case(lines: Iterable[str], source: str) -> Case:
+    """The case that `format_case` wrote, or a person.
+
+    Raises:
+        InputError: a line cannot be understood.
+    """
+    remedy = "begin with: fleet seed=N uavs=N tasks=N"
+    text = list(lines)
+    first = next((n for n, line in enumerate(text) if line.partition("#")[0].strip()), 0)
+    found = _HEADER.fullmatch(text[first].strip()) if text else None
+    if found is None:
+        raise InputError(InputFault(source, f"line {first + 1}", "no fleet", remedy))
+    words = dict(word.split("=", 1) for word in found[1].split())
+    try:
+        case = Case(
+            seed=int(words.pop("seed", "0")),
+            uavs=int(words.pop("uavs", "0")),
+            tasks=int(words.pop("tasks", "0")),
+            popups=int(words.pop("popups", "0")),
+            topology=Topology(words.pop("topology", Topology.ROUTER.value)),
+            method=words.pop("method", "greedy"),
+            bug=words.pop("bug", ""),
+        )
+        if words:
+            raise ValueError(f"unknown: {', '.join(words)}")
+    except ValueError as fault:
+        raise InputError(InputFault(source, f"line {first + 1}", str(fault), remedy)) from None
+    text[first] = ""
+    tasks = [task.id for task in case.flown().tasks]
+    return replace(case, schedule=parse_schedule(text, source, case.processes(), tasks))
+
+
+@lru_cache(maxsize=64)
+def _random_mission(seed: int, uavs: int, tasks: int, popups: int) -> Mission:
+    """Drawn as the largest of its seed, so that a smaller one is a part of the larger."""
+    rng = stream(seed, "mission")
+    fleet = []
+    for number in range(MOST_UAVS):
+        success = {kind: float(rng.uniform(0.3, 1.0)) for kind in KINDS_OF_TASK}
+        if rng.random() < 0.3:
+            success[str(rng.choice(KINDS_OF_TASK))] = 0.0
+        survival = {kind: float(rng.uniform(0.8, 1.0)) for kind in KINDS_OF_TASK}
+        start, speed_m_s = _point(rng, AREA_M / 3.0), float(rng.uniform(4.0, 15.0))
+        fleet.append(Uav(UavId(f"u{number}"), start, speed_m_s, success, survival))
+    board = []
+    for number in range(MOST_TASKS):
+        appears_s = float(rng.uniform(1.0, 25.0))
+        board.append(
+            Task(
+                TaskId(f"t{number}"),
+                _point(rng, AREA_M),
+                value=float(rng.uniform(0.5, 7.0)),
+                service_s=float(rng.uniform(0.0, 4.0) * rng.integers(0, 2)),
+                kind=str(rng.choice(KINDS_OF_TASK)),
+                appears_s=appears_s if number < popups else 0.0,
+            )
+        )
+    return Mission(f"random-{seed}", 300.0, tuple(fleet[:uavs]), tuple(board[:tasks]))
+
+
+def _point(rng: np.random.Generator, size_m: float) -> tuple[float, float, float]:
+    east_m, north_m = rng.uniform(0.0, size_m, 2).tolist()
+    return east_m, north_m, 0.0
+
+
+def _clocks(case: Case) -> dict[str, LocalClock]:
+    """No two clocks show the same, or run quite as fast."""
+    clocks = {}
+    for name in case.processes():
+        rng = stream(case.seed, "clock", name)
+        rate = 1.0 + 1e-6 * float(rng.uniform(-CLOCK_PPM, CLOCK_PPM))
+        clocks[name] = LocalClock(float(rng.uniform(0.0, 1e4)), rate)
+    return clocks

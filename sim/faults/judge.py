@@ -1,0 +1,250 @@
+"""What must hold of a whole fleet in virtual time, after every step and at the end.
+
+Beside the invariants of the messages (sim.faults.testimony):
+
+- *raises*, *never rests*: no core raises, or is busy without time passing;
+- *suspects without link*: no process gives another up while its own link is down;
+- *claimed twice*: once everything has been calm for `SETTLED_S`, no two living UAVs that can
+  talk to each other claim one task for longer than that;
+- *disagree*: and each knows what the others claim, the epoch in force and the board;
+- *winners differ*: whenever two have equal registers, they see the same states and winners;
+- *task lost*: in the end each posted task is done, failed, withdrawn, or open with no UAV
+  able to do it that came home of its own accord;
+- *not home*: every living agent ends within `Judge.limit_s`;
+- *miscounted*: the onlooker knows the visits of every UAV that left in calm, invents none, and
+  counts as duplicates just what it knows of.
+
+UAVs that were cut off or died may have done what nobody could hear of; nothing is claimed
+about the counting of that. Leaves out: how faults come about (sim.faults.director).
+"""
+
+from __future__ import annotations
+
+import itertools
+import traceback
+from collections.abc import Iterator
+
+from agent.core import AgentCore
+from agent.vehicle import GoTo
+from sim.faults.director import Director
+from sim.faults.testimony import Broken, Testimony
+from sim.processes import Process
+from sim.rough_network import RoughNetwork
+from sim.world import World
+from swarm.events import Note
+from swarm.state.board import TaskState
+from swarm.state.claims import holders
+from swarm.wire.messages import Message, Result, StatusPhase
+
+__all__ = ["SETTLED_S", "Judge"]
+
+SETTLED_S = 5.0
+"""Calm for this long, the fleet must agree."""
+LOOK_EVERY_S = 0.5
+STEPS_AT_ONCE = 3000
+"""More steps of all processes without time passing are a loop."""
+_IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
+
+
+class Judge:
+    """Watches one world; see `sim.world.Watch`.
+
+    The first breach ends the run.
+    """
+
+    def __init__(self) -> None:
+        self.testimony = Testimony()
+        self._world: World | None = None
+        self._network: RoughNetwork | None = None
+        self._director: Director | None = None
+        self._lives: dict[Process, int] = {}
+        self._changed_s: dict[str, float] = {}
+        self._steps = 0
+        self._steps_at_s = 0.0
+        self._left_in_calm: set[str] = set()
+        self._shared_since_s: dict[tuple[Process, Process, str], float] = {}
+
+    @property
+    def broken(self) -> Broken | None:
+        """The first invariant that did not hold."""
+        return next(iter(self.testimony.broken), None)
+
+    def attend(self, world: World, network: RoughNetwork, director: Director) -> None:
+        """Watch this world, which has not begun."""
+        self._world, self._network, self._director = world, network, director
+        world.queue.at(LOOK_EVERY_S, self._look)
+
+    # -- while it runs ----------------------------------------------------------------
+
+    def said(self, process: Process, message: Message) -> None:
+        """``process`` publishes ``message``."""
+        now_s, testimony = self._now_s, self.testimony
+        life = self._lives.setdefault(process, len(self._lives))
+        self._changed_s[process.name] = now_s
+        testimony.said(now_s, process.name, life, message)
+        self._stop_if_broken()
+
+    def stepped(self, process: Process) -> None:
+        """``process`` has made a step."""
+        now_s = self._now_s
+        self._steps = self._steps + 1 if now_s == self._steps_at_s else 0
+        self._steps_at_s = now_s
+        if self._steps > STEPS_AT_ONCE:
+            self._break("never rests", f"{process.name} steps on and on without time passing")
+        if process.over and self._calm_for_s > SETTLED_S:
+            self._left_in_calm.add(process.name)
+
+    def raised(self, process: Process, fault: Exception) -> None:
+        """The core of ``process`` has raised."""
+        where = traceback.extract_tb(fault.__traceback__)[-1]
+        place = f"{where.filename.rpartition('/')[2]}:{where.lineno}"
+        self._break("raises", f"{process.name}: {type(fault).__name__}: {fault} ({place})")
+
+    def refused(self, process: Process, order: GoTo) -> None:
+        """The vehicle of ``process`` will not obey."""
+        for task in self._there.mission.tasks:
+            if task.position_enu_m[:2] == order.position_enu_m[:2]:
+                self.testimony.refused(process.name, task.id)
+
+    def noted(self, process: Process, note: Note) -> None:
+        """``process`` has written a line into its log."""
+        if note.text == "lost" and not process.linked:
+            text = f"{process.name} gives {note.fields['writer']} up while its own link is down"
+            self._break("suspects without link", text)
+
+    def _look(self) -> None:
+        if self._there.alive:
+            self._there.queue.after(LOOK_EVERY_S, self._look)
+        agents = [(p, core) for p, core in self._living() if isinstance(core, AgentCore)]
+        self._look_for_shared_tasks(agents)
+        self._look_for_equal_registers(agents)
+        if self._calm_for_s > SETTLED_S:
+            self._look_for_disagreement(agents)
+        self._stop_if_broken()
+
+    def _look_for_shared_tasks(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        now_s, shared = self._now_s, set()
+        for (one, core), (other, rival) in itertools.combinations(agents, 2):
+            task = core.claim.task if core.claim is not None else None
+            same = rival.claim is not None and rival.claim.task == task
+            if task is not None and same and self._joined(one, other):
+                shared.add((one, other, task))
+        for key in shared:
+            since_s = self._shared_since_s.setdefault(key, now_s)
+            if min(now_s - since_s, self._calm_for_s) > SETTLED_S:
+                one, other, task = key
+                text = f"{one.name} and {other.name} both claim {task} since {since_s:.2f} s"
+                self._break("claimed twice", text)
+        for key in self._shared_since_s.keys() - shared:
+            del self._shared_since_s[key]
+
+    def _look_for_equal_registers(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        for (one, core), (other, peer) in itertools.combinations(agents, 2):
+            mine, its = core.replica, peer.replica
+            if mine.claims == its.claims and list(mine.messages()) == list(its.messages()):
+                states = _task_states(core), _task_states(peer)
+                if holders(mine.claims) != holders(its.claims) or states[0] != states[1]:
+                    text = f"{one.name} and {other.name} know the same and see it differently"
+                    self._break("winners differ", text)
+
+    def _look_for_disagreement(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        settled_s = self._now_s - SETTLED_S
+        for (one, core), (other, peer) in itertools.permutations(agents, 2):
+            quiet = self._changed_s.get(other.name, 0.0) < settled_s
+            if quiet and self._joined(one, other):
+                known = core.replica.claims.get(other.name)
+                if known != peer.replica.claims.get(other.name):
+                    self._break("disagree", f"{one.name} takes {other.name} to claim {known}")
+
+    # -- in the end -------------------------------------------------------------------
+
+    def conclude(self) -> None:
+        """Judge what has come of it."""
+        if self.broken is None:
+            self._look_for_the_missing()
+        if self.broken is None:
+            self._look_for_lost_tasks()
+        if self.broken is None:
+            self._look_at_the_count()
+
+    def _look_for_the_missing(self) -> None:
+        left = [p.name for p, core in self._living() if isinstance(core, AgentCore)]
+        if left:
+            self._break("not home", f"{', '.join(left)} still there")
+
+    def _look_for_lost_tasks(self) -> None:
+        testimony, world = self.testimony, self._there
+        settled = testimony.done | testimony.failed | testimony.withdrawn
+        home = [u for u in world.mission.uavs if world.finished.get(u.id) == 0]
+        for task in world.mission.tasks:
+            if task.id not in testimony.posted or task.id in settled:
+                continue
+            able = [
+                uav.id
+                for uav in home
+                if world.mission.success(uav, task) > 0.0 and (uav.id, task.id) not in world.refuses
+            ]
+            if able:
+                text = f"{task.id} is open, though {', '.join(able)} could have done it"
+                self._break("task lost", text)
+
+    def _look_at_the_count(self) -> None:
+        observer, true = self._there.observer, self.testimony.visits
+        known = {
+            key: outcome.attempt
+            for key, outcome in observer.replica.outcomes.items()
+            if outcome.result is Result.DONE
+        }
+        for key, attempts in true.items():
+            if key[0] in self._left_in_calm and key not in known:
+                self._break("miscounted", f"nobody knows that {key[0]} visited {key[1]}")
+            elif key in known and known[key] not in attempts:
+                self._break("miscounted", f"{key[0]} never visited {key[1]} {known[key]} times")
+        told = observer.result().duplicate_visits
+        visits = sum(known.values())
+        if told != visits - len({task for _, task in known}):
+            self._break("miscounted", f"{told} duplicates told, {visits} visits known")
+
+    # -- pieces -----------------------------------------------------------------------
+
+    def _living(self) -> Iterator[tuple[Process, object]]:
+        """Processes that run, or will go on, with their cores."""
+        for process in self._there.processes.values():
+            if not process.over and process not in self._directed.held_for_good:
+                yield process, process.core
+
+    def _joined(self, one: Process, other: Process) -> bool:
+        return self._network is not None and self._network.joined(one, other)
+
+    @property
+    def _there(self) -> World:
+        if self._world is None:
+            raise ValueError("a judge must attend a world first")
+        return self._world
+
+    @property
+    def _directed(self) -> Director:
+        if self._director is None:
+            raise ValueError("a judge must attend a world first")
+        return self._director
+
+    @property
+    def _calm_for_s(self) -> float:
+        return self._directed.calm_for_s
+
+    @property
+    def _now_s(self) -> float:
+        return self._there.queue.now_s()
+
+    def _break(self, invariant: str, text: str) -> None:
+        self.testimony.broken.append(Broken(self._now_s, invariant, text))
+        self._stop_if_broken()
+
+    def _stop_if_broken(self) -> None:
+        if self.broken is not None:
+            self._there.queue.stop()
+
+
+def _task_states(core: AgentCore) -> dict[str, TaskState]:
+    """What the agent itself makes of its registers."""
+    return core._picture.board.states  # noqa: SLF001 - a look inside is the point

@@ -1,0 +1,153 @@
+"""What must hold of all that is said, wherever it was said: the invariants of the messages.
+
+`Testimony` is told every statement in the order it was made and keeps what breaks a rule:
+
+- *stamps*: a process never says a register with a smaller stamp than before, in this life or
+  an earlier one, nor with the same stamp and other contents;
+- *keeps its task*: a UAV leaves a task it claimed only when the task is done or withdrawn,
+  another has a stronger claim on it, its vehicle refused, its process started anew, or the
+  mission has ended for it; so never because of re-planning.
+
+It knows no process from within, so recordings of real ones can be told as well. Leaves out:
+what takes a view into the processes (sim.faults.judge).
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+from swarm.state.claims import claim_strength
+from swarm.wire.codec import key_of
+from swarm.wire.messages import (
+    Board,
+    Claim,
+    ClaimPhase,
+    Epoch,
+    EpochPhase,
+    Message,
+    Outcome,
+    Result,
+    Status,
+)
+
+__all__ = ["Broken", "Testimony"]
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """An invariant that did not hold."""
+
+    at_s: float
+    invariant: str
+    """Which, in a word or two that stay the same for the same kind of breach."""
+    text: str
+    """What happened."""
+
+    def __str__(self) -> str:
+        return f"at {self.at_s:.3f} s, {self.invariant}: {self.text}"
+
+
+class Testimony:
+    """Everything that is said about one mission."""
+
+    def __init__(self) -> None:
+        self.broken: list[Broken] = []
+        self.posted: dict[str, Board] = {}
+        """The newest entry of every task that was ever on the board."""
+        self.visits: dict[tuple[str, str], set[int]] = defaultdict(set)
+        """By UAV and task: the attempts that ended done."""
+        self.failed: set[str] = set()
+        """Tasks an attempt at which failed."""
+        self.ended = False
+        """Whether a coordinator has said that the mission is over."""
+        self._said: dict[tuple[str, str], Message] = {}
+        self._claims: dict[tuple[str, int], Claim] = {}
+        self._rivals: dict[str, dict[str, list[Claim]]] = defaultdict(lambda: defaultdict(list))
+        self._refused: set[tuple[str, str]] = set()
+
+    @property
+    def done(self) -> set[str]:
+        """Tasks that were visited."""
+        return {task for _, task in self.visits}
+
+    @property
+    def withdrawn(self) -> set[str]:
+        """Tasks that were taken off the board."""
+        return {task for task, entry in self.posted.items() if entry.withdrawn}
+
+    @property
+    def duplicates(self) -> int:
+        """Visits to tasks that had been visited before."""
+        return sum(map(len, self.visits.values())) - len(self.done)
+
+    def refused(self, uav: str, task: str) -> None:
+        """The vehicle of ``uav`` will not fly to ``task``."""
+        self._refused.add((uav, task))
+
+    def said(self, at_s: float, process: str, life: int, message: Message) -> None:
+        """A process has said something.
+
+        Args:
+            at_s: when.
+            process: name; two processes may speak for one writer, one after the other.
+            life: another number in every life of the process.
+            message: what it said.
+        """
+        if isinstance(message.body, Status):
+            return
+        self._check_stamp(at_s, process, message)
+        match message.body:
+            case Board(task=task) as entry:
+                self.posted[task] = entry
+            case Epoch(phase=EpochPhase.ENDED):
+                self.ended = True
+            case Outcome(task=task, result=Result.DONE, attempt=attempt):
+                self.visits[message.writer, task].add(attempt)
+            case Outcome(task=task):
+                self.failed.add(task)
+            case Claim() as claim:
+                self._check_claim(at_s, message.writer, life, claim)
+            case _:
+                pass
+
+    def _check_stamp(self, at_s: float, process: str, message: Message) -> None:
+        register = key_of(message)
+        before = self._said.get((process, register))
+        if before is not None and message.stamp < before.stamp:
+            text = f"{process} said {register} with {message.stamp} after {before.stamp}"
+            self._break(at_s, "stamps go back", text)
+        elif before is not None and message.stamp == before.stamp and message.body != before.body:
+            text = f"{process} said {register} differently with {message.stamp}"
+            self._break(at_s, "one stamp, two contents", text)
+        self._said[process, register] = message
+
+    def _check_claim(self, at_s: float, uav: str, life: int, claim: Claim) -> None:
+        before = self._claims.get((uav, life))
+        self._claims[uav, life] = claim
+        if claim.task is not None:
+            said = self._rivals[claim.task][uav]
+            if not said or said[-1] != claim:
+                said.append(claim)
+        if before is None or before.task is None or before.task == claim.task:
+            return
+        if not self._may_leave(uav, before, claim):
+            now = claim.task or claim.phase.value
+            self._break(at_s, "left its task", f"{uav} left {before.task} for {now}")
+
+    def _may_leave(self, uav: str, before: Claim, claim: Claim) -> bool:
+        task = str(before.task)
+        if task in self.done | self.failed | self.withdrawn or (uav, task) in self._refused:
+            return True
+        if claim.phase is ClaimPhase.OUT and self.ended:
+            return True
+        own = claim_strength(uav, before)
+        return any(
+            claim_strength(rival, said) < own
+            for rival, claims in self._rivals[task].items()
+            if rival != uav
+            for said in claims
+        )
+
+    def _break(self, at_s: float, invariant: str, text: str) -> None:
+        self.broken.append(Broken(at_s, invariant, text))
