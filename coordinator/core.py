@@ -1,17 +1,30 @@
 """The coordinator's decisions: task board, membership, epochs; events in, actions out.
 
-It briefs the fleet, plans while the vehicles get ready, starts the mission when all
-are airborne (or given up), posts pop-ups when their time comes, and ends the
-mission when nothing is left that anybody could do. The fleet needs it for none of
-its own decisions. Leaves out: how plans are made (coordinator.planner), transport
+It learns before it says anything. Where a mission runs it takes charge of that; else it
+briefs the fleet, plans while the vehicles get ready, and starts the mission when all are
+airborne (or given up). It posts pop-ups when their time comes, and ends the mission when
+nothing is left that anybody could do. The fleet needs it for none of its own decisions.
+Leaves out: what it finds of a mission (coordinator.heritage), who keeps the seat when two
+sit on it (coordinator.seat), how a mission begins (coordinator.beginning) and when it is
+over (coordinator.ending), the board (coordinator.postings), what it says again
+(coordinator.speech), how plans are made (coordinator.planner), and transport
 (coordinator.daemon).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
-from coordinator.events import Action, Event, MakePlan, PlanFailed, PlanMade
+from coordinator.beginning import Beginning, Verdict
+from coordinator.briefing import FlightLayers, brief_of, differences
+from coordinator.ending import Ending
+from coordinator.events import Action, Event, PlanFailed, PlanMade
+from coordinator.heritage import Heritage, inherit, statements
+from coordinator.inquiry import Inquiry
+from coordinator.postings import Postings, exit_status
+from coordinator.seat import Standing, gives_way, standing_of
+from coordinator.speech import Speech
 from swarm.config import Timing
 from swarm.events import (
     Ask,
@@ -22,52 +35,27 @@ from swarm.events import (
     Note,
     PeerGone,
     PeerSeen,
-    Publish,
+    Save,
     Stop,
-    Tick,
 )
-from swarm.model import Mission, Origin, Plan, Task, UavId
-from swarm.model.frames import DEFAULT_ORIGIN
+from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
-from swarm.state.board import TaskBoard, TaskState, doable
+from swarm.pulse import Pulse
+from swarm.state.board import TaskBoard
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
-    Board,
     Body,
-    Brief,
     Claim,
     ClaimPhase,
     Epoch,
     EpochPhase,
-    Fleet,
+    Message,
     Snapshot,
 )
 
 __all__ = ["CoordinatorCore", "FlightLayers"]
-
-
-@dataclass(frozen=True, slots=True)
-class FlightLayers:
-    """Heights at which the UAVs fly, each its own.
-
-    Raises:
-        ValueError: a height is not positive.
-    """
-
-    lowest_m: float = 10.0
-    """Height of the first UAV's layer above the places it visits [m]."""
-    spacing_m: float = 3.0
-    """Distance between neighbouring layers [m]."""
-
-    def __post_init__(self) -> None:
-        if not (self.lowest_m > 0.0 and self.spacing_m >= 0.0):
-            raise ValueError(f"layers need lowest_m > 0 and spacing_m >= 0, not {self}")
-
-    def layer_m(self, index: int) -> float:
-        """Layer of the UAV with that place in the scenario [m]."""
-        return self.lowest_m + index * self.spacing_m
 
 
 class CoordinatorCore:
@@ -81,6 +69,8 @@ class CoordinatorCore:
         timing: timers, in the seconds of ``now_s``.
         start_timeout_s: UAVs that are not airborne by then are given up [s].
         layers: heights of flight.
+        memory: of an earlier life, its mission time brought to now; None if there is none.
+        memory_age_s: how old that is [s].
     """
 
     def __init__(
@@ -93,38 +83,44 @@ class CoordinatorCore:
         timing: Timing,
         start_timeout_s: float,
         layers: FlightLayers,
+        memory: Snapshot | None = None,
+        memory_age_s: float = 0.0,
     ) -> None:
         self.replica = Replica()
-        self.plan: Plan | None = None
-        """The plan the current epoch stands on."""
+        self.stood_down: str | None = None
+        """Why it has left its seat to another coordinator; None as long as it has not."""
         self._mission = mission
-        self._method = method
-        self._seed = seed
         self._timing = timing
-        self._start_timeout_s = start_timeout_s
         self._layers = layers
-        self._voice = Voice(mission.name, COORDINATOR, incarnation)
+        self._memory = memory
+        self._memory_is_young = memory_age_s <= timing.recall_s
         self._membership = Membership(timing)
         self._board = TaskBoard(self.replica, mission.name)
+        self._postings = Postings(mission, self.replica)
+        voice = Voice(mission.name, COORDINATOR, incarnation)
+        self._speech = Speech(voice, self.replica, timing)
+        self._beginning = Beginning(
+            mission, method, seed, self.replica, self._membership, start_timeout_s
+        )
+        self._ending = Ending(self._board, self._membership, timing)
+        self._inquiry = Inquiry(timing.ask_gap_s)
+        self._pulse = Pulse(timing.pause_s)
         self._actions: list[Action] = []
+        self._in_charge = False
+        self._linked = True
+        self._answers: list[Snapshot] = []
+        self._overheard: list[Message] = []
         self._zero_s: float | None = None
-        self._request = 0
-        self._planned_for: tuple[UavId, ...] = ()
-        self._start_by_s: float | None = None
-        self._stalemate_at_s: float | None = None
-        self._announce_at_s = 0.0
         self._leave_at_s: float | None = None
-        self._announced = 0
         self._finished = False
+        self._saved: object = None
+
+    # -- the one entry point ----------------------------------------------------------
 
     def start(self, now_s: float) -> list[Action]:
-        """Brief the fleet, post the tasks known at the start and begin to plan."""
-        self._start_by_s = now_s + self._start_timeout_s
-        self._announce_at_s = now_s + self._timing.announce_s
-        self._say(_brief(self._mission, self._layers, self._voice.incarnation))
-        self._post(now_s)
-        self._make_plan(tuple(uav.id for uav in self._mission.uavs))
-        return self._drain()
+        """Ask what there is to know."""
+        self._inquiry.want(now_s, before_deciding=True)
+        return self._conclude(now_s)
 
     def step(self, event: Event, now_s: float) -> list[Action]:
         """React to one event.
@@ -133,63 +129,206 @@ class CoordinatorCore:
             event: what happened.
             now_s: now, on this process's own clock [s]; never decreases.
         """
-        match event:
-            case Heard(message):
-                self._membership.heard(message.writer, now_s)
-                self.replica.join(message)
-                if isinstance(message.body, Claim):
-                    self._membership.spoke(message.writer)
-            case Learned(snapshots):
-                for snapshot in snapshots:
-                    self.replica.join_all(snapshot.messages)
-            case PeerSeen(writer):
-                self._membership.seen(writer, now_s)
-            case PeerGone(writer):
-                self._membership.gone(writer, now_s)
-            case LinkChanged(up):
-                self._membership.link(up, now_s)
-            case PlanMade(request, plan):
-                if request == self._request:
-                    self.plan = plan
-            case PlanFailed(request, reason):
-                if request == self._request:
-                    self._end(f"no plan: {reason}", now_s)
-            case Stop(reason):
-                self._end(reason, now_s)
-            case Tick():
-                pass
-        self._advance(now_s)
-        return self._drain()
+        if self._finished:
+            return []
+        if self._pulse.late(now_s):
+            self._membership.held_up(now_s)
+            self._inquiry.want(now_s, before_deciding=True)
+            self._actions.append(Note("was held up"))
+        self._handle(event, now_s)
+        if not self._finished:
+            self._advance(now_s)
+        return self._conclude(now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a `Tick` at the latest; None when it has finished."""
         if self._finished:
             return None
-        deadlines = [
-            self._announce_at_s,
-            self._membership.next_deadline_s(),
-            self._start_by_s,
-            self._stalemate_at_s,
-            self._leave_at_s,
-        ]
-        if self._zero_s is not None and not self._ended:
-            deadlines += [self._zero_s + task.appears_s for task in self._unposted()]
-        return min(deadline for deadline in deadlines if deadline is not None)
+        deadlines = [self._inquiry.next_deadline_s(), self._membership.next_deadline_s()]
+        if not self._inquiry.unsure:  # what it would do waits until it knows more
+            deadlines += [
+                self._speech.next_deadline_s(),
+                self._beginning.next_deadline_s(),
+                self._ending.next_deadline_s(),
+                self._leave_at_s,
+            ]
+            if self._zero_s is not None and not self._ended:
+                deadlines.append(self._postings.next_deadline_s(self._zero_s))
+        return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What this process answers for: its own registers, and those of who cannot."""
         writers = {COORDINATOR} | (self.replica.writers() - self._membership.steady)
+        return self._snapshot(tuple(self.replica.messages(writers)), now_s)
+
+    def memory(self, now_s: float) -> Snapshot:
+        """All it knows, for its next life."""
+        return self._snapshot(tuple(self.replica.messages()), now_s)
+
+    @property
+    def plan(self) -> Plan | None:
+        """The plan that the mission starts with."""
+        return self._beginning.plan
+
+    def _snapshot(self, messages: tuple[Message, ...], now_s: float) -> Snapshot:
         mission_s = None if self._zero_s is None else now_s - self._zero_s
-        messages = tuple(self.replica.messages(writers))
-        incarnation = self._voice.incarnation
+        incarnation = self._speech.incarnation
         return Snapshot(self._mission.name, COORDINATOR, incarnation, mission_s, messages)
+
+    # -- events -----------------------------------------------------------------------
+
+    def _handle(self, event: Event, now_s: float) -> None:
+        match event:
+            case Heard(message) if message.writer == COORDINATOR:
+                self._hear_another(message, now_s)
+            case Heard(message):
+                if self._membership.heard(message.writer, now_s):
+                    self._welcome(message.writer, now_s)
+                self.replica.join(message)
+                if isinstance(message.body, Claim):
+                    self._membership.spoke(message.writer)
+                if self._zero_s is None and self._beginning.is_forestalled:
+                    self._inquiry.want(now_s, before_deciding=True)
+            case Learned(snapshots):
+                self._learn(snapshots, now_s)
+            case PeerSeen(writer) if writer != COORDINATOR:
+                if self._membership.seen(writer, now_s):
+                    self._welcome(writer, now_s)
+            case PeerGone(writer):
+                self._membership.gone(writer, now_s)
+            case LinkChanged(up):
+                self._membership.link(up, now_s)
+                self._linked = up
+                if up and self._inquiry.ever:
+                    self._inquiry.want(now_s, before_deciding=True)
+            case PlanMade(request, plan) if self._beginning.expects(request):
+                self._beginning.plan = plan
+            case PlanFailed(request, reason) if self._beginning.expects(request):
+                self._end(f"no plan: {reason}", now_s)
+            case Stop(reason):
+                self._end(reason, now_s)
+            case _:
+                pass
+
+    def _welcome(self, writer: str, now_s: float) -> None:
+        """Somebody is there who was not: it may know more, even of a mission that runs."""
+        if self._zero_s is None:
+            if self._inquiry.ever:  # else a question is under way
+                self._inquiry.want(now_s, before_deciding=True)
+        elif writer in self.replica.writers():
+            self._inquiry.want(now_s)
+
+    def _hear_another(self, message: Message, now_s: float) -> None:
+        """Another process speaks from this seat, or its last words were long under way."""
+        newer = message.stamp.incarnation > self._speech.incarnation
+        if not self._in_charge:
+            self._overheard.append(message)
+        elif newer and self._standing is Standing.STARTED and isinstance(message.body, Epoch):
+            self._stand_down("another coordinator has taken over")
+        else:
+            self._inquiry.want(now_s, before_deciding=True)
+
+    # -- taking charge ------------------------------------------------------------------
+
+    @property
+    def _standing(self) -> Standing:
+        if not self._in_charge:
+            return Standing.LEARNING
+        return Standing.BRIEFED if self.replica.epoch is None else Standing.STARTED
+
+    def _learn(self, snapshots: Sequence[Snapshot], now_s: float) -> None:
+        self._inquiry.answered()
+        mine = self._speech.incarnation
+        others = [s for s in snapshots if s.writer == COORDINATOR and s.incarnation != mine]
+        if any(gives_way(self._standing, mine, other) for other in others):
+            self._stand_down("a coordinator is already there")
+        elif self._in_charge:
+            self._take_in(snapshots, others, now_s)
+        else:
+            self._answers += snapshots
+            if self._linked and not self._inquiry.unsure:
+                self._take_charge(now_s)
+
+    def _stand_down(self, reason: str) -> None:
+        self.stood_down, self._finished = reason, True
+        self._actions += [Note("stands down", {"reason": reason}), Finish(1)]
+
+    def _take_charge(self, now_s: float) -> None:
+        """Resume the mission that is flown, or begin one."""
+        memory = self._memory
+        heard = [*self.replica.messages(), *self._overheard]
+        heritage = inherit(self._answers, heard, memory, memory_is_young=self._memory_is_young)
+        if memory is not None:
+            self._speech.outdo(statements(memory.messages))
+        self._in_charge = True
+        self._answers, self._overheard, self._memory = [], [], None
+        self._adopt(heritage, now_s)
+        if self.replica.brief is None:
+            self._say(brief_of(self._mission, self._layers, self._speech.incarnation))
+        self._post(now_s)
+        if self.replica.epoch is None:
+            self._actions += self._beginning.begin(now_s)
+
+    def _take_in(
+        self, snapshots: Sequence[Snapshot], others: Sequence[Snapshot], now_s: float
+    ) -> None:
+        """Add what has become known to the mission in charge of.
+
+        Newer statements from this seat than the own ones are of a coordinator that is gone:
+        they hold, unless it had only begun a mission that runs already.
+        """
+        heritage = inherit(snapshots)
+        theirs = statements(heritage.replica.messages())
+        mine, started = self._speech.incarnation, self._zero_s is not None
+        newer = [m for m in theirs if m.stamp.incarnation > mine]
+        newer_hold = any(isinstance(message.body, Epoch) for message in newer)
+        if newer_hold if started else heritage.runs:
+            self._adopt(heritage, now_s)
+        else:
+            messages = heritage.replica.messages()
+            self.replica.join_all(m for m in messages if m.writer != COORDINATOR)
+            if self._speech.outdo(theirs):
+                self._actions += self._speech.restate()
+        if started:
+            older = [m for m in theirs if m.stamp.incarnation < mine]
+            same = [s for s in others if standing_of(s) is Standing.STARTED]
+            older += [m for s in same for m in statements(s.messages)]
+            for entry in self._postings.merged(older):
+                self._say(entry)
+        if others:
+            self._speech.hurry(now_s)
+
+    def _adopt(self, heritage: Heritage, now_s: float) -> None:
+        """Make all that is known of the mission one's own, and say it in one's own name."""
+        messages, epoch = list(heritage.replica.messages()), heritage.replica.epoch
+        self.replica.join_all(m for m in messages if m.writer != COORDINATOR)
+        theirs = statements(messages)
+        if not theirs:
+            return
+        if epoch is not None:
+            known_s = epoch.mission_s if heritage.mission_s is None else heritage.mission_s
+            self._zero_s = now_s - known_s if self._zero_s is None else self._zero_s
+            self._leave_at_s = now_s + self._timing.linger_s if _ended(epoch) else None
+            self._beginning.leave()
+            self._ending.wait_until(now_s + self._timing.relink_grace_s)
+            epoch = replace(epoch, mission_s=self._mission_s(now_s))
+        self._speech.outdo(theirs)
+        bodies = [message.body for message in theirs if not isinstance(message.body, Epoch)]
+        self._actions += self._speech.restate(bodies if epoch is None else [epoch, *bodies])
+        self._actions.append(Note("resumes the mission", {"mission_s": self._mission_s(now_s)}))
+        if changed := differences(self._mission, self._layers, self.replica):
+            fields: dict[str, object] = {"differs_in": ", ".join(changed)}
+            self._actions.append(Note("the mission is not that of the scenario file", fields))
 
     # -- phases ---------------------------------------------------------------------
 
     @property
     def _ended(self) -> bool:
-        epoch = self.replica.epoch
-        return epoch is not None and epoch.phase is EpochPhase.ENDED
+        return self.replica.epoch is not None and _ended(self.replica.epoch)
+
+    def _mission_s(self, now_s: float) -> float:
+        """Mission time [s]; 0 as long as the mission has not begun."""
+        return 0.0 if self._zero_s is None else now_s - self._zero_s
 
     def _advance(self, now_s: float) -> None:
         anybody_lost = False
@@ -199,7 +338,9 @@ class CoordinatorCore:
             self._actions.append(Note("left" if left else "lost", {"writer": writer}))
             anybody_lost |= not left
         if anybody_lost:
-            self._actions.append(Ask())  # others may have heard its last words
+            self._inquiry.want(now_s)  # others may have heard its last words
+        if self._inquiry.unsure:
+            return
         if self._ended:
             self._leave_when_empty(now_s)
         else:
@@ -208,161 +349,79 @@ class CoordinatorCore:
             if self._zero_s is not None:
                 self._post(now_s)
                 self._end_if_over(now_s)
-        if self._announce_at_s <= now_s and not self._finished:
-            self._announce(now_s)
+        if not self._finished:
+            self._actions += self._speech.repeat(now_s, self._mission_s(now_s))
 
     def _start_if_ready(self, now_s: float) -> None:
-        if self._start_by_s is not None and self._start_by_s <= now_s:
-            self._start_by_s = None
-        uavs = tuple(uav.id for uav in self._mission.uavs)
-        ready = tuple(uav for uav in uavs if self._phase_of(uav) is ClaimPhase.IDLE)
-        out = [uav for uav in uavs if self._phase_of(uav) is ClaimPhase.OUT]
-        if len(ready) + len(out) < len(uavs) and self._start_by_s is not None:
-            return
-        if not ready:
+        verdict, actions = self._beginning.advance(now_s)
+        self._actions += actions
+        if verdict is Verdict.START:
+            self._zero_s = now_s
+            why = "every UAV is airborne or given up"
+            self._say(self._beginning.epoch(EpochPhase.RUNNING, why))
+        elif verdict is Verdict.NOBODY:
             self._end("no UAV is airborne", now_s)
-        elif self._planned_for != ready:
-            # Somebody is missing: the sequence must be one of those who fly.
-            missing = sorted(set(uavs) - set(ready))
-            self._actions.append(Note("starting without", {"uavs": ", ".join(missing)}))
-            self._make_plan(ready)
-        elif self.plan is not None:
-            self._zero_s, self._start_by_s = now_s, None
-            self._say_epoch(1, EpochPhase.RUNNING, "every UAV is airborne or given up", now_s)
 
-    def _phase_of(self, uav: str) -> ClaimPhase | None:
-        """Phase of its claim; None while it is absent or has none."""
-        claim = self.replica.claims.get(uav)
-        return None if claim is None or uav not in self._membership.present else claim.phase
+    def _post(self, now_s: float) -> None:
+        for entry in self._postings.due(self._zero_s, now_s):
+            self._say(entry)
+            if self._zero_s is not None:
+                self._actions.append(Note("pop-up posted", {"task": entry.task}))
 
     def _end_if_over(self, now_s: float) -> None:
-        phases = {self._phase_of(uav.id) for uav in self._mission.uavs} - {None, ClaimPhase.OUT}
-        if doable(self._board, self._membership.present) or (self._unposted() and phases):
-            self._end_if_stale(phases == {ClaimPhase.IDLE} and not self._unposted(), now_s)
-            return
-        left = TaskState.OPEN in self._board.states.values() or self._unposted()
-        reason = "nobody is left who could go on" if left else "every task has ended"
-        self._end(reason, now_s)
-
-    def _end_if_stale(self, stalemate: bool, now_s: float) -> None:
-        """Tasks may be open that every UAV refuses for reasons of its own, such as a geofence."""
-        if not stalemate:
-            self._stalemate_at_s = None
-        elif self._stalemate_at_s is None:
-            self._stalemate_at_s = now_s + self._timing.stalemate_s
-        elif self._stalemate_at_s <= now_s:
-            self._end("nobody takes what is left", now_s)
+        reason = self._ending.reason(now_s, more_to_come=self._postings.more_to_come)
+        if reason is not None:
+            self._end(reason, now_s)
 
     def _end(self, reason: str, now_s: float) -> None:
-        if self._ended:
-            return
-        self._start_by_s = self._stalemate_at_s = None
-        number = 1 if self.replica.epoch is None else self.replica.epoch.number + 1
-        self._say_epoch(number, EpochPhase.ENDED, reason, now_s)
-        self._actions.append(Note("mission ends", {"reason": reason}))
-        self._leave_at_s = now_s + self._timing.linger_s
+        if not self._in_charge:
+            self._finished = True
+            self._actions += [Note("ends before it began", {"reason": reason}), Finish(1)]
+        elif not self._ended:
+            self._beginning.leave()
+            self._ending.settle()
+            self._say_next_epoch(now_s, EpochPhase.ENDED, reason)
+            self._actions.append(Note("mission ends", {"reason": reason}))
+            self._leave_at_s = now_s + self._timing.linger_s
 
     def _leave_when_empty(self, now_s: float) -> None:
         """Stay until all agents have left, so that each has heard of the end."""
-        if self._finished or self._leave_at_s is None or now_s < self._leave_at_s:
+        if self._leave_at_s is None or now_s < self._leave_at_s:
             return
-        if self._membership.present - {COORDINATOR}:
+        if self._membership.present:
             self._leave_at_s = now_s + self._timing.linger_s
             return
         self._finished, self._leave_at_s = True, None
-        states = self._board.states.values()
-        done = all(s in (TaskState.DONE, TaskState.WITHDRAWN) for s in states)
-        self._actions.append(Finish(0 if done and not self._unposted() else 1))
-
-    # -- board and plan ---------------------------------------------------------------
-
-    def _unposted(self) -> list[Task]:
-        return [task for task in self._mission.tasks if task.id not in self.replica.board]
-
-    def _post(self, now_s: float) -> None:
-        """Post what is due; before the start, what has been there all along."""
-        numbers = {task.id: number for number, task in enumerate(self._mission.tasks)}
-        for task in self._unposted():
-            popped_up = self._zero_s is not None and self._zero_s + task.appears_s <= now_s
-            if task.appears_s == 0.0 or popped_up:
-                self._say(
-                    Board(
-                        task=task.id,
-                        number=numbers[task.id],
-                        position_enu_m=task.position_enu_m,
-                        value=task.value,
-                        service_s=task.service_s,
-                        kind=task.kind,
-                        withdrawn=False,
-                    )
-                )
-                if task.appears_s > 0.0:
-                    self._actions.append(Note("pop-up posted", {"task": task.id}))
-
-    def _make_plan(self, uavs: tuple[UavId, ...]) -> None:
-        self._request += 1
-        self._planned_for, self.plan = uavs, None
-        fleet = tuple(uav for uav in self._mission.uavs if uav.id in uavs)
-        mission = replace(self._mission.known_at_start(), uavs=fleet)
-        self._actions.append(MakePlan(self._request, mission, self._method, self._seed))
+        self._actions.append(Finish(exit_status(self._board, self._mission)))
 
     # -- saying -----------------------------------------------------------------------
 
     def _say(self, body: Body) -> None:
-        message = self._voice.say(body)
-        self.replica.join(message)
-        self._actions.append(Publish(message))
+        self._actions.append(self._speech.say(body))
 
-    def _say_epoch(self, number: int, phase: EpochPhase, reason: str, now_s: float) -> None:
-        sequence = () if self.plan is None else self.plan.sequence or ()
-        mission_s = 0.0 if self._zero_s is None else now_s - self._zero_s
-        plan = {} if self.plan is None else self.plan.routes
-        routes = {str(uav): tuple(map(str, tasks)) for uav, tasks in plan.items()}
-        self._say(
-            Epoch(number, phase, self._method, tuple(sequence), mission_s, reason[:200], routes)
-        )
+    def _say_next_epoch(self, now_s: float, phase: EpochPhase, reason: str) -> None:
+        """The epoch in force gives way to one that differs in phase."""
+        last = self.replica.epoch
+        if last is None:
+            self._say(self._beginning.epoch(phase, reason))
+            return
+        number, mission_s = last.number + 1, self._mission_s(now_s)
+        epoch = replace(last, number=number, phase=phase, mission_s=mission_s, reason=reason[:200])
+        self._say(epoch)
 
-    def _announce(self, now_s: float) -> None:
-        """Repeat the epoch with the mission time of now, the brief and some of the board.
-
-        Whoever joins asks by itself; this is for what got lost on the way, so a few
-        entries at a time are enough and the bus stays quiet on large boards.
-        """
-        self._announce_at_s = now_s + self._timing.announce_s
+    def _conclude(self, now_s: float) -> list[Action]:
+        """The actions of this step, with what is to ask and to keep."""
+        if not self._finished and self._inquiry.due(now_s):
+            self._actions.append(Ask())
         epoch = self.replica.epoch
-        if epoch is not None:
-            mission_s = 0.0 if self._zero_s is None else now_s - self._zero_s
-            self._say(replace(epoch, mission_s=mission_s))
-        own = list(self.replica.messages({COORDINATOR}))
-        rest = [message for message in own if not isinstance(message.body, Epoch)]
-        turn = [rest[(self._announced + k) % len(rest)] for k in range(min(8, len(rest)))]
-        self._announced += len(turn)
-        self._actions += [Publish(message) for message in turn]
-
-    def _drain(self) -> list[Action]:
+        state = self.replica.task_version, epoch and (epoch.number, epoch.phase)
+        if self._in_charge and state != self._saved:
+            self._saved = state
+            self._actions.append(Save())
+        self._pulse.promise(self.next_deadline_s())
         actions, self._actions = self._actions, []
         return actions
 
 
-def _brief(mission: Mission, layers: FlightLayers, run: int) -> Brief:
-    origin: Origin = mission.origin or DEFAULT_ORIGIN
-    return Brief(
-        horizon_s=mission.horizon_s,
-        success_default=mission.success_default,
-        survival_default=mission.survival_default,
-        reattempt_failed=mission.reattempt_failed,
-        run=run,
-        origin=(origin.lat_deg, origin.lon_deg, origin.alt_m),
-        uavs=tuple(
-            Fleet(
-                id=uav.id,
-                position_enu_m=uav.position_enu_m,
-                speed_m_s=uav.speed_m_s,
-                success=dict(uav.success),
-                survival=dict(uav.survival),
-                kind=uav.kind,
-                layer_m=layers.layer_m(index),
-            )
-            for index, uav in enumerate(mission.uavs)
-        ),
-    )
+def _ended(epoch: Epoch) -> bool:
+    return epoch.phase is EpochPhase.ENDED

@@ -1,41 +1,55 @@
 """The coordinator's process: its core on a bus, plans made beside it.
 
 Publishes ``brief``, ``plan`` and ``board/<task>``, holds ``alive/coordinator`` and
-answers on ``state/coordinator``; subscribes to ``uav/*/claim`` and
-``uav/*/outcome/*`` and watches ``alive/*``. Leaves out: every decision
-(coordinator.core).
+answers on ``state/coordinator``; while it stands by, none of that. Subscribes to
+``brief``, ``plan``, ``board/*``, ``uav/*/claim`` and ``uav/*/outcome/*`` and watches
+``alive/*``. Leaves out: every decision (coordinator.core, coordinator.standby).
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from coordinator.core import CoordinatorCore
-from coordinator.events import Action, Event, MakePlan, PlanFailed, PlanMade
+from coordinator.events import Action, Event, MakePlan, PlanFailed, PlanMade, TakeSeat
+from coordinator.standby import StandbyCore
 from swarm.bus.port import Bus
 from swarm.clock import Clock
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
 from swarm.process import call_in_background
 from swarm.shell import Shell, take_seat
+from swarm.wire.keys import Keys
+from swarm.wire.messages import Message, Snapshot
 
 __all__ = ["run_coordinator"]
 
 
 async def run_coordinator(
-    core: CoordinatorCore,
+    core: CoordinatorCore | StandbyCore,
     mission: Mission,
     bus: Bus,
     clock: Clock,
     make_plan: Callable[[Mission, str, int], Plan],
+    save: Callable[[Snapshot], None] | None = None,
 ) -> int:
-    """Coordinate ``mission`` until it has ended and all agents have left.
+    """Coordinate ``mission``, or stand by for it, until it has ended and all agents have left.
+
+    Args:
+        core: decides; one that stands by says nothing before it takes the seat.
+        mission: the scenario.
+        bus: open; closed by whoever opened it.
+        clock: gives ``now_s``.
+        make_plan: plans a mission by method and seed.
+        save: keeps what the core knows for its next life.
 
     Returns:
-        Exit status: 0 when every task was done, 1 otherwise.
+        Exit status: 0 when every task was done, 1 otherwise, also when the core has stood
+        down for another coordinator.
     """
     planning: set[asyncio.Task[None]] = set()
+    keys = Keys(mission.name)
 
     async def plan(request: MakePlan) -> None:
         def call() -> Plan:
@@ -50,15 +64,22 @@ async def run_coordinator(
             shell.step(PlanMade(request.request, made))
 
     def execute(action: Action) -> None:
-        if isinstance(action, MakePlan):
-            task = asyncio.get_running_loop().create_task(plan(action))
-            planning.add(task)
-            task.add_done_callback(planned)
+        match action:
+            case MakePlan():
+                task = asyncio.get_running_loop().create_task(plan(action))
+                planning.add(task)
+                task.add_done_callback(planned)
+            case TakeSeat():
+                bus.serve(keys.state(COORDINATOR))
+                bus.declare_token(keys.alive(COORDINATOR))
 
     def planned(task: asyncio.Task[None]) -> None:
         planning.discard(task)
         if not task.cancelled() and (fault := task.exception()):
             shell.fail(fault)
+
+    def known() -> Iterable[Message]:
+        return core.replica.messages()  # another one once it has taken over
 
     def as_event(fact: Event) -> Event:
         return fact
@@ -72,8 +93,11 @@ async def run_coordinator(
         from_bus=as_event,
         execute=execute,
         snapshot=core.snapshot,
+        known=known,
+        save=None if save is None else lambda now_s: save(core.memory(now_s)),
     )
-    take_seat(bus, mission.name, COORDINATOR, status=False)
+    watches = isinstance(core, StandbyCore)
+    take_seat(bus, mission.name, None if watches else COORDINATOR, status=False)
     try:
         return await shell.run()
     finally:

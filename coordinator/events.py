@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from swarm.events import BusFact, Wish
 from swarm.model import Mission, Plan
 
-__all__ = ["Action", "Event", "MakePlan", "PlanFailed", "PlanMade"]
+__all__ = ["Action", "Event", "MakePlan", "PlanFailed", "PlanMade", "TakeSeat"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,5 +36,10 @@ class MakePlan:
     seed: int
 
 
+@dataclass(frozen=True, slots=True)
+class TakeSeat:
+    """Show that the coordinator is there, and answer for it."""
+
+
 Event = BusFact | PlanMade | PlanFailed
-Action = Wish | MakePlan
+Action = Wish | MakePlan | TakeSeat

@@ -9,15 +9,16 @@ from typing import TypeVar
 from coordinator.core import CoordinatorCore, FlightLayers
 from coordinator.events import Action, Event, MakePlan, PlanMade
 from swarm.config import Timing
-from swarm.events import Finish, Heard, Note, PeerGone, PeerSeen, Publish, Tick
+from swarm.events import Ask, Finish, Heard, Learned, Note, PeerGone, PeerSeen, Publish, Tick
 from swarm.model import Mission, Plan, UavId
-from swarm.wire.messages import Body, Epoch, EpochPhase
+from swarm.wire.messages import Body, Epoch, EpochPhase, Snapshot
 from tests.builders import IDLE, OUT, message
 
 T = TypeVar("T")
 
-TIMING = Timing(announce_s=1e6, silence_s=2e6)
+TIMING = Timing(announce_s=1e6, silence_s=2e6, ask_gap_s=1e-6)
 START_TIMEOUT_S = 60.0
+LAYERS = FlightLayers(lowest_m=10.0, spacing_m=3.0)
 
 
 def plan_of(mission: Mission, *sequence: str) -> Plan:
@@ -37,21 +38,42 @@ def plan_of(mission: Mission, *sequence: str) -> Plan:
 
 
 class LoneCoordinator:
-    """The coordinator of ``mission``, from the start of its process on."""
+    """The coordinator of ``mission``, from the start of its process on.
+
+    Args:
+        mission: the scenario.
+        timing: timers.
+        begin_s: its clock at the start of the process.
+        answers: what the others answer to all its questions; None if it must wait.
+        incarnation: of its process.
+        memory: of an earlier life.
+        memory_age_s: how old that is.
+    """
 
     def __init__(
-        self, mission: Mission, *, timing: Timing = TIMING, begin_s: float = 100.0
+        self,
+        mission: Mission,
+        *,
+        timing: Timing = TIMING,
+        begin_s: float = 100.0,
+        answers: Sequence[Snapshot] | None = (),
+        incarnation: int = 1,
+        memory: Snapshot | None = None,
+        memory_age_s: float = 0.0,
     ) -> None:
         self.mission = mission
+        self.answers = answers
         self.uavs: list[str] = [uav.id for uav in mission.uavs]
         self.core = CoordinatorCore(
             mission,
             method="greedy",
             seed=7,
-            incarnation=1,
+            incarnation=incarnation,
             timing=timing,
             start_timeout_s=START_TIMEOUT_S,
-            layers=FlightLayers(lowest_m=10.0, spacing_m=3.0),
+            layers=LAYERS,
+            memory=memory,
+            memory_age_s=memory_age_s,
         )
         self.timing = timing
         self.now_s = begin_s
@@ -80,7 +102,9 @@ class LoneCoordinator:
         return self.happen(Heard(message(writer, body, self._counters[writer])), at_s)
 
     def see(self, *uavs: str) -> list[Action]:
-        return [action for uav in uavs for action in self.happen(PeerSeen(uav))]
+        """Their tokens are there, and what it asks about that is answered."""
+        actions = [action for uav in uavs for action in self.happen(PeerSeen(uav))]
+        return actions + self.run_until(self.now_s + 2.0 * self.timing.ask_gap_s)
 
     def lose(self, uav: str, at_s: float) -> list[Action]:
         """Its token goes and does not come back."""
@@ -124,7 +148,10 @@ class LoneCoordinator:
 
     def _do(self, actions: Sequence[Action]) -> list[Action]:
         self.log += actions
-        return list(actions)
+        done = list(actions)
+        if self.answers is not None and Ask() in actions:
+            done += self.happen(Learned(tuple(self.answers)))
+        return done
 
 
 def said(actions: Sequence[Action], kind: type[T]) -> list[T]:

@@ -1,0 +1,80 @@
+"""When a running mission is over, as the coordinator finds.
+
+Leaves out: saying so (coordinator.core).
+"""
+
+from __future__ import annotations
+
+from swarm.config import Timing
+from swarm.state.board import TaskBoard, TaskState, doable
+from swarm.state.membership import Membership
+from swarm.wire.messages import ClaimPhase
+
+__all__ = ["Ending"]
+
+ALL_ENDED = "every task has ended"
+NOBODY_LEFT = "nobody is left who could go on"
+NOBODY_WILL = "nobody takes what is left"
+
+
+class Ending:
+    """The end of one mission.
+
+    Args:
+        board: its tasks.
+        membership: who is there.
+        timing: how long to wait for those who may come back, or change their minds.
+    """
+
+    def __init__(self, board: TaskBoard, membership: Membership, timing: Timing) -> None:
+        self._board = board
+        self._membership = membership
+        self._timing = timing
+        self._grace_until_s = 0.0
+        self._prospect: str | None = None
+        self._over_at_s: float | None = None
+
+    def wait_until(self, grace_until_s: float) -> None:
+        """Nobody is missed before then: they need the time to show themselves."""
+        self._grace_until_s = grace_until_s
+
+    def reason(self, now_s: float, *, more_to_come: bool) -> str | None:
+        """Why the mission is over; None while it is not.
+
+        Args:
+            now_s: now.
+            more_to_come: whether tasks will yet be posted.
+        """
+        prospect, patience_s = self._outlook(more_to_come=more_to_come)
+        if prospect is None or prospect == ALL_ENDED:
+            self._prospect = self._over_at_s = None
+            return prospect
+        at_s = max(now_s + patience_s, self._grace_until_s)
+        if prospect != self._prospect or self._over_at_s is None:
+            self._prospect, self._over_at_s = prospect, at_s
+        self._over_at_s = min(self._over_at_s, at_s)
+        return prospect if self._over_at_s <= now_s else None
+
+    def settle(self) -> None:
+        """The mission has ended: nothing more to find out."""
+        self._over_at_s = None
+
+    def next_deadline_s(self) -> float | None:
+        """When `reason` may find that it has waited long enough."""
+        return self._over_at_s
+
+    def _outlook(self, *, more_to_come: bool) -> tuple[str | None, float]:
+        """How the mission will end if nothing changes, and how long that may yet change [s]."""
+        claims, problem = self._board.replica.claims, self._board.problem
+        fleet = () if problem is None else problem.uav_ids
+        taking_part = {u for u in fleet if u in claims and claims[u].phase is not ClaimPhase.OUT}
+        here = taking_part & self._membership.present
+        if doable(self._board, here) or (more_to_come and here):
+            idle = all(claims[uav].phase is ClaimPhase.IDLE for uav in here)
+            # Every UAV may refuse a task for reasons of its own, such as a geofence.
+            return (NOBODY_WILL if idle and not more_to_come else None), self._timing.stalemate_s
+        if TaskState.OPEN not in self._board.states.values() and not more_to_come:
+            return ALL_ENDED, 0.0
+        # Who was lost and never said that it is out may have been cut off, and come back.
+        may_return = doable(self._board, taking_part) or (more_to_come and taking_part)
+        return NOBODY_LEFT, self._timing.abandon_s if may_return else 0.0

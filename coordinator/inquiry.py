@@ -1,0 +1,53 @@
+"""Asking before deciding: whether a process knows all that it could know by asking.
+
+Leaves out: when questions are due (swarm.asking), and what the answers are good for.
+"""
+
+from __future__ import annotations
+
+from swarm.asking import Asking
+
+__all__ = ["Inquiry"]
+
+
+class Inquiry:
+    """The questions of one process.
+
+    Args:
+        gap_s: shortest interval between two of them [s].
+    """
+
+    def __init__(self, gap_s: float) -> None:
+        self.unsure = False
+        """Whether something may have happened that nobody has told yet: decide nothing."""
+        self.ever = False
+        """Whether any question has been answered, be it by nobody."""
+        self._asking = Asking(gap_s)
+        self._unanswered = 0
+
+    def want(self, now_s: float, *, before_deciding: bool = False) -> None:
+        """There is a reason to ask.
+
+        Args:
+            now_s: now.
+            before_deciding: what is known may be old.
+        """
+        self.unsure |= before_deciding
+        self._asking.want(now_s)
+
+    def due(self, now_s: float) -> bool:
+        """Whether to ask now; True once for each question."""
+        due = self._asking.due(now_s)
+        self._unanswered += due
+        return due
+
+    def answered(self) -> None:
+        """A question has been answered by everyone who could."""
+        self.ever = True
+        self._unanswered = max(0, self._unanswered - 1)
+        if self._unanswered == 0 and self._asking.next_deadline_s() is None:
+            self.unsure = False
+
+    def next_deadline_s(self) -> float | None:
+        """When `due` will next be true."""
+        return self._asking.next_deadline_s()
