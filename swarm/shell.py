@@ -79,11 +79,11 @@ class Shell(Generic[E, A]):
         bus: open; closed by whoever opened it.
         clock: gives ``now_s``.
         mission: mission name.
-        name: writer id of this process, for the log.
+        name: writer id of this process.
         from_bus: makes the core's event of a fact from the bus.
         execute: carries out an action that is not common to all processes.
         snapshot: answers a query; None for a process that answers none.
-        known: all registers the core knows, which answers to it need not repeat.
+        known: all registers the core knows; answers to it need not repeat those of others.
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
     """
@@ -107,6 +107,7 @@ class Shell(Generic[E, A]):
         self._bus = bus
         self._clock = clock
         self._keys = Keys(mission)
+        self._name = name
         self._codec = Codec(mission)
         self._log = get_logger(name, mission=mission)
         self._from_bus = from_bus
@@ -259,8 +260,11 @@ class Shell(Generic[E, A]):
 
     async def _ask(self) -> None:
         asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
-        known = encode_digest(digest(self._known()))
-        answers = await self._bus.query(self._keys.state("*"), known, timeout_s=self._answer_s)
+        # What is said in the own name is always told: by who remembers an earlier life, or a twin.
+        known = digest(message for message in self._known() if message.writer != self._name)
+        answers = await self._bus.query(
+            self._keys.state("*"), encode_digest(known), timeout_s=self._answer_s
+        )
         now_s, wall_s = self._clock.now_s(), self._loop.time()
         pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
         snapshots = []

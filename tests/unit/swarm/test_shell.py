@@ -380,10 +380,13 @@ def test_mission_time_in_an_answer_does_not_age_while_others_are_waited_for() ->
     play(scenario)
 
 
-def test_a_question_tells_what_the_core_knows() -> None:
+def test_a_question_tells_what_the_core_knows_but_for_the_own_registers() -> None:
+    """Who answers in the own name is a twin, or remembers an earlier life: that must be heard."""
+
     async def scenario() -> None:
         core = ScriptedCore(first=[Ask()])
-        async with at_work(core, known=REGISTERS) as played:
+        own = message("u0", held("t1", 2.0))
+        async with at_work(core, known=[*REGISTERS, own]) as played:
             queries: list[Query] = []
 
             def asked() -> bool:
