@@ -37,6 +37,8 @@ from swarm.options import (
 if TYPE_CHECKING:
     from rich.status import Status
 
+    from swarm.model import Mission, Plan
+
 __all__ = ["coordinator", "plan"]
 
 _BOUND_S = 3.0
@@ -64,6 +66,18 @@ def plan(
             show_default=False,
         ),
     ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Write every UAV's list there as a QGroundControl plan, MISSION.UAV.plan.",
+            show_default=False,
+        ),
+    ] = None,
+    firmware: Annotated[
+        str,
+        typer.Option(metavar="ardupilot|px4", help="What the exported plans are to be flown by."),
+    ] = "ardupilot",
     bound: Annotated[
         bool,
         typer.Option(
@@ -80,10 +94,12 @@ def plan(
     Examples:
         swarm plan table-1
         swarm plan valley-survey --plot lists.png
+        swarm plan valley-survey --method guided --export plans
         swarm plan table-1 --method exact --json
     """
     from json import dumps
 
+    from coordinator.export import require_origin
     from coordinator.plan_report import plan_as_json, plan_table
     from coordinator.planner.exact import ProblemTooLargeError
     from coordinator.planner.plan import make_plan
@@ -92,8 +108,10 @@ def plan(
     from swarm.process import EXIT_INTERRUPTED
     from swarm.scenario import load_scenario
 
-    _check_plan_options(method, plot)
+    _check_plan_options(method, plot, firmware)
     mission = load_scenario(scenario)
+    if export is not None:
+        require_origin(mission, str(scenario))
     clock = SystemClock()
     try:
         with _searching() as (interrupted, progress):
@@ -120,6 +138,8 @@ def plan(
             problem = f"cannot write {plot}: {error.strerror or error}"
             raise InputError(Fault("--plot", "", problem, "name a file that can be")) from error
         print(f"drawn: {plot}", file=sys.stderr)
+    if export is not None:
+        _export(export, mission, result, firmware)
     if json:
         print(dumps(plan_as_json(result), allow_nan=False))
     else:
@@ -127,6 +147,21 @@ def plan(
 
         Console(highlight=False).print(plan_table(mission, result))
     return EXIT_INTERRUPTED if told_to_stop else 0
+
+
+def _export(folder: Path, mission: Mission, made: Plan, firmware: str) -> None:
+    """Write the lists as plans, and say which."""
+    from coordinator.export import Firmware, write_plans
+
+    try:
+        written = write_plans(folder, mission, made, Firmware(firmware))
+    except OSError as error:
+        problem = f"cannot write into {folder}: {error.strerror or error}"
+        raise InputError(Fault("--export", "", problem, "name a folder that can be")) from error
+    idle = [uav for uav, route in made.routes.items() if not route]
+    without = f"; none for {', '.join(idle)}, without tasks" if idle else ""
+    plans = "1 plan" if len(written) == 1 else f"{len(written)} plans"
+    print(f"exported: {plans} into {folder}{without}", file=sys.stderr)
 
 
 def _status_line() -> contextlib.AbstractContextManager[Status | None]:
@@ -235,7 +270,6 @@ def coordinator(
     from swarm.clock import ScaledClock, SystemClock, incarnation
     from swarm.config import preset
     from swarm.log import configure_logging
-    from swarm.model import Mission, Plan
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
 
@@ -270,8 +304,9 @@ def coordinator(
     return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
 
 
-def _check_plan_options(method: str, plot: Path | None) -> None:
+def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     """Refuse what cannot be done before any work is done."""
+    from coordinator.export import Firmware
     from coordinator.planner.plan import METHODS
     from coordinator.plot import PLOT_SUFFIXES
 
@@ -283,5 +318,9 @@ def _check_plan_options(method: str, plot: Path | None) -> None:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
         remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
         faults.append(Fault("--plot", str(plot), problem, remedy))
+    firmwares = [known.value for known in Firmware]
+    if firmware not in firmwares:
+        remedy = f"choose one of {', '.join(firmwares)}"
+        faults.append(Fault("--firmware", firmware, "no such firmware", remedy))
     if faults:
         raise InputError(*faults)
