@@ -16,6 +16,7 @@ from coordinator.events import Action, Event, MakePlan, PlanFailed, PlanMade, Ta
 from coordinator.standby import StandbyCore
 from swarm.bus.port import Bus
 from swarm.clock import Clock
+from swarm.config import PRESETS, Link
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
 from swarm.process import call_in_background
@@ -32,7 +33,9 @@ async def run_coordinator(
     bus: Bus,
     clock: Clock,
     make_plan: Callable[[Mission, str, int], Plan],
+    *,
     save: Callable[[Snapshot], None] | None = None,
+    answer_s: float = PRESETS[Link.NORMAL].answer_s,
 ) -> int:
     """Coordinate ``mission``, or stand by for it, until it has ended and all agents have left.
 
@@ -43,6 +46,7 @@ async def run_coordinator(
         clock: gives ``now_s``.
         make_plan: plans a mission by method and seed.
         save: keeps what the core knows for its next life.
+        answer_s: how long a question waits for the slowest answer [wall s].
 
     Returns:
         Exit status: 0 when every task was done, 1 otherwise, also when the core has stood
@@ -95,6 +99,7 @@ async def run_coordinator(
         snapshot=core.snapshot,
         known=known,
         save=None if save is None else lambda now_s: save(core.memory(now_s)),
+        answer_s=answer_s,
     )
     watches = isinstance(core, StandbyCore)
     take_seat(bus, mission.name, None if watches else COORDINATOR, status=False)
