@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agent.deciding import Turn, decide, ranks, rule_of
+from agent.deciding import Turn, decide
 from agent.events import Action, Order
 from agent.peers import Peers
 from agent.picture import Picture
@@ -20,6 +20,7 @@ from swarm.config import Timing
 from swarm.events import Note
 from swarm.state.board import TaskState
 from swarm.state.registers import Replica
+from swarm.state.team import ranks, rule_of
 from swarm.wire.messages import Board, Claim, ClaimPhase, Epoch, Outcome, Point, Result, StatusPhase
 
 __all__ = ["Tasking"]
@@ -259,7 +260,8 @@ class Tasking:
         """The rule in force, and what to say about it when it is new."""
         if self._rule_epoch == (epoch.number, epoch.rule):
             return self._rule, []
-        self._rule, self._rule_epoch = rule_of(epoch), (epoch.number, epoch.rule)
+        self._rule = rule_of(epoch.rule, epoch.routes)
+        self._rule_epoch = epoch.number, epoch.rule
         if self._rule is not None:
             return self._rule, []
         self._speech.note = f"cannot decide by rule {epoch.rule}"

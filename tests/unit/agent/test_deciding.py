@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agent.deciding import Turn, decide, ranks, rule_of
+from agent.deciding import Turn, decide
 from swarm.allocation.lower_level import TeamState, decisions, rank_of
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import rule_by_name
@@ -17,6 +17,7 @@ from swarm.model import Mission, Uav
 from swarm.model.ids import COORDINATOR
 from swarm.state.board import TaskBoard
 from swarm.state.registers import Replica
+from swarm.state.team import rule_of
 from swarm.wire.messages import Board, Body
 from tests.builders import (
     IDLE,
@@ -82,7 +83,7 @@ class Scene:
         problem, epoch_ = self.board.problem, self.replica.epoch
         assert problem is not None
         assert epoch_ is not None
-        rule = rule_of(epoch_)
+        rule = rule_of(epoch_.rule, epoch_.routes)
         assert rule is not None
         decision = decide(problem, self.board, rule, turn)
         return None if decision is None else problem.task_ids[decision.task]
@@ -99,7 +100,7 @@ def test_it_decides_from_its_place_and_the_time_of_now() -> None:
 
     problem = scene.board.problem
     assert problem is not None
-    rule = rule_of(epoch("u0"))
+    rule = rule_of("greedy", {})
     assert rule is not None
     decision = decide(problem, scene.board, rule, turn)
     assert decision is not None
@@ -209,22 +210,6 @@ def test_nothing_odd_is_computed_about_someone_who_is_very_late() -> None:
     scene.say("u1", held("now", 0.0, 0, completion_s=1.0))
 
     assert scene.choice(replace(TURN, now_s=99.0, decided_s=99.0)) is None
-
-
-def test_ranks_follow_the_sequence_and_then_the_ids() -> None:
-    assert ranks(("u2", "gone", "u0"), ("u3", "u0", "u1", "u2")) == {
-        "u2": 0,
-        "u0": 1,
-        "u1": 2,
-        "u3": 3,
-    }
-
-
-def test_an_epoch_under_a_rule_not_known_here_has_no_rule() -> None:
-    assert rule_of(epoch("u0", rule="newer")) is None
-    rule = rule_of(epoch("u0", rule="lookahead"))
-    assert rule is not None
-    assert rule.name == "lookahead"
 
 
 # -- the plan, decision for decision ----------------------------------------------------
