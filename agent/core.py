@@ -94,6 +94,8 @@ class AgentCore:
         """Messages the shell has dropped so far, by reason; goes out with the status."""
         self._mission = mission
         self._rejoin = rejoin
+        if memory is not None:  # the calendar clock may have gone back since
+            incarnation = max(incarnation, memory.incarnation + 1)
         self._speech = Speech(Voice(mission, uav, incarnation), self.replica, timing)
         self._peers = Peers(uav, timing)
         self._picture = Picture(mission, uav, self.replica)
@@ -160,8 +162,8 @@ class AgentCore:
         """
         if self._stage is StatusPhase.LEARNING:
             return self._snapshot_of((), now_s)
-        writers = {self.uav} | (self.replica.writers() - self._peers.membership.steady)
-        return self._snapshot_of(self.replica.messages(writers), now_s)
+        steady = self._peers.membership.steady
+        return self._snapshot_of(self.replica.answers(self.uav, steady), now_s)
 
     def memory(self, now_s: float) -> Snapshot:
         """Everything it knows, for a later life of this agent."""

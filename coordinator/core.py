@@ -158,8 +158,8 @@ class CoordinatorCore:
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What this process answers for: its own registers, and those of who cannot."""
-        writers = {COORDINATOR} | (self.replica.writers() - self._membership.steady)
-        return self._snapshot(tuple(self.replica.messages(writers)), now_s)
+        answers = self.replica.answers(COORDINATOR, self._membership.steady)
+        return self._snapshot(tuple(answers), now_s)
 
     def memory(self, now_s: float) -> Snapshot:
         """All it knows, for its next life."""

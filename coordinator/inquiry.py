@@ -18,7 +18,7 @@ class Inquiry:
     """
 
     def __init__(self, gap_s: float) -> None:
-        self.unsure = False
+        self.unsure = True
         """Whether something may have happened that nobody has told yet: decide nothing."""
         self.ever = False
         """Whether any question has been answered, be it by nobody."""

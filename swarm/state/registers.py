@@ -8,7 +8,7 @@ follows from the registers (swarm.state.board, swarm.state.claims).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from swarm.wire.codec import encode, key_of
 from swarm.wire.messages import Board, Brief, Claim, Epoch, Message, Outcome, Status
@@ -70,6 +70,27 @@ class Replica:
         wanted = None if writers is None else set(writers)
         for _, message in sorted(self._registers.items()):
             if wanted is None or message.writer in wanted:
+                yield message
+
+    def answers(self, own: str, steady: Collection[str]) -> Iterator[Message]:
+        """What ``own`` answers for, in key order.
+
+        That is its own registers and those of all who may not remember them: who is not
+        steady, and of everyone what an earlier life has said, which the present one may
+        not have found yet.
+
+        Args:
+            own: who answers.
+            steady: writers that are there and remember all they ever said.
+        """
+        lives: dict[str, int] = {}
+        for message in self._registers.values():
+            known = lives.get(message.writer, 0)
+            lives[message.writer] = max(known, message.stamp.incarnation)
+        for _, message in sorted(self._registers.items()):
+            writer = message.writer
+            outlived = message.stamp.incarnation < lives[writer]
+            if writer == own or writer not in steady or outlived:
                 yield message
 
     def writers(self) -> set[str]:

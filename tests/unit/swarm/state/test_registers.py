@@ -249,3 +249,20 @@ def test_versions_grow_only_with_what_they_are_about() -> None:
     assert growth(message(COORDINATOR, epoch("u0"))) == (0, 0)
     assert growth(message("u0", IDLE)) == (0, 0)
     assert growth(message("u0", done("t0"))) == (0, 1)
+
+
+def test_one_answers_for_itself_and_for_those_who_may_not_remember() -> None:
+    replica = Replica()
+    own, absent = message("u0", IDLE), message("u1", IDLE)
+    replica.join_all([own, absent, message("u2", IDLE)])
+
+    assert list(replica.answers("u0", {"u0", "u2"})) == [own, absent]
+
+
+def test_one_answers_for_what_an_earlier_life_of_somebody_said() -> None:
+    """The new life may not have been told; its token may never have been missed."""
+    replica = Replica()
+    said_before = message("u1", done("t0"), counter=9, incarnation=1)
+    replica.join_all([said_before, message("u1", IDLE, incarnation=2)])
+
+    assert list(replica.answers("u0", {"u1"})) == [said_before]
