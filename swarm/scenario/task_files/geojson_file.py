@@ -61,10 +61,13 @@ def _entry(
         return Fault(source, place, "is not an array of 2 or 3 numbers", remedy)
     table: dict[str, object] = {}
     identity = properties.get("id", member(feature, "id"))
-    if identity is not None:
-        # RFC 7946 allows a number.
-        is_number = isinstance(identity, int) and not isinstance(identity, bool)
-        table["id"] = str(identity) if is_number else identity
+    if isinstance(identity, int) and not isinstance(identity, bool):
+        identity = str(identity)  # as RFC 7946 allows
+    if isinstance(identity, str):
+        table["id"] = identity
+    elif identity is not None:
+        problem = f"{shown(identity)} is not an id"
+        return Fault(source, f"{place}, id", problem, "give a string or a whole number")
     table |= dict(zip(("lon_deg", "lat_deg", "alt_m"), numbers, strict=False))
     for name, value in properties.items():
         if slip := slip_of(name, TASK_KEYS):
