@@ -122,13 +122,17 @@ class RoughNetwork:
     # -- what processes do ------------------------------------------------------------
 
     def join(self, seat: Seat) -> None:
-        """A process begins; transports come up one by one."""
+        """A process begins; transports come up one by one, that to a router at once."""
         others = list(self._others(seat))
         self._seats.append(seat)
         for other in others:
-            self._review(seat, other)
-            if not isinstance(other, _Router):
+            if other is not self._router:
                 self._review(other, seat)
+                self._review(seat, other)
+            elif self._is_cut(seat, other):
+                self._review(seat, other)
+            else:
+                self._change(seat, other, 0.0, opens=True)
 
     def leave(self, seat: Seat) -> None:
         """A process has ended: its transports go as soon as what it said has arrived."""
@@ -390,7 +394,7 @@ class RoughNetwork:
         if was_linked and not self._is_linked(viewer):
             viewer.receive(LinkChanged(False))
         self._tell_gone(viewer, other)
-        if other in self._seats and viewer in self._seats:
+        if viewer in self._seats and (other is self._router or other in self._seats):
             self._review(viewer, other)
 
     def _lose_all(self, viewer: Seat) -> None:
