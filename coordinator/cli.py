@@ -31,6 +31,7 @@ from swarm.options import (
     ScenarioArgument,
     SeedOption,
     SpeedupOption,
+    StateOption,
     TimeLimitOption,
 )
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from rich.status import Status
 
     from swarm.model import Mission, Plan
+    from swarm.wire.messages import Snapshot
 
 __all__ = ["coordinator", "plan"]
 
@@ -238,6 +240,14 @@ def coordinator(
             help="Every further UAV flies this much higher than the one before.",
         ),
     ] = 3.0,
+    state: StateOption = None,
+    standby: Annotated[
+        bool,
+        typer.Option(
+            "--standby",
+            help="Watch the coordinator that is there, and take its place when it is lost.",
+        ),
+    ] = False,
     bus: BusOption = "router",
     listen: ListenOption = "",
     connect: ConnectOption = None,
@@ -251,33 +261,40 @@ def coordinator(
 ) -> int:
     """Plan a mission, brief the agents, start them together and tell them when it is over.
 
-    Once it has started, the fleet finishes without the coordinator. With --json the plan is
-    printed as `swarm plan --json` prints it. Exit status 0: every task was done.
+    Once it has started, the fleet finishes without the coordinator. Started anew, it takes
+    charge of the mission that is being flown, as far as agents or its own --state know it.
+    With --json the plan is printed as `swarm plan --json` prints it. Exit status 0: every
+    task was done.
 
     Examples:
         swarm coordinator table-1
-        swarm coordinator valley-survey --connect tcp/192.168.1.2:7447
+        swarm coordinator valley-survey --connect tcp/192.168.1.2:7447 --state /var/lib/peckorder
+        swarm coordinator valley-survey --connect tcp/192.168.1.2:7447 --standby
     """
     import asyncio
     from json import dumps
 
-    from coordinator.core import CoordinatorCore, FlightLayers
-    from coordinator.daemon import run_coordinator
+    from coordinator.briefing import FlightLayers
+    from coordinator.core import CoordinatorCore
     from coordinator.plan_report import plan_as_json
     from coordinator.planner.plan import check_online_method, make_plan
+    from coordinator.service import Service
     from swarm.bus.config import bus_config
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, SystemClock, incarnation
     from swarm.config import preset
     from swarm.log import configure_logging
+    from swarm.model.ids import COORDINATOR
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
+    from swarm.store import Store
 
     configure_logging(log_level, log_format)
     check_online_method(method)
     network = preset(link, lease_s)
     config = bus_config(bus, listen, connect or (), network.lease_s)
     mission = load_scenario(scenario)
+    timing = network.timing.scaled(speedup)
 
     def planner(what: Mission, how: str, planner_seed: int) -> Plan:
         made = make_plan(what, how, clock=SystemClock(), seed=planner_seed)
@@ -285,23 +302,44 @@ def coordinator(
             print(dumps(plan_as_json(made), allow_nan=False), flush=True)
         return made
 
-    async def work() -> int:
-        core = CoordinatorCore(
+    def core(memory: Snapshot | None, memory_age_s: float) -> CoordinatorCore:
+        return CoordinatorCore(
             mission,
             method=method,
             seed=seed,
             incarnation=incarnation(),
-            timing=network.timing.scaled(speedup),
+            timing=timing,
             start_timeout_s=start_timeout_s * max(1.0, speedup),
             layers=FlightLayers(lowest_layer_m, layer_spacing_m),
+            memory=memory,
+            memory_age_s=memory_age_s,
         )
-        seat = await open_zenoh_bus(config)
-        try:
-            return await run_coordinator(core, mission, seat, ScaledClock(speedup), planner)
-        finally:
-            seat.close()
 
-    return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
+    store = None if state is None else Store(state, mission.name, COORDINATOR, speedup=speedup)
+    service = Service(
+        mission=mission,
+        make_core=core,
+        make_plan=planner,
+        open_bus=lambda: open_zenoh_bus(config),
+        clock=ScaledClock(speedup),
+        timing=timing,
+        answer_s=network.answer_s,
+        store=store,
+    )
+
+    async def work() -> int:
+        if standby:
+            return await service.stand_by()
+        status, stood_down = await service.coordinate()
+        if stood_down is not None:
+            print(f"{stood_down}; add --standby to wait for its loss", file=sys.stderr)
+        return status
+
+    try:
+        return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
+    finally:
+        if store is not None:
+            store.close()
 
 
 def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
