@@ -184,7 +184,7 @@ def _write(path: Path, text: str) -> None:
 def _story(tasks: TaskFile, uavs: int, output: Path | None) -> str:
     """What has been made of the file, and how to go on."""
     count = len(tasks.entries)
-    story = f"{tasks.source}: {count} task{'s' if count > 1 else ''} for {uavs} UAVs"
+    story = f"{tasks.source}: {count} task{'s'[: count - 1]} for {uavs} UAV{'s'[: uavs - 1]}"
     if tasks.left_out:
         parts = (f"{n} × {what}" if n > 1 else what for what, n in tasks.left_out.items())
         story += f"; left out: {', '.join(parts)}"

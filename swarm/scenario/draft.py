@@ -23,6 +23,7 @@ SPEED_M_S = 5.0
 _PAD_SPACING_M = 5.0
 """Distance between the pads of neighbouring UAVs [m]."""
 _SHORTEST_HORIZON_S = 60.0
+_LONGEST_HORIZON_S = 1e9
 _KEYS = (
     "id",
     "position_m",
@@ -102,13 +103,13 @@ def _horizon_s(mission: Mission) -> float:
     service_s = sum(task.service_s for task in mission.tasks)
     latest_s = max(task.appears_s for task in mission.tasks)
     needed_s = length_m / uav.speed_m_s + service_s + latest_s
-    return max(_SHORTEST_HORIZON_S, 10.0 * math.ceil(needed_s / 10.0))
+    return min(max(_SHORTEST_HORIZON_S, 10.0 * math.ceil(needed_s / 10.0)), _LONGEST_HORIZON_S)
 
 
 def _lines(
     tasks: TaskFile, fleet: Fleet, uavs: Iterable[Mapping[str, object]], horizon_s: float
 ) -> Iterator[str]:
-    yield f"# {len(tasks.entries)} tasks of {tasks.source} for a fleet of {fleet.uavs}."
+    yield f"# Tasks of {tasks.source} ({len(tasks.entries)}) for a fleet of {fleet.uavs}."
     yield "# To look over: where the UAVs stand, how fast they fly, and what each task is worth."
     yield ""
     yield "schema = 1"

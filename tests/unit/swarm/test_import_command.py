@@ -75,6 +75,15 @@ def test_horizon_leaves_one_uav_the_time_for_everything(capsys: pytest.CaptureFi
     assert flight_m / 2.0 + 40.0 < mission.horizon_s <= flight_m / 2.0 + 50.0
 
 
+def test_horizon_of_an_endless_journey_is_the_longest_allowed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "far.csv"
+    path.write_text("east_m,north_m\n1e7,0\n-1e7,0\n")
+
+    assert imported(capsys, str(path), "--speed-m-s", "0.01").horizon_s == 1e9
+
+
 def test_options_say_the_rest(capsys: pytest.CaptureFixture[str]) -> None:
     options = "--uavs 2 --speed-m-s 7.5 --horizon-s 900 --value 4 --service-s 8 --name my-trees"
     mission = imported(capsys, str(DATA / "trees.geojson"), "--home", "47,8,390", *options.split())

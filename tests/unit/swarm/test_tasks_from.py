@@ -90,8 +90,8 @@ def test_faults_of_tasks_are_named_at_their_place_in_the_file(tmp_path: Path) ->
         "grid.csv: line 3, id: 'p2' is already the id of task[0]; give every one an id of its own",
         f"grid.csv: line 4, position_m: 1000000000.0 is not <= 1e+07; {point}",
         (
-            "grid.csv: line 4, id: 'not an id' is not an id; give an id of 1 to 64 letters, digits, "
-            "'_', '-' or '.', beginning with a letter or digit"
+            "grid.csv: line 4, id: 'not an id' is not an id; give an id of 1 to 64 letters, "
+            "digits, '_', '-' or '.', beginning with a letter or digit"
         ),
     ]
 
