@@ -156,7 +156,7 @@ async def run_agent(
         from_bus=as_event,
         execute=execute,
         snapshot=core.snapshot,
-        known=core.replica.messages,
+        known=core.replica.digest,
         save=keep,
         answer_s=answer_s,
     )

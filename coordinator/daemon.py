@@ -9,22 +9,36 @@ answers on ``state/coordinator``; while it stands by, none of that. Subscribes t
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Coroutine, Mapping
 
 from coordinator.core import CoordinatorCore
-from coordinator.events import Action, Event, MakePlan, PlanFailed, PlanMade, TakeSeat
+from coordinator.events import (
+    Action,
+    Event,
+    MakePlan,
+    PlanFailed,
+    PlanMade,
+    Replan,
+    Replanned,
+    TakeSeat,
+)
+from coordinator.planner.live import NewPlan, replan
+from coordinator.planner.stop import after_time
 from coordinator.standby import StandbyCore
 from swarm.bus.port import Bus
-from swarm.clock import Clock
+from swarm.clock import Clock, SystemClock
 from swarm.config import PRESETS, Link
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
 from swarm.process import call_in_background
 from swarm.shell import Shell, take_seat
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Message, Snapshot
+from swarm.wire.messages import Snapshot
 
 __all__ = ["run_coordinator"]
+
+REPLAN_S = 1.0
+"""Wall time that a running mission waits for a better plan, apart from valuing it."""
 
 
 async def run_coordinator(
@@ -67,12 +81,31 @@ async def run_coordinator(
         else:
             shell.step(PlanMade(request.request, made))
 
+    async def plan_anew(request: Replan) -> None:
+        def call() -> NewPlan:
+            return replan(
+                request.situation,
+                request.course,
+                request.method,
+                seed=request.seed,
+                stop=after_time(SystemClock(), REPLAN_S),
+                threads=1,  # agents on this machine must not wait for a processor
+            )
+
+        made = await asyncio.wrap_future(call_in_background(call, "replanner"))
+        shell.step(Replanned(request.request, made))
+
+    def begin(work: Coroutine[None, None, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        planning.add(task)
+        task.add_done_callback(planned)
+
     def execute(action: Action) -> None:
         match action:
             case MakePlan():
-                task = asyncio.get_running_loop().create_task(plan(action))
-                planning.add(task)
-                task.add_done_callback(planned)
+                begin(plan(action))
+            case Replan():
+                begin(plan_anew(action))
             case TakeSeat():
                 bus.serve(keys.state(COORDINATOR))
                 bus.declare_token(keys.alive(COORDINATOR))
@@ -82,8 +115,8 @@ async def run_coordinator(
         if not task.cancelled() and (fault := task.exception()):
             shell.fail(fault)
 
-    def known() -> Iterable[Message]:
-        return core.replica.messages()  # another one once it has taken over
+    def known() -> Mapping[str, int]:
+        return core.replica.digest()  # of another one once it has taken over
 
     def as_event(fact: Event) -> Event:
         return fact

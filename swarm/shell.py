@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
@@ -43,9 +43,9 @@ from swarm.events import (
 )
 from swarm.log import get_logger
 from swarm.wire.codec import Codec, encode, fit, key_of
-from swarm.wire.digest import decode_digest, digest, encode_digest, unknown
+from swarm.wire.digest import decode_digest, encode_digest, unknown
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Message, Snapshot, Status
+from swarm.wire.messages import Snapshot, Status
 
 __all__ = ["Core", "Shell", "take_seat"]
 
@@ -83,7 +83,8 @@ class Shell(Generic[E, A]):
         from_bus: makes the core's event of a fact from the bus.
         execute: carries out an action that is not common to all processes.
         snapshot: answers a query; None for a process that answers none.
-        known: all registers the core knows; answers to it need not repeat those of others.
+        known: digest of the registers the core knows; answers to it leave those out, and
+            its own answers what the asker knows.
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
     """
@@ -99,7 +100,7 @@ class Shell(Generic[E, A]):
         from_bus: Callable[[BusFact], E],
         execute: Callable[[A], None],
         snapshot: Callable[[float], Snapshot] | None,
-        known: Callable[[], Iterable[Message]] = tuple,
+        known: Callable[[], Mapping[str, int]] = dict,
         save: Callable[[float], None] | None = None,
         answer_s: float = PRESETS[Link.NORMAL].answer_s,
     ) -> None:
@@ -246,12 +247,12 @@ class Shell(Generic[E, A]):
     def _answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
         if self._snapshot is None:
             return
-        known = decode_digest(payload)
-        if known is None:
+        theirs = decode_digest(payload)
+        if theirs is None:
             self._codec.dropped["malformed"] += 1
             return
         whole = self._snapshot(self._clock.now_s())
-        news = replace(whole, messages=unknown(whole.messages, known))
+        news = replace(whole, messages=unknown(whole.messages, self._known(), theirs))
         fitted = fit(news)
         if len(fitted.messages) < len(news.messages):
             left_out = len(news.messages) - len(fitted.messages)
@@ -261,7 +262,7 @@ class Shell(Generic[E, A]):
     async def _ask(self) -> None:
         asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
         # What is said in the own name is always told: by who remembers an earlier life, or a twin.
-        known = digest(message for message in self._known() if message.writer != self._name)
+        known = {writer: number for writer, number in self._known().items() if writer != self._name}
         answers = await self._bus.query(
             self._keys.state("*"), encode_digest(known), timeout_s=self._answer_s
         )

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 
 from swarm.wire.codec import encode, key_of
+from swarm.wire.digest import fingerprint
 from swarm.wire.messages import Board, Brief, Claim, Epoch, Message, Outcome, Status
 
 __all__ = ["Replica"]
@@ -21,6 +22,11 @@ class Replica:
 
     def __init__(self) -> None:
         self._registers: dict[str, Message] = {}
+        self._digest: dict[str, int] = {}
+        self._in_digest: dict[str, int] = {}
+        """Fingerprint of each register, as far as the digest has been asked for."""
+        self._changed: set[str] = set()
+        """Keys of registers that have changed since."""
         self.brief: Brief | None = None
         self.epoch: Epoch | None = None
         self.board: dict[str, Board] = {}
@@ -46,6 +52,7 @@ class Replica:
             self.stale += message.stamp < known.stamp
             return False
         self._registers[key] = message
+        self._changed.add(key)
         self.board_version += isinstance(message.body, Brief | Board)
         self.task_version += isinstance(message.body, Brief | Board | Outcome)
         match message.body:
@@ -92,6 +99,17 @@ class Replica:
             outlived = message.stamp.incarnation < lives[writer]
             if writer == own or writer not in steady or outlived:
                 yield message
+
+    def digest(self) -> dict[str, int]:
+        """Writer -> a number that is equal wherever all its registers are."""
+        for key in self._changed:
+            message = self._registers[key]
+            number = fingerprint(message)
+            change = number ^ self._in_digest.get(key, 0)
+            self._digest[message.writer] = self._digest.get(message.writer, 0) ^ change
+            self._in_digest[key] = number
+        self._changed.clear()
+        return dict(self._digest)
 
     def writers(self) -> set[str]:
         """Everyone who has said something."""

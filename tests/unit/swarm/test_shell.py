@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 
@@ -31,7 +31,7 @@ from swarm.events import (
 from swarm.model.ids import COORDINATOR
 from swarm.shell import Shell, take_seat
 from swarm.wire.codec import Codec, encode, key_of
-from swarm.wire.digest import decode_digest, digest, encode_digest
+from swarm.wire.digest import decode_digest, encode_digest
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
 from tests.builders import MISSION, brief, done, entry, epoch, held, message, status, uav
@@ -116,7 +116,7 @@ async def at_work(
     execute: Callable[[Action], None] | None = None,
     answers: bool = True,
     snapshot: Snapshot = SNAPSHOT,
-    known: Sequence[Message] = (),
+    known: Mapping[str, int] | None = None,
     save: Callable[[float], None] | None = None,
     capacity: int = 4096,
 ) -> AsyncIterator[Played]:
@@ -141,7 +141,7 @@ async def at_work(
         from_bus=as_event,
         execute=execute or remember,
         snapshot=(lambda _: snapshot) if answers else None,
-        known=lambda: known,
+        known=lambda: known or {},
         save=save,
     )
     running = asyncio.create_task(shell.run())
@@ -263,8 +263,8 @@ def test_queries_are_answered_with_the_cores_snapshot() -> None:
 
 def test_an_answer_leaves_out_what_the_asker_knows() -> None:
     async def scenario() -> None:
-        async with at_work(ScriptedCore()) as played:
-            known = encode_digest(digest(SNAPSHOT.messages))
+        async with at_work(ScriptedCore(), known={"u0": 7}) as played:
+            known = encode_digest({"u0": 7})
             (answer,) = await played.other.query(KEYS.state("*"), known, timeout_s=5.0)
 
             shortened = Codec(MISSION).decode_snapshot(answer.key, answer.payload)
@@ -385,8 +385,7 @@ def test_a_question_tells_what_the_core_knows_but_for_the_own_registers() -> Non
 
     async def scenario() -> None:
         core = ScriptedCore(first=[Ask()])
-        own = message("u0", held("t1", 2.0))
-        async with at_work(core, known=[*REGISTERS, own]) as played:
+        async with at_work(core, known={"u0": 1, "u1": 2, COORDINATOR: 3}) as played:
             queries: list[Query] = []
 
             def asked() -> bool:
@@ -395,7 +394,7 @@ def test_a_question_tells_what_the_core_knows_but_for_the_own_registers() -> Non
                 return bool(queries)
 
             await until(asked, "being asked")
-            assert decode_digest(queries[0].payload) == digest(REGISTERS)
+            assert decode_digest(queries[0].payload) == {"u1": 2, COORDINATOR: 3}
 
     play(scenario)
 
