@@ -70,6 +70,9 @@ class Hearing:
                 self.learning.doubt(now_s)
             return []
         actions = self._greet(writer, now_s) if self._peers.heard(writer, body, now_s) else []
+        if isinstance(body, Brief) and self._replica.brief is None and not self.at_work:
+            # Whoever answered before did not know the mission; now somebody may know more.
+            self.learning.doubt(now_s)
         actions += self._take_in(message, now_s)
         return actions + (self._start_clock(body, now_s) if isinstance(body, Epoch) else [])
 

@@ -10,7 +10,7 @@ from agent.core import AgentCore
 from agent.events import Action, Event, Order
 from agent.vehicle import Arrived, GoTo, Orders, Telemetry, VehicleReady
 from swarm.config import Timing
-from swarm.events import Heard, Learned, Note, PeerGone, PeerSeen, Publish, Tick
+from swarm.events import Finish, Heard, Learned, Note, PeerGone, PeerSeen, Publish, Tick
 from swarm.model import Uav
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import (
@@ -46,17 +46,51 @@ class LoneAgent:
         timing: Timing = TIMING,
         incarnation: int = 5,
         reattempt_failed: bool = False,
+        now_s: float = START_S,
+        memory: Snapshot | None = None,
+        memory_age_s: float = 0.0,
+        rejoin: bool = False,
     ) -> None:
         self.uavs = uavs
         self.me = uavs[0].id
-        self.core = AgentCore(MISSION, self.me, incarnation, timing)
+        self.core = AgentCore(
+            MISSION, self.me, incarnation, timing, memory, memory_age_s, rejoin=rejoin
+        )
         self.timing = timing
-        self.now_s = START_S
+        self.now_s = now_s
         self.brief = brief(*uavs, reattempt_failed=reattempt_failed)
         self.log: list[Action] = []
         """Every action so far."""
         self._counters: Counter[str] = Counter()
         self._do(self.core.start(self.now_s))
+
+    def reborn(
+        self, *, down_s: float = 2.0, remembers: bool = False, rejoin: bool = False
+    ) -> LoneAgent:
+        """The next life of this agent, which has learned nothing from others yet.
+
+        Args:
+            down_s: how long there was no process.
+            remembers: whether it finds what this life kept last.
+            rejoin: whether it is to take part at any rate.
+        """
+        memory = self.core.memory(self.now_s + down_s)
+        agent = LoneAgent(
+            *self.uavs,
+            timing=self.timing,
+            incarnation=memory.incarnation + 1,
+            now_s=self.now_s + down_s,
+            memory=memory if remembers else None,
+            memory_age_s=down_s,
+            rejoin=rejoin,
+        )
+        agent.brief, agent._counters = self.brief, self._counters
+        return agent
+
+    def learn_what_was_known_to(self, earlier: LoneAgent) -> list[Action]:
+        """Others answer, who had heard everything that life of this agent said and heard."""
+        memory = earlier.core.memory(self.now_s)
+        return self.learn(*memory.messages, mission_s=memory.mission_s)
 
     # -- what happens ------------------------------------------------------------------
 
@@ -110,6 +144,10 @@ class LoneAgent:
     def learn(self, *messages: Message, mission_s: float | None = None) -> list[Action]:
         """One answer to the agent's question."""
         return self.happen(Learned((Snapshot(MISSION, "other", 1, mission_s, messages),)))
+
+    def learn_from_nobody(self) -> list[Action]:
+        """Nobody answers."""
+        return self.happen(Learned(()))
 
     def post(self, *entries: Board) -> list[Action]:
         return [action for e in entries for action in self.hear(COORDINATOR, e)]
@@ -183,6 +221,10 @@ def claims(actions: Sequence[Action]) -> list[Claim]:
 
 def outcomes(actions: Sequence[Action]) -> list[Outcome]:
     return said(actions, Outcome)
+
+
+def finishes(actions: Sequence[Action]) -> list[int]:
+    return [action.status for action in actions if isinstance(action, Finish)]
 
 
 def statuses(actions: Sequence[Action]) -> list[Status]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from agent.events import Action
 from agent.vehicle import Arrived, GoTo, HandedOver, Home, Prepare, Refused, Return, VehicleReady
-from swarm.events import Finish, Heard, Stop
+from swarm.events import Heard, Stop
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Board, ClaimPhase, EpochPhase, StatusPhase
 from tests.builders import IDLE, OUT, done, entry, epoch, held, proposed, uav
-from tests.lone_agent import LoneAgent, claims, orders, outcomes, statuses
+from tests.lone_agent import LoneAgent, claims, finishes, orders, outcomes, statuses
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
 
@@ -20,10 +19,6 @@ def flying(*tasks: Board, others: int = 0) -> LoneAgent:
     agent.fly_to(*tasks)
     agent.start_mission()
     return agent
-
-
-def finishes(actions: list[Action]) -> list[int]:
-    return [action.status for action in actions if isinstance(action, Finish)]
 
 
 # -- arriving and serving ---------------------------------------------------------------

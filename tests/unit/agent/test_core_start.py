@@ -28,7 +28,10 @@ def test_it_asks_first_and_prepares_nothing_before_it_has_learned() -> None:
     agent = LoneAgent(uav("u0"))
     assert agent.log == [Ask()]
 
-    assert orders(agent.hear(COORDINATOR, agent.brief)) == []
+    agent.learn()
+    agent.now_s += agent.timing.ask_gap_s
+    actions = agent.hear(COORDINATOR, agent.brief)
+    assert (orders(actions), actions.count(Ask())) == ([], 1)
     assert orders(agent.learn()) == [PREPARE]
 
 
@@ -38,10 +41,12 @@ def test_it_asks_again_as_long_as_nobody_knows_the_brief() -> None:
     asked = []
     while agent.now_s < START_S + 3.5 * agent.timing.ask_s:
         asked += [action for action in agent.tick_when_due() if action == Ask()]
+        agent.learn()
 
     assert len(asked) == 3
     assert "brief" in statuses(agent.log)[-1].note
-    assert orders(agent.hear(COORDINATOR, agent.brief)) == [PREPARE]
+    agent.hear(COORDINATOR, agent.brief)
+    assert orders(agent.learn()) == [PREPARE]
 
 
 def test_it_asks_again_as_long_as_the_brief_does_not_name_it() -> None:

@@ -76,6 +76,7 @@ class Played:
     seat: MemoryBus
     coordinator: MemoryBus
     vehicles: list[FakeVehicle]
+    clock: HandClock
 
     def say(self, *said: Message) -> None:
         for each in said:
@@ -85,9 +86,16 @@ class Played:
         token = TokenSeen(KEYS.alive("u0"))
         await take_until(self.coordinator, lambda seen: token in seen)
 
-    async def airborne(self) -> FakeVehicle:
+    async def briefed(self) -> None:
+        """Heard of the mission, and asked everyone for more."""
         await self.seated()
         self.say(BRIEF)
+        await until(lambda: self.core.replica.brief is not None, "hearing the brief")
+        self.clock.time_s += 0.5
+        self.say(BRIEF)
+
+    async def airborne(self) -> FakeVehicle:
+        await self.briefed()
         await until(lambda: self.core.claim is not None, "getting airborne")
         return self.vehicles[0]
 
@@ -99,15 +107,15 @@ async def at_work(*, broken: bool = False, stays_away: bool = False) -> AsyncIte
     watching, seat = network.join("watching"), network.join("u0")
     take_seat(watching, MISSION, None, status=True)
     core = AgentCore(MISSION, "u0", 1, Timing())
-    stop, vehicles = StopRequest(), list[FakeVehicle]()
+    stop, vehicles, clock = StopRequest(), list[FakeVehicle](), HandClock()
 
     def make_vehicle(origin: Origin, report: Callable[[Report], None]) -> FakeVehicle:
         vehicles.append(FakeVehicle(origin, report, broken, stays_away))
         return vehicles[-1]
 
-    running = asyncio.create_task(run_agent(core, MISSION, seat, HandClock(), make_vehicle, stop))
+    running = asyncio.create_task(run_agent(core, MISSION, seat, clock, make_vehicle, stop))
     try:
-        yield Played(core, running, stop, seat, watching, vehicles)
+        yield Played(core, running, stop, seat, watching, vehicles, clock)
     finally:
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
@@ -216,8 +224,7 @@ def test_told_to_stop_before_it_knows_the_mission_it_just_leaves(at_once: bool) 
 def test_a_vehicle_that_cannot_be_reached_ends_the_agent_with_the_reason() -> None:
     async def scenario() -> None:
         async with at_work(broken=True) as played:
-            await played.seated()
-            played.say(BRIEF)
+            await played.briefed()
             with pytest.raises(OwnError):
                 await played.running
             assert played.vehicles[0].closed == 1
