@@ -49,6 +49,7 @@ from agent.vehicle import (
     VehicleReady,
 )
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
+from swarm.pulse import Pulse
 
 __all__ = ["Bridge", "Phase"]
 
@@ -101,12 +102,15 @@ class Bridge:
         self._wrong_autopilot: int | None = None
         self._told_not_ready: str | None = None
         self._heartbeat_at_s = -math.inf
+        self._pulse = Pulse(config.silence_timeout_s / 2.0)
         self._now_s = 0.0
         self._actions: list[Action] = []
 
     def step(self, event: Event, now_s: float) -> list[Action]:
         """What to do about ``event``, in order; never raises on anything received."""
         self._now_s = now_s
+        if self._pulse.late(now_s):
+            self._vehicle.excuse_silence(now_s)
         match event:
             case Received(data):
                 for heard in self.codec.decode(data):
@@ -123,6 +127,7 @@ class Bridge:
             case Tick():
                 pass
         self._advance()
+        self._pulse.promise(self.next_deadline_s())
         actions, self._actions = self._actions, []
         return actions
 

@@ -65,6 +65,11 @@ class VehicleState:
     _suspect_boot_s: float = 0.0
     _suspect_messages: int = 0
 
+    def excuse_silence(self, now_s: float) -> None:
+        """Nobody listened for a while: what it said meanwhile is still unread."""
+        if self.heartbeat_at_s is not None:
+            self.heartbeat_at_s = now_s
+
     @property
     def armed(self) -> bool:
         """Whether the motors run, as far as heard."""

@@ -9,7 +9,7 @@ import pytest
 
 from agent.mavlink.bridge import Phase
 from agent.mavlink.config import BridgeConfig
-from agent.mavlink.events import LinkDown, LinkUp
+from agent.mavlink.events import LinkDown, LinkUp, Tick
 from agent.vehicle import Arrived, GoTo, HandedOver, Home, Refused, Return, VehicleReady
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.fake_copter import (
@@ -304,6 +304,23 @@ def test_vehicle_that_disarms_in_flight_is_handed_over() -> None:
     flight = BridgeFlight().flying()
     flight.copter.armed = False
     flight.run_until(HandedOver("the vehicle disarmed by itself"))
+
+
+def test_a_bridge_that_was_itself_held_up_does_not_take_its_vehicle_for_silent() -> None:
+    flight = BridgeFlight().flying()
+    flight.now_s += 30.0  # nobody steps the bridge meanwhile, and nothing is read
+    reports = flight.happen(Tick())
+    flight.run_until(Arrived(1))
+    assert not any(isinstance(report, HandedOver) for report in [*reports, *flight.reports])
+
+
+def test_a_vehicle_that_stays_silent_after_the_bridge_was_held_up_is_handed_over() -> None:
+    flight = BridgeFlight().flying()
+    flight.copter.silent = True
+    flight.now_s += 30.0
+    held_up_s = flight.now_s
+    assert flight.run_until(HandedOver) == HandedOver("no heartbeat for 5 s")
+    assert 4.0 <= flight.now_s - held_up_s <= 6.0
 
 
 def test_silent_vehicle_is_handed_over_and_can_be_prepared_again() -> None:
