@@ -21,10 +21,10 @@ from swarm.model.frames import enu_from_wgs84
 from swarm.scenario.checks import check, origin_of
 from swarm.scenario.files import decode, read_bytes
 from swarm.scenario.findings import Document, Finding, faults_of, printable
-from swarm.scenario.task_files import SUFFIXES, TaskFile, read_task_file
 
 if TYPE_CHECKING:
     from swarm.scenario.shapes import Scenario, TaskTable, UavTable
+    from swarm.scenario.task_files import TaskFile
 
 __all__ = ["build_mission", "load_scenario", "parse_scenario"]
 
@@ -39,11 +39,18 @@ def load_scenario(path: Path) -> Mission:
         InputError: the file cannot be read, or is wrong; see `parse_scenario`.
     """
     source = printable(str(path))
-    if path.suffix.lower() in SUFFIXES:
-        problem = "holds tasks and no fleet"
-        remedy = f"make a scenario of it: swarm import {source} --uavs 3 -o {path.stem}.toml"
-        raise InputError(Fault(source, "", problem, remedy))
+    if path.suffix != ".toml":
+        _refuse_tasks_alone(path, source)
     return parse_scenario(read_bytes(path, _WHAT), source, path.parent)
+
+
+def _refuse_tasks_alone(path: Path, source: str) -> None:
+    """Say of a file of tasks how it becomes a scenario."""
+    from swarm.scenario.task_files import SUFFIXES
+
+    if path.suffix.lower() in SUFFIXES:
+        remedy = f"make a scenario of it: swarm import {source} --uavs 3 -o {path.stem}.toml"
+        raise InputError(Fault(source, "", "holds tasks and no fleet", remedy))
 
 
 def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
@@ -63,6 +70,8 @@ def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
     document = _document(data, source)
     if "tasks_from" not in document:
         return build_mission(document, source)
+    from swarm.scenario.task_files import read_task_file
+
     document = {**document, "task": document.get("task", [])}
     name = document["tasks_from"]
     if not isinstance(name, str) or not name:
