@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarm.bus.port import MAX_PAYLOAD_BYTES
 from swarm.model.ids import COORDINATOR
 from swarm.state.registers import Replica
-from swarm.wire.digest import decode_digest, encode_digest, unknown
+from swarm.wire.digest import MOST_WRITERS, decode_digest, encode_digest, unknown
 from swarm.wire.messages import Message
 from tests.builders import IDLE, brief, done, entry, held, message, uav
 from tests.message_strategies import messages
@@ -74,6 +75,14 @@ def test_every_digest_comes_back(said: list[Message]) -> None:
 
     assert decode_digest(encode_digest(known)) == known
     assert decode_digest(b"") == {}
+
+
+def test_a_digest_of_endlessly_many_writers_still_fits_a_question() -> None:
+    endless = {f"{number:064d}": 2**64 - 1 for number in range(100_000)}
+    data = encode_digest(endless)
+
+    assert len(data) < MAX_PAYLOAD_BYTES
+    assert decode_digest(data) == dict(list(endless.items())[:MOST_WRITERS])
 
 
 @pytest.mark.parametrize("thing", [1, None, "u0", [], [["u0", 1]], {"u0": b"x"}, {1: 1}])
