@@ -112,6 +112,11 @@ class Beginning:
         routes = {str(uav): tuple(map(str, tasks)) for uav, tasks in lists.items()}
         return Epoch(1, phase, self._method, tuple(sequence), 0.0, reason[:200], routes)
 
+    @property
+    def completion_s(self) -> dict[str, float]:
+        """When the plan has each task done [s mission time]."""
+        return {} if self.plan is None else {str(t): s for t, s in self.plan.completion_s.items()}
+
     def next_deadline_s(self) -> float | None:
         """When `advance` gives up on who is not airborne."""
         return self._start_by_s

@@ -3,12 +3,13 @@
 It learns before it says anything. Where a mission runs it takes charge of that; else it
 briefs the fleet, plans while the vehicles get ready, and starts the mission when all are
 airborne (or given up). It posts pop-ups when their time comes, and ends the mission when
-nothing is left that anybody could do. The fleet needs it for none of its own decisions.
+nothing is left that anybody could do; where that is worth more it publishes another epoch
+meanwhile. The fleet needs it for none of its own decisions.
 Leaves out: what it finds of a mission (coordinator.heritage), who keeps the seat when two
 sit on it (coordinator.seat), how a mission begins (coordinator.beginning) and when it is
-over (coordinator.ending), the board (coordinator.postings), what it says again
-(coordinator.speech), how plans are made (coordinator.planner), and transport
-(coordinator.daemon).
+over (coordinator.ending), the board (coordinator.postings), when it plans anew
+(coordinator.replanning), what it says again (coordinator.speech), how plans are made
+(coordinator.planner), and transport (coordinator.daemon).
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ from dataclasses import replace
 from coordinator.beginning import Beginning, Verdict
 from coordinator.briefing import FlightLayers, brief_of, differences
 from coordinator.ending import Ending
-from coordinator.events import Action, Event, PlanFailed, PlanMade
+from coordinator.events import Action, Event, PlanFailed, PlanMade, Replanned
 from coordinator.heritage import Heritage, inherit, statements
 from coordinator.inquiry import Inquiry
+from coordinator.planner.live import Situation
 from coordinator.postings import Postings, exit_status
+from coordinator.replanning import Replanning
 from coordinator.seat import Standing, gives_way, standing_of
 from coordinator.speech import Speech
 from swarm.config import Timing
@@ -103,6 +106,7 @@ class CoordinatorCore:
             mission, method, seed, self.replica, self._membership, start_timeout_s
         )
         self._ending = Ending(self._board, self._membership, timing)
+        self._replanning = Replanning(method, seed, timing.replan_interval_s)
         self._inquiry = Inquiry(timing.ask_gap_s)
         self._pulse = Pulse(timing.pause_s)
         self._actions: list[Action] = []
@@ -154,6 +158,7 @@ class CoordinatorCore:
             ]
             if self._zero_s is not None and not self._ended:
                 deadlines.append(self._postings.next_deadline_s(self._zero_s))
+                deadlines.append(self._replanning.next_deadline_s())
         return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
     def snapshot(self, now_s: float) -> Snapshot:
@@ -205,6 +210,8 @@ class CoordinatorCore:
                 self._beginning.plan = plan
             case PlanFailed(request, reason) if self._beginning.expects(request):
                 self._end(f"no plan: {reason}", now_s)
+            case Replanned() as replanned:
+                self._judge(replanned, now_s)
             case Stop(reason):
                 self._end(reason, now_s)
             case _:
@@ -311,6 +318,7 @@ class CoordinatorCore:
             self._leave_at_s = now_s + self._timing.linger_s if _ended(epoch) else None
             self._beginning.leave()
             self._ending.wait_until(now_s + self._timing.relink_grace_s)
+            self._replanning.begin(None, {}, now_s)
             epoch = replace(epoch, mission_s=self._mission_s(now_s))
         self._speech.outdo(theirs)
         bodies = [message.body for message in theirs if not isinstance(message.body, Epoch)]
@@ -349,6 +357,7 @@ class CoordinatorCore:
             if self._zero_s is not None:
                 self._post(now_s)
                 self._end_if_over(now_s)
+                self._replan(now_s)
         if not self._finished:
             self._actions += self._speech.repeat(now_s, self._mission_s(now_s))
 
@@ -359,6 +368,7 @@ class CoordinatorCore:
             self._zero_s = now_s
             why = "every UAV is airborne or given up"
             self._say(self._beginning.epoch(EpochPhase.RUNNING, why))
+            self._replanning.begin(self._situation(now_s), self._beginning.completion_s, now_s)
         elif verdict is Verdict.NOBODY:
             self._end("no UAV is airborne", now_s)
 
@@ -372,6 +382,28 @@ class CoordinatorCore:
         reason = self._ending.reason(now_s, more_to_come=self._postings.more_to_come)
         if reason is not None:
             self._end(reason, now_s)
+
+    def _situation(self, now_s: float) -> Situation | None:
+        return Situation.of(self._board, self._membership.credible, self._mission_s(now_s))
+
+    def _replan(self, now_s: float) -> None:
+        epoch = self.replica.epoch
+        if epoch is None or self._ended or self._replanning.is_quiet(now_s):
+            return
+        situation = self._situation(now_s)
+        wanted = situation and self._replanning.wanted(situation, epoch, now_s)
+        if wanted:
+            self._actions.append(wanted)
+
+    def _judge(self, replanned: Replanned, now_s: float) -> None:
+        epoch, situation = self.replica.epoch, self._situation(now_s)
+        if self._inquiry.unsure or epoch is None or situation is None or self._ended:
+            self._replanning.drop()
+            return
+        better = self._replanning.judge(replanned, situation, epoch, now_s)
+        if better is not None:
+            self._say(better)
+            self._actions.append(Note("plans anew", {"reason": better.reason}))
 
     def _end(self, reason: str, now_s: float) -> None:
         if not self._in_charge:

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from coordinator.planner.live import Course, NewPlan, Situation
 from swarm.events import BusFact, Wish
 from swarm.model import Mission, Plan
 
-__all__ = ["Action", "Event", "MakePlan", "PlanFailed", "PlanMade", "TakeSeat"]
+__all__ = [
+    "Action",
+    "Event",
+    "MakePlan",
+    "PlanFailed",
+    "PlanMade",
+    "Replan",
+    "Replanned",
+    "TakeSeat",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +47,29 @@ class MakePlan:
 
 
 @dataclass(frozen=True, slots=True)
+class Replan:
+    """Plan the rest of a running mission in the background; ends in `Replanned`."""
+
+    request: int
+    situation: Situation
+    course: Course
+    """Of the epoch in force."""
+    method: str
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Replanned:
+    """The answer to a `Replan`."""
+
+    request: int
+    plan: NewPlan
+
+
+@dataclass(frozen=True, slots=True)
 class TakeSeat:
     """Show that the coordinator is there, and answer for it."""
 
 
-Event = BusFact | PlanMade | PlanFailed
-Action = Wish | MakePlan | TakeSeat
+Event = BusFact | PlanMade | PlanFailed | Replanned
+Action = Wish | MakePlan | Replan | TakeSeat

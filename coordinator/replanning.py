@@ -2,122 +2,136 @@
 
 Reasons are differences between the situation that the epoch in force answers to and the
 situation of now, so a reason that comes at a bad moment is not forgotten. Leaves out: planning
-(`coordinator.planner.live`).
+(`coordinator.planner.live`) and publishing (`coordinator.core`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.planner.live import Lists, NewPlan, Situation, worth
+from coordinator.events import Replan, Replanned
+from coordinator.planner.live import Course, Lists, Situation, worth
+from swarm.wire.messages import Epoch
 
-__all__ = ["DRIFT_FRAC", "MARGIN_FRAC", "NextEpoch", "Replanning"]
+__all__ = ["DRIFT_FRAC", "MARGIN_FRAC", "Replanning"]
 
-MARGIN_FRAC = 0.005
+MARGIN_FRAC = 0.01
 """Of the value still to be won; a new plan that promises less more is not worth an epoch."""
 DRIFT_FRAC = 0.05
 """Of the time the plan still takes; UAVs that are later by more make a new plan worth a try."""
-
-
-@dataclass(frozen=True, slots=True)
-class NextEpoch:
-    """What the next epoch says."""
-
-    rule: str
-    sequence: tuple[str, ...]
-    routes: Lists
-    """What each UAV has visited and is on its way to, and then its new list: every posted task
-    is on a list."""
-    reason: str
 
 
 class Replanning:
     """The decision to plan anew, and to adopt or to discard what comes of it.
 
     Args:
-        interval_s: shortest time between two epochs, in the seconds of ``now_s``.
+        method: planning method.
+        seed: of the planner.
+        interval_s: shortest time between two plans, in the seconds of ``now_s``.
         margin_frac: see `MARGIN_FRAC`.
         drift_frac: see `DRIFT_FRAC`.
     """
 
     def __init__(
         self,
+        method: str,
+        seed: int,
         interval_s: float,
         *,
         margin_frac: float = MARGIN_FRAC,
         drift_frac: float = DRIFT_FRAC,
     ) -> None:
+        self._method = method
+        self._seed = seed
         self._interval_s = interval_s
         self._margin_frac = margin_frac
         self._drift_frac = drift_frac
         self._answered: Situation | None = None
+        """What the epoch in force answers to, and every plan that was no better."""
         self._expected_s: Mapping[str, float] = {}
-        self._planning: tuple[Situation, str] | None = None
+        self._under_way: tuple[Situation, str] | None = None
+        """What is being planned for, and why."""
+        self._request = 0
         self._quiet_until_s: float | None = None
-        self._waits = False
 
     def begin(
         self, situation: Situation | None, completion_s: Mapping[str, float], now_s: float
     ) -> None:
-        """An epoch has come into force that was not made here.
+        """An epoch has come into force that was not made here; a plan under way is for nothing.
 
         Args:
             situation: the one it answers to; None if unknown, which is a reason to plan anew.
             completion_s: when its tasks are expected to be done [s mission time].
             now_s: now.
         """
-        self._answered, self._expected_s, self._planning = situation, completion_s, None
+        self._answered, self._expected_s, self._under_way = situation, completion_s, None
         self._quiet_until_s = now_s + self._interval_s
 
-    def wanted(self, situation: Situation, now_s: float) -> bool:
-        """Whether to plan anew from ``situation``; if so, `judge` or `discard` must follow."""
-        self._waits = False
-        if self._planning is not None or situation.is_settled:
-            return False
+    def is_quiet(self, now_s: float) -> bool:
+        """Whether nothing can be wanted by now, whatever has happened."""
+        if self._quiet_until_s is not None and self._quiet_until_s <= now_s:
+            self._quiet_until_s = None
+        return self._under_way is not None or self._quiet_until_s is not None
+
+    def wanted(self, situation: Situation, epoch: Epoch, now_s: float) -> Replan | None:
+        """The plan that is wanted, if any; its answer goes to `judge`.
+
+        Args:
+            situation: of now.
+            epoch: in force.
+            now_s: now.
+        """
+        if self.is_quiet(now_s) or situation.is_settled:
+            return None
         reasons = self._reasons(situation)
         if not reasons:
-            return False
-        if self._quiet_until_s is not None and now_s < self._quiet_until_s:
-            self._waits = True
-            return False
-        self._planning = situation, ", ".join(reasons)
-        return True
+            return None
+        self._under_way = situation, ", ".join(reasons)
+        self._quiet_until_s = now_s + self._interval_s
+        self._request += 1
+        seed = self._seed + self._request
+        return Replan(self._request, situation, Course.of(epoch), self._method, seed)
 
-    def judge(self, plan: NewPlan, situation: Situation, now_s: float) -> NextEpoch | None:
-        """What to publish of the plan that was wanted; None if going on is about as good.
+    def drop(self) -> None:
+        """What is being planned comes at a bad moment; it will be wanted again."""
+        self._under_way = None
+
+    def judge(
+        self, replanned: Replanned, situation: Situation, epoch: Epoch, now_s: float
+    ) -> Epoch | None:
+        """The next epoch; None if that plan is not wanted any more or hardly better than going on.
 
         Both are valued from ``situation``, which is the one of now and not of when planning began.
         """
-        if self._planning is None:
+        if self._under_way is None or replanned.request != self._request:
             return None
-        planned_for, reasons = self._planning
+        plan = replanned.plan
+        (planned_for, reasons), self._under_way = self._under_way, None
         new, old = plan.prediction, plan.going_on
         new_worth, old_worth = worth(situation, new.lists), worth(situation, old.lists)
         gain = new_worth - old_worth
         adopted = gain > self._margin_frac * abs(old_worth) and not situation.is_settled
-        self._answered, self._planning = planned_for, None
+        self._answered = planned_for
         self._expected_s = new.completion_s if adopted else old.completion_s
         if not adopted:
             return None
         self._quiet_until_s = now_s + self._interval_s
-        return NextEpoch(
-            plan.rule,
-            plan.sequence,
-            _whole_lists(situation, new.lists),
-            f"{reasons}: worth {gain:.4g} more than {old_worth:.4g} value·s",
+        why = f": worth {new_worth:.4g} instead of {old_worth:.4g} value·s"
+        return Epoch(
+            number=epoch.number + 1,
+            phase=epoch.phase,
+            rule=plan.rule,
+            sequence=plan.sequence,
+            mission_s=situation.now_s,
+            reason=reasons[: 200 - len(why)] + why,
+            routes=_whole_lists(situation, new.lists),
         )
 
-    def discard(self) -> None:
-        """The plan that was wanted has failed; only a further change makes another one wanted."""
-        if self._planning is not None:
-            self._answered, self._planning = self._planning[0], None
-
     def next_deadline_s(self) -> float | None:
-        """When `wanted` will answer otherwise though nothing happens."""
-        return self._quiet_until_s if self._waits else None
+        """When something may be wanted though nothing happens."""
+        return None if self._under_way is not None else self._quiet_until_s
 
     def _reasons(self, now: Situation) -> list[str]:
         before = self._answered

@@ -22,8 +22,9 @@ from agent.events import Order
 from agent.vehicle import GoTo, Orders, Refused, Report, Telemetry, VehicleReady
 from coordinator.core import CoordinatorCore, FlightLayers
 from coordinator.events import Action as CoordinatorAction
-from coordinator.events import MakePlan, PlanMade
+from coordinator.events import MakePlan, PlanMade, Replan, Replanned
 from coordinator.observer import Observer
+from coordinator.planner.live import NewPlan, replan
 from sim.event_queue import EventQueue
 from sim.network import IdealNetwork, Network
 from sim.processes import LocalClock, Process
@@ -34,7 +35,17 @@ from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
 
-__all__ = ["ONLOOKER", "QUIET", "Faults", "Planner", "Recall", "Setting", "Watch", "World"]
+__all__ = [
+    "ONLOOKER",
+    "QUIET",
+    "Faults",
+    "Planner",
+    "Recall",
+    "Replanner",
+    "Setting",
+    "Watch",
+    "World",
+]
 
 QUIET = Timing(announce_s=60.0, status_s=60.0, silence_s=150.0)
 """Timers for an ideal bus, on which nothing need be said twice."""
@@ -45,6 +56,16 @@ WRITE_S = 0.02
 
 Planner = Callable[[Mission, str, int], Plan]
 """Plans a mission by method and seed."""
+
+
+Replanner = Callable[[Replan], NewPlan]
+"""Plans the rest of a running mission."""
+
+
+def planned_anew(wanted: Replan) -> NewPlan:
+    """What the coordinator's process would do, without a limit in time."""
+    situation, course = wanted.situation, wanted.course
+    return replan(situation, course, wanted.method, seed=wanted.seed, threads=1)
 
 
 class Recall(StrEnum):
@@ -107,6 +128,8 @@ class Setting:
 
     network: Callable[[EventQueue], Network]
     """Makes the network."""
+    replan: Replanner = planned_anew
+    """Plans the rest of a running mission."""
     clocks: Mapping[str, LocalClock] = field(default_factory=dict)
     """By process; the clocks of all others show virtual time."""
     kept: Collection[str] = ()
@@ -250,6 +273,9 @@ class World:
                     self.observer.plan = plan
                 made = partial(process.step, PlanMade(request, plan))
                 self.queue.after(self._setting.plan_s, made)
+            case Replan(request=request) as wanted:
+                answer = partial(process.step, Replanned(request, self._setting.replan(wanted)))
+                self.queue.after(self._setting.plan_s, answer)
             case Save() if process.name in self._setting.kept:
                 self._settle_disk(process.name)
                 memory: Snapshot = process.core.memory(process.now_s())  # type: ignore[attr-defined]  # who saves has one

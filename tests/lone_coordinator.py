@@ -16,7 +16,7 @@ from tests.builders import IDLE, OUT, message
 
 T = TypeVar("T")
 
-TIMING = Timing(announce_s=1e6, silence_s=2e6, ask_gap_s=1e-6)
+TIMING = Timing(announce_s=1e6, silence_s=2e6, ask_gap_s=1e-6, replan_interval_s=1e6)
 START_TIMEOUT_S = 60.0
 LAYERS = FlightLayers(lowest_m=10.0, spacing_m=3.0)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from coordinator.planner.routes import guided_plan
 from coordinator.planner.sequence import best_sequence
-from coordinator.planner.stop import ShouldStop, never
+from coordinator.planner.stop import ShouldStop, after_evaluations, first_of, never
 from swarm.allocation.guided import GuidedRule, route_arrays, team_arrays
 from swarm.allocation.lower_level import TeamState, run
 from swarm.allocation.objective import evaluate
@@ -31,6 +31,11 @@ __all__ = ["Course", "Lists", "NewPlan", "Prediction", "Situation", "predicted",
 
 Lists = Mapping[str, tuple[str, ...]]
 """Task ids by UAV id, in order of execution."""
+
+_ITERATIONS_PER_TASK = 400
+_SEQUENCES = 200
+"""Tried at most: UAVs under way decide in the order in which they become free, and a sequence
+settles only what two of them decide at the same moment."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,14 +174,14 @@ def replan(
     stop: ShouldStop = never,
     threads: int | None = None,
 ) -> NewPlan:
-    """The best plan found for what is open, from where everybody is.
+    """The best plan found in a second's work or so for what is open, from where everybody is.
 
     Args:
         situation: to plan from.
         course: by which the fleet goes on until there is another one.
         method: one of the online methods.
         seed: >= 0.
-        stop: ends the search; see `coordinator.planner.stop`.
+        stop: ends the search earlier.
         threads: as many as there are processors when None; changes nothing but speed.
 
     Raises:
@@ -185,11 +190,12 @@ def replan(
     problem, state = situation.problem, situation.state
     going_on = predicted(situation, course)
     routes: Lists = {}
+    n_open = int(np.count_nonzero(state.open))
     if method == GuidedRule.name:
         plan = guided_plan(
             problem,
             seed=seed,
-            stop=stop,
+            stop=first_of(stop, after_evaluations(_ITERATIONS_PER_TASK * max(1, n_open))),
             state=state,
             lists=_by_index(problem, going_on.lists),
             threads=threads,
@@ -200,7 +206,7 @@ def replan(
             problem,
             rule_by_name(method),
             np.random.default_rng(seed),
-            stop,
+            first_of(stop, after_evaluations(_SEQUENCES)),
             state,
             threads=threads,
         ).sequence

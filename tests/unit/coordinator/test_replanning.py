@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import pytest
 
+from coordinator.events import Replan, Replanned
 from coordinator.planner.live import Course, Lists, NewPlan, Prediction, Situation, replan
-from coordinator.replanning import NextEpoch, Replanning
-from swarm.wire.messages import Body
+from coordinator.replanning import Replanning
+from swarm.wire.messages import Body, Epoch, EpochPhase
 from tests.builders import IDLE, OUT, done, entries_of, failed, held, mission, task, uav
 from tests.running_mission import RunningMission
 
@@ -28,8 +29,9 @@ class Scene:
 
     def __init__(self, *, expected_s: Mapping[str, float] = EXPECTED_S, margin: float = 0.005):
         self.mission = RunningMission(mission(FLEET, TASKS))
-        self.policy = Replanning(INTERVAL_S, margin_frac=margin)
+        self.policy = Replanning("guided", 7, INTERVAL_S, margin_frac=margin)
         self.policy.begin(self.mission.at(0.0), expected_s, 0.0)
+        self.asked: list[Replan] = []
 
     def say(self, writer: str, body: Body) -> Scene:
         self.mission.say(writer, body)
@@ -40,11 +42,23 @@ class Scene:
         return self
 
     def wanted(self, now_s: float) -> bool:
-        return self.policy.wanted(self.mission.at(now_s), now_s)
+        wanted = self.policy.wanted(self.mission.at(now_s), self.epoch, now_s)
+        self.asked += [] if wanted is None else [wanted]
+        return wanted is not None
 
-    def judge(self, now_s: float, new: Lists, old: Lists = GOING_ON) -> NextEpoch | None:
+    def judge(
+        self, now_s: float, new: Lists, old: Lists = GOING_ON, *, request: int | None = None
+    ) -> Epoch | None:
         plan = NewPlan("guided", ("a", "b", "c"), prediction(new), prediction(old))
-        return self.policy.judge(plan, self.mission.at(now_s), now_s)
+        number = len(self.asked) if request is None else request
+        replanned = Replanned(number, plan)
+        return self.policy.judge(replanned, self.mission.at(now_s), self.epoch, now_s)
+
+    @property
+    def epoch(self) -> Epoch:
+        epoch = self.mission.replica.epoch
+        assert epoch is not None
+        return epoch
 
     def situation(self, now_s: float) -> Situation:
         return self.mission.at(now_s)
@@ -168,8 +182,8 @@ def test_there_is_one_job_at_a_time() -> None:
     assert not scene.say("coordinator", POP_UP).wanted(7.0)
     assert scene.policy.next_deadline_s() is None
 
-    scene.judge(8.0, GOING_ON)
-    assert scene.wanted(8.0)
+    scene.judge(12.0, GOING_ON)
+    assert scene.wanted(12.0)
 
 
 def test_after_an_epoch_the_next_waits_for_the_interval() -> None:
@@ -197,17 +211,40 @@ def test_a_change_during_planning_is_a_reason_for_the_next() -> None:
     scene.lose("c")
     scene.judge(7.0, GOING_ON)
 
-    assert scene.wanted(8.0)
+    assert scene.wanted(6.0 + INTERVAL_S)
 
 
-def test_a_plan_that_failed_is_not_tried_again_without_a_further_reason() -> None:
+def test_even_plans_that_come_to_nothing_are_wanted_at_intervals() -> None:
+    scene = Scene().lose("b")
+    assert scene.wanted(6.0)
+    assert scene.judge(7.0, GOING_ON) is None
+    scene.lose("c")
+
+    assert not scene.wanted(8.0)
+    assert scene.policy.next_deadline_s() == 6.0 + INTERVAL_S
+
+
+def test_what_comes_at_a_bad_moment_is_wanted_again() -> None:
     scene = Scene().lose("b")
     assert scene.wanted(6.0)
 
-    scene.policy.discard()
+    scene.policy.drop()
 
-    assert not scene.wanted(7.0)
-    assert scene.lose("c").wanted(8.0)
+    assert scene.judge(7.0, FAR_BETTER, POOR) is None
+    assert scene.wanted(6.0 + INTERVAL_S)
+
+
+def test_each_plan_is_made_of_the_situation_and_epoch_of_then_with_a_seed_of_its_own() -> None:
+    scene = Scene().lose("b")
+    assert scene.wanted(6.0)
+    scene.judge(7.0, GOING_ON)
+    assert scene.lose("c").wanted(12.0)
+
+    first, second = scene.asked
+    assert [first.situation.now_s, second.situation.now_s] == [6.0, 12.0]
+    assert (first.request, first.seed, second.request, second.seed) == (1, 8, 2, 9)
+    assert first.course == Course.of(scene.epoch)
+    assert first.method == "guided"
 
 
 # -- whether ----------------------------------------------------------------------------
@@ -256,6 +293,19 @@ def test_a_plan_for_one_who_has_been_lost_since_counts_without_it() -> None:
 def test_a_plan_nobody_asked_for_is_no_epoch() -> None:
     assert Scene().judge(6.0, FAR_BETTER, POOR) is None
 
+    scene = Scene().lose("b")
+    assert scene.wanted(6.0)
+    assert scene.judge(6.5, FAR_BETTER, POOR, request=0) is None
+    assert scene.judge(6.5, FAR_BETTER, POOR) is not None
+
+
+def test_a_plan_made_for_another_epoch_is_no_epoch() -> None:
+    scene = Scene().lose("b")
+    assert scene.wanted(6.0)
+    scene.policy.begin(None, {}, 7.0)
+
+    assert scene.judge(8.0, FAR_BETTER, POOR) is None
+
 
 def test_once_nothing_is_open_any_more_there_is_no_epoch() -> None:
     scene = Scene(margin=-1e9).lose("b")
@@ -279,6 +329,7 @@ def test_every_task_is_on_a_list_after_what_was_before_it() -> None:
 
     assert epoch is not None
     assert (epoch.rule, epoch.sequence) == ("guided", ("a", "b", "c"))
+    assert (epoch.number, epoch.phase, epoch.mission_s) == (2, EpochPhase.RUNNING, 6.0)
     assert epoch.routes == {"a": ("t2", "t1", "t3", "t4"), "c": ("t5", "late", "t7", "t6")}
 
 
@@ -301,4 +352,19 @@ def test_going_on_well_is_left_alone() -> None:
 
     plan = replan(scene.situation(6.0), good, "guided")
 
-    assert scene.policy.judge(plan, scene.situation(6.0), 6.0) is None
+    judged = scene.policy.judge(Replanned(1, plan), scene.situation(6.0), scene.epoch, 6.0)
+    assert judged is None
+
+
+def test_a_reason_may_be_long_but_fits_the_message() -> None:
+    many = [task(f"x{n}", 5.0, appears_s=9.0) for n in range(40)]
+    scene = Scene(margin=-1e9)
+    for number, posted in enumerate(entries_of(mission(FLEET, many))):
+        scene.say("coordinator", replace(posted, number=100 + number, task="x" * 60 + str(number)))
+    assert scene.lose("b").wanted(6.0)
+
+    epoch = scene.judge(7.0, GOING_ON)
+
+    assert epoch is not None
+    assert len(epoch.reason) == 200
+    assert epoch.reason.endswith("value·s")
