@@ -236,11 +236,16 @@ class RoughNetwork:
     def cont(self, seat: Seat) -> None:
         """Undo a `stop`: whoever has given it up meanwhile must be reached anew."""
         self._stopped.discard(seat)
-        for other in list(self._others(seat)):
+        others = list(self._others(seat))
+        gave_up: set[Seat] = {
+            o for o in self._seats if o is not seat and (o, seat) not in self._open
+        }
+        if self._router is not None and gave_up:
+            gave_up.add(self._router)
+        for other in others:
             if other is not self._router:
                 self._review(other, seat)
-            given_up = other is self._router or (other, seat) not in self._open
-            if given_up and (seat, other) in self._open:
+            if other in gave_up and (seat, other) in self._open:
                 self._change(seat, other, 0.2 * next(self._draws), opens=False)
             else:
                 self._review(seat, other)

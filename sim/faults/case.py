@@ -20,7 +20,7 @@ from sim.faults.bugs import BUGS
 from sim.faults.director import Director
 from sim.faults.judge import Judge
 from sim.faults.schedule import Disturbance, Kind, format_schedule, parse_schedule
-from sim.faults.testimony import Broken
+from sim.faults.transcript import Broken
 from sim.processes import LocalClock
 from sim.rough_network import Conditions, RoughNetwork, Topology
 from sim.streams import stream

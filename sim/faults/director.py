@@ -1,6 +1,6 @@
 """Lets a schedule come true in a world, and knows when the world is calm again.
 
-Leaves out: what must hold meanwhile and afterwards (sim.faults.testimony, sim.faults.judge).
+Leaves out: what must hold meanwhile and afterwards (sim.faults.transcript, sim.faults.judge).
 """
 
 from __future__ import annotations

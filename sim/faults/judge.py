@@ -1,6 +1,6 @@
 """What must hold of a whole fleet in virtual time, after every step and at the end.
 
-Beside the invariants of the messages (sim.faults.testimony):
+Beside the invariants of the messages (sim.faults.transcript):
 
 - *raises*, *never rests*: no core raises, or is busy without time passing;
 - *suspects without link*: no process gives another up while its own link is down;
@@ -9,8 +9,8 @@ Beside the invariants of the messages (sim.faults.testimony):
 - *disagree*: and each knows what the others claim, the epoch in force and the board;
 - *winners differ*: whenever two have equal registers, they see the same states and winners;
 - *task lost*: in the end each posted task is done, failed, withdrawn, or open with no UAV
-  able to do it that came home of its own accord;
-- *not home*: every living agent ends within `Judge.limit_s`;
+  able to do it that knew of it and came home of its own accord;
+- *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
 - *miscounted*: the onlooker knows the visits of every UAV that left in calm, invents none, and
   counts as duplicates just what it knows of.
 
@@ -26,8 +26,10 @@ from collections.abc import Iterator
 
 from agent.core import AgentCore
 from agent.vehicle import GoTo
+from coordinator.core import CoordinatorCore
+from coordinator.observer import Observer
 from sim.faults.director import Director
-from sim.faults.testimony import Broken, Testimony
+from sim.faults.transcript import Broken, Transcript
 from sim.processes import Process
 from sim.rough_network import RoughNetwork
 from sim.world import World
@@ -53,7 +55,7 @@ class Judge:
     """
 
     def __init__(self) -> None:
-        self.testimony = Testimony()
+        self.transcript = Transcript()
         self._world: World | None = None
         self._network: RoughNetwork | None = None
         self._director: Director | None = None
@@ -67,7 +69,7 @@ class Judge:
     @property
     def broken(self) -> Broken | None:
         """The first invariant that did not hold."""
-        return next(iter(self.testimony.broken), None)
+        return next(iter(self.transcript.broken), None)
 
     def attend(self, world: World, network: RoughNetwork, director: Director) -> None:
         """Watch this world, which has not begun."""
@@ -78,10 +80,10 @@ class Judge:
 
     def said(self, process: Process, message: Message) -> None:
         """``process`` publishes ``message``."""
-        now_s, testimony = self._now_s, self.testimony
+        now_s, transcript = self._now_s, self.transcript
         life = self._lives.setdefault(process, len(self._lives))
         self._changed_s[process.name] = now_s
-        testimony.said(now_s, process.name, life, message)
+        transcript.said(now_s, process.name, life, message)
         self._stop_if_broken()
 
     def stepped(self, process: Process) -> None:
@@ -104,7 +106,7 @@ class Judge:
         """The vehicle of ``process`` will not obey."""
         for task in self._there.mission.tasks:
             if task.position_enu_m[:2] == order.position_enu_m[:2]:
-                self.testimony.refused(process.name, task.id)
+                self.transcript.refused(process.name, task.id)
 
     def noted(self, process: Process, note: Note) -> None:
         """``process`` has written a line into its log."""
@@ -168,28 +170,33 @@ class Judge:
             self._look_at_the_count()
 
     def _look_for_the_missing(self) -> None:
-        left = [p.name for p, core in self._living() if isinstance(core, AgentCore)]
-        if left:
+        living = [(process, core) for process, core in self._living() if process.writer is not None]
+        left = [process.name for process, core in living if isinstance(core, AgentCore)]
+        # Who has forgotten all and finds nobody who knows of a mission waits for one.
+        if left and any(core.replica.brief is not None for _, core in living):
             self._break("not home", f"{', '.join(left)} still there")
 
     def _look_for_lost_tasks(self) -> None:
-        testimony, world = self.testimony, self._there
-        settled = testimony.done | testimony.failed | testimony.withdrawn
+        transcript, world = self.transcript, self._there
+        settled = transcript.done | transcript.failed | transcript.withdrawn
         home = [u for u in world.mission.uavs if world.finished.get(u.id) == 0]
+        heard_of = {name: core.replica.board for name, core in world.agents.items()}
         for task in world.mission.tasks:
-            if task.id not in testimony.posted or task.id in settled:
+            if task.id not in transcript.posted or task.id in settled:
                 continue
             able = [
                 uav.id
                 for uav in home
-                if world.mission.success(uav, task) > 0.0 and (uav.id, task.id) not in world.refuses
+                if world.mission.success(uav, task) > 0.0
+                and task.id in heard_of[uav.id]
+                and (uav.id, task.id) not in world.refuses
             ]
             if able:
                 text = f"{task.id} is open, though {', '.join(able)} could have done it"
                 self._break("task lost", text)
 
     def _look_at_the_count(self) -> None:
-        observer, true = self._there.observer, self.testimony.visits
+        observer, true = self._there.observer, self.transcript.visits
         known = {
             key: outcome.attempt
             for key, outcome in observer.replica.outcomes.items()
@@ -207,11 +214,13 @@ class Judge:
 
     # -- pieces -----------------------------------------------------------------------
 
-    def _living(self) -> Iterator[tuple[Process, object]]:
+    def _living(self) -> Iterator[tuple[Process, AgentCore | CoordinatorCore | Observer]]:
         """Processes that run, or will go on, with their cores."""
         for process in self._there.processes.values():
             if not process.over and process not in self._directed.held_for_good:
-                yield process, process.core
+                core = process.core
+                if isinstance(core, AgentCore | CoordinatorCore | Observer):
+                    yield process, core
 
     def _joined(self, one: Process, other: Process) -> bool:
         return self._network is not None and self._network.joined(one, other)
@@ -237,7 +246,7 @@ class Judge:
         return self._there.queue.now_s()
 
     def _break(self, invariant: str, text: str) -> None:
-        self.testimony.broken.append(Broken(self._now_s, invariant, text))
+        self.transcript.broken.append(Broken(self._now_s, invariant, text))
         self._stop_if_broken()
 
     def _stop_if_broken(self) -> None:

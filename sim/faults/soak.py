@@ -16,7 +16,7 @@ from sim.faults.case import Case, play
 from sim.faults.generator import random_case
 from sim.faults.schedule import Kind
 from sim.faults.shrink import shrink
-from sim.faults.testimony import Broken
+from sim.faults.transcript import Broken
 
 __all__ = ["Breach", "first_breach", "shrunk", "soak"]
 

@@ -1,6 +1,6 @@
 """What must hold of all that is said, wherever it was said: the invariants of the messages.
 
-`Testimony` is told every statement in the order it was made and keeps what breaks a rule:
+`Transcript` is told every statement in the order it was made and keeps what breaks a rule:
 
 - *stamps*: a process never says a register with a smaller stamp than before, in this life or
   an earlier one, nor with the same stamp and other contents;
@@ -31,7 +31,7 @@ from swarm.wire.messages import (
     Status,
 )
 
-__all__ = ["Broken", "Testimony"]
+__all__ = ["Broken", "Transcript"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Broken:
         return f"at {self.at_s:.3f} s, {self.invariant}: {self.text}"
 
 
-class Testimony:
+class Transcript:
     """Everything that is said about one mission."""
 
     def __init__(self) -> None:

@@ -1,0 +1,148 @@
+"""The invariants of what is said, each broken and kept by hand."""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.faults.transcript import Transcript
+from swarm.model.ids import COORDINATOR
+from swarm.wire.messages import (
+    Board,
+    Body,
+    Claim,
+    ClaimPhase,
+    Epoch,
+    EpochPhase,
+    Message,
+    Outcome,
+    Result,
+    Stamp,
+)
+
+
+class Telling:
+    """Says things in the name of writers; stamps grow by themselves."""
+
+    def __init__(self) -> None:
+        self.transcript = Transcript()
+        self._counter = 0
+
+    def say(self, writer: str, body: Body, *, life: int = 0, stamp: Stamp | None = None) -> None:
+        self._counter += 1
+        message = Message("m", writer, stamp or Stamp(1, self._counter), body)
+        self.transcript.said(float(self._counter), writer, life, message)
+
+    def claim(self, uav: str, task: str | None, *, decided_s: float = 0.0, life: int = 0) -> None:
+        phase = ClaimPhase.IDLE if task is None else ClaimPhase.PROPOSED
+        self.say(uav, Claim(phase, task, decided_s, 0, 9.0), life=life)
+
+    @property
+    def broken(self) -> list[str]:
+        return [each.invariant for each in self.transcript.broken]
+
+
+@pytest.fixture
+def told() -> Telling:
+    return Telling()
+
+
+IDLE = Claim(ClaimPhase.IDLE, None, 0.0, 0, 0.0)
+
+
+def test_a_smaller_stamp_than_before_is_a_breach(told: Telling) -> None:
+    told.say("u0", IDLE, stamp=Stamp(2, 1))
+    told.say("u0", IDLE, stamp=Stamp(1, 9), life=1)
+
+    assert told.broken == ["stamps go back"]
+
+
+def test_the_same_statement_again_is_none(told: Telling) -> None:
+    told.say("u0", IDLE, stamp=Stamp(2, 1))
+    told.say("u0", IDLE, stamp=Stamp(2, 1))
+
+    assert told.broken == []
+
+
+def test_one_stamp_for_two_contents_is_a_breach(told: Telling) -> None:
+    told.say("u0", IDLE, stamp=Stamp(2, 1))
+    told.say("u0", Claim(ClaimPhase.IDLE, None, 1.0, 0, 0.0), stamp=Stamp(2, 1))
+
+    assert told.broken == ["one stamp, two contents"]
+
+
+def test_registers_are_counted_each_by_itself(told: Telling) -> None:
+    told.say("u0", Outcome("t0", Result.DONE, 1, 1.0), stamp=Stamp(2, 5))
+    told.say("u0", Outcome("t1", Result.DONE, 1, 1.0), stamp=Stamp(2, 4))
+
+    assert told.broken == []
+
+
+def test_leaving_a_task_without_a_reason_is_a_breach(told: Telling) -> None:
+    told.claim("u0", "t0")
+    told.claim("u0", "t1")
+    told.claim("u0", None)
+
+    assert told.broken == ["left its task"] * 2
+
+
+def test_a_new_life_may_begin_with_another_task(told: Telling) -> None:
+    told.claim("u0", "t0")
+    told.claim("u0", "t1", life=1)
+
+    assert told.broken == []
+
+
+@pytest.mark.parametrize("uav", ["u0", "u1"])
+def test_a_task_that_is_done_may_be_left(told: Telling, uav: str) -> None:
+    told.claim("u0", "t0")
+    told.say(uav, Outcome("t0", Result.DONE, 1, 1.0))
+    told.claim("u0", "t1")
+
+    assert told.broken == []
+
+
+def test_a_task_that_is_withdrawn_may_be_left(told: Telling) -> None:
+    told.claim("u0", "t0")
+    told.say(COORDINATOR, Board("t0", 0, (0.0, 0.0, 0.0), 1.0, 0.0, None, True))
+    told.claim("u0", "t1")
+
+    assert told.broken == []
+
+
+def test_a_task_may_be_left_to_a_stronger_claim_only(told: Telling) -> None:
+    told.claim("u1", "t0", decided_s=1.0)
+    told.claim("u2", "t1", decided_s=3.0)
+    told.claim("u0", "t0", decided_s=2.0)
+    told.claim("u0", "t1", decided_s=2.0)
+    assert told.broken == []
+
+    told.claim("u0", "t2", decided_s=2.0)
+    assert told.broken == ["left its task"]
+
+
+def test_a_task_that_the_vehicle_refuses_may_be_left(told: Telling) -> None:
+    told.claim("u0", "t0")
+    told.transcript.refused("u0", "t0")
+    told.claim("u0", "t1")
+
+    assert told.broken == []
+
+
+def test_who_goes_home_may_leave_its_task_when_the_mission_has_ended(told: Telling) -> None:
+    out = Claim(ClaimPhase.OUT, None, 0.0, 0, 0.0)
+    told.claim("u0", "t0")
+    told.claim("u1", "t1")
+    told.say("u0", out)
+    told.say(COORDINATOR, Epoch(2, EpochPhase.ENDED, "greedy", (), 0.0, "over", {}))
+    told.say("u1", out)
+
+    assert [each.text for each in told.transcript.broken] == ["u0 left t0 for out"]
+
+
+def test_visits_beyond_the_first_are_duplicates(told: Telling) -> None:
+    for uav, task, attempt in (("u0", "t0", 1), ("u1", "t0", 1), ("u0", "t0", 2), ("u0", "t1", 1)):
+        told.say(uav, Outcome(task, Result.DONE, attempt, 1.0))
+        told.say(uav, Outcome(task, Result.DONE, attempt, 1.0))
+
+    assert told.transcript.duplicates == 2
+    assert told.transcript.done == {"t0", "t1"}
