@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+from pathlib import Path
 
 import pytest
 
@@ -58,3 +60,24 @@ def test_a_bus_takes_the_lease_of_every_preset(link: Link) -> None:
 def test_a_preset_of_no_duration_is_refused(durations: tuple[float, float]) -> None:
     with pytest.raises(ValueError, match="_s must be > 0 s"):
         LinkPreset(*durations, Timing())
+
+
+def test_the_protocols_table_tells_the_timers_as_they_are() -> None:
+    page = (Path(__file__).parents[3] / "swarm" / "state" / "README.md").read_text()
+    rows = re.findall(
+        r"^\| ((?:`\w+_s`(?:, )?)+) \| (.+?) \| (.+?) \| (.+?) \|", page, re.MULTILINE
+    )
+    told = {
+        name: tuple(float(cell.split(", ")[place]) for cell in cells)
+        for names, *cells in rows
+        for place, name in enumerate(re.findall(r"\w+_s", names))
+    }
+    differing = {
+        field.name
+        for field in dataclasses.fields(Timing)
+        if len({getattr(PRESETS[link].timing, field.name) for link in Link}) > 1
+    }
+
+    assert set(told) == differing
+    for name, values in told.items():
+        assert values == tuple(getattr(PRESETS[link].timing, name) for link in Link), name
