@@ -1,6 +1,7 @@
 """The commands of the family `swarm bench`.
 
-Leaves out: what they do (`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown
+Leaves out: the commands about fleets in trouble (`sim.bench.trouble_commands`), what the
+others do (`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown
 (`sim.bench.plan_report`, `sim.bench.plan_plot`).
 """
 
@@ -9,10 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sim.bench.trouble_commands import FAILOVER_HELP, FLOOD_HELP, failover, flood
+from sim.bench.words import each
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, SeedOption
 from swarm.scenario.shipped import resolve_scenario
@@ -21,8 +24,6 @@ if TYPE_CHECKING:
     from sim.bench.worker import Source
 
 __all__ = ["bench"]
-
-T = TypeVar("T")
 
 _DEFAULT_SIZES = "10x50,50x500"
 _SCALING_SIZES = "10x50,10x500,50x500,50x2000,100x1000,200x2000,200x5000"
@@ -46,7 +47,6 @@ Examples:
     swarm bench decide
     swarm bench decide --size 10x50 --json
 """
-
 bench = typer.Typer(
     help="Benchmarks, each printing machine, seeds and ratios.",
     rich_markup_mode=None,
@@ -149,10 +149,10 @@ def plan(
         scaling_grid,
     )
 
-    limits_s = _each("--time-limit-s", time_limit_s, _limit_s)
-    all_seeds = _each("--seeds", seeds, _seed)
+    limits_s = each("--time-limit-s", time_limit_s, _limit_s)
+    all_seeds = each("--seeds", seeds, _seed)
     default_methods = "guided,greedy" if scaling else ",".join(METHODS)
-    names = _each("--methods", methods or default_methods, _method)
+    names = each("--methods", methods or default_methods, _method)
     _check_files(plot, out)
     if scaling:
         limits_s, all_seeds = limits_s[:1], all_seeds[:1]
@@ -214,6 +214,12 @@ def decide(
     return 0
 
 
+bench.command("failover", help=FAILOVER_HELP, short_help="Measure fleets in trouble.")(failover)
+bench.command("flood", help=FLOOD_HELP, short_help="Fly while a hostile peer floods the bus.")(
+    flood
+)
+
+
 def _sources(scenario: Path | None, sizes: str | None, default: str) -> list[tuple[str, Source]]:
     """Cases by name, the scenario first."""
     from sim.bench.worker import Source
@@ -224,15 +230,9 @@ def _sources(scenario: Path | None, sizes: str | None, default: str) -> list[tup
         name = load_scenario(scenario).name
         found.append((name, Source(scenario=str(scenario.resolve()))))
     if scenario is None or sizes is not None:
-        for n_uav, n_task in _each("--sizes", sizes or default, _size):
+        for n_uav, n_task in each("--sizes", sizes or default, _size):
             found.append((f"{n_uav}×{n_task}", Source(n_uav=n_uav, n_task=n_task)))
     return found
-
-
-def _each(flag: str, text: str, read: Callable[[str, str], T]) -> list[T]:
-    """The values between commas, each once."""
-    words = [word.strip() for word in text.split(",")]
-    return list(dict.fromkeys(read(flag, word) for word in words))
 
 
 def _size(flag: str, word: str) -> tuple[int, int]:

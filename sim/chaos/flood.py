@@ -35,7 +35,7 @@ from swarm.scenario.write import format_scenario
 from swarm.wire.codec import Codec
 from swarm.wire.keys import Keys
 
-__all__ = ["RATE_HZ", "Flood", "fly_flooded", "long_mission"]
+__all__ = ["RATE_HZ", "Flood", "fly_flooded", "long_mission", "times_for"]
 
 RATE_HZ = 24.0
 """Messages of each kind per second."""
@@ -45,6 +45,10 @@ GHOSTS = 8
 """Liveliness tokens of processes that do not exist, shown one after the other."""
 SETTLE_S = 0.6
 """Until what was sent last has been counted and told [wall s]."""
+TAKE_OFF_S = 9.0
+"""From the first agent that is there to the mission's beginning [s]."""
+FLOODED_S = 1.9
+"""When the paper's mission is done but for two tasks [s]."""
 READY_S, LOOK_S = 60.0, 20.0
 """Limits for the fleet to be there and for `swarm status` to answer [wall s]."""
 
@@ -90,6 +94,17 @@ class Flood:
         }
 
     @property
+    def ok(self) -> bool:
+        """Whether the flood has changed nothing and everyone has counted it."""
+        # A UAV that has not heard of something newer yet finds nothing old.
+        counted = all(
+            count.get(reason, 0) >= (0.8 if reason == "stale" else 1.0) * expected
+            for count in self.counted.values()
+            for reason, expected in self.expected.items()
+        )
+        return self.decisions_kept and not self.result.open and not self.fates and counted
+
+    @property
     def decisions_kept(self) -> bool:
         """Whether every list flown is the one planned."""
         return self.result.executed_routes == self.planned
@@ -111,6 +126,11 @@ def long_mission(times: float) -> Mission:
     )
 
 
+def times_for(flood_s: float) -> float:
+    """How long a mission, see `long_mission`, is flooded for about ``flood_s``."""
+    return max(0.5, (flood_s - TAKE_OFF_S) / FLOODED_S)
+
+
 async def fly_flooded(
     times: float,
     *,
@@ -118,7 +138,7 @@ async def fly_flooded(
     bus: BusKind = BusKind.ROUTER,
     on_progress: Callable[[str], None] | None = None,
 ) -> Flood:
-    """Fly a mission of some ``4.4 times`` seconds under a flood that lasts almost to its end.
+    """Fly a mission of some ``3 times`` seconds under a flood that lasts almost to its end.
 
     The flood begins when all agents are there, before they take off, and ends when all
     tasks but the last two are done, so that `swarm status` can be asked about it.

@@ -70,6 +70,8 @@ class LaunchOptions:
     """How many routers there are, where there are any."""
     link: Link = Link.NORMAL
     """What the network is like: sets lease and timers."""
+    address: str = "127.0.0.1"
+    """Where routers and peers listen; an address of this machine."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -115,9 +117,12 @@ class Layout:
         self.routers = tuple(f"router {number}" for number in range(1, count + 1))
         """Names of the routers; none in a mesh."""
         listeners = self.routers or (*self._seats, *self._onlookers)
-        endpoints = free_loopback_endpoints(len(listeners), rng)
+        ports = [each.rpartition(":")[2] for each in free_loopback_endpoints(len(listeners), rng)]
+        endpoints = [f"tcp/{options.address}:{port}" for port in ports]
         self._endpoints = dict(zip(listeners, endpoints, strict=True))
         self._diverted: dict[DialedLink, str] = {}
+        self.state: Path | None = None
+        """Folder in which agents and coordinator keep their memory; nowhere if None."""
 
     @property
     def links(self) -> tuple[DialedLink, ...]:
@@ -173,12 +178,16 @@ class Layout:
             *("--mavlink", url, "--system-id", str(system_id)),
             *("--position-rate-hz", repr(rate_hz)),
             *("--acceptance-radius-m", repr(options.acceptance_radius_m)),
+            *self._memory(),
             *self._speed(),
             *self.seat_arguments(uav),
         ]
 
     def _speed(self) -> list[str]:
         return ["--speedup", repr(self._options.speedup)]
+
+    def _memory(self) -> list[str]:
+        return [] if self.state is None else ["--state", str(self.state)]
 
     def _link(self) -> list[str]:
         return ["--link", self._options.link]

@@ -1,0 +1,285 @@
+"""How long until another UAV holds the task of one that was killed, hangs or is cut off.
+
+Three UAVs, two tasks so far away that none is ever reached: two fly, one is idle. Whoever
+flies is struck; the idle one takes over, the struck one comes back, and one of them is
+idle again. Times are taken by a recorder that hears the bus directly. Leaves out: other
+measurements of a fleet in trouble (sim.bench.trouble).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import tempfile
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+
+from sim.chaos.flight import ChaosFlight, open_chaos_flight
+from sim.launch.fleet import BusKind, LaunchOptions, default_position_rate_hz
+from swarm.clock import SystemClock
+from swarm.config import Link
+from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.scenario.write import format_scenario
+from swarm.wire.messages import Claim, ClaimPhase, Message
+
+__all__ = ["Blow", "Takeovers", "far_mission", "flying", "measure_takeovers", "options_for"]
+
+FAR_M = 10_000.0
+SPEED_M_S = 1.0
+START_S = 90.0
+"""Until the whole fleet flies [wall s]."""
+SETTLE_S = 60.0
+"""Until one is idle again after a blow [wall s]."""
+MISSED_S = 40.0
+"""A task that nobody holds by then counts as missed [wall s]."""
+CALM_S = 1.0
+"""Least time between two blows in which nothing changes; up to twice that, at random [wall s]."""
+LOOK_S = 0.02
+
+_STUCK = """
+import signal, time
+
+stuck = False
+
+def hang(*_):
+    global stuck
+    stuck = True
+    while stuck:
+        time.sleep(0.01)
+
+def go_on(*_):
+    global stuck
+    stuck = False
+
+signal.signal(signal.SIGUSR1, hang)
+signal.signal(signal.SIGUSR2, go_on)
+"""
+"""Blocks a Python program between two of its steps while its other threads, and so its
+connections, live on: what a deadlock or an endless loop does."""
+
+
+class Blow(StrEnum):
+    """What happens to an agent."""
+
+    KILL = "kill"
+    """SIGKILL; started again afterwards."""
+    HANG = "hang"
+    """SIGSTOP; nothing of it runs, its connections stay open."""
+    CUT = "cut"
+    """Its link swallows everything; nobody is told."""
+    DEADLOCK = "deadlock"
+    """Its program stands still, its connections live."""
+
+
+@dataclass(frozen=True, slots=True)
+class Takeovers:
+    """Times of one kind of blow."""
+
+    blow: Blow
+    link: Link
+    bus: BusKind
+    times_s: tuple[float, ...]
+    """From each blow to another's held claim on the task, as heard on the bus [s]."""
+    missed: int
+    """Blows after which nobody held the task in time."""
+
+    def quantile_s(self, share: float) -> float | None:
+        """The smallest time that is not exceeded in that share of all trials, missed included."""
+        if not self.times_s and not self.missed:
+            return None
+        times = np.sort(np.array([*self.times_s, *[np.inf] * self.missed]))
+        worst = float(times[max(0, int(np.ceil(share * times.size)) - 1)])
+        return worst if np.isfinite(worst) else None
+
+
+async def measure_takeovers(
+    blow: Blow,
+    trials: int,
+    *,
+    link: Link = Link.NORMAL,
+    bus: BusKind = BusKind.ROUTER,
+    seed: int = 0,
+    on_progress: Callable[[str], None] | None = None,
+) -> Takeovers:
+    """Strike ``trials`` times, and wait each time until another UAV holds the task.
+
+    Args:
+        blow: what happens.
+        trials: how often.
+        link: preset of all processes.
+        bus: how they reach each other.
+        seed: of who is struck, and when.
+        on_progress: told how far it is.
+
+    Raises:
+        ChildFailedError: a process did not start.
+        TimeoutError: the fleet was not complete again in time after a blow.
+    """
+    tell = on_progress or (lambda _: None)
+    rng, clock = np.random.default_rng(seed), SystemClock()
+    times_s: list[float] = []
+    missed = 0
+    mission = far_mission(n_uav=3, n_task=2)
+    with _stuck_on_demand() if blow is Blow.DEADLOCK else contextlib.nullcontext():
+        async with flying(mission, link=link, bus=bus, relayed=blow is Blow.CUT) as flight:
+            for trial in range(trials):
+                tell(f"{blow}: {trial} of {trials}")
+                busy = await _calm(flight, mission, CALM_S * (1.0 + rng.random()))
+                victim, task = sorted(busy.items())[int(rng.integers(len(busy)))]
+                begin = len(flight.recorder.entries)
+                struck_s = clock.now_s()
+                await _strike(flight, blow, victim)
+                held_s = await _held_by_another(flight, begin, victim, task)
+                if held_s is None:
+                    missed += 1
+                else:
+                    times_s.append(held_s - struck_s)
+                await _revive(flight, blow, victim)
+    return Takeovers(blow, link, bus, tuple(times_s), missed)
+
+
+def far_mission(n_uav: int, n_task: int) -> Mission:
+    """Tasks that nobody reaches within hours."""
+    return Mission(
+        name="failover",
+        horizon_s=1e6,
+        uavs=tuple(
+            Uav(UavId(f"uav{number}"), (20.0 * number, 0.0, 0.0), SPEED_M_S)
+            for number in range(1, n_uav + 1)
+        ),
+        tasks=tuple(
+            Task(TaskId(f"t{number}"), (20.0 * number, FAR_M, 0.0), 1.0)
+            for number in range(1, n_task + 1)
+        ),
+        origin=Origin(46.8, 9.7, 1100.0),
+    )
+
+
+@contextlib.contextmanager
+def options_for(
+    mission: Mission,
+    *,
+    link: Link,
+    bus: BusKind,
+    method: str = "greedy",
+    address: str = "127.0.0.1",
+) -> Iterator[LaunchOptions]:
+    """Options to fly ``mission`` with, as long as the context lasts."""
+    with tempfile.TemporaryDirectory() as folder:
+        scenario = Path(folder) / "scenario.toml"
+        scenario.write_text(format_scenario(mission), encoding="utf-8")
+        yield LaunchOptions(
+            scenario=scenario,
+            method=method,
+            seed=0,
+            speedup=1.0,
+            bus=bus,
+            position_rate_hz=min(20.0, default_position_rate_hz(len(mission.uavs))),
+            acceptance_radius_m=0.5,
+            start_timeout_s=120.0,
+            link=link,
+            address=address,
+        )
+
+
+@contextlib.asynccontextmanager
+async def flying(
+    mission: Mission,
+    *,
+    link: Link,
+    bus: BusKind,
+    relayed: bool = False,
+    method: str = "greedy",
+    seed: int = 0,
+) -> AsyncIterator[ChaosFlight]:
+    """Start to fly ``mission``; all processes are gone when the context ends."""
+    with options_for(mission, link=link, bus=bus, method=method) as options:
+        async with open_chaos_flight(mission, options, relayed=relayed, seed=seed) as flight:
+            yield flight
+
+
+async def _calm(flight: ChaosFlight, mission: Mission, calm_s: float) -> dict[str, str]:
+    """Wait until all are there, two hold tasks and the third is idle, for ``calm_s``.
+
+    Returns:
+        Task by UAV that holds it.
+    """
+    observer, clock = flight.run.observer, SystemClock()
+    fleet = {uav.id for uav in mission.uavs}
+    limit_s = SETTLE_S if observer.replica.claims else START_S
+    begin_s = since_s = clock.now_s()
+    before: dict[str, str] = {}
+    while True:
+        claims = observer.replica.claims
+        held = {u: c.task for u, c in claims.items() if c.task and c.phase is ClaimPhase.HELD}
+        idle = {uav for uav, claim in claims.items() if claim.phase is ClaimPhase.IDLE}
+        complete = fleet <= observer.present and len(held) == 2 and len(idle) == 1
+        now_s = clock.now_s()
+        if not complete or held != before or len(set(held.values())) < 2:
+            since_s, before = now_s, held
+        elif now_s - since_s >= calm_s:
+            return held
+        if now_s - begin_s > limit_s:
+            story = "; ".join(each.text for each in observer.story[-5:])
+            raise TimeoutError(f"the fleet was not complete within {limit_s:g} s: {story}")
+        await asyncio.sleep(LOOK_S)
+
+
+async def _held_by_another(flight: ChaosFlight, begin: int, victim: str, task: str) -> float | None:
+    """When another UAV first said that it holds ``task``; None if nobody has in time."""
+    entries, clock = flight.recorder.entries, SystemClock()
+    limit_s = clock.now_s() + MISSED_S
+    while clock.now_s() < limit_s:
+        for entry in entries[begin:]:
+            match entry.what:
+                case Message(writer=uav, body=Claim(phase=ClaimPhase.HELD, task=held)):
+                    if uav != victim and held == task:
+                        return entry.at_s
+        await asyncio.sleep(LOOK_S)
+    return None
+
+
+async def _strike(flight: ChaosFlight, blow: Blow, victim: str) -> None:
+    match blow:
+        case Blow.KILL:
+            await flight.kill(victim)
+        case Blow.HANG:
+            flight.pause(victim)
+        case Blow.CUT:
+            flight.isolate({victim})
+        case Blow.DEADLOCK:
+            os.kill(flight.run.launch.child(victim).pid, signal.SIGUSR1)
+
+
+async def _revive(flight: ChaosFlight, blow: Blow, victim: str) -> None:
+    match blow:
+        case Blow.KILL:
+            await flight.restart(victim)
+        case Blow.HANG:
+            flight.resume(victim)
+        case Blow.CUT:
+            flight.heal()
+        case Blow.DEADLOCK:
+            os.kill(flight.run.launch.child(victim).pid, signal.SIGUSR2)
+
+
+@contextlib.contextmanager
+def _stuck_on_demand() -> Iterator[None]:
+    """Let Python programs started meanwhile stand still on SIGUSR1, until SIGUSR2."""
+    before = os.environ.get("PYTHONPATH")
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "sitecustomize.py").write_text(_STUCK, encoding="utf-8")
+        os.environ["PYTHONPATH"] = folder if before is None else f"{folder}{os.pathsep}{before}"
+        try:
+            yield
+        finally:
+            if before is None:
+                del os.environ["PYTHONPATH"]
+            else:
+                os.environ["PYTHONPATH"] = before

@@ -1,0 +1,68 @@
+"""Times of takeovers, and what a program is that stands still."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+from sim.bench.takeover import Blow, Takeovers, _stuck_on_demand, far_mission
+from sim.launch.fleet import BusKind
+from swarm.config import Link
+
+
+def takeovers(*times_s: float, missed: int = 0) -> Takeovers:
+    return Takeovers(Blow.KILL, Link.NORMAL, BusKind.ROUTER, times_s, missed)
+
+
+def test_quantiles_are_times_that_were_measured() -> None:
+    hundred = takeovers(*(float(number) for number in range(100, 0, -1)))
+
+    assert [hundred.quantile_s(share) for share in (0.01, 0.5, 0.99, 1.0)] == [1.0, 50.0, 99.0, 100]
+    assert takeovers(3.0).quantile_s(0.5) == 3.0
+    assert takeovers().quantile_s(0.5) is None
+
+
+def test_missed_ones_count_as_the_longest() -> None:
+    assert takeovers(1.0, 2.0, 3.0, missed=1).quantile_s(0.75) == 3.0
+    assert takeovers(1.0, 2.0, 3.0, missed=1).quantile_s(0.99) is None
+
+
+def test_nobody_gets_anywhere_in_the_mission() -> None:
+    mission = far_mission(3, 2)
+
+    nearest_m = min(abs(task.position_enu_m[1]) for task in mission.tasks)
+    assert nearest_m / max(uav.speed_m_s for uav in mission.uavs) > 3600.0
+
+
+def test_a_program_stands_still_on_demand_while_its_threads_go_on() -> None:
+    program = """
+import sys, threading, time
+def other():
+    while True:
+        print("other", flush=True); time.sleep(0.02)
+threading.Thread(target=other, daemon=True).start()
+while True:
+    print("main", flush=True); time.sleep(0.02)
+"""
+    before = os.environ.get("PYTHONPATH")
+    with _stuck_on_demand():
+        process = subprocess.Popen(
+            [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
+        )
+        try:
+            assert process.stdout is not None
+            lines = process.stdout
+            while lines.readline() != "main\n":
+                pass
+            process.send_signal(signal.SIGUSR1)
+            said = [lines.readline() for _ in range(30)]
+            assert set(said[10:]) == {"other\n"}
+            process.send_signal(signal.SIGUSR2)
+            while lines.readline() != "main\n":
+                pass
+        finally:
+            process.kill()
+            process.communicate()
+    assert os.environ.get("PYTHONPATH") == before
