@@ -29,6 +29,7 @@ from sim.launch.fleet import LaunchOptions
 from sim.launch.run import Flight, Run, open_run
 from swarm.clock import SystemClock
 from swarm.model import Mission
+from swarm.wire.messages import Message
 
 __all__ = ["ChaosFlight", "Verdict", "open_chaos_flight"]
 
@@ -45,10 +46,12 @@ class Verdict:
     """Invariants that did not hold, in words; none when all is well."""
     visits: tuple[Visit, ...]
     """Visits that ended done, as recorded; duplicates included."""
+    messages: tuple[Message, ...]
+    """What was said, as heard at the first seat."""
     agreement_s: float
     """Longest time from a healing to agreement on all claims [wall s]."""
-    released: tuple[str, ...]
-    """Tasks given up on the way, one line of a log each."""
+    lines: tuple[tuple[str, str], ...]
+    """Everything the processes have logged: name and line."""
 
     @property
     def duplicates(self) -> int:
@@ -59,12 +62,18 @@ class Verdict:
 class ChaosFlight:
     """A flight to which faults are done; made by `open_chaos_flight`."""
 
-    def __init__(self, run: Run, network: RelayNetwork, recorder: Recorder) -> None:
+    def __init__(
+        self,
+        run: Run,
+        network: RelayNetwork,
+        recorder: Recorder,
+        lines: list[tuple[str, str]],
+    ) -> None:
         self.run = run
         self.network = network
         self.recorder = recorder
-        self.lines: list[tuple[str, str]] = []
-        """Everything the processes have logged: name and line."""
+        self.lines = lines
+        """Everything the processes have logged so far: name and line."""
         self._clock = SystemClock()
         self._fates: list[Fate] = []
         self._troubles: list[Trouble] = []
@@ -121,10 +130,6 @@ class ChaosFlight:
         begun_s = self._begun_s.pop(name, self._clock.now_s())
         self._troubles.append(Trouble(begun_s, self._clock.now_s()))
 
-    def log_of(self, name: str) -> list[str]:
-        """What the processes of that name have logged."""
-        return [line for who, line in self.lines if who == name]
-
     def verdict(self) -> Verdict:
         """Check everything; complete once all processes are gone."""
         flight = self.run.flight()
@@ -140,8 +145,9 @@ class ChaosFlight:
                 *disagreements(found, self._troubles),
             ),
             visits=tuple(seen),
+            messages=tuple(self.recorder.messages()),
             agreement_s=max((agreement_s(found, each) for each in self._troubles), default=0.0),
-            released=tuple(line for _, line in self.lines if "event=released" in line),
+            lines=tuple(self.lines),
         )
 
     def _lost_outcomes(self, flight: Flight) -> list[str]:
@@ -189,6 +195,4 @@ async def open_chaos_flight(
         recorder = await stack.enter_async_context(
             Recorder(mission.name, recorder_seats(run.launch.layout), SystemClock(), file=record)
         )
-        flight = ChaosFlight(run, network, recorder)
-        flight.lines = lines
-        yield flight
+        yield ChaosFlight(run, network, recorder, lines)

@@ -164,6 +164,7 @@ class Layout:
             str(options.scenario),
             *("--method", options.method, "--seed", str(options.seed), "--json"),
             *("--start-timeout-s", repr(options.start_timeout_s)),
+            *self._memory(),
             *self._speed(),
             *self.seat_arguments(COORDINATOR),
         ]

@@ -7,7 +7,9 @@ one process (sim.launch.process), and the mission they fly (sim.launch.run).
 from __future__ import annotations
 
 import asyncio
+import tempfile
 from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -68,6 +70,7 @@ class Launch:
         self._on_plan = on_plan
         self._through = through
         self._current: dict[str, Child] = {}
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
 
     async def start(self) -> None:
         """Start everything, in the order in which one needs the other.
@@ -78,6 +81,9 @@ class Launch:
             ChildFailedError: a router or an autopilot did not come up.
         """
         layout = self.layout
+        # A process's memory is for its next life in this run, and for nobody after that.
+        self._folder = tempfile.TemporaryDirectory(prefix="peckorder-", ignore_cleanup_errors=True)
+        layout.state = Path(self._folder.name)
         if self._through is not None:
             for link in layout.links:
                 layout.divert(link, await self._through(link, layout.endpoint(link.listener)))
@@ -101,6 +107,8 @@ class Launch:
             if child.returncode is None:
                 child.resume()
         await asyncio.gather(*(child.stop() for child in self.lives))
+        if self._folder is not None:
+            self._folder.cleanup()
 
     @property
     def names(self) -> tuple[str, ...]:

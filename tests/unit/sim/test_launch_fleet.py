@@ -137,6 +137,16 @@ def test_clients_take_turns_in_the_router_they_prefer_and_know_all() -> None:
     assert made.seat_of_onlooker().topology == ClientTopology((first, second))
 
 
+def test_processes_are_told_where_to_keep_their_memory_and_what_the_network_is_like() -> None:
+    made = layout(routers=1)
+    made.state = Path("here/state")
+
+    for arguments in (made.coordinator(), made.agent("u0", "tcp:127.0.0.1:5760", 1)):
+        assert value(arguments, "--state") == "here/state"
+        assert value(arguments, "--link") == "normal"
+    assert value(made.router("router 1"), "--link") == "normal"
+
+
 @pytest.mark.parametrize("routers", [0, 9])
 def test_no_run_has_fewer_than_one_router_or_too_many(routers: int) -> None:
     with pytest.raises(ValueError, match=r"routers must be within 1\.\.8"):

@@ -1,0 +1,99 @@
+"""Missions that are short, and plays of faults on them, for tests with real processes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import numpy as np
+
+from sim.chaos.flight import ChaosFlight, Verdict, open_chaos_flight
+from sim.launch.fleet import BusKind, LaunchOptions
+from swarm.config import Link
+from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.scenario.write import format_scenario
+
+__all__ = ["all_done", "play", "story", "survey"]
+
+LIMIT_S = 150.0
+
+
+def survey(n_uav: int, n_task: int, *, side_m: float = 300.0, service_s: float = 2.0) -> Mission:
+    """UAVs in a row beside a square of tasks; flown in some 40 s of mission time."""
+    rng = np.random.default_rng(5)
+    return Mission(
+        "chaos",
+        600.0,
+        tuple(
+            Uav(UavId(f"uav{number:02}"), (12.0 * number, -10.0, 0.0), 10.0)
+            for number in range(1, n_uav + 1)
+        ),
+        tuple(
+            Task(
+                TaskId(f"t{number:02}"),
+                (float(east_m), float(north_m), 0.0),
+                1.0,
+                service_s=service_s,
+            )
+            for number, (east_m, north_m) in enumerate(rng.uniform(0.0, side_m, (n_task, 2)), 1)
+        ),
+        origin=Origin(46.8, 9.7, 1100.0),
+    )
+
+
+def play(
+    mission: Mission,
+    folder: Path,
+    script: Callable[[ChaosFlight], Awaitable[None]],
+    *,
+    bus: BusKind,
+    speedup: float,
+    routers: int = 1,
+    relayed: bool = False,
+    link: Link = Link.NORMAL,
+) -> Verdict:
+    """Fly ``mission``, do to it what ``script`` says, and judge what came of it."""
+    scenario = folder / "scenario.toml"
+    scenario.write_text(format_scenario(mission))
+    options = LaunchOptions(
+        scenario=scenario,
+        method="guided",
+        seed=0,
+        speedup=speedup,
+        bus=bus,
+        position_rate_hz=50.0,
+        acceptance_radius_m=1.0,
+        start_timeout_s=60.0,
+        routers=routers,
+        link=link,
+    )
+
+    async def fly() -> Verdict:
+        async with asyncio.timeout(LIMIT_S):
+            async with open_chaos_flight(mission, options, relayed=relayed) as flight:
+                try:
+                    await script(flight)
+                    await flight.run.finish()
+                except BaseException as fault:
+                    told = [happening.text for happening in flight.run.observer.story]
+                    logged = [f"{name}: {line}" for name, line in flight.lines[-40:]]
+                    fault.add_note("\n".join([*told, *logged]))
+                    raise
+            return flight.verdict()
+
+    return asyncio.run(fly())
+
+
+def story(verdict: Verdict) -> list[str]:
+    """What the onlooker told, line by line."""
+    return [happening.text for happening in verdict.flight.observer.story]
+
+
+def all_done(verdict: Verdict, n_task: int) -> None:
+    """Assert that nothing was lost, no invariant broken and every duplicate counted."""
+    told = "\n".join(story(verdict))
+    assert verdict.faults == (), told
+    assert len(verdict.flight.result.done) == n_task, told
+    assert verdict.flight.result.duplicate_visits == verdict.duplicates
+    assert verdict.flight.fates == ()

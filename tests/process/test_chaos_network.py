@@ -1,0 +1,94 @@
+"""Real agents on a bad network: parted and healed, delayed and lossy."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from sim.chaos.checks import AGREE_WITHIN_S
+from sim.chaos.flight import ChaosFlight
+from sim.chaos.relay import Quality
+from sim.launch.fleet import BusKind
+from tests.process.chaos_play import all_done, play, story, survey
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(200)]
+
+FAR = {f"uav{number:02}" for number in (2, 4, 6, 8, 10)}
+PARTED_S = 6.0
+SPEEDUP = 4.0
+
+
+async def part_and_heal(flight: ChaosFlight, group: set[str]) -> None:
+    flight.isolate(group)
+    await asyncio.sleep(PARTED_S)
+    flight.heal()
+
+
+def test_parted_halves_of_a_mesh_agree_after_healing_and_lose_nothing(tmp_path: Path) -> None:
+    async def script(flight: ChaosFlight) -> None:
+        await flight.until_done(5)
+        await part_and_heal(flight, FAR)
+
+    verdict = play(
+        survey(10, 70), tmp_path, script, bus=BusKind.MESH, speedup=SPEEDUP, relayed=True
+    )
+
+    all_done(verdict, 70)
+    assert verdict.duplicates > 0  # a parting that nobody noticed would prove nothing
+    assert verdict.agreement_s <= AGREE_WITHIN_S
+
+
+def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Path) -> None:
+    async def script(flight: ChaosFlight) -> None:
+        await flight.until_done(5)
+        relays = flight.network.relays
+        served = {
+            link.dialer
+            for link in flight.network.links_of("router 2")
+            if link.listener == "router 2" and relays[link].n_connection
+        }
+        assert len(served) == 5
+        await part_and_heal(flight, served | {"router 2"})
+
+    verdict = play(
+        survey(10, 70),
+        tmp_path,
+        script,
+        bus=BusKind.ROUTER,
+        routers=2,
+        speedup=SPEEDUP,
+        relayed=True,
+    )
+
+    all_done(verdict, 70)
+    assert verdict.duplicates > 0
+    assert verdict.agreement_s <= AGREE_WITHIN_S
+
+
+def test_agents_cut_off_from_their_only_router_come_back(tmp_path: Path) -> None:
+    async def script(flight: ChaosFlight) -> None:
+        await flight.until_done(5)
+        await part_and_heal(flight, {"uav01", "uav03", "uav05"})
+
+    verdict = play(
+        survey(6, 40), tmp_path, script, bus=BusKind.ROUTER, speedup=SPEEDUP, relayed=True
+    )
+
+    all_done(verdict, 40)
+    for uav in ("uav01", "uav03", "uav05"):
+        assert f"{uav} is back" in story(verdict)
+    assert verdict.agreement_s <= AGREE_WITHIN_S
+
+
+@pytest.mark.parametrize("bus", [BusKind.ROUTER, BusKind.MESH])
+def test_nobody_is_lost_on_a_slow_and_lossy_link(tmp_path: Path, bus: BusKind) -> None:
+    async def script(flight: ChaosFlight) -> None:
+        flight.network.degrade(Quality(delay_s=0.03, jitter_s=0.005, loss_frac=0.05))
+
+    verdict = play(survey(6, 30), tmp_path, script, bus=bus, speedup=SPEEDUP, relayed=True)
+
+    all_done(verdict, 30)
+    assert verdict.flight.result.lost_uavs == ()
+    assert [line for line in verdict.lines if "event=lost" in line[1]] == []
