@@ -25,10 +25,8 @@ class Seat(Protocol):
         """Of the process; the same in its next life."""
         ...
 
-    @property
-    def writer(self) -> str | None:
-        """Whose token it holds and for whom it answers; None for an onlooker."""
-        ...
+    writer: str | None
+    """Whose token it holds and for whom it answers; None for an onlooker."""
 
     def receive(self, fact: BusFact) -> None:
         """Something has arrived; nothing happens any more at the seat of one that ended."""
@@ -48,6 +46,10 @@ class Network(Protocol):
 
     def leave(self, seat: Seat) -> None:
         """A process has ended, of itself or not."""
+        ...
+
+    def seat(self, seat: Seat, writer: str) -> None:
+        """Who has been an onlooker shows the token of ``writer`` and answers for it."""
         ...
 
     def publish(self, sender: Seat, message: Message) -> None:
@@ -86,6 +88,11 @@ class IdealNetwork:
         self._seats.remove(seat)
         if seat.writer is not None:
             self._tell_all(PeerGone(seat.writer), seat)
+
+    def seat(self, seat: Seat, writer: str) -> None:
+        """Show the token."""
+        seat.writer = writer
+        self._tell_all(PeerSeen(writer), seat)
 
     def publish(self, sender: Seat, message: Message) -> None:
         """Tell everyone; status goes to onlookers only."""

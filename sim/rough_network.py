@@ -147,6 +147,13 @@ class RoughNetwork:
                 self._changes[viewer, seat] += 1  # it will not come up any more
         self._open = {pair for pair in self._open if pair[0] is not seat}
 
+    def seat(self, seat: Seat, writer: str) -> None:
+        """Show the token to all that have a transport."""
+        seat.writer = writer
+        for viewer in list(self._seats):
+            if viewer is not seat:
+                self._queue.after(self._conditions.latency_s, partial(self._show, viewer, seat))
+
     def publish(self, sender: Seat, message: Message) -> None:
         """Tell everyone it reaches; status goes to onlookers only."""
         is_status, fact = isinstance(message.body, Status), Heard(message)

@@ -22,15 +22,16 @@ from agent.events import Order
 from agent.vehicle import GoTo, Orders, Refused, Report, Telemetry, VehicleReady
 from coordinator.core import CoordinatorCore, FlightLayers
 from coordinator.events import Action as CoordinatorAction
-from coordinator.events import MakePlan, PlanMade, Replan, Replanned
+from coordinator.events import MakePlan, PlanMade, Replan, Replanned, TakeSeat
 from coordinator.observer import Observer
 from coordinator.planner.live import NewPlan, replan
+from coordinator.standby import StandbyCore
 from sim.event_queue import EventQueue
 from sim.network import IdealNetwork, Network
 from sim.processes import LocalClock, Process
 from sim.virtual_vehicle import VirtualVehicle
 from swarm.config import Timing
-from swarm.events import Ask, Finish, Note, Publish, Save
+from swarm.events import Ask, Finish, Note, Publish, Save, Tick
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
@@ -38,6 +39,7 @@ from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
 __all__ = [
     "ONLOOKER",
     "QUIET",
+    "STANDBY",
     "Faults",
     "Planner",
     "Recall",
@@ -51,6 +53,8 @@ QUIET = Timing(announce_s=60.0, status_s=60.0, silence_s=150.0)
 """Timers for an ideal bus, on which nothing need be said twice."""
 ONLOOKER = "onlooker"
 """Name of the process that only watches."""
+STANDBY = "standby"
+"""Name of the process that takes the coordinator's place when it is lost."""
 WRITE_S = 0.02
 """Until what a process wants kept is on its disk."""
 
@@ -132,6 +136,8 @@ class Setting:
     """Plans the rest of a running mission."""
     clocks: Mapping[str, LocalClock] = field(default_factory=dict)
     """By process; the clocks of all others show virtual time."""
+    standby: bool = False
+    """Whether a second coordinator stands by."""
     kept: Collection[str] = ()
     """Processes whose disks are needed later."""
     plan_s: float = 0.0
@@ -190,6 +196,7 @@ class World:
         self._disks: dict[str, tuple[float, Snapshot]] = {}
         self._writing: dict[str, list[tuple[float, Snapshot]]] = {}
         names = [ONLOOKER, COORDINATOR, *(uav.id for uav in mission.uavs)]
+        names += [STANDBY] if self._setting.standby else []
         self._clocks = {name: self._setting.clocks.get(name, LocalClock()) for name in names}
         self.processes = {name: self._process(name, 1_000_000) for name in names}
         """The latest life of every process, by name."""
@@ -234,14 +241,11 @@ class World:
         """Start a process anew that died; False if it did not, or for good."""
         if not self.processes[name].over or name in self.finished:
             return False
-        if name != COORDINATOR and name not in self._vehicles:
+        if name not in (COORDINATOR, STANDBY) and name not in self._vehicles:
             return False
         wall_ms = 0 if memory is Recall.PAST else 1_000_000
         kept = None if memory is Recall.NONE else self._disks.get(name)
-        process = self._process(name, wall_ms + round(1e3 * self.queue.now_s()), kept, memory)
-        self.processes[name] = process
-        self.network.join(process)
-        process.start()
+        self._begin(self._process(name, wall_ms + round(1e3 * self.queue.now_s()), kept, memory))
         return True
 
     def slow(self, uav: str, speed_frac: float) -> None:
@@ -250,7 +254,15 @@ class World:
             self._vehicles[uav].speed_frac = speed_frac
 
     def withdraw(self, task: str) -> None:
-        """Take a task off the board."""
+        """Take a task off the board, as an operator would ask every coordinator there is."""
+        for process in list(self.processes.values()):
+            core = process.core.coordinator if process.name == STANDBY else process.core  # type: ignore[attr-defined]  # a StandbyCore
+            if isinstance(core, CoordinatorCore) and not (process.over or process.held):
+                entry = core.replica.board.get(task)
+                if entry is not None:
+                    # Operators have no way yet to say so.
+                    core._say(replace(entry, withdrawn=True))  # noqa: SLF001
+                    process.step(Tick())
 
     def skew(self, name: str, by_s: float) -> None:
         """Let the clock of a process jump forward."""
@@ -280,9 +292,14 @@ class World:
                 self._settle_disk(process.name)
                 memory: Snapshot = process.core.memory(process.now_s())  # type: ignore[attr-defined]  # who saves has one
                 self._writing.setdefault(process.name, []).append((self.queue.now_s(), memory))
+            case TakeSeat():
+                self.network.seat(process, COORDINATOR)
             case Finish(status):
-                self.finished[process.name] = status
                 self._end(process)
+                if process.name == STANDBY and process.core.stood_down is not None:  # type: ignore[attr-defined]  # a StandbyCore
+                    self._stand_by_again(process)
+                else:
+                    self.finished[process.name] = status
             case Note() if self._watch is not None:
                 self._watch.noted(process, action)
             case _:
@@ -360,18 +377,17 @@ class World:
             return new(None, self.observer)
         age_s, known = self._recall(kept, memory)
         if name == COORDINATOR:
-            coordinator = CoordinatorCore(
-                self.mission,
-                method=self._method,
-                seed=self._seed,
-                incarnation=incarnation,
-                timing=self._timing,
-                start_timeout_s=60.0,
-                layers=FlightLayers(),
-                memory=known,
-                memory_age_s=age_s,
-            )
+            coordinator = self._coordinator(incarnation, known, age_s)
             return new(name, coordinator, snapshot=coordinator.snapshot)
+        if name == STANDBY:
+            begun_s = self.queue.now_s()
+
+            def make_coordinator(memory: Snapshot | None, memory_age_s: float) -> CoordinatorCore:
+                later_ms = round(1e3 * (self.queue.now_s() - begun_s))
+                return self._coordinator(incarnation + later_ms, memory, memory_age_s)
+
+            core = StandbyCore(self.mission, make_coordinator, self._timing, known, age_s)
+            return new(None, core, snapshot=core.snapshot)
         agent = AgentCore(
             self.mission.name,
             name,
@@ -387,6 +403,33 @@ class World:
             telemetry=partial(self._telemetry, name),
             telemetry_gap_s=self._setting.telemetry_gap_s,
         )
+
+    def _coordinator(
+        self, incarnation: int, memory: Snapshot | None, memory_age_s: float
+    ) -> CoordinatorCore:
+        return CoordinatorCore(
+            self.mission,
+            method=self._method,
+            seed=self._seed,
+            incarnation=incarnation,
+            timing=self._timing,
+            start_timeout_s=60.0,
+            layers=FlightLayers(),
+            memory=memory,
+            memory_age_s=memory_age_s,
+        )
+
+    def _stand_by_again(self, process: Process) -> None:
+        """Who has left the coordinator's seat to another one watches anew, from a new seat."""
+        memory: Snapshot = process.core.memory(process.now_s())  # type: ignore[attr-defined]  # a StandbyCore
+        kept = self.queue.now_s(), memory
+        incarnation = 1_000_000 + round(1e3 * self.queue.now_s())
+        self._begin(self._process(process.name, incarnation, kept, Recall.DISK))
+
+    def _begin(self, process: Process) -> None:
+        self.processes[process.name] = process
+        self.network.join(process)
+        process.start()
 
     def _recall(
         self, kept: tuple[float, Snapshot] | None, memory: Recall

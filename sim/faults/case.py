@@ -24,7 +24,7 @@ from sim.faults.transcript import Broken
 from sim.processes import LocalClock
 from sim.rough_network import Conditions, RoughNetwork, Topology
 from sim.streams import stream
-from sim.world import ONLOOKER, Planner, Setting, World
+from sim.world import ONLOOKER, STANDBY, Planner, Setting, World
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.config import Timing
 from swarm.errors import Fault as InputFault
@@ -68,6 +68,8 @@ class Case:
     """How many of the tasks appear only during the mission."""
     topology: Topology = Topology.ROUTER
     method: str = "greedy"
+    standby: bool = False
+    """Whether a second coordinator stands by."""
     bug: str = ""
     """A protocol bug put in on purpose; see `sim.faults.bugs`."""
     schedule: tuple[Disturbance, ...] = ()
@@ -89,7 +91,8 @@ class Case:
 
     def processes(self) -> tuple[str, ...]:
         """Names of all processes that a fault may befall."""
-        return (COORDINATOR, ONLOOKER, *(uav.id for uav in self.flown().uavs))
+        standby = (STANDBY,) if self.standby else ()
+        return (COORDINATOR, ONLOOKER, *standby, *(uav.id for uav in self.flown().uavs))
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +151,7 @@ def play(case: Case, make_plan: Planner = quick_plan) -> Verdict:
             setting=Setting(
                 network=make_network,
                 clocks=_clocks(case),
+                standby=case.standby,
                 kept={each.names[0] for each in case.schedule if each.kind is Kind.CRASH},
                 plan_s=0.05,
                 telemetry_gap_s=0.2,
@@ -183,7 +187,8 @@ def limit_s(case: Case) -> float:
 def format_case(case: Case) -> str:
     """Lines that `parse_case` reads: the fleet, unless it is a scenario's, then the schedule."""
     facts = {"seed": case.seed, "uavs": case.uavs, "tasks": case.tasks, "popups": case.popups}
-    words = {**facts, "topology": case.topology.value, "method": case.method, "bug": case.bug}
+    words = {**facts, "topology": case.topology.value, "method": case.method}
+    words |= {"standby": "yes" if case.standby else "", "bug": case.bug}
     header = " ".join(f"{key}={value}" for key, value in words.items() if value != "")
     return f"fleet {header}\n{format_schedule(case.schedule)}"
 
@@ -209,6 +214,7 @@ def parse_case(lines: Iterable[str], source: str) -> Case:
             popups=int(words.pop("popups", "0")),
             topology=Topology(words.pop("topology", Topology.ROUTER.value)),
             method=words.pop("method", "greedy"),
+            standby=words.pop("standby", "no") == "yes",
             bug=words.pop("bug", ""),
         )
         if words:

@@ -72,6 +72,7 @@ def soak(
     import sys
     from json import dumps
 
+    from sim.faults.bugs import BUGS
     from sim.faults.case import format_case
     from sim.faults.generator import kinds_of
     from sim.faults.soak import shrunk
@@ -80,6 +81,8 @@ def soak(
 
     if replay is not None:
         return _replay(replay, json=json)
+    if bug and bug not in BUGS:
+        raise InputError(Fault("--bug", bug, f"is none of {', '.join(BUGS)}", "choose one"))
     kinds, clock = kinds_of(faults, "--faults"), SystemClock()
     with _counting(seeds) as progress:
         breach = play_all(

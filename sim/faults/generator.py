@@ -14,7 +14,7 @@ from sim.faults.case import MOST_TASKS, MOST_UAVS, Case
 from sim.faults.schedule import Disturbance, Kind, shape_of
 from sim.rough_network import Topology
 from sim.streams import stream
-from sim.world import ONLOOKER, Recall
+from sim.world import ONLOOKER, STANDBY, Recall
 from swarm.errors import Fault as InputFault
 from swarm.errors import InputError
 from swarm.model import Mission
@@ -54,26 +54,39 @@ def random_case(seed: int, kinds: Collection[Kind] = tuple(Kind), bug: str = "")
         popups=int(rng.integers(0, 1 + tasks // 3)),
         topology=Topology(str(rng.choice([each.value for each in Topology]))),
         method="guided" if rng.random() < 0.3 else "greedy",
+        standby=bool(rng.random() < 0.3),
         bug=bug,
     )
-    schedule = random_schedule(seed, kinds, case.flown(), SPAN_S)
+    schedule = random_schedule(seed, kinds, case.flown(), SPAN_S, standby=case.standby)
     return replace(case, schedule=schedule)
 
 
 def random_schedule(
-    seed: int, kinds: Collection[Kind], mission: Mission, span_s: float
+    seed: int,
+    kinds: Collection[Kind],
+    mission: Mission,
+    span_s: float,
+    *,
+    standby: bool = False,
 ) -> tuple[Disturbance, ...]:
     """What goes wrong in one flight of ``mission``, all of it beginning within ``span_s``."""
     rng = stream(seed, "schedule")
     choice = sorted(kinds)
+    coordinators = [COORDINATOR, STANDBY] if standby else [COORDINATOR]
     drawn = [
-        _draw(rng, choice[int(rng.integers(len(choice)))], mission, span_s)
+        _draw(rng, choice[int(rng.integers(len(choice)))], mission, coordinators, span_s)
         for _ in range(int(rng.integers(1, 7)))
     ]
     return tuple(sorted(drawn, key=lambda each: each.at_s))
 
 
-def _draw(rng: np.random.Generator, kind: Kind, mission: Mission, span_s: float) -> Disturbance:
+def _draw(
+    rng: np.random.Generator,
+    kind: Kind,
+    mission: Mission,
+    coordinators: Sequence[str],
+    span_s: float,
+) -> Disturbance:
     shape = shape_of(kind)
     uavs = [uav.id for uav in mission.uavs]
     lasts_s = None
@@ -85,7 +98,7 @@ def _draw(rng: np.random.Generator, kind: Kind, mission: Mission, span_s: float)
     return Disturbance(
         at_s=round(float(rng.uniform(0.0, span_s)), 2),
         kind=kind,
-        names=_names(rng, shape.names, uavs, [task.id for task in mission.tasks]),
+        names=_names(rng, shape.names, coordinators, uavs, [t.id for t in mission.tasks]),
         lasts_s=lasts_s,
         amount=_amount(rng, kind) if shape.amount else None,
         memory=memory,
@@ -98,9 +111,13 @@ def _amount(rng: np.random.Generator, kind: Kind) -> float:
 
 
 def _names(
-    rng: np.random.Generator, wanted: str, uavs: Sequence[str], tasks: Sequence[str]
+    rng: np.random.Generator,
+    wanted: str,
+    coordinators: Sequence[str],
+    uavs: Sequence[str],
+    tasks: Sequence[str],
 ) -> tuple[str, ...]:
-    processes = [COORDINATOR, *uavs]
+    processes = [*coordinators, *uavs]
 
     def one(of: Sequence[str]) -> str:
         return of[int(rng.integers(len(of)))]

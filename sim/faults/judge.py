@@ -7,12 +7,13 @@ Beside the invariants of the messages (sim.faults.transcript):
 - *claimed twice*: once everything has been calm for `SETTLED_S`, no two living UAVs that can
   talk to each other claim one task for longer than that;
 - *disagree*: and each knows what the others claim, the epoch in force and the board;
+- *two coordinators*: and only one of them coordinates;
 - *winners differ*: whenever two have equal registers, they see the same states and winners;
 - *task lost*: in the end each posted task is done, failed, withdrawn, or open with no UAV
-  able to do it that knew of it and came home of its own accord;
+  able to do it that knew of it, and of a mission that had begun, and came home of its own accord;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
 - *miscounted*: the onlooker knows the visits of every UAV that left in calm, invents none, and
-  counts as duplicates just what it knows of.
+  counts as duplicates all that it knows of, and no more than there were.
 
 UAVs that were cut off or died may have done what nobody could hear of; nothing is claimed
 about the counting of that. Leaves out: how faults come about (sim.faults.director).
@@ -28,6 +29,7 @@ from agent.core import AgentCore
 from agent.vehicle import GoTo
 from coordinator.core import CoordinatorCore
 from coordinator.observer import Observer
+from coordinator.standby import StandbyCore
 from sim.faults.director import Director
 from sim.faults.transcript import Broken, Transcript
 from sim.processes import Process
@@ -122,6 +124,7 @@ class Judge:
         self._look_for_equal_registers(agents)
         if self._calm_for_s > SETTLED_S:
             self._look_for_disagreement(agents)
+            self._look_for_two_coordinators()
         self._stop_if_broken()
 
     def _look_for_shared_tasks(self, agents: list[tuple[Process, AgentCore]]) -> None:
@@ -158,6 +161,12 @@ class Judge:
                 if known != peer.replica.claims.get(other.name):
                     self._break("disagree", f"{one.name} takes {other.name} to claim {known}")
 
+    def _look_for_two_coordinators(self) -> None:
+        at_work = [process for process, core in self._living() if _coordinates(core)]
+        for one, other in itertools.combinations(at_work, 2):
+            if self._joined(one, other):
+                self._break("two coordinators", f"{one.name} and {other.name} both coordinate")
+
     # -- in the end -------------------------------------------------------------------
 
     def conclude(self) -> None:
@@ -180,7 +189,10 @@ class Judge:
         transcript, world = self.transcript, self._there
         settled = transcript.done | transcript.failed | transcript.withdrawn
         home = [u for u in world.mission.uavs if world.finished.get(u.id) == 0]
-        heard_of = {name: core.replica.board for name, core in world.agents.items()}
+        heard_of = {
+            name: core.replica.board if core.replica.epoch is not None else {}
+            for name, core in world.agents.items()
+        }
         for task in world.mission.tasks:
             if task.id not in transcript.posted or task.id in settled:
                 continue
@@ -197,29 +209,29 @@ class Judge:
 
     def _look_at_the_count(self) -> None:
         observer, true = self._there.observer, self.transcript.visits
-        known = {
-            key: outcome.attempt
-            for key, outcome in observer.replica.outcomes.items()
-            if outcome.result is Result.DONE
-        }
-        for key, attempts in true.items():
-            if key[0] in self._left_in_calm and key not in known:
-                self._break("miscounted", f"nobody knows that {key[0]} visited {key[1]}")
-            elif key in known and known[key] not in attempts:
-                self._break("miscounted", f"{key[0]} never visited {key[1]} {known[key]} times")
+        outcomes = observer.replica.outcomes.items()
+        known = {k: o.completed_s for k, o in outcomes if o.result is Result.DONE}
+        for key, completed_s in known.items():
+            if completed_s not in true[key]:
+                self._break("miscounted", f"{key[0]} never visited {key[1]} at {completed_s:.3f} s")
+        for uav, task in sorted(true.keys() - known.keys()):
+            if uav in self._left_in_calm:
+                self._break("miscounted", f"nobody knows that {uav} visited {task}")
         told = observer.result().duplicate_visits
-        visits = sum(known.values())
-        if told != visits - len({task for _, task in known}):
-            self._break("miscounted", f"{told} duplicates told, {visits} visits known")
+        least, most = len(known) - len({task for _, task in known}), self.transcript.duplicates
+        if not least <= told <= most:
+            self._break("miscounted", f"{told} duplicates told, not {least} to {most}")
 
     # -- pieces -----------------------------------------------------------------------
 
-    def _living(self) -> Iterator[tuple[Process, AgentCore | CoordinatorCore | Observer]]:
+    def _living(
+        self,
+    ) -> Iterator[tuple[Process, AgentCore | CoordinatorCore | StandbyCore | Observer]]:
         """Processes that run, or will go on, with their cores."""
         for process in self._there.processes.values():
             if not process.over and process not in self._directed.held_for_good:
                 core = process.core
-                if isinstance(core, AgentCore | CoordinatorCore | Observer):
+                if isinstance(core, AgentCore | CoordinatorCore | StandbyCore | Observer):
                     yield process, core
 
     def _joined(self, one: Process, other: Process) -> bool:
@@ -257,3 +269,9 @@ class Judge:
 def _task_states(core: AgentCore) -> dict[str, TaskState]:
     """What the agent itself makes of its registers."""
     return core._picture.board.states  # noqa: SLF001 - a look inside is the point
+
+
+def _coordinates(core: object) -> bool:
+    if isinstance(core, StandbyCore):
+        return core.coordinator is not None
+    return isinstance(core, CoordinatorCore)

@@ -72,6 +72,8 @@ def _smaller_fleets(case: Case) -> Iterator[Case]:
                 yield replace(case, uavs=uavs)
         for popups in _fewer(case.popups + 1):
             yield replace(case, popups=popups - 1)
+    if case.standby and not any("standby" in each.names for each in case.schedule):
+        yield replace(case, standby=False)
     if case.method != "greedy":
         yield replace(case, method="greedy")
     if case.topology is not Topology.ROUTER:

@@ -55,8 +55,8 @@ class Transcript:
         self.broken: list[Broken] = []
         self.posted: dict[str, Board] = {}
         """The newest entry of every task that was ever on the board."""
-        self.visits: dict[tuple[str, str], set[int]] = defaultdict(set)
-        """By UAV and task: the attempts that ended done."""
+        self.visits: dict[tuple[str, str], set[float]] = defaultdict(set)
+        """By UAV and task: when attempts ended done [s mission time]."""
         self.failed: set[str] = set()
         """Tasks an attempt at which failed."""
         self.ended = False
@@ -102,8 +102,8 @@ class Transcript:
                 self.posted[task] = entry
             case Epoch(phase=EpochPhase.ENDED):
                 self.ended = True
-            case Outcome(task=task, result=Result.DONE, attempt=attempt):
-                self.visits[message.writer, task].add(attempt)
+            case Outcome(task=task, result=Result.DONE, completed_s=completed_s):
+                self.visits[message.writer, task].add(completed_s)
             case Outcome(task=task):
                 self.failed.add(task)
             case Claim() as claim:

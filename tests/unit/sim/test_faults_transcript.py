@@ -141,8 +141,8 @@ def test_who_goes_home_may_leave_its_task_when_the_mission_has_ended(told: Telli
 
 def test_visits_beyond_the_first_are_duplicates(told: Telling) -> None:
     for uav, task, attempt in (("u0", "t0", 1), ("u1", "t0", 1), ("u0", "t0", 2), ("u0", "t1", 1)):
-        told.say(uav, Outcome(task, Result.DONE, attempt, 1.0))
-        told.say(uav, Outcome(task, Result.DONE, attempt, 1.0))
+        told.say(uav, Outcome(task, Result.DONE, attempt, 1.0 * attempt))
+        told.say(uav, Outcome(task, Result.DONE, attempt, 1.0 * attempt))
 
     assert told.transcript.duplicates == 2
     assert told.transcript.done == {"t0", "t1"}

@@ -1,0 +1,44 @@
+"""Random fleets under random faults of every kind: no invariant ever breaks.
+
+`swarm soak` plays more of the same, and makes small what fails.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.faults.case import format_case
+from sim.faults.generator import random_case
+from sim.faults.schedule import Kind
+from sim.faults.soak import Breach, first_breach, shrunk
+
+BLOCK = 20
+BLOCKS = 15
+
+
+def told(breach: Breach | None) -> str:
+    """What a person needs who is to mend it; empty if there is nothing to mend."""
+    if breach is None:
+        return ""
+    small = shrunk(breach)
+    return f"seed {breach.case.seed}: {small.broken}\n{format_case(small.case)}"
+
+
+@pytest.mark.parametrize("block", range(BLOCKS))
+def test_every_kind_of_fault_is_survived(block: int) -> None:
+    breach = first_breach(range(block * BLOCK, (block + 1) * BLOCK), tuple(Kind))
+
+    assert told(breach) == ""
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_each_kind_alone_is_survived(kind: Kind) -> None:
+    breach = first_breach(range(100_000, 100_008), (kind,))
+
+    assert told(breach) == ""
+
+
+def test_the_first_seeds_hold_every_kind_of_fault() -> None:
+    kinds = {each.kind for seed in range(BLOCK) for each in random_case(seed).schedule}
+
+    assert kinds == set(Kind)
