@@ -6,16 +6,19 @@ how any of it is shown.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
 from swarm.allocation.objective import executed_objective
 from swarm.allocation.problem import Problem
+from swarm.asking import Asking
 from swarm.config import Timing
 from swarm.events import Ask, BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Wish
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.model.ids import COORDINATOR
+from swarm.pulse import Pulse
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.claims import holders
 from swarm.state.membership import Membership
@@ -29,6 +32,7 @@ from swarm.wire.messages import (
     Message,
     Outcome,
     Result,
+    Stamp,
     Status,
 )
 
@@ -59,12 +63,14 @@ class MissionResult:
     open: tuple[TaskId, ...]
     """Neither done nor failed nor withdrawn; pop-ups that never appeared included."""
     duplicate_visits: int
-    """Visits to a task that had already been done."""
+    """Visits to a task that had already been done, by another UAV or by the same one again."""
     makespan_s: float
     """Latest completion [s mission time]; 0 when nothing was done."""
     lost_uavs: tuple[UavId, ...]
+    """UAVs that disappeared while they took part and did not come back; who came back and
+    took part again is none of them, however long it was gone."""
     epochs: int
-    """Epochs in which the mission ran."""
+    """Epochs in which the mission ran; one that a new coordinator restates is the same."""
 
 
 class Observer:
@@ -82,35 +88,49 @@ class Observer:
         self.replica = Replica()
         self.board = TaskBoard(self.replica, mission.name)
         self.statuses: dict[str, Status] = {}
-        """Newest status by UAV id."""
+        """Newest status by UAV id, whatever order they arrived in."""
         self.heard_s: dict[str, float] = {}
         """When each writer last said something itself [s of ``now_s``]."""
         self.present: set[str] = set()
         """Writers believed to be there."""
         self.lost: list[UavId] = []
-        """UAVs that disappeared while they took part."""
+        """UAVs that disappeared while they took part, and are not back."""
         self.story: list[Happening] = []
         self._membership = Membership(timing)
         self._zero_s: float | None = None
         self._orphans: dict[str, str] = {}
-        self._numbers: set[int] = set()
+        self._epochs: set[tuple[object, ...]] = set()
+        self._stamps: dict[str, Stamp] = {}
+        self._dropped_before: dict[str, Counter[str]] = {}
+        self._repeated_visits = 0
+        self._coordinator: int | None = None
+        self._coordinator_missed = False
+        self._missed: set[str] = set()
+        self._pulse = Pulse(timing.pause_s)
         self._known_at_start = {task.id for task in mission.known_at_start().tasks}
         self._ended_told = False
         self._timing = timing
+        self._asking = Asking(timing.ask_gap_s)
         self._ask_at_s = 0.0
         self._problem = Problem.from_mission(mission)
 
     def start(self, now_s: float) -> list[Wish]:
         """Ask what has happened so far."""
+        self._asking.want(now_s)
         return self._ask(now_s)
 
     def step(self, fact: BusFact, now_s: float) -> list[Wish]:
         """Take note of one fact."""
-        wishes: list[Wish] = []
+        ask = self._pulse.late(now_s)
+        if ask:
+            self._membership.held_up(now_s)
         match fact:
             case Heard(message):
                 self.heard_s[message.writer] = now_s
-                self._membership.heard(message.writer, now_s)
+                if self._membership.heard(message.writer, now_s):
+                    ask |= self._welcome_back(message.writer, now_s)
+                if message.writer == COORDINATOR:
+                    self._hear_coordinator(message, now_s)
                 self._hear(message, now_s)
             case Learned(snapshots):
                 for snapshot in snapshots:
@@ -119,19 +139,22 @@ class Observer:
                     for message in snapshot.messages:
                         self._hear(message, now_s)
             case PeerSeen(writer):
-                self._membership.seen(writer, now_s)
+                if self._membership.seen(writer, now_s):
+                    ask |= self._welcome_back(writer, now_s)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
-                wishes = self._ask(now_s) if up else []
+                ask |= up
             case _:
                 pass
-        if self.replica.brief is None and self._ask_at_s <= now_s:
-            wishes = self._ask(now_s)
         for writer in self._membership.lost(now_s):
-            self._lose(writer, now_s)
+            ask |= self._lose(writer, now_s)
         self.present = self._membership.present
+        if ask or (self.replica.brief is None and self._ask_at_s <= now_s):
+            self._asking.want(now_s)
+        wishes = self._ask(now_s)
+        self._pulse.promise(self.next_deadline_s())
         return wishes
 
     def revise(self, mission: Mission) -> None:
@@ -141,9 +164,12 @@ class Observer:
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
-        doubt_s = self._membership.next_deadline_s()
-        ask_at_s = self._ask_at_s if self.replica.brief is None else None
-        return min((at_s for at_s in (doubt_s, ask_at_s) if at_s is not None), default=None)
+        deadlines = (
+            self._membership.next_deadline_s(),
+            self._asking.next_deadline_s(),
+            self._ask_at_s if self.replica.brief is None else None,
+        )
+        return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
     def mission_s(self, now_s: float) -> float | None:
         """Mission time; None before the start."""
@@ -161,6 +187,14 @@ class Observer:
         claims = {u: c for u, c in self.replica.claims.items() if u in self.present}
         states = self.board.states
         return {t: u for t, u in holders(claims).items() if states.get(t) is TaskState.OPEN}
+
+    @property
+    def dropped(self) -> dict[str, Counter[str]]:
+        """What each UAV's agents have dropped in all their lives, by reason."""
+        return {
+            uav: self._dropped_before.get(uav, Counter()) + Counter(status.dropped)
+            for uav, status in self.statuses.items()
+        }
 
     def result(self) -> MissionResult:
         """What has been executed so far."""
@@ -199,13 +233,15 @@ class Observer:
                 for t in problem.task_ids
                 if states.get(t, TaskState.OPEN) is TaskState.OPEN and t not in completion_s
             ),
-            duplicate_visits=len(visits) - len(completion_s),
+            duplicate_visits=len(visits) - len(completion_s) + self._repeated_visits,
             makespan_s=max(completion_s.values(), default=0.0),
             lost_uavs=tuple(self.lost),
-            epochs=len(self._numbers),
+            epochs=len(self._epochs),
         )
 
     def _ask(self, now_s: float) -> list[Wish]:
+        if not self._asking.due(now_s):
+            return []
         self._ask_at_s = now_s + self._timing.ask_s
         return [Ask()]
 
@@ -213,9 +249,10 @@ class Observer:
 
     def _hear(self, message: Message, now_s: float) -> None:
         if isinstance(message.body, Status):
-            self.statuses[message.writer] = message.body
+            self._hear_status(message.writer, message.stamp, message.body)
             return
         before = self.replica.claims.get(message.writer)
+        earlier = self.replica.known(message)
         if not self.replica.join(message):
             return
         match message.body:
@@ -227,8 +264,8 @@ class Observer:
                 self._tell(f"task {task} appeared", now_s)
             case Claim() as claim:
                 self._hear_claim(message.writer, claim, before, now_s)
-            case Outcome(task=task, result=result):
-                self._tell(f"{message.writer} ended {task}: {result}", now_s)
+            case Outcome() as outcome:
+                self._hear_outcome(message.writer, outcome, earlier, now_s)
             case _:
                 pass
 
@@ -236,9 +273,59 @@ class Observer:
         """Whether the task is a pop-up, or one that the scenario does not know at all."""
         return self._zero_s is not None and task not in self._known_at_start
 
+    def _hear_status(self, uav: str, stamp: Stamp, status: Status) -> None:
+        known = self._stamps.get(uav)
+        if known is not None and stamp <= known:
+            return
+        if known is not None and stamp.incarnation > known.incarnation:
+            # A new process counts from nought.
+            before = self._dropped_before.setdefault(uav, Counter())
+            before.update(self.statuses[uav].dropped)
+        self._stamps[uav], self.statuses[uav] = stamp, status
+
+    def _hear_outcome(
+        self, uav: str, outcome: Outcome, earlier: Message | None, now_s: float
+    ) -> None:
+        done, by = outcome.result is Result.DONE, uav
+        former = earlier.body if earlier is not None else None
+        if isinstance(former, Outcome) and former.result is Result.DONE and done:
+            # The very same outcome, restated by a new life of the agent, is no other visit.
+            if former.completed_s == outcome.completed_s:
+                return
+            self._repeated_visits += 1
+        outcomes = self.replica.outcomes.items()
+        others = {u for (u, t), o in outcomes if t == outcome.task and o.result is Result.DONE}
+        again = f", as {', '.join(sorted(others - {by}))} had" if done and others - {by} else ""
+        self._tell(f"{uav} ended {outcome.task}: {outcome.result}{again}", now_s)
+
+    def _hear_coordinator(self, message: Message, now_s: float) -> None:
+        """Tell when the coordinator is back, or another one has taken its place."""
+        life = message.stamp.incarnation
+        if self._coordinator is not None and life < self._coordinator:
+            return
+        if self.phase is not EpochPhase.ENDED and COORDINATOR in self._membership.present:
+            if self._coordinator is not None and life > self._coordinator:
+                self._tell("a new coordinator has taken charge", now_s)
+                self._coordinator_missed = False
+            elif self._coordinator_missed:
+                self._tell("coordinator is back", now_s)
+                self._coordinator_missed = False
+        self._coordinator = life
+
+    def _welcome_back(self, writer: str, now_s: float) -> bool:
+        """Whether ``writer``, present anew, had been missed."""
+        missed = writer in self._missed
+        self._missed.discard(writer)
+        if writer in self.lost:
+            self.lost.remove(UavId(writer))
+            self._tell(f"{writer} is back", now_s)
+        return missed
+
     def _hear_epoch(self, epoch: Epoch, now_s: float) -> None:
-        if epoch.phase is EpochPhase.RUNNING and epoch.number not in self._numbers:
-            self._numbers.add(epoch.number)
+        lists = tuple((uav, tasks) for uav, tasks in sorted(epoch.routes.items()))
+        course = epoch.number, epoch.rule, epoch.sequence, lists
+        if epoch.phase is EpochPhase.RUNNING and course not in self._epochs:
+            self._epochs.add(course)
             if self._zero_s is None:
                 self._zero_s = now_s - epoch.mission_s
             order = " > ".join(epoch.sequence)
@@ -257,24 +344,30 @@ class Observer:
         if former != uav:
             self._tell(f"{uav} took over {claim.task} from {former}", now_s)
 
-    def _lose(self, writer: str, now_s: float) -> None:
+    def _lose(self, writer: str, now_s: float) -> bool:
+        """Tell of a loss; whether others may have heard last words."""
+        self._missed.add(writer)
+        silent = ", silent though its link is up" if self._membership.mute(writer) else ""
         if writer == COORDINATOR:
             if self.phase is EpochPhase.RUNNING:
-                self._tell("coordinator lost; the fleet goes on with the last epoch", now_s)
+                text = f"coordinator lost{silent}; the fleet goes on with the last epoch"
+                self._tell(text, now_s)
             elif self.phase is EpochPhase.PREPARING:
-                self._tell("coordinator lost before the mission began", now_s)
-            return
+                self._tell(f"coordinator lost{silent} before the mission began", now_s)
+            self._coordinator_missed = True
+            return True
         claim = self.replica.claims.get(writer)
         if claim is None or claim.phase is ClaimPhase.OUT:
-            return
+            return False
         if writer not in self.lost:
             self.lost.append(UavId(writer))
         opened = self.board.states.get(claim.task or "") is TaskState.OPEN
         if claim.task is not None and opened:
             self._orphans[claim.task] = writer
-            self._tell(f"{writer} lost; task {claim.task} is open again", now_s)
+            self._tell(f"{writer} lost{silent}; task {claim.task} is open again", now_s)
         else:
-            self._tell(f"{writer} lost", now_s)
+            self._tell(f"{writer} lost{silent}", now_s)
+        return True
 
     def _tell(self, text: str, now_s: float) -> None:
         self.story.append(Happening(self.mission_s(now_s), text))

@@ -139,4 +139,4 @@ class Teller:
 
     def lose(self, writer: str, now_s: float) -> None:
         self.observer.step(PeerGone(writer), now_s)
-        self.observer.step(Tick(), now_s + 10.0)
+        self.observer.step(Tick(), now_s + Timing().loss_delay_s)

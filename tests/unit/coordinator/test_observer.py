@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from coordinator.observer import Observer
@@ -50,8 +52,8 @@ FLOWN = mission(FLEET, [T0, T1, POPUP], horizon_s=100.0)
 class Onlooker:
     """An observer of `FLOWN` whose mission begins at 200 s of its clock."""
 
-    def __init__(self, flown: Mission = FLOWN) -> None:
-        self.observer = Observer(flown, TIMING)
+    def __init__(self, flown: Mission = FLOWN, timing: Timing = TIMING) -> None:
+        self.observer = Observer(flown, timing)
         self.flown = flown
         self.now_s = 100.0
         self._counters: Counter[str] = Counter()
@@ -226,8 +228,76 @@ def test_a_uav_that_comes_back_takes_its_task_over_from_nobody() -> None:
     onlooker.hear("u0", proposed("t0", 4.0))
     onlooker.lose("u0", 5.0)
 
-    assert onlooker.story[1:] == ["u0 lost; task t0 is open again"] * 2
+    loss = "u0 lost; task t0 is open again"
+    assert onlooker.story[1:] == [loss, "u0 is back", loss]
     assert onlooker.observer.result().lost_uavs == ("u0",)
+
+
+def test_who_came_back_and_stayed_is_not_among_the_lost() -> None:
+    onlooker = Onlooker().running()
+    onlooker.lose("u0", 3.0)
+    onlooker.happen(PeerSeen("u0"), 60.0)
+
+    assert onlooker.observer.result().lost_uavs == ()
+
+
+def test_a_loss_by_silence_is_told_as_such_and_so_is_the_end_of_the_silence() -> None:
+    onlooker = Onlooker(timing=Timing()).running()
+    for mission_s in np.arange(0.5, 2.0 * Timing().silence_s, 0.5):
+        onlooker.hear("u1", status(), float(mission_s))
+        onlooker.hear(COORDINATOR, epoch("u0", "u1", mission_s=float(mission_s)))
+    assert onlooker.story[1:] == ["u0 lost, silent though its link is up"]
+
+    onlooker.hear("u0", IDLE, 100.0)
+    assert onlooker.story[2] == "u0 is back"
+
+
+def test_a_second_visit_is_told() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", done("t1", 9.0), 9.0)
+    onlooker.hear("u1", done("t1", 9.5), 9.5)
+
+    assert onlooker.story[-1] == "u1 ended t1: done, as u0 had"
+
+
+def test_an_agent_that_forgot_its_visit_and_made_it_again_made_a_duplicate() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", done("t1", 9.0), 9.0)
+    onlooker.happen(Heard(message("u0", done("t1", 40.0), 1, incarnation=2)), 40.0)
+
+    assert onlooker.observer.result().duplicate_visits == 1
+
+
+def test_an_outcome_that_a_new_life_of_an_agent_restates_is_no_second_visit() -> None:
+    onlooker = Onlooker().running()
+    onlooker.hear("u0", done("t1", 9.0), 9.0)
+    onlooker.happen(Heard(message("u0", done("t1", 9.0), 1, incarnation=2)), 40.0)
+
+    assert onlooker.observer.result().duplicate_visits == 0
+    assert len(onlooker.story) == 2
+
+
+def test_the_newest_status_is_the_one_said_last_and_not_the_one_heard_last() -> None:
+    onlooker = Onlooker().running()
+    older, newer = (
+        message("u0", status(position_enu_m=(x, 0.0, 0.0)), n, 1)
+        for n, x in enumerate((1.0, 2.0), 50)
+    )
+    reborn = message("u0", status(position_enu_m=(3.0, 0.0, 0.0)), 1, incarnation=2)
+    for said, east_m in ((newer, 2.0), (older, 2.0), (reborn, 3.0), (newer, 3.0)):
+        onlooker.happen(Heard(said))
+        assert onlooker.observer.statuses["u0"].position_enu_m == (east_m, 0.0, 0.0)
+
+
+def test_what_agents_dropped_is_added_up_over_their_lives() -> None:
+    onlooker = Onlooker().running()
+    counts = [{"malformed": 2}, {"malformed": 5, "stale": 1}]
+    for number, dropped in enumerate(counts):
+        onlooker.happen(Heard(message("u0", replace(status(), dropped=dropped), 90 + number)))
+    reborn = replace(status(), dropped={"malformed": 3})
+    onlooker.happen(Heard(message("u0", reborn, 1, incarnation=2)))
+
+    assert onlooker.observer.dropped == {"u0": Counter(malformed=8, stale=1)}
 
 
 def test_who_leaves_after_its_last_word_is_not_lost() -> None:
@@ -273,6 +343,43 @@ def test_the_loss_of_the_coordinator_is_told_for_what_it_means(
     assert onlooker.observer.lost == []
 
 
+def test_the_return_of_the_coordinator_is_told() -> None:
+    onlooker = Onlooker().running()
+    onlooker.lose(COORDINATOR, 5.0)
+    onlooker.happen(PeerSeen(COORDINATOR), 9.0)
+    onlooker.hear(COORDINATOR, epoch("u0", "u1", mission_s=9.0))
+
+    assert onlooker.story[2:] == ["coordinator is back"]
+
+
+@pytest.mark.parametrize("was_missed", [True, False])
+def test_a_new_coordinator_is_told_and_its_epoch_is_no_new_one(was_missed: bool) -> None:
+    onlooker = Onlooker().running()
+    if was_missed:
+        onlooker.lose(COORDINATOR, 5.0)
+        onlooker.happen(PeerSeen(COORDINATOR), 9.0)
+    restated = message(COORDINATOR, epoch("u0", "u1", mission_s=9.0), 1, incarnation=2)
+    for _ in range(2):
+        onlooker.happen(Heard(restated), 9.0)
+    next_one = message(COORDINATOR, epoch("u1", "u0", number=2, mission_s=9.0), 2, incarnation=2)
+    onlooker.happen(Heard(next_one))
+
+    assert onlooker.story[1 + was_missed :] == [
+        "a new coordinator has taken charge",
+        "epoch 2: greedy, u1 > u0",
+    ]
+    assert onlooker.observer.result().epochs == 2
+
+
+def test_late_words_of_the_old_coordinator_are_no_news() -> None:
+    onlooker = Onlooker().running()
+    onlooker.happen(Heard(message(COORDINATOR, epoch("u0", "u1"), 1, incarnation=5)))
+    before = list(onlooker.story)
+    onlooker.hear(COORDINATOR, epoch("u0", "u1", mission_s=3.0))
+
+    assert onlooker.story == before
+
+
 # -- joining ----------------------------------------------------------------------------
 
 
@@ -288,6 +395,22 @@ def test_it_asks_until_it_knows_the_brief_and_then_only_for_losses() -> None:
     assert observer.next_deadline_s() is None
     assert observer.step(Tick(), 200.0) == []
     assert observer.step(LinkChanged(True), 200.0) == [Ask()]
+
+
+def test_it_asks_the_others_for_the_last_words_of_the_lost_and_for_what_the_returned_know() -> None:
+    onlooker = Onlooker().running()
+    onlooker.happen(PeerGone("u0"), 5.0)
+    assert onlooker.happen(Tick(), 5.0 + TIMING.loss_delay_s) == [Ask()]
+    assert onlooker.happen(PeerSeen("u0"), 10.0) == [Ask()]
+    assert onlooker.happen(PeerSeen("u9"), 15.0) == []
+
+
+def test_after_it_was_held_up_itself_it_asks_and_misses_nobody_yet() -> None:
+    onlooker = Onlooker(timing=Timing()).running()
+    onlooker.happen(Tick(), 0.5)
+    assert Ask() in onlooker.happen(Tick(), 60.0)
+
+    assert onlooker.observer.present == {COORDINATOR, "u0", "u1"}
 
 
 def test_one_who_joins_late_learns_time_and_result_but_tells_no_tales_of_pop_ups() -> None:
