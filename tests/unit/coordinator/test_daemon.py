@@ -23,7 +23,7 @@ from swarm.state.registers import Replica
 from swarm.wire.codec import Codec, encode, key_of
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Body, EpochPhase, Message
-from tests.builders import IDLE, MISSION, OUT, done, message, mission, task, uav
+from tests.builders import IDLE, MISSION, OUT, done, held, message, mission, task, uav
 from tests.shell_play import LIMIT_S, HandClock, play, take_until, until
 
 KEYS = Keys(MISSION)
@@ -68,14 +68,14 @@ class Played:
 
 
 @asynccontextmanager
-async def at_work(make_plan: MakePlan = planned) -> AsyncIterator[Played]:
-    """The coordinator of `WHOLE`."""
+async def at_work(make_plan: MakePlan = planned, flown: Mission = WHOLE) -> AsyncIterator[Played]:
+    """The coordinator of ``flown``, by one UAV."""
     network = MemoryNetwork()
     onlooker = network.join("onlooker")
     fleet, seat = network.join("u0"), network.join(COORDINATOR)
     take_seat(fleet, MISSION, "u0", status=False)
     core = CoordinatorCore(
-        WHOLE,
+        flown,
         method="greedy",
         seed=5,
         incarnation=1,
@@ -84,7 +84,7 @@ async def at_work(make_plan: MakePlan = planned) -> AsyncIterator[Played]:
         layers=FlightLayers(),
     )
     clock = HandClock()
-    running = asyncio.create_task(run_coordinator(core, WHOLE, seat, clock, make_plan))
+    running = asyncio.create_task(run_coordinator(core, flown, seat, clock, make_plan))
     try:
         yield Played(core, running, clock, fleet, onlooker)
     finally:
@@ -189,6 +189,30 @@ def test_a_plan_under_way_does_not_outlive_the_coordinator() -> None:
                 await played.running
             assert len(asyncio.all_tasks()) == 1
             may_end.set()
+
+    play(scenario)
+
+
+def test_a_running_mission_is_planned_anew_beside_the_loop() -> None:
+    tasks = [task("t0", 1.0), task("t1", 2.0, appears_s=4.0)]
+
+    async def scenario() -> None:
+        async with at_work(flown=mission([uav("u0")], tasks)) as played:
+            await until(lambda: played.core.plan is not None, "a plan")
+            played.core._replanning._margin_frac = -1.0  # whatever is planned becomes an epoch
+            played.say(IDLE)
+            await played.phase(EpochPhase.RUNNING)
+            played.clock.time_s += 6.0
+            played.say(held("t0", 0.0, completion_s=9.0), counter=2)
+
+            def planned_anew() -> bool:
+                epoch = played.core.replica.epoch
+                return epoch is not None and epoch.number == 2
+
+            await until(planned_anew, "another epoch")
+            epoch = played.core.replica.epoch
+            assert epoch is not None
+            assert epoch.routes == {"u0": ("t0", "t1")}
 
     play(scenario)
 
