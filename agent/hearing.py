@@ -55,6 +55,8 @@ class Hearing:
         self._peers = peers
         self._speech = speech
         self._tasking = tasking
+        self._answered: set[str] = set()
+        self._insisted = False
         self._echoes: list[Message] = []
         """Heard in the own name, though this life has not said so."""
 
@@ -87,7 +89,17 @@ class Hearing:
         self._learn_clock([snapshot.mission_s for snapshot in snapshots], now_s)
         somebody_knows = any(isinstance(message.body, Brief) for message in told)
         self.learning.take(enough=somebody_knows and not self.at_work)
+        self._answered.update(snapshot.writer for snapshot in snapshots)
+        if self.learning.current and not self.at_work:
+            self._insist(now_s)
         return actions
+
+    def _insist(self, now_s: float) -> None:
+        """Ask once more if somebody is there who has not answered: it may know the newest."""
+        silent = self._peers.membership.present - self._answered
+        if silent and not self._insisted:
+            self._insisted = True
+            self.learning.doubt(now_s)
 
     def remember(self, memory: Snapshot, now_s: float) -> list[Action]:
         """An earlier life of this agent knew so."""

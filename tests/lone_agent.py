@@ -62,6 +62,7 @@ class LoneAgent:
         self.log: list[Action] = []
         """Every action so far."""
         self._counters: Counter[str] = Counter()
+        self._there: set[str] = set()
         self._do(self.core.start(self.now_s))
 
     def reborn(
@@ -99,6 +100,10 @@ class LoneAgent:
         if mission_s is not None:
             assert ZERO_S + mission_s >= self.now_s, "time never goes back"
             self.now_s = ZERO_S + mission_s
+        if isinstance(event, PeerSeen):
+            self._there.add(event.writer)
+        elif isinstance(event, PeerGone):
+            self._there.discard(event.writer)
         return self._do(self.core.step(event, self.now_s))
 
     def tick(self, mission_s: float | None = None) -> list[Action]:
@@ -142,8 +147,10 @@ class LoneAgent:
         return before + self.tick(mission_s + self.timing.loss_delay_s)
 
     def learn(self, *messages: Message, mission_s: float | None = None) -> list[Action]:
-        """One answer to the agent's question."""
-        return self.happen(Learned((Snapshot(MISSION, "other", 1, mission_s, messages),)))
+        """Everyone who is there answers the agent's question; one of them has something to tell."""
+        answers = [Snapshot(MISSION, "other", 1, mission_s, messages)]
+        answers += [Snapshot(MISSION, writer, 1, None, ()) for writer in sorted(self._there)]
+        return self.happen(Learned(tuple(answers)))
 
     def learn_from_nobody(self) -> list[Action]:
         """Nobody answers."""

@@ -69,10 +69,12 @@ class Storm:
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
-        self.core = AgentCore(MISSION, "u0", 1, TIMING)
         self.now_s = 50.0
         self.finished = False
         self.counter = 0
+        memory = self.answer("u0") if self.rng.random() < 0.3 else None
+        age_s = float(self.pick(1.0, 1e3))
+        self.core = AgentCore(MISSION, "u0", 1, TIMING, memory, age_s)
         self.ordered: list[Orders] = []
         self.stamps: dict[str, Stamp] = {}
         self.codec = Codec(MISSION)
@@ -130,11 +132,12 @@ class Storm:
             lambda: PeerGone(self.pick(*WRITERS)),
             lambda: LinkChanged(bool(self.rng.random() < 0.7)),
             self.learned,
+            self.learned,
             self.report,
             self.report,
         ]
         if self.rng.random() < 0.01:
-            return Stop("told")
+            return self.pick(Stop("told"), self.echo())  # type: ignore[no-any-return]  # events
         event: Event = self.pick(*makers)()
         return event
 
@@ -166,20 +169,29 @@ class Storm:
             withdrawn=bool(self.rng.random() < 0.2),
         )
         sequence = [str(u) for u in self.rng.permutation(["u0", *OTHERS])]
-        phase = self.pick(*[EpochPhase.RUNNING] * 12, EpochPhase.PREPARING, EpochPhase.ENDED)
+        phase = self.pick(*[EpochPhase.RUNNING] * 60, EpochPhase.PREPARING, EpochPhase.ENDED)
         rule = self.pick("greedy", "lookahead")
         body: Body = self.pick(BRIEF, posted, posted, epoch(*sequence, phase=phase, rule=rule))
         return body
 
     def learned(self) -> Learned:
+        answers = [self.answer(writer) for writer in WRITERS]
+        if self.rng.random() < 0.005:
+            answers.append(self.answer("u0"))
+        return Learned(self.pick((), tuple(answers), tuple(answers)))
+
+    def answer(self, writer: str) -> Snapshot:
         said = [self.heard(COORDINATOR, self.coordinator_body()).message]
         said += [self.heard(uav, self.uav_body()).message for uav in OTHERS]
-        own = message("u0", self.uav_body(), int(self.rng.integers(1, 99)))
-        if self.rng.random() < 0.3:
-            said.append(own)
+        if self.rng.random() < 0.1:
+            said.append(self.echo().message)
         mission_s = self.pick(None, float(self.rng.uniform(0.0, 9.0)))
-        answer = Snapshot(MISSION, "u1", 1, mission_s, tuple(said))
-        return Learned(self.pick((), (answer,)))
+        return Snapshot(MISSION, writer, int(self.rng.integers(1, 4)), mission_s, tuple(said))
+
+    def echo(self) -> Heard:
+        """Something in its own name."""
+        counter, incarnation = int(self.rng.integers(1, 99)), int(self.rng.integers(0, 3))
+        return Heard(message("u0", self.uav_body(), counter, incarnation))
 
     def report(self) -> Event:
         legs = [order.leg for order in self.ordered if isinstance(order, GoTo)] or [0]
@@ -211,7 +223,7 @@ def test_no_storm_of_events_raises_or_leaves_a_deadline_behind(block: int) -> No
 def test_the_storms_reach_every_phase() -> None:
     """Else the test above would prove little."""
     phases = set()
-    for seed in range(40):
+    for seed in range(80):
         storm = Storm(seed)
         for _ in range(150):
             storm.blow()

@@ -9,10 +9,19 @@ import pytest
 from agent.events import Action
 from agent.vehicle import GoTo, HandedOver, Home, Prepare, Refused, Return, VehicleReady
 from swarm.config import Timing
-from swarm.events import Ask, Publish, Stop
+from swarm.events import Ask, Learned, Publish, Stop
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Board, Body, ClaimPhase, EpochPhase, Message, Status, StatusPhase
-from tests.builders import done, entry, epoch, held, proposed, uav
+from swarm.wire.messages import (
+    Board,
+    Body,
+    ClaimPhase,
+    EpochPhase,
+    Message,
+    Snapshot,
+    Status,
+    StatusPhase,
+)
+from tests.builders import MISSION, done, entry, epoch, held, message, proposed, uav
 from tests.lone_agent import ZERO_S, LoneAgent, claims, finishes, notes, orders, outcomes
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
@@ -228,6 +237,34 @@ def test_a_brief_heard_before_any_answer_is_no_answer_yet() -> None:
 
     assert orders(agent.learn_what_was_known_to(earlier)) == [RESUME]
     assert agent.task == "near"
+
+
+def test_whoever_is_there_and_has_not_answered_is_asked_once_more() -> None:
+    """The coordinator may have been parted from the others, and know less than they do."""
+    earlier = crashed(others=1)
+    agent = earlier.reborn()
+    agent.see(COORDINATOR, "u1")
+    known = earlier.core.memory(0.0).messages
+    agent.now_s += agent.timing.ask_gap_s
+    actions = agent.happen(Learned((Snapshot(MISSION, COORDINATOR, 1, 6.0, known),)))
+    assert (orders(actions), actions.count(Ask())) == ([], 1)
+
+    own = message("u0", done("near", 3.0), counter=99, incarnation=5)
+    agent.happen(Learned((Snapshot(MISSION, "u1", 1, 6.0, (own,)),)))
+    assert orders(agent.log) == [RESUME]
+    assert claims(agent.log) != [HELD]
+
+
+def test_one_who_never_answers_is_waited_for_no_longer() -> None:
+    earlier = crashed(others=1)
+    agent = earlier.reborn()
+    agent.see(COORDINATOR, "u1")
+    known = earlier.core.memory(0.0).messages
+    agent.now_s += agent.timing.ask_gap_s
+    for _ in range(2):
+        agent.happen(Learned((Snapshot(MISSION, COORDINATOR, 1, 6.0, known),)))
+
+    assert orders(agent.log) == [RESUME]
 
 
 def test_with_nobody_there_an_old_memory_is_not_trusted_but_the_vehicle_is_brought_home() -> None:
