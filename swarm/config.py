@@ -64,8 +64,9 @@ class Timing:
     """An agent that starts anew and finds nobody trusts its own memory up to this age."""
     reconsider_s: float = 30.0
     """A task that the vehicle refused is considered again after this time."""
-    stalemate_s: float = 30.0
-    """How long a fleet may leave open tasks to themselves before the mission ends."""
+    stalemate_s: float = 45.0
+    """How long a fleet may leave open tasks to themselves before the mission ends; longer than
+    `reconsider_s`, or no task that was refused would be considered again."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):

@@ -10,6 +10,7 @@ proves nothing. Each process judges for itself. Leaves out: what follows from a 
 from __future__ import annotations
 
 from swarm.config import Timing
+from swarm.model.ids import COORDINATOR
 
 __all__ = ["Membership"]
 
@@ -137,7 +138,8 @@ class Membership:
 
     def _enter(self, writer: str, now_s: float) -> None:
         self.present.add(writer)
-        if writer in self._heard:
+        # The coordinator speaks as long as it is there; agents may have nothing to say yet.
+        if writer in self._heard or writer == COORDINATOR:
             self._silent_at_s[writer] = now_s + self._timing.silence_s
 
     def _grant_grace(self, now_s: float) -> None:

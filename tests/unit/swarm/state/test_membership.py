@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarm.model.ids import COORDINATOR
 from swarm.state.membership import Membership
 from tests.builders import TIMING
 
@@ -169,6 +170,14 @@ def test_who_has_been_heard_and_falls_silent_is_lost_although_its_token_lives(
     assert members.steady == set()
     assert members.next_deadline_s() is None
     assert members.lost(1000.0) == []
+
+
+def test_a_coordinator_is_lost_by_silence_though_it_was_never_heard(members: Membership) -> None:
+    """A new agent may find a token whose program hangs already."""
+    members.seen(COORDINATOR, 1.0)
+
+    assert members.lost(1.0 + 0.99 * SILENCE_S) == []
+    assert members.lost(1.0 + SILENCE_S) == [COORDINATOR]
 
 
 def test_a_loss_by_silence_can_be_told_from_one_by_the_token(members: Membership) -> None:
