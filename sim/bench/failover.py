@@ -256,7 +256,7 @@ def _takeovers(rows: Sequence[Takeovers]) -> Table:
 def _losses(rows: Sequence[FalseLosses]) -> Table:
     table = _table(
         "Living processes taken for lost",
-        ["loss, delay each way", "link", "path"],
+        ["loss, delay", "link", "path"],
         ["UAVs", "watched [s]", "packets", "lost", "false losses"],
     )
     for each in rows:

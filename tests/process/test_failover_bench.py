@@ -2,57 +2,48 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import subprocess
 import sys
-from typing import Any
 
 import pytest
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(300)]
+from sim.bench.latency import measure_latencies
+from sim.bench.trouble import BAD_LINKS, measure_false_losses
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(200)]
 
 
-def failover(*words: str) -> dict[str, list[dict[str, Any]]]:
+def test_another_holds_the_task_of_a_killed_agent() -> None:
+    words = ["bench", "failover", "--what", "kill", "--trials", "2", "--json"]
     done = subprocess.run(
-        [sys.executable, "-m", "swarm", "bench", "failover", *words, "--json"],
+        [sys.executable, "-m", "swarm", *words],
         capture_output=True,
         text=True,
-        timeout=280,
+        timeout=180,
         check=True,
         stdin=subprocess.DEVNULL,
     )
-    told: dict[str, list[dict[str, Any]]] = json.loads(done.stdout)
-    return told
+    (kill,) = json.loads(done.stdout)["takeovers"]
 
-
-def test_another_holds_the_task_of_a_killed_and_of_a_silent_agent() -> None:
-    told = failover("--what", "kill,deadlock", "--trials", "2")["takeovers"]
-
-    assert [each["blow"] for each in told] == ["kill", "deadlock"]
-    for each in told:
-        assert (each["trials"], each["missed"]) == (2, 0)
-        assert 0.2 < each["p50_s"] <= each["p99_s"]
-        assert each["p99_s"] < 3.0 + each["bound_s"]  # a test machine may be busy
+    assert (kill["blow"], kill["trials"], kill["missed"]) == ("kill", 2, 0)
+    assert 0.2 < kill["p50_s"] <= kill["p99_s"] < 5.0  # a test machine may be busy
 
 
 @pytest.mark.parametrize("relay", [False, True])
 def test_nobody_is_lost_on_links_that_lose_some_packets(relay: bool) -> None:
-    told = failover("--what", "loss", "--watch-s", "3", *(["--relay"] if relay else []))["losses"]
+    watched = measure_false_losses(BAD_LINKS[0], 4.0, uavs=2, relay=relay)
 
-    assert len(told) == 3
-    assert all(each["false_losses"] == 0 for each in told)
-    for each in told:
-        if each["path"] == "tun":
-            share = each["packets_lost"] / each["packets"]
-            assert 0.4 * each["loss_frac"] < share < 2.0 * each["loss_frac"]
-        else:
-            assert each["path"] == "relay"
+    assert watched.losses == 0
+    assert (watched.path == "relay") >= relay
+    if watched.path == "tun":  # where the system permits it
+        assert 0.01 < watched.dropped / watched.packets < 0.12
 
 
 def test_decisions_are_timed() -> None:
-    told = failover("--what", "latency")["latencies"]
+    measured = asyncio.run(measure_latencies("greedy", uavs=2, tasks=8))
 
-    assert [each["method"] for each in told] == ["greedy", "guided"]
-    for each in told:
-        assert each["decisions"] >= 30
-        assert 0.0 < each["p50_s"] < 0.1
+    # Who hears of a better claim in time turns round, which is a decision more.
+    assert len(measured.times_s) >= 6
+    assert 0.0 < (measured.quantile_s(0.5) or 0.0) < 0.1

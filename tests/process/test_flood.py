@@ -26,11 +26,5 @@ def test_malformed_messages_change_no_decision_and_are_all_counted() -> None:
     assert len(flood.result.done) == 8
     assert flood.fates == ()
     assert len(flood.counted) == 3
-    for counted in flood.counted.values():
-        for reason, expected in flood.expected.items():
-            if reason == "stale":
-                # A UAV that has not heard of something newer yet finds nothing old.
-                assert counted[reason] >= 0.8 * expected
-            else:
-                assert counted[reason] >= expected
+    assert flood.ok, (flood.expected, flood.counted)
     assert any(other.startswith("ghost") for other in flood.after["others"])
