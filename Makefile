@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
-.PHONY: demo test lint format kernels sanitize soak clean help
+.PHONY: demo test lint format kernels sanitize soak chaos clean help
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
@@ -15,6 +15,7 @@ help:
 	@echo "make kernels build the C++ kernels again and write their type stub"
 	@echo "make sanitize  test the kernels under the address and undefined-behaviour sanitizers"
 	@echo "make soak    play 10000 random missions with faults in virtual time (SEEDS=N for more)"
+	@echo "make chaos   kill and restart real processes at random moments of whole missions, 60 flights"
 	@echo "make clean   remove what was built and installed here"
 
 demo: $(VENV)/.installed
@@ -73,6 +74,9 @@ $(VENV)/.installed-dev: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bi
 SEEDS ?= 10000
 soak: $(VENV)/.installed
 	$(BIN)/swarm soak --seeds $(SEEDS)
+
+chaos: $(VENV)/.installed
+	$(BIN)/python -m sim.chaos --jobs 2
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

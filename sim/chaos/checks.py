@@ -1,7 +1,8 @@
 """What must hold of everything said on a bus, whatever happened to the processes.
 
-Looks at a recording from outside, with the view of one who hears all sides. Leaves
-out: how it was recorded (sim.chaos.recorder).
+Looks at a recording from outside, with the view of one who hears all sides: at agreement
+and visits here, at single statements as `sim.faults.transcript` does. Leaves out: how it
+was recorded (sim.chaos.recorder).
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from sim.chaos.recorder import Entry
+from sim.faults.transcript import Transcript
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.registers import Replica
-from swarm.wire.codec import key_of
-from swarm.wire.messages import Claim, Message, Outcome, Result, Status
+from swarm.wire.messages import Claim, Message, Status
 
 __all__ = [
     "AGREE_WITHIN_S",
@@ -22,9 +23,9 @@ __all__ = [
     "Trouble",
     "Visit",
     "agreement_s",
-    "counter_faults",
     "disagreements",
     "rivalries",
+    "transcripts",
     "visits",
 ]
 
@@ -62,44 +63,36 @@ class Rivalry:
     end_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, order=True)
 class Visit:
     """A UAV has done a task."""
 
-    task: str
-    uav: str
-    attempt: int
     completed_s: float
     """Mission time [s]."""
+    task: str
+    uav: str
 
 
-def counter_faults(entries: Iterable[Entry]) -> list[str]:
-    """Registers whose counters went back, or that said two things under one counter."""
-    faults: list[str] = []
-    newest: dict[tuple[int, str, str], Message] = {}
+def transcripts(entries: Iterable[Entry]) -> list[Transcript]:
+    """What was said at each seat, with the rules it breaks."""
+    found: dict[int, Transcript] = {}
     for entry in entries:
-        message = entry.what
-        if not isinstance(message, Message):
-            continue
-        place = (entry.seat, message.writer, key_of(message))
-        known = newest.get(place)
-        if known is not None and message.stamp < known.stamp:
-            faults.append(f"{key_of(message)} went back from {known.stamp} to {message.stamp}")
-        elif known is not None and message.stamp == known.stamp and message.body != known.body:
-            faults.append(f"{key_of(message)} said two things as {message.stamp}")
-        else:
-            newest[place] = message
-    return faults
+        if isinstance(entry.what, Message):
+            transcript = found.setdefault(entry.seat, Transcript())
+            message = entry.what
+            transcript.said(entry.at_s, message.writer, message.stamp.incarnation, message)
+    return list(found.values())
 
 
-def visits(entries: Iterable[Entry]) -> list[Visit]:
+def visits(told: Iterable[Transcript]) -> list[Visit]:
     """Every visit that ended done, duplicates included, in order of completion."""
-    found: dict[tuple[str, str, int], Visit] = {}
-    for entry in entries:
-        match entry.what:
-            case Message(writer=uav, body=Outcome(task, Result.DONE, attempt, completed_s)):
-                found[uav, task, attempt] = Visit(task, uav, attempt, completed_s)
-    return sorted(found.values(), key=lambda visit: (visit.completed_s, visit.uav))
+    found = {
+        Visit(completed_s, task, uav)
+        for transcript in told
+        for (uav, task), times_s in transcript.visits.items()
+        for completed_s in times_s
+    }
+    return sorted(found)
 
 
 def rivalries(entries: Sequence[Entry], mission: str, fates: Iterable[Fate] = ()) -> list[Rivalry]:

@@ -18,13 +18,14 @@ from sim.chaos.checks import (
     Trouble,
     Visit,
     agreement_s,
-    counter_faults,
     disagreements,
     rivalries,
+    transcripts,
     visits,
 )
 from sim.chaos.network import RelayNetwork
 from sim.chaos.recorder import RECORDER, Recorder, recorder_seats
+from sim.faults.transcript import Transcript
 from sim.launch.fleet import LaunchOptions
 from sim.launch.run import Flight, Run, open_run
 from swarm.clock import SystemClock
@@ -34,6 +35,7 @@ from swarm.wire.messages import Message
 __all__ = ["ChaosFlight", "Verdict", "open_chaos_flight"]
 
 CUT = "the network"
+LEFT = "left its task"
 DONE_LINE = re.compile(r'event="task done".* task=(\S+)')
 
 
@@ -78,6 +80,7 @@ class ChaosFlight:
         self._fates: list[Fate] = []
         self._troubles: list[Trouble] = []
         self._begun_s: dict[str, float] = {}
+        self._heard_all = True
 
     @property
     def done(self) -> int:
@@ -94,6 +97,7 @@ class ChaosFlight:
 
     async def kill(self, name: str) -> None:
         """End a process at once."""
+        self._heard_all &= name not in self.run.launch.layout.routers
         await self.run.launch.kill(name)
         self._silence(name)
 
@@ -104,6 +108,7 @@ class ChaosFlight:
 
     def pause(self, name: str) -> None:
         """Let a process hang."""
+        self._heard_all = False
         self.run.launch.pause(name)
         self._silence(name)
 
@@ -114,6 +119,7 @@ class ChaosFlight:
 
     def isolate(self, group: Collection[str]) -> None:
         """Cut ``group`` off; see `RelayNetwork.isolate`."""
+        self._heard_all = False
         self._begun_s.setdefault(CUT, self._clock.now_s())
         self.network.isolate(group)
 
@@ -135,11 +141,12 @@ class ChaosFlight:
         flight = self.run.flight()
         entries = self.recorder.entries
         found = rivalries(entries, flight.observer.mission.name, self._fates)
-        seen = visits(entries)
+        told = transcripts(entries)
+        seen = visits(told)
         return Verdict(
             flight=flight,
             faults=(
-                *counter_faults(entries),
+                *self._broken_rules(told),
                 *self._lost_outcomes(flight),
                 *self._miscounted(flight, seen),
                 *disagreements(found, self._troubles),
@@ -149,6 +156,11 @@ class ChaosFlight:
             agreement_s=max((agreement_s(found, each) for each in self._troubles), default=0.0),
             lines=tuple(self.lines),
         )
+
+    def _broken_rules(self, told: list[Transcript]) -> set[str]:
+        """Broken rules of the messages; who has not heard all knows not why a task was left."""
+        broken = [each for transcript in told for each in transcript.broken]
+        return {str(each) for each in broken if self._heard_all or each.invariant != LEFT}
 
     def _lost_outcomes(self, flight: Flight) -> list[str]:
         """Tasks a UAV says it has done, of which the fleet knows nothing in the end."""

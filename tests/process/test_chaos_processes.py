@@ -46,7 +46,10 @@ def said_by(verdict: Verdict, uav: str, kind: type[B]) -> list[tuple[int, B]]:
     ]
 
 
-def test_a_restarted_agent_resumes_its_task_while_its_vehicle_flies_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("bus", [BusKind.ROUTER, BusKind.MESH])
+def test_a_restarted_agent_resumes_its_task_while_its_vehicle_flies_on(
+    tmp_path: Path, bus: BusKind
+) -> None:
     async def script(flight: ChaosFlight) -> None:
         def sets_off() -> bool:
             claim = newest_claim(flight, VICTIM)
@@ -60,7 +63,7 @@ def test_a_restarted_agent_resumes_its_task_while_its_vehicle_flies_on(tmp_path:
     mission = survey(3, 0)
     tasks = (Task(TaskId(f"t{n}"), (36.0 * n, 600.0, 0.0), 1.0, service_s=1.0) for n in (1, 2, 3))
     mission = replace(mission, tasks=tuple(tasks))
-    verdict = play(mission, tmp_path, script, bus=BusKind.ROUTER, speedup=10.0)
+    verdict = play(mission, tmp_path, script, bus=bus, speedup=10.0)
 
     all_done(verdict, 3)
     assert verdict.duplicates == 0
