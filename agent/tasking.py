@@ -58,7 +58,7 @@ class Tasking:
         self._speech = speech
         self._timing = timing
         self._rule: Rule | None = None
-        self._rule_epoch: tuple[int, str] | None = None
+        self._rule_basis: object = None
         self._free_since_s = 0.0
         self._leg = 0
         self._refusals: dict[str, tuple[int, float]] = {}
@@ -258,10 +258,10 @@ class Tasking:
 
     def _rule_of(self, epoch: Epoch) -> tuple[Rule | None, list[Action]]:
         """The rule in force, and what to say about it when it is new."""
-        if self._rule_epoch == (epoch.number, epoch.rule):
+        basis = epoch.rule, epoch.routes  # numbers are no proof: two coordinators may count alike
+        if self._rule_basis == basis:
             return self._rule, []
-        self._rule = rule_of(epoch.rule, epoch.routes)
-        self._rule_epoch = epoch.number, epoch.rule
+        self._rule, self._rule_basis = rule_of(*basis), basis
         if self._rule is not None:
             return self._rule, []
         self._speech.note = f"cannot decide by rule {epoch.rule}"
