@@ -329,7 +329,8 @@ class Observer:
             if self._zero_s is None:
                 self._zero_s = now_s - epoch.mission_s
             order = " > ".join(epoch.sequence)
-            self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}", now_s)
+            why = f" ({epoch.reason})" if epoch.number > 1 and epoch.reason else ""
+            self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}{why}", now_s)
         elif epoch.phase is EpochPhase.ENDED and not self._ended_told:
             self._ended_told = True
             self._tell(f"mission ends: {epoch.reason}", now_s)

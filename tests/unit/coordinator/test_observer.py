@@ -371,6 +371,14 @@ def test_a_new_coordinator_is_told_and_its_epoch_is_no_new_one(was_missed: bool)
     assert onlooker.observer.result().epochs == 2
 
 
+def test_a_new_plan_is_told_with_its_reason() -> None:
+    onlooker = Onlooker().running()
+    anew = epoch("u1", "u0", number=2, mission_s=9.0, reason="u2 lost: worth 9 instead of 8")
+    onlooker.happen(Heard(message(COORDINATOR, anew, 9)), 9.0)
+
+    assert onlooker.story[-1] == "epoch 2: greedy, u1 > u0 (u2 lost: worth 9 instead of 8)"
+
+
 def test_late_words_of_the_old_coordinator_are_no_news() -> None:
     onlooker = Onlooker().running()
     onlooker.happen(Heard(message(COORDINATOR, epoch("u0", "u1"), 1, incarnation=5)))
