@@ -66,7 +66,10 @@ class Speech:
             self._replica.join(message)
             return []
         said = self._replica.known(message)
-        return [] if said is None or said.stamp >= message.stamp else [self.say(said.body)]
+        if said is None:
+            return []
+        self._replica.stale += message.stamp < said.stamp
+        return [self.say(said.body)] if said.stamp < message.stamp else []
 
     def announce(self, now_s: float) -> list[Publish]:
         """Repeat the own registers, so that what got lost on the way arrives after all.

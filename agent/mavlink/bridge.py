@@ -309,10 +309,9 @@ class Bridge:
         self.phase = Phase.IDLE
         if flavour is None or heartbeat is None:
             if order.resume:
-                self._to_return, self._told_not_ready = order, None
-                self._to_return_until_s = self._now_s + (
-                    _UNHEARD_TIMEOUTS * self.config.silence_timeout_s
-                )
+                patience_s = _UNHEARD_TIMEOUTS * self.config.silence_timeout_s
+                self._to_return, self._to_return_until_s = order, self._now_s + patience_s
+                self._told_not_ready = None
             else:
                 self._actions.append(Home())
             return
@@ -327,8 +326,7 @@ class Bridge:
         if self._silent():
             self._refuse_return(order, "the autopilot is silent")
         elif not (commanded or flavour.is_returning(heartbeat.custom_mode)):
-            mode = flavour.mode_name(heartbeat.custom_mode)
-            self._refuse_return(order, f"its pilot flies it in {mode}")
+            self._hand_over(f"its pilot flies it in {flavour.mode_name(heartbeat.custom_mode)}")
         else:
             self._returning = Returning(order, self.config, self._commands, flavour)
             self.phase = Phase.RETURNING

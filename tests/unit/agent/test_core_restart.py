@@ -341,8 +341,10 @@ def test_a_pilot_who_has_the_vehicle_by_then_keeps_it() -> None:
     agent = earlier.reborn()
     (order,) = orders(agent.learn_what_was_known_to(earlier))
 
-    assert finishes(agent.happen(Refused(order, "its pilot flies it in LOITER"))) == [1]
+    assert finishes(agent.happen(HandedOver("its pilot flies it in LOITER"))) == [1]
     assert orders(agent.log) == [order]
+    assert agent.claim is not None
+    assert agent.claim.handed_over
 
 
 @pytest.mark.parametrize("from_peers", [True, False], ids=["peers' memory", "own memory"])

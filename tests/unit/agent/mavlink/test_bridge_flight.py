@@ -249,13 +249,12 @@ def test_target_sent_before_the_take_over_is_seen_does_not_pull_the_vehicle_back
     assert flight.copter.target_m is None or flight.copter.target_m[1] < 1.0
 
 
-def test_return_is_refused_while_a_pilot_flies() -> None:
+def test_return_leaves_the_vehicle_to_a_pilot_who_flies_it() -> None:
     flight = BridgeFlight().flying()
     flight.copter.set_mode(LOITER)
     flight.run_until(HandedOver)
     flight.copter.heard.clear()
-    order = Return("mission ended")
-    assert flight.order(order) == [Refused(order, "its pilot flies it in LOITER")]
+    assert flight.order(Return("mission ended")) == [HandedOver("its pilot flies it in LOITER")]
     flight.run(5.0)
     assert not flight.copter.commands(SET_MODE)
 
