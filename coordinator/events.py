@@ -56,6 +56,8 @@ class Replan:
     """Of the epoch in force."""
     method: str
     seed: int
+    reason: str
+    """What has changed since the epoch in force was made."""
 
 
 @dataclass(frozen=True, slots=True)

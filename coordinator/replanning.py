@@ -51,8 +51,7 @@ class Replanning:
         self._answered: Situation | None = None
         """What the epoch in force answers to, and every plan that was no better."""
         self._expected_s: Mapping[str, float] = {}
-        self._under_way: tuple[Situation, str] | None = None
-        """What is being planned for, and why."""
+        self._under_way: Replan | None = None
         self._request = 0
         self._quiet_until_s: float | None = None
 
@@ -88,11 +87,17 @@ class Replanning:
         reasons = self._reasons(situation)
         if not reasons:
             return None
-        self._under_way = situation, ", ".join(reasons)
         self._quiet_until_s = now_s + self._interval_s
         self._request += 1
-        seed = self._seed + self._request
-        return Replan(self._request, situation, Course.of(epoch), self._method, seed)
+        self._under_way = Replan(
+            self._request,
+            situation,
+            Course.of(epoch),
+            self._method,
+            self._seed + self._request,
+            ", ".join(reasons),
+        )
+        return self._under_way
 
     def drop(self) -> None:
         """What is being planned comes at a bad moment; it will be wanted again."""
@@ -105,15 +110,14 @@ class Replanning:
 
         Both are valued from ``situation``, which is the one of now and not of when planning began.
         """
-        if self._under_way is None or replanned.request != self._request:
+        wanted, plan = self._under_way, replanned.plan
+        if wanted is None or replanned.request != wanted.request:
             return None
-        plan = replanned.plan
-        (planned_for, reasons), self._under_way = self._under_way, None
         new, old = plan.prediction, plan.going_on
         new_worth, old_worth = worth(situation, new.lists), worth(situation, old.lists)
         gain = new_worth - old_worth
         adopted = gain > self._margin_frac * abs(old_worth) and not situation.is_settled
-        self._answered = planned_for
+        self._under_way, self._answered = None, wanted.situation
         self._expected_s = new.completion_s if adopted else old.completion_s
         if not adopted:
             return None
@@ -125,7 +129,7 @@ class Replanning:
             rule=plan.rule,
             sequence=plan.sequence,
             mission_s=situation.now_s,
-            reason=reasons[: 200 - len(why)] + why,
+            reason=wanted.reason[: 200 - len(why)] + why,
             routes=_whole_lists(situation, new.lists),
         )
 
