@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import signal
 import sys
 from collections import deque
@@ -183,12 +184,17 @@ class Child:
     async def _gone(self) -> None:
         """Wait for its end and its last words, but not for ever.
 
-        A process that waits for a device in the kernel dies only when that answers, and a
-        grandchild may hold its pipes open.
+        What it has started itself may hold its pipes open; that ends with it. A process that
+        waits for a device in the kernel dies only when that answers: it is left.
         """
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(KILL_TIMEOUT_S):
-                await self.ended()
+        for last_try in (False, True):
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(KILL_TIMEOUT_S):
+                    await self.ended()
+                    break
+            if not last_try:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(self.pid, signal.SIGKILL)
         for reader in self._readers:
             reader.cancel()
         await asyncio.gather(*self._readers, return_exceptions=True)

@@ -190,6 +190,52 @@ def test_a_child_that_was_killed_by_somebody_says_so() -> None:
     play(scenario)
 
 
+def test_a_child_killed_by_us_is_gone_and_was_stopped() -> None:
+    async def scenario() -> None:
+        async with started(Child("router", ROUTER)) as child:
+            await child.ready()
+            await child.kill()
+            assert child.returncode == -signal.SIGKILL
+            assert child.stopped
+            child.resume()  # the dead hear nothing
+            await child.kill()
+
+    play(scenario)
+
+
+def test_a_paused_child_hangs_until_it_is_resumed() -> None:
+    async def scenario() -> None:
+        async with started(Child("router", ROUTER)) as child:
+            await child.ready()
+            child.pause()
+            child._signal(signal.SIGTERM)
+            await asyncio.sleep(0.5)
+            assert child.returncode is None
+            child.resume()
+            assert await child.ended() == 0
+
+    play(scenario)
+
+
+def test_what_a_child_has_started_itself_ends_with_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    script(monkeypatch, tmp_path, "sleep 60 & echo $! >&2; echo {}; exec cat")
+    monkeypatch.setattr(process, "TERMINATE_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(process, "KILL_TIMEOUT_S", 0.3)
+
+    async def scenario() -> None:
+        child = Child("parent", [])
+        await child.start()
+        assert await child.ready() == [{}]
+        begin_s = asyncio.get_running_loop().time()
+        await child.stop()
+        assert asyncio.get_running_loop().time() - begin_s < 20.0
+        assert not alive(int(child.log[0]))
+
+    play(scenario)
+
+
 def test_a_child_leaves_when_its_parent_closes_the_lifeline() -> None:
     async def scenario() -> None:
         async with started(Child("router", ROUTER)) as child:
