@@ -192,7 +192,7 @@ class CoordinatorCore:
                 self.replica.join(message)
                 if isinstance(message.body, Claim):
                     self._membership.spoke(message.writer)
-                if self._zero_s is None and self._beginning.is_forestalled:
+                if self._standing is Standing.BRIEFED and self._beginning.is_forestalled:
                     self._inquiry.want(now_s, before_deciding=True)
             case Learned(snapshots):
                 self._learn(snapshots, now_s)
@@ -393,7 +393,7 @@ class CoordinatorCore:
         situation = self._situation(now_s)
         wanted = situation and self._replanning.wanted(situation, epoch, now_s)
         if wanted:
-            self._actions.append(wanted)
+            self._actions += [wanted, Note("plans the rest", {"because": wanted.reason})]
 
     def _judge(self, replanned: Replanned, now_s: float) -> None:
         epoch, situation = self.replica.epoch, self._situation(now_s)
@@ -403,7 +403,7 @@ class CoordinatorCore:
         better = self._replanning.judge(replanned, situation, epoch, now_s)
         if better is not None:
             self._say(better)
-            self._actions.append(Note("plans anew", {"reason": better.reason}))
+            self._actions.append(Note("another epoch", {"because": better.reason}))
 
     def _end(self, reason: str, now_s: float) -> None:
         if not self._in_charge:

@@ -23,7 +23,10 @@ class Inquiry:
         self.ever = False
         """Whether any question has been answered, be it by nobody."""
         self._asking = Asking(gap_s)
-        self._unanswered = 0
+        self._open = 0
+        """Questions without an answer."""
+        self._outdated = 0
+        """Those of them that were asked before the last doubt."""
 
     def want(self, now_s: float, *, before_deciding: bool = False) -> None:
         """There is a reason to ask.
@@ -32,21 +35,22 @@ class Inquiry:
             now_s: now.
             before_deciding: what is known may be old.
         """
-        self.unsure |= before_deciding
+        if before_deciding:
+            self.unsure, self._outdated = True, self._open
         self._asking.want(now_s)
 
     def due(self, now_s: float) -> bool:
         """Whether to ask now; True once for each question."""
         due = self._asking.due(now_s)
-        self._unanswered += due
+        self._open += due
         return due
 
     def answered(self) -> None:
         """A question has been answered by everyone who could."""
         self.ever = True
-        self._unanswered = max(0, self._unanswered - 1)
-        if self._unanswered == 0 and self._asking.next_deadline_s() is None:
+        if self._open > self._outdated == 0:
             self.unsure = False
+        self._open, self._outdated = max(0, self._open - 1), max(0, self._outdated - 1)
 
     def next_deadline_s(self) -> float | None:
         """When `due` will next be true."""
