@@ -70,6 +70,8 @@ class Hearing:
                 # A twin lives, or word of an earlier life was long under way: ask which.
                 self._echoes.append(message)
                 self.learning.doubt(now_s)
+            elif message != self._replica.known(message):
+                self._replica.stale += 1
             return []
         actions = self._greet(writer, now_s) if self._peers.heard(writer, body, now_s) else []
         if isinstance(body, Brief) and self._replica.brief is None and not self.at_work:

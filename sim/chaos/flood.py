@@ -96,9 +96,8 @@ class Flood:
     @property
     def ok(self) -> bool:
         """Whether the flood has changed nothing and everyone has counted it."""
-        # A UAV that has not heard of something newer yet finds nothing old.
         counted = all(
-            count.get(reason, 0) >= (0.8 if reason == "stale" else 1.0) * expected
+            count.get(reason, 0) >= expected
             for count in self.counted.values()
             for reason, expected in self.expected.items()
         )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from agent.vehicle import GoTo, Refused, Return
-from swarm.events import LinkChanged, PeerGone, PeerSeen
+from swarm.events import Heard, LinkChanged, PeerGone, PeerSeen
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Board, Claim, ClaimPhase
-from tests.builders import IDLE, OUT, done, entry, epoch, failed, held, proposed, uav
+from tests.builders import IDLE, OUT, done, entry, epoch, failed, held, message, proposed, uav
 from tests.lone_agent import LoneAgent, claims, notes, orders, statuses
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
@@ -402,3 +402,16 @@ def test_a_refusal_of_an_older_leg_means_nothing() -> None:
     agent.happen(Refused(order, "busy"), 0.2)
 
     assert agent.task == "far"
+
+
+def test_older_words_in_its_own_name_are_counted_and_change_nothing() -> None:
+    agent = flying(NEAR, FAR)
+    before = len(agent.log)
+
+    for _ in range(3):
+        agent.happen(Heard(message("u0", held("far", -9.0), incarnation=1)))
+    agent.tick(1.0)
+
+    assert agent.task == "near"
+    assert not orders(agent.log[before:])
+    assert statuses(agent.log)[-1].dropped == {"stale": 3}
