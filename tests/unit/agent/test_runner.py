@@ -25,7 +25,7 @@ from swarm.process import StopRequest
 from swarm.shell import take_seat
 from swarm.wire.codec import Codec, encode, key_of
 from swarm.wire.keys import Keys
-from swarm.wire.messages import EpochPhase, Message
+from swarm.wire.messages import EpochPhase, Message, Snapshot
 from tests.builders import IDLE, MISSION, brief, epoch, message, uav
 from tests.shell_play import HandClock, play, take_until, until
 
@@ -101,19 +101,26 @@ class Played:
 
 
 @asynccontextmanager
-async def at_work(*, broken: bool = False, stays_away: bool = False) -> AsyncIterator[Played]:
+async def at_work(
+    *,
+    broken: bool = False,
+    stays_away: bool = False,
+    memory: Snapshot | None = None,
+    save: Callable[[Snapshot], None] | None = None,
+) -> AsyncIterator[Played]:
     """The agent of u0, whose vehicle is a `FakeVehicle`."""
     network = MemoryNetwork()
     watching, seat = network.join("watching"), network.join("u0")
     take_seat(watching, MISSION, None, status=True)
-    core = AgentCore(MISSION, "u0", 1, Timing())
+    core = AgentCore(MISSION, "u0", 1, Timing(), memory)
     stop, vehicles, clock = StopRequest(), list[FakeVehicle](), HandClock()
 
     def make_vehicle(origin: Origin, report: Callable[[Report], None]) -> FakeVehicle:
         vehicles.append(FakeVehicle(origin, report, broken, stays_away))
         return vehicles[-1]
 
-    running = asyncio.create_task(run_agent(core, MISSION, seat, clock, make_vehicle, stop))
+    agent = run_agent(core, MISSION, seat, clock, make_vehicle, stop, save=save)
+    running = asyncio.create_task(agent)
     try:
         yield Played(core, running, stop, seat, watching, vehicles, clock)
     finally:
@@ -217,6 +224,36 @@ def test_told_to_stop_before_it_knows_the_mission_it_just_leaves(at_once: bool) 
 
             assert await played.running == 0
             assert played.vehicles == []
+
+    play(scenario)
+
+
+def test_what_the_agent_knows_is_kept_for_its_next_life() -> None:
+    async def scenario() -> None:
+        kept: list[Snapshot] = []
+        async with at_work(save=kept.append) as played:
+            await played.airborne()
+
+            assert BRIEF in kept[0].messages
+            assert IDLE in [message.body for message in kept[-1].messages]
+
+    play(scenario)
+
+
+def test_a_vehicle_that_an_earlier_life_left_in_the_air_is_brought_home() -> None:
+    running = message(COORDINATOR, epoch("u0"), counter=2)
+    idle = message("u0", IDLE)
+    memory = Snapshot(MISSION, "u0", 1, 5.0, (BRIEF, running, idle))
+
+    async def scenario() -> None:
+        async with at_work(memory=memory) as played:
+            await played.seated()
+            played.say(BRIEF)
+            played.stop.request(0)
+            await played.running
+
+            (vehicle,) = played.vehicles
+            assert [type(order) for order in vehicle.orders][-1] is Return
 
     play(scenario)
 
