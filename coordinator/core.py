@@ -347,7 +347,7 @@ class CoordinatorCore:
             anybody_lost |= not left
         if anybody_lost:
             self._inquiry.want(now_s)  # others may have heard its last words
-        if self._inquiry.unsure:
+        if self._inquiry.unsure or not self._in_charge:
             return
         if self._ended:
             self._leave_when_empty(now_s)
