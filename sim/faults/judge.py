@@ -189,9 +189,10 @@ class Judge:
         transcript, world = self.transcript, self._there
         settled = transcript.done | transcript.failed | transcript.withdrawn
         home = [u for u in world.mission.uavs if world.finished.get(u.id) == 0]
-        heard_of = {
-            name: core.replica.board if core.replica.epoch is not None else {}
-            for name, core in world.agents.items()
+        to_do = {
+            uav: {task for task, entry in core.replica.board.items() if not entry.withdrawn}
+            for uav, core in world.agents.items()
+            if core.replica.epoch is not None
         }
         for task in world.mission.tasks:
             if task.id not in transcript.posted or task.id in settled:
@@ -200,7 +201,7 @@ class Judge:
                 uav.id
                 for uav in home
                 if world.mission.success(uav, task) > 0.0
-                and task.id in heard_of[uav.id]
+                and task.id in to_do.get(uav.id, ())
                 and (uav.id, task.id) not in world.refuses
             ]
             if able:
