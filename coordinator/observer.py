@@ -139,6 +139,8 @@ class Observer:
                     for message in snapshot.messages:
                         self._hear(message, now_s)
             case PeerSeen(writer):
+                # What it said while one of us had no link has not come here.
+                ask |= self._membership.missing(writer)
                 if self._membership.seen(writer, now_s):
                     ask |= self._welcome_back(writer, now_s)
             case PeerGone(writer):
@@ -333,6 +335,7 @@ class Observer:
             self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}{why}", now_s)
         elif epoch.phase is EpochPhase.ENDED and not self._ended_told:
             self._ended_told = True
+            self._asking.want(now_s)  # soon nobody will be there to tell what was not heard
             self._tell(f"mission ends: {epoch.reason}", now_s)
 
     def _hear_claim(self, uav: str, claim: Claim, before: Claim | None, now_s: float) -> None:

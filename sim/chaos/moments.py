@@ -30,7 +30,7 @@ LONGEST_GONE_S = 2.0
 """A process stays dead for up to this long [wall s]."""
 START_LIMIT_S = 120.0
 END_LIMIT_S = 180.0
-LAST_WORDS_S = 0.5
+LAST_WORDS_S = 1.0
 """Wall time after the end of a mission in which its last news reach everyone."""
 
 

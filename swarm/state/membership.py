@@ -55,6 +55,10 @@ class Membership:
         """Whether ``writer`` was lost by its silence, with a living token."""
         return writer in self._mute
 
+    def missing(self, writer: str) -> bool:
+        """Whether ``writer`` counts as present although its token has gone."""
+        return writer in self._gone_until_s
+
     # -- what is observed -------------------------------------------------------------
 
     def seen(self, writer: str, now_s: float) -> bool:

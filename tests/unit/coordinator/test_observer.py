@@ -413,6 +413,21 @@ def test_it_asks_the_others_for_the_last_words_of_the_lost_and_for_what_the_retu
     assert onlooker.happen(PeerSeen("u9"), 15.0) == []
 
 
+def test_it_asks_again_when_a_token_that_was_gone_is_back_before_its_writer_was_lost() -> None:
+    onlooker = Onlooker().running()
+    onlooker.happen(PeerGone("u0"), 5.0)
+    assert onlooker.happen(PeerSeen("u0"), 5.1) == [Ask()]
+    assert onlooker.happen(PeerSeen("u0"), 9.0) == []
+
+
+def test_it_asks_once_more_at_the_end_when_there_is_still_somebody_to_answer() -> None:
+    onlooker = Onlooker().running()
+    last = message(COORDINATOR, epoch("u0", phase=EpochPhase.ENDED), 90)
+    assert onlooker.happen(Heard(last), 50.0) == [Ask()]
+    again = message(COORDINATOR, epoch("u0", phase=EpochPhase.ENDED), 91)
+    assert onlooker.happen(Heard(again), 60.0) == []
+
+
 def test_after_it_was_held_up_itself_it_asks_and_misses_nobody_yet() -> None:
     onlooker = Onlooker(timing=Timing()).running()
     onlooker.happen(Tick(), 0.5)

@@ -343,3 +343,16 @@ def test_deadlines_lie_ahead_and_each_loss_is_told_once(
         assert members.credible <= members.present
         assert members.steady <= members.present
         assert deadline_s is None or deadline_s > now_s
+
+
+def test_a_writer_whose_token_has_gone_is_missing_until_it_is_seen_or_lost() -> None:
+    membership = Membership(TIMING)
+    membership.seen("u1", 0.0)
+    assert not membership.missing("u1")
+    membership.gone("u1", 1.0)
+    assert membership.missing("u1")
+    membership.seen("u1", 1.1)
+    assert not membership.missing("u1")
+    membership.gone("u1", 2.0)
+    assert membership.lost(2.0 + TIMING.loss_delay_s) == ["u1"]
+    assert not membership.missing("u1")
