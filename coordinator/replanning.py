@@ -170,8 +170,12 @@ class Replanning:
 
 
 def _whole_lists(situation: Situation, new: Lists) -> dict[str, tuple[str, ...]]:
-    """New lists with all that is closed before them, so that no task is on no list."""
-    problem = situation.problem
+    """New lists after all that is closed or under way.
+
+    UAVs search anew at each decision while a task stands on no list. So every task is put on one,
+    except those that nobody has planned for, because they have opened since.
+    """
+    problem, state = situation.problem, situation.state
     lists: dict[str, list[str]] = {}
     listed: set[str] = set()
 
@@ -188,9 +192,9 @@ def _whole_lists(situation: Situation, new: Lists) -> dict[str, tuple[str, ...]]
     for uav, tasks in new.items():
         for task in tasks:
             add(uav, task)
-    # Withdrawn, or beyond all who take part: whose list it is on makes no difference now.
-    for task, able in zip(problem.task_ids, problem.capable.T, strict=True):
-        if able.any():
+    takers = problem.capable[state.active].any(axis=0) & state.open
+    for task, able, may_be_taken in zip(problem.task_ids, problem.capable.T, takers, strict=True):
+        if able.any() and not may_be_taken:  # whose list it is on makes no difference now
             add(problem.uav_ids[int(able.argmax())], task)
     return {uav: tuple(tasks) for uav, tasks in lists.items()}
 

@@ -49,7 +49,7 @@ class Situation:
     now_s: float
     """Mission time [s]."""
     visited: Mapping[str, tuple[str, ...]]
-    """Tasks that each UAV has ended, in order; a task that two have ended is the first one's."""
+    """Closed tasks by who has ended them, in order; what two have ended is the first one's."""
     under_way: Mapping[str, str]
     """UAV id -> id of the open task that it is going to end."""
     withdrawn: frozenset[str]
@@ -89,7 +89,7 @@ class Situation:
             problem,
             state,
             mission_s,
-            _visited(replica.outcomes),
+            _visited(replica.outcomes, states),
             under_way,
             frozenset(task for task, what in states.items() if what is TaskState.WITHDRAWN),
             sum(outcome.result is Result.FAILED for outcome in replica.outcomes.values()),
@@ -124,12 +124,12 @@ class Course:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """What becomes of the open tasks."""
+    """What becomes of the tasks that are not closed yet."""
 
     lists: Lists
     """What each UAV is going to do, after what it is doing now."""
     completion_s: Mapping[str, float]
-    """Predicted completion of the tasks on the lists [s mission time]."""
+    """Predicted completion of the tasks on the lists and of those under way [s mission time]."""
     objective: float
     """Σ of eq. 1 over the lists [value·s]."""
 
@@ -155,14 +155,17 @@ def predicted(situation: Situation, course: Course) -> Prediction:
         rank = ranks(course.sequence, problem.uav_ids)
         places = np.array([rank[uav] for uav in problem.uav_ids], dtype=np.int64)
         lists, _ = run(problem, situation.state, places, rule)
-    objective, completion_s = evaluate(problem, lists, situation.state)
-    return Prediction(
-        lists=_by_id(problem, lists),
-        completion_s={
-            problem.task_ids[task]: float(completion_s[task]) for route in lists for task in route
-        },
-        objective=objective,
-    )
+    objective, times_s = evaluate(problem, lists, situation.state)
+    free_s = situation.state.free_s
+    completion_s = {
+        situation.under_way[uav]: float(free_s[index])
+        for index, uav in enumerate(problem.uav_ids)
+        if uav in situation.under_way
+    }
+    completion_s |= {
+        str(problem.task_ids[task]): float(times_s[task]) for route in lists for task in route
+    }
+    return Prediction(_by_id(problem, lists), completion_s, objective)
 
 
 def replan(
@@ -231,11 +234,13 @@ def worth(situation: Situation, lists: Lists) -> float:
     return guided_choice(team, indices, int(next_s.argmin())).worth
 
 
-def _visited(outcomes: Mapping[tuple[str, str], Outcome]) -> dict[str, tuple[str, ...]]:
+def _visited(
+    outcomes: Mapping[tuple[str, str], Outcome], states: Mapping[str, TaskState]
+) -> dict[str, tuple[str, ...]]:
     visited: dict[str, list[str]] = {}
     seen: set[str] = set()
     for (uav, task), _ in sorted(outcomes.items(), key=lambda item: (item[1].completed_s, item[0])):
-        if task not in seen:
+        if task not in seen and states.get(task, TaskState.OPEN) is not TaskState.OPEN:
             seen.add(task)
             visited.setdefault(uav, []).append(task)
     return {uav: tuple(tasks) for uav, tasks in visited.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import pytest
@@ -10,6 +10,7 @@ import pytest
 from coordinator.events import Replan, Replanned
 from coordinator.planner.live import Course, Lists, NewPlan, Prediction, Situation, replan
 from coordinator.replanning import Replanning
+from swarm.model import Uav
 from swarm.wire.messages import Body, Epoch, EpochPhase
 from tests.builders import IDLE, OUT, done, entries_of, failed, held, mission, task, uav
 from tests.running_mission import RunningMission
@@ -27,8 +28,14 @@ GOING_ON: Lists = {"a": ("t1", "t2", "t3"), "b": ("t7", "t6"), "c": ("t5", "t4")
 class Scene:
     """A policy whose first epoch came into force at 0 s, and the mission it watches."""
 
-    def __init__(self, *, expected_s: Mapping[str, float] = EXPECTED_S, margin: float = 0.005):
-        self.mission = RunningMission(mission(FLEET, TASKS))
+    def __init__(
+        self,
+        *,
+        expected_s: Mapping[str, float] = EXPECTED_S,
+        margin: float = 0.005,
+        fleet: Sequence[Uav] = FLEET,
+    ) -> None:
+        self.mission = RunningMission(mission(fleet, TASKS))
         self.policy = Replanning("guided", 7, INTERVAL_S, margin_frac=margin)
         self.policy.begin(self.mission.at(0.0), expected_s, 0.0)
         self.asked: list[Replan] = []
@@ -331,6 +338,27 @@ def test_every_task_is_on_a_list_after_what_was_before_it() -> None:
     assert (epoch.rule, epoch.sequence) == ("guided", ("a", "b", "c"))
     assert (epoch.number, epoch.phase, epoch.mission_s) == (2, EpochPhase.RUNNING, 6.0)
     assert epoch.routes == {"a": ("t2", "t1", "t3", "t4"), "c": ("t5", "late", "t7", "t6")}
+
+
+def test_what_has_opened_since_is_on_no_list_so_that_uavs_find_a_place_for_it() -> None:
+    scene = Scene(margin=-1e9).say("c", held("t7", 0.0)).lose("b")
+    assert scene.wanted(6.0)
+    scene.lose("c").say("coordinator", POP_UP)
+
+    epoch = scene.judge(7.0, {"a": ("t1", "t2"), "c": ("t3", "t4")})
+
+    assert epoch is not None
+    assert epoch.routes == {"a": ("t1", "t2"), "c": ("t3", "t4")}
+
+
+def test_a_task_beyond_all_who_take_part_is_on_a_list_all_the_same() -> None:
+    scene = Scene(margin=-1e9, fleet=(uav("a", t3=0.0), uav("b"), uav("c", t3=0.0)))
+    assert scene.lose("b").wanted(6.0)
+
+    epoch = scene.judge(6.0, {"a": ("t1", "t2"), "c": ("t4", "t5", "t6", "t7")})
+
+    assert epoch is not None
+    assert epoch.routes["b"] == ("t3",)
 
 
 def test_a_task_claimed_since_is_the_claimants() -> None:

@@ -129,6 +129,17 @@ def test_what_is_closed_is_not_open() -> None:
     assert situation.failures == 1
 
 
+def test_a_task_that_failed_and_is_open_again_counts_as_not_visited() -> None:
+    running = RunningMission(replace(fork().mission, reattempt_failed=True))
+    running.say("a", failed("t0", 10.0)).say("a", done("t1", 30.0))
+
+    situation = running.at(50.0)
+
+    assert situation.visited == {"a": ("t1",)}
+    assert situation.state.open.tolist() == [True, False, True]
+    assert situation.failures == 1
+
+
 def test_there_is_no_situation_before_the_brief() -> None:
     assert Situation.of(TaskBoard(Replica(), MISSION), (), 0.0) is None
 
@@ -160,8 +171,10 @@ def test_prediction_equals_the_plain_lower_level_from_the_live_state(rule: str, 
     assert indices(situation, found) == lists
     assert found.objective == pytest.approx(worth_of_lists, abs=1e-9)
     _, completion_s = evaluate(situation.problem, lists, situation.state)
-    for name, time_s in found.completion_s.items():
-        assert time_s == completion_s[situation.problem.task_ids.index(name)]
+    for who in found.lists:
+        for name in found.lists[who]:
+            time_s = completion_s[situation.problem.task_ids.index(name)]
+            assert found.completion_s[name] == time_s
 
 
 def test_completion_times_are_those_of_the_mission_clock() -> None:
@@ -170,7 +183,7 @@ def test_completion_times_are_those_of_the_mission_clock() -> None:
     found = predicted(running.at(12.0), Course("guided", (), {"a": ("t1", "t0", "t2")}))
 
     assert found.lists == {"a": ("t0", "t2"), "b": ()}
-    assert found.completion_s == {"t0": 50.0, "t2": 120.0}
+    assert found.completion_s == {"t1": 30.0, "t0": 50.0, "t2": 120.0}
     assert found.objective == pytest.approx(450.0 + 380.0)
 
 
