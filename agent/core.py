@@ -110,6 +110,7 @@ class AgentCore:
         self._actions: list[Action] = []
         self._stage = StatusPhase.LEARNING
         self._flew_before = False
+        self._exit_status = 0
         self._finished = False
         self._kept: object = None
 
@@ -149,7 +150,7 @@ class AgentCore:
             self._peers.membership.next_deadline_s(),
             self._speech.next_deadline_s(),
             self._tasking.next_deadline_s(),
-            self._ending.next_deadline_s(),
+            self._ending.next_deadline_s() if self._knows_enough else None,
             self._learning.next_deadline_s(),
             self._recall.next_deadline_s() if self._is_beginning else None,
         )
@@ -242,6 +243,8 @@ class AgentCore:
         self._actions.append(Note("vehicle refused", {"order": str(order), "reason": reason}))
         if isinstance(order, GoTo):
             self._actions += self._tasking.refuse(order.leg, reason, now_s)
+        elif isinstance(order, Prepare) and self._flew_before:
+            self._go_home(reason, now_s, status=1)  # it may be in the air
         elif isinstance(order, Prepare | Return):
             self._leave_vehicle(reason, now_s, handed_over=False)
 
@@ -261,7 +264,7 @@ class AgentCore:
         if self.phase is StatusPhase.RETURNING:
             self._enter(StatusPhase.HOME, self._speech.note)
             self._actions.append(Note("landed at home"))
-            self._finish(1 if self._recall.forlorn else 0, now_s)
+            self._finish(self._exit_status, now_s)
 
     # -- what follows from the state ------------------------------------------------
 
@@ -269,7 +272,8 @@ class AgentCore:
         self._actions += self._hearing.lose(now_s)
         if self._is_beginning:
             self._recollect(now_s)
-        self._go_home_if_over(now_s)
+        if self._knows_enough:
+            self._go_home_if_over(now_s)
         if self._is_beginning:
             self._begin(now_s)
         if self._tasking.phase is not None and self._picture.running:
@@ -282,8 +286,13 @@ class AgentCore:
             )
 
     @property
+    def _knows_enough(self) -> bool:
+        """Whether it may act: in its first stage, only on what all others know."""
+        return self._stage is not StatusPhase.LEARNING or self._learning.current
+
+    @property
     def _is_beginning(self) -> bool:
-        """Whether it knows what others know, and has not acted on it yet."""
+        """Whether it knows enough, and has not acted on it yet."""
         return self._stage is StatusPhase.LEARNING and self._learning.current
 
     def _recollect(self, now_s: float, *, last_chance: bool = False) -> None:
@@ -296,7 +305,7 @@ class AgentCore:
         claim = self.replica.claims.get(self.uav)
         self._flew_before = claim is not None
         if self._recall.forlorn:
-            self._go_home("nobody knows of a mission", now_s)
+            self._go_home("nobody knows of a mission", now_s, status=1)
         elif claim is not None and claim.phase is ClaimPhase.OUT and not self._rejoin:
             self._stay_out(claim, now_s)
 
@@ -331,7 +340,7 @@ class AgentCore:
         return epoch is not None and epoch.phase is EpochPhase.RUNNING
 
     def _go_home_if_over(self, now_s: float) -> None:
-        if self.phase is StatusPhase.RETURNING or not self._learning.ever:
+        if self.phase is StatusPhase.RETURNING:
             return
         reason = self._ending.reason(self.phase, now_s, undecided=self._tasking.undecided)
         if reason is not None:
@@ -344,13 +353,14 @@ class AgentCore:
         self._stage, self._speech.note = stage, note[:200]
         self._hearing.at_work = True
 
-    def _go_home(self, reason: str, now_s: float) -> None:
+    def _go_home(self, reason: str, now_s: float, *, status: int = 0) -> None:
         if self.phase is StatusPhase.OUT:
             # The vehicle is not ours to command any more.
             self._finish(0, now_s)
         elif self.phase is not StatusPhase.RETURNING:
             self._actions += self._tasking.end(now_s, handed_over=False)
             self._ending.settle()
+            self._exit_status = status
             self._enter(StatusPhase.RETURNING, reason)
             order = Return(reason, resume=self._flew_before)
             self._actions += [Note("returning", {"reason": reason}), Order(order)]

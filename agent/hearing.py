@@ -18,7 +18,7 @@ from swarm.config import Timing
 from swarm.events import Note
 from swarm.model.ids import COORDINATOR
 from swarm.state.registers import Replica
-from swarm.wire.messages import Brief, ClaimPhase, Epoch, EpochPhase, Message, Snapshot
+from swarm.wire.messages import Body, Brief, ClaimPhase, Epoch, EpochPhase, Message, Snapshot
 
 __all__ = ["Hearing"]
 
@@ -74,7 +74,7 @@ class Hearing:
                 self._replica.stale += 1
             return []
         actions = self._greet(writer, now_s) if self._peers.heard(writer, body, now_s) else []
-        if isinstance(body, Brief) and self._replica.brief is None and not self.at_work:
+        if not self.at_work and self._is_first(body):
             # Whoever answered before did not know the mission; now somebody may know more.
             self.learning.doubt(now_s)
         actions += self._take_in(message, now_s)
@@ -122,6 +122,12 @@ class Hearing:
         if self.at_work:
             return bool(twin.messages) and newer
         return bool(twin.messages) or not newer
+
+    def _is_first(self, body: Body) -> bool:
+        """Whether nothing was known of the mission in that respect."""
+        return (isinstance(body, Brief) and self._replica.brief is None) or (
+            isinstance(body, Epoch) and self._replica.epoch is None
+        )
 
     def _take_in(self, message: Message, now_s: float) -> list[Action]:
         if message.writer == self._uav:

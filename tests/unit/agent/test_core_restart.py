@@ -325,6 +325,29 @@ def test_a_mission_that_ended_meanwhile_brings_the_vehicle_home(from_peers: bool
     assert finishes(agent.happen(Home())) == [0]
 
 
+def test_the_end_of_a_mission_heard_before_any_answer_is_asked_about_first() -> None:
+    """Somebody may remember that this vehicle is in the air."""
+    earlier = crashed()
+    agent = earlier.reborn()
+    agent.learn_from_nobody()
+    agent.now_s += agent.timing.ask_gap_s
+    actions = agent.end_mission(20.0)
+    assert (orders(actions), actions.count(Ask())) == ([], 1)
+
+    assert orders(agent.learn_what_was_known_to(earlier)) == [Return("over", resume=True)]
+
+
+def test_one_whose_vehicle_will_not_be_resumed_brings_it_home() -> None:
+    earlier = crashed()
+    agent = earlier.reborn()
+    (order,) = orders(agent.learn_what_was_known_to(earlier))
+    actions = agent.happen(Refused(order, "the cruise speed cannot be set"))
+
+    assert orders(actions) == [Return("the cruise speed cannot be set", resume=True)]
+    assert agent.phase is ClaimPhase.OUT
+    assert finishes(agent.happen(Home())) == [1]
+
+
 def test_one_that_was_returning_returns() -> None:
     earlier = crashed()
     earlier.happen(Stop("told"))
