@@ -53,7 +53,8 @@ class Timing:
     linger_s: float = 2.0
     """Without a coordinator: how long after the last task agents wait before going home."""
     abandon_s: float = 60.0
-    """Without a coordinator: how long airborne agents wait for a mission to start."""
+    """Without a coordinator: how long airborne agents wait for a mission to start. Without
+    the UAVs that could go on: how long a coordinator waits for them to come back."""
     ask_gap_s: float = 0.2
     """Shortest interval between two questions to everyone."""
     takeover_s: float = 1.0
@@ -61,7 +62,7 @@ class Timing:
     replan_interval_s: float = 5.0
     """Shortest interval between two epochs of a running mission."""
     recall_s: float = 60.0
-    """An agent that starts anew and finds nobody trusts its own memory up to this age."""
+    """A process that starts anew and finds nobody trusts its own memory up to this age."""
     reconsider_s: float = 30.0
     """A task that the vehicle refused is considered again after this time."""
     stalemate_s: float = 45.0
