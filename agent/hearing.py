@@ -68,8 +68,9 @@ class Hearing:
         if writer == self._uav:
             if self._speech.is_foreign(message):
                 # A twin lives, or word of an earlier life was long under way: ask which.
+                if not self._echoes:
+                    self.learning.doubt(now_s)
                 self._echoes.append(message)
-                self.learning.doubt(now_s)
             elif message != self._replica.known(message):
                 self._replica.stale += 1
             return []

@@ -294,6 +294,19 @@ def test_words_in_its_name_that_a_living_twin_said_end_the_older() -> None:
     assert finishes(agent.happen(twin(9, held("far", 0.0)))) == [1]
 
 
+def test_a_flood_of_words_in_its_name_keeps_it_from_no_decision() -> None:
+    agent = flying(NEAR, FAR)
+    for n in range(20):
+        agent.now_s += 0.1
+        agent.happen(Heard(message("u0", held("far", 0.0), counter=n, incarnation=10_000 + n)))
+        if n == 9:
+            agent.arrive(agent.now_s - ZERO_S)
+            assert agent.phase is ClaimPhase.IDLE
+    agent.learn_from_nobody()
+
+    assert agent.task == "far"
+
+
 def test_its_own_token_means_nothing_to_it() -> None:
     agent = flying(NEAR)
     actions = agent.see("u0") + agent.happen(PeerGone("u0"))
