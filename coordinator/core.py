@@ -110,6 +110,7 @@ class CoordinatorCore:
         self._inquiry = Inquiry(timing.ask_gap_s)
         self._pulse = Pulse(timing.pause_s)
         self._actions: list[Action] = []
+        self._began_s = 0.0
         self._in_charge = False
         self._linked = True
         self._answers: list[Snapshot] = []
@@ -123,6 +124,7 @@ class CoordinatorCore:
 
     def start(self, now_s: float) -> list[Action]:
         """Ask what there is to know."""
+        self._began_s = now_s
         self._inquiry.want(now_s, before_deciding=True)
         return self._conclude(now_s)
 
@@ -137,6 +139,7 @@ class CoordinatorCore:
             return []
         if self._pulse.late(now_s):
             self._membership.held_up(now_s)
+            self._ending.wait_until(now_s + self._timing.relink_grace_s)
             self._inquiry.want(now_s, before_deciding=True)
             self._actions.append(Note("was held up"))
         self._handle(event, now_s)
@@ -168,6 +171,8 @@ class CoordinatorCore:
 
     def memory(self, now_s: float) -> Snapshot:
         """All it knows, for its next life."""
+        if not self._in_charge and self._memory is not None:
+            return _aged(self._memory, now_s - self._began_s)
         return self._snapshot(tuple(self.replica.messages()), now_s)
 
     @property
@@ -205,6 +210,7 @@ class CoordinatorCore:
                 self._membership.link(up, now_s)
                 self._linked = up
                 if up and self._inquiry.ever:
+                    self._ending.wait_until(now_s + self._timing.relink_grace_s)
                     self._inquiry.want(now_s, before_deciding=True)
             case PlanMade(request, plan) if self._beginning.expects(request):
                 self._beginning.plan = plan
@@ -246,7 +252,7 @@ class CoordinatorCore:
     def _learn(self, snapshots: Sequence[Snapshot], now_s: float) -> None:
         self._inquiry.answered()
         mine = self._speech.incarnation
-        others = [s for s in snapshots if s.writer == COORDINATOR and s.incarnation != mine]
+        others = [snapshot for snapshot in snapshots if snapshot.writer == COORDINATOR]
         if any(gives_way(self._standing, mine, other) for other in others):
             self._stand_down("a coordinator is already there")
         elif self._in_charge:
@@ -262,7 +268,7 @@ class CoordinatorCore:
 
     def _take_charge(self, now_s: float) -> None:
         """Resume the mission that is flown, or begin one."""
-        memory = self._memory
+        memory = None if self._memory is None else _aged(self._memory, now_s - self._began_s)
         heard = [*self.replica.messages(), *self._overheard]
         heritage = inherit(self._answers, heard, memory, memory_is_young=self._memory_is_young)
         if memory is not None:
@@ -317,7 +323,10 @@ class CoordinatorCore:
             self._zero_s = now_s - known_s if self._zero_s is None else self._zero_s
             self._leave_at_s = now_s + self._timing.linger_s if _ended(epoch) else None
             self._beginning.leave()
-            self._ending.wait_until(now_s + self._timing.relink_grace_s)
+            # Where no claim is known, nothing says how many may be flying out of sight.
+            claims, timing = self.replica.claims, self._timing
+            grace_s = timing.relink_grace_s if claims else timing.abandon_s
+            self._ending.wait_until(now_s + grace_s)
             self._replanning.begin(None, {}, now_s)
             epoch = replace(epoch, mission_s=self._mission_s(now_s))
         self._speech.outdo(theirs)
@@ -457,3 +466,10 @@ class CoordinatorCore:
 
 def _ended(epoch: Epoch) -> bool:
     return epoch.phase is EpochPhase.ENDED
+
+
+def _aged(memory: Snapshot, age_s: float) -> Snapshot:
+    """``memory`` with the mission time of that much later."""
+    if memory.mission_s is None:
+        return memory
+    return replace(memory, mission_s=memory.mission_s + age_s)

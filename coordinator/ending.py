@@ -36,7 +36,9 @@ class Ending:
 
     def wait_until(self, grace_until_s: float) -> None:
         """Nobody is missed before then: they need the time to show themselves."""
-        self._grace_until_s = grace_until_s
+        self._grace_until_s = max(self._grace_until_s, grace_until_s)
+        if self._over_at_s is not None:
+            self._over_at_s = max(self._over_at_s, grace_until_s)
 
     def reason(self, now_s: float, *, more_to_come: bool) -> str | None:
         """Why the mission is over; None while it is not.

@@ -24,7 +24,7 @@ from swarm.events import (
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Board, Body, Brief, Epoch, EpochPhase, Message, Snapshot
-from tests.builders import IDLE, MISSION, done, epoch, held, message, mission, task, uav
+from tests.builders import IDLE, MISSION, OUT, done, epoch, held, message, mission, task, uav
 from tests.lone_coordinator import (
     LAYERS,
     TIMING,
@@ -174,14 +174,46 @@ def test_the_mission_goes_on_to_its_end() -> None:
 
 
 def test_nobody_is_missed_before_they_had_the_time_to_show_themselves() -> None:
-    """Also if nothing is known of any claim."""
-    alone = replace(answer(registers(running()), 5.0), messages=tuple(registers(running())))
-    coordinator = LoneCoordinator(FLOWN, answers=[alone], incarnation=600)
+    out = replace(
+        answer(registers(running()), 5.0), messages=(*registers(running()), message("u0", OUT))
+    )
+    coordinator = LoneCoordinator(FLOWN, answers=[out], incarnation=600)
     coordinator.run_until(100.0 + 0.9 * TIMING.relink_grace_s)
     assert coordinator.phase is EpochPhase.RUNNING
 
     coordinator.run_until(100.0 + 1.1 * TIMING.relink_grace_s)
     assert coordinator.reason == "nobody is left who could go on"
+
+
+def test_where_nothing_is_known_of_any_uav_it_waits_for_them_as_for_the_lost() -> None:
+    """It may be cut off from a whole fleet."""
+    alone = replace(answer(registers(running()), 5.0), messages=tuple(registers(running())))
+    coordinator = LoneCoordinator(FLOWN, answers=[alone], incarnation=600)
+    coordinator.run_until(100.0 + 0.9 * TIMING.abandon_s)
+    assert coordinator.phase is EpochPhase.RUNNING
+
+    coordinator.run_until(100.0 + 1.1 * TIMING.abandon_s)
+    assert coordinator.reason == "nobody is left who could go on"
+
+
+def test_memory_grows_older_while_it_waits_for_answers() -> None:
+    coordinator = LoneCoordinator(
+        FLOWN, answers=None, incarnation=600, memory=memory(running(10.0), mission_s=25.0)
+    )
+    assert coordinator.core.memory(101.0).mission_s == 26.0
+
+    coordinator.happen(Learned(()), 103.0)
+    assert coordinator.core.snapshot(103.0).mission_s == 28.0
+
+
+def test_one_that_stands_down_before_it_took_charge_keeps_what_it_remembered() -> None:
+    kept = memory(running(10.0), mission_s=25.0)
+    coordinator = LoneCoordinator(
+        FLOWN, answers=[twin(1, mission_s=3.0)], incarnation=600, memory=kept
+    )
+
+    assert coordinator.core.stood_down is not None
+    assert coordinator.core.memory(100.0) == kept
 
 
 def test_one_odd_clock_among_many_does_not_set_the_time() -> None:
@@ -450,6 +482,17 @@ def test_running_it_stands_down_for_a_newer_one_at_its_first_epoch() -> None:
 
     assert finishes(actions) == [1]
     assert coordinator.core.stood_down == "another coordinator has taken over"
+
+
+def test_of_two_with_one_incarnation_one_comes_out_higher() -> None:
+    """As when two machines' clocks are behind and both have outdone the same stamp."""
+    coordinator = LoneCoordinator(mission([U0], [T0]), incarnation=600).started()
+    theirs = message(COORDINATOR, running(), 90, 600)
+    coordinator.answers = [twin(600, theirs, mission_s=9.0)]
+    actions = coordinator.happen(Heard(theirs), 110.0)
+
+    stamps = [a.message.stamp for a in actions if isinstance(a, Publish)]
+    assert min(stamps) > theirs.stamp
 
 
 def test_running_it_outlasts_an_older_one_and_makes_itself_heard() -> None:

@@ -57,3 +57,13 @@ def test_older_memories_change_nothing() -> None:
     voice.outdo(Stamp(6, 100))
 
     assert voice.say(IDLE).stamp == Stamp(7, 1)
+
+
+def test_two_lives_that_outdo_one_stamp_do_not_come_out_alike() -> None:
+    heard = Stamp(5000, 3)
+    first, second = Voice(MISSION, "u0", 7), Voice(MISSION, "u0", 8)
+    for voice in (first, second):
+        voice.outdo(heard)
+
+    assert 5000 < first.incarnation <= 6000
+    assert first.incarnation != second.incarnation
