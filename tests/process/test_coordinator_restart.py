@@ -1,0 +1,200 @@
+"""The coordinator's process dies, hangs, starts anew, or another one takes its place.
+
+Every process is started by hand, as an operator does, and flies the same short mission. One
+task appears late, when there is, or should be, another coordinator.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.scenario.write import format_scenario
+from tests.process.mission import wait_until
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+
+LIMIT_S = 150.0
+SPEEDUP = "2"
+UAVS = ["uav1", "uav2"]
+POPUP_S = 30.0
+
+
+def _flown() -> Mission:
+    rng = np.random.default_rng(3)
+    places = [(float(x), float(y), 0.0) for x, y in rng.uniform(0.0, 150.0, (9, 2))]
+    tasks = [Task(TaskId(f"t{n}"), place, 1.0, service_s=2.0) for n, place in enumerate(places)]
+    popup = Task(TaskId("popup"), (60.0, 60.0, 0.0), 1.0, service_s=1.0, appears_s=POPUP_S)
+    uavs = [Uav(UavId(u), (12.0 * n, 0.0, 0.0), 10.0) for n, u in enumerate(UAVS)]
+    origin = Origin(46.8, 9.7, 1100.0)
+    return Mission("restart", 600.0, tuple(uavs), (*tasks, popup), origin=origin)
+
+
+FLOWN = _flown()
+
+
+class ByHand:
+    """The processes of one mission; each logs into a file of its own."""
+
+    def __init__(self, folder: Path, stack: contextlib.ExitStack) -> None:
+        self.folder = folder
+        self._stack = stack
+        self._scenario = folder / "restart.toml"
+        self._scenario.write_text(format_scenario(FLOWN))
+        (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
+        self._seat = ["--connect", endpoint, "--speedup", SPEEDUP]
+        router = self.start("router", ["router", "--listen", endpoint, "--json"])
+        self._line(router)
+        chosen = [word for uav in UAVS for word in ("--uav", uav)]
+        listen = ["--listen", "tcp:127.0.0.1:0", "--speedup", SPEEDUP, "--json"]
+        autopilot = ["autopilot", str(self._scenario), *chosen, *listen]
+        flying = self.start("autopilot", autopilot)
+        vehicles = [self._line(flying) for _ in UAVS]
+        self.agents = [self._agent(vehicle) for vehicle in vehicles]
+
+    def coordinator(self, name: str, *options: str) -> subprocess.Popen[str]:
+        """Start a coordinator; ``name`` is that of its log."""
+        words = ["coordinator", str(self._scenario), "--method", "greedy", "--json"]
+        return self.start(name, [*words, *self._seat, *options])
+
+    def start(self, name: str, arguments: list[str]) -> subprocess.Popen[str]:
+        log = self._stack.enter_context((self.folder / f"{name}.log").open("w"))
+        process = subprocess.Popen(
+            [sys.executable, "-m", "swarm", *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+            env={**os.environ, "NO_COLOR": "1", "SWARM_LOG_FORMAT": "lines"},
+        )
+        self._stack.callback(_end, process)
+        return process
+
+    def log(self, name: str) -> str:
+        """All that process has logged so far."""
+        return (self.folder / f"{name}.log").read_text()
+
+    def wait_for(self, name: str, text: str) -> None:
+        """Wait for a line in a log."""
+        wait_until(lambda: text in self.log(name), LIMIT_S, f"{text!r} in {name}: {self.log(name)}")
+
+    def done(self) -> list[str]:
+        """Tasks done so far, once for every visit."""
+        logs = "".join(self.log(uav) for uav in UAVS)
+        return re.findall(r'event="task done".*?\btask=(\w+)', logs)
+
+    def wait_for_done(self, count: int) -> None:
+        """Wait until so many tasks are done."""
+        wait_until(lambda: len(self.done()) >= count, LIMIT_S, f"the end of {count} tasks")
+
+    def assert_all_done(self) -> None:
+        """Every task was visited once, and everybody came home."""
+        assert [agent.wait(60) for agent in self.agents] == [0] * len(UAVS)
+        assert sorted(self.done()) == sorted(task.id for task in FLOWN.tasks)
+
+    def _agent(self, vehicle: dict[str, object]) -> subprocess.Popen[str]:
+        uav = str(vehicle["uav"])
+        words = ["agent", "--mission", FLOWN.name, "--uav", uav]
+        words += ["--mavlink", str(vehicle["url"]), "--system-id", str(vehicle["system_id"])]
+        return self.start(uav, [*words, *self._seat])
+
+    @staticmethod
+    def _line(process: subprocess.Popen[str]) -> dict[str, object]:
+        assert process.stdout is not None
+        said = json.loads(process.stdout.readline())
+        assert isinstance(said, dict)
+        return said
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    if process.poll() is None:
+        process.send_signal(signal.SIGCONT)
+        process.terminate()
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    assert process.stdout is not None
+    process.stdout.close()
+
+
+@pytest.fixture
+def by_hand(tmp_path: Path) -> Iterator[ByHand]:
+    with contextlib.ExitStack() as stack:
+        yield ByHand(tmp_path, stack)
+
+
+@pytest.mark.parametrize("keeps_state", [True, False])
+def test_a_killed_coordinator_started_anew_ends_the_mission(
+    by_hand: ByHand, keeps_state: bool
+) -> None:
+    options = ["--state", str(by_hand.folder / "state")] if keeps_state else []
+    first = by_hand.coordinator("first", *options)
+    by_hand.wait_for_done(2)
+    first.kill()
+    first.wait()
+    by_hand.wait_for("uav1", "lost")
+    by_hand.wait_for_done(4)
+
+    second = by_hand.coordinator("second", *options)
+    assert second.wait(LIMIT_S) == 0, by_hand.log("second")
+    by_hand.assert_all_done()
+    assert "resumes the mission" in by_hand.log("second")
+    assert second.stdout is not None
+    assert second.stdout.read() == "", "it has made no plan to begin with"
+
+
+def test_one_that_stands_by_takes_over_and_ends_the_mission(by_hand: ByHand) -> None:
+    first = by_hand.coordinator("first")
+    second = by_hand.coordinator("second", "--standby")
+    by_hand.wait_for_done(2)
+    assert second.poll() is None
+    assert "takes the coordinator's place" not in by_hand.log("second")
+    first.kill()
+    first.wait()
+
+    assert second.wait(LIMIT_S) == 0, by_hand.log("second")
+    by_hand.assert_all_done()
+    assert "takes the coordinator's place" in by_hand.log("second")
+
+
+def test_one_that_hung_gives_way_and_stands_by_for_the_one_that_took_over(by_hand: ByHand) -> None:
+    first = by_hand.coordinator("first", "--standby")
+    by_hand.wait_for("first", "takes the coordinator's place")
+    second = by_hand.coordinator("second", "--standby")
+    by_hand.wait_for_done(2)
+    first.send_signal(signal.SIGSTOP)
+    by_hand.wait_for("second", "resumes the mission")
+    first.send_signal(signal.SIGCONT)
+    by_hand.wait_for("first", "stands down")
+    second.kill()
+    second.wait()
+
+    assert first.wait(LIMIT_S) == 0, by_hand.log("first")
+    by_hand.assert_all_done()
+    assert by_hand.log("first").count("takes the coordinator's place") == 2
+
+
+def test_beside_a_living_coordinator_another_one_ends_with_a_clear_line(by_hand: ByHand) -> None:
+    first = by_hand.coordinator("first")
+    by_hand.wait_for_done(1)
+    second = by_hand.coordinator("second")
+
+    assert second.wait(30) == 1
+    last = by_hand.log("second").splitlines()[-1]
+    assert last == "a coordinator is already there; add --standby to wait for its loss"
+    assert first.wait(LIMIT_S) == 0
+    by_hand.assert_all_done()
