@@ -201,8 +201,14 @@ class SeatPlay:
                 self._send(None, other, PeerGone(writer or ""))
 
     def _send(self, sender: Place | None, to: Place, event: Event) -> None:
-        """In order per pair, as over TCP; lost if they are parted when it would arrive."""
-        pair = ("" if sender is None else sender.name, to.name)
+        """In order per pair, as over TCP; lost if they are parted when it would arrive.
+
+        What one is told of another's token keeps its order too, whoever tells it.
+        """
+        source = "" if sender is None else sender.name
+        if isinstance(event, PeerSeen | PeerGone):
+            source = f"token of {event.writer}"
+        pair = (source, to.name)
         at_s = self.now_s + float(self._rng.uniform(0.0, self._delay_s))
         at_s = self._arrived[pair] = max(at_s, self._arrived.get(pair, 0.0))
 

@@ -85,7 +85,8 @@ def test_story_tells_every_loss_and_no_other(seed: int) -> None:
     world = flown(seed)
 
     lost = set(world.observer.result().lost_uavs)
-    told = {line.text.split(" ")[0] for line in world.observer.story if " lost" in line.text}
+    sentences = [line.text.replace(";", "").split() for line in world.observer.story]
+    told = {words[0] for words in sentences if words[1:2] == ["lost"]}
     assert told - {COORDINATOR} == lost
     assert lost == {uav.id for uav in world.mission.uavs} - survivors(world)
 
