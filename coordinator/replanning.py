@@ -17,7 +17,7 @@ from swarm.wire.messages import Epoch
 
 __all__ = ["DRIFT_FRAC", "MARGIN_FRAC", "Replanning"]
 
-MARGIN_FRAC = 0.01
+MARGIN_FRAC = 0.005
 """Of the value still to be won; a new plan that promises less more is not worth an epoch."""
 DRIFT_FRAC = 0.05
 """Of the time the plan still takes; UAVs that are later by more make a new plan worth a try."""
