@@ -232,13 +232,13 @@ class CoordinatorCore:
             self._inquiry.want(now_s)
 
     def _hear_another(self, message: Message, now_s: float) -> None:
-        """Another process speaks from this seat, or its last words were long under way."""
-        newer = message.stamp.incarnation > self._speech.incarnation
-        if not self._in_charge:
-            self._overheard.append(message)
-        elif newer and self._standing is Standing.STARTED and isinstance(message.body, Epoch):
-            self._stand_down("another coordinator has taken over")
-        else:
+        """Words from this seat that are not its own: another process is there, or has been.
+
+        Their sender may be dead and its words long under way, so they alone decide nothing;
+        until everyone has been asked, this one says nothing that might contradict.
+        """
+        self._overheard.append(message)
+        if self._in_charge:
             self._inquiry.want(now_s, before_deciding=True)
 
     # -- taking charge ------------------------------------------------------------------
@@ -254,13 +254,15 @@ class CoordinatorCore:
         mine = self._speech.incarnation
         others = [snapshot for snapshot in snapshots if snapshot.writer == COORDINATOR]
         if any(gives_way(self._standing, mine, other) for other in others):
-            self._stand_down("a coordinator is already there")
+            came = "another coordinator has taken over"
+            self._stand_down(came if self._in_charge else "a coordinator is already there")
         elif self._in_charge:
             self._take_in(snapshots, others, now_s)
         else:
             self._answers += snapshots
             if self._linked and not self._inquiry.unsure:
                 self._take_charge(now_s)
+        self._membership.expect(self.replica.claims, now_s)
 
     def _stand_down(self, reason: str) -> None:
         self.stood_down, self._finished = reason, True
@@ -300,8 +302,9 @@ class CoordinatorCore:
         else:
             messages = heritage.replica.messages()
             self.replica.join_all(m for m in messages if m.writer != COORDINATOR)
-            if self._speech.outdo(theirs):
-                self._actions += self._speech.restate()
+        if self._speech.outdo([*theirs, *self._overheard]):
+            self._actions += self._speech.restate()
+        self._overheard = []
         if started:
             older = [m for m in theirs if m.stamp.incarnation < mine]
             same = [s for s in others if standing_of(s) is Standing.STARTED]

@@ -422,6 +422,7 @@ def test_after_a_pause_another_coordinator_may_be_there() -> None:
     short = replace(TIMING, announce_s=2.0, silence_s=5.0)
     coordinator = LoneCoordinator(mission([U0], [T0]), timing=short).started()
     newer = message(COORDINATOR, running(), 1, OLD_LIFE)
+    coordinator.answers = [twin(OLD_LIFE, newer, mission_s=60.0)]
     actions = coordinator.happen(Heard(newer), 160.0)
 
     assert said(actions, Epoch) == []
@@ -476,12 +477,30 @@ def test_of_two_that_begin_together_the_one_that_came_first_stays() -> None:
     assert (first.core.stood_down, finishes(second.log)) == (None, [1])
 
 
-def test_running_it_stands_down_for_a_newer_one_at_its_first_epoch() -> None:
-    coordinator = LoneCoordinator(mission([U0], [T0])).started()
-    actions = coordinator.happen(Heard(message(COORDINATOR, running(), 1, OLD_LIFE)), 110.0)
+def test_running_it_falls_silent_at_a_newer_ones_words_and_stands_down_if_that_lives() -> None:
+    short = replace(TIMING, announce_s=2.0, silence_s=1e6)
+    coordinator = LoneCoordinator(mission([U0], [T0]), timing=short).started()
+    newer = message(COORDINATOR, running(), 1, OLD_LIFE)
+    coordinator.answers = None
+    coordinator.happen(Heard(newer), 101.0)
+    assert said(coordinator.run_until(110.0), Epoch) == []
 
+    actions = coordinator.happen(Learned((twin(OLD_LIFE, newer, mission_s=9.0),)))
     assert finishes(actions) == [1]
     assert coordinator.core.stood_down == "another coordinator has taken over"
+
+
+def test_a_newer_one_that_nobody_knows_and_that_does_not_answer_deposes_nobody() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0])).started()
+    newer = message(COORDINATOR, running(), 1, OLD_LIFE)
+    coordinator.happen(Heard(newer), 110.0)
+
+    assert coordinator.core.stood_down is None
+    assert coordinator.epoch is not None
+    assert coordinator.epoch.sequence == ("u0",)
+    known = coordinator.core.replica.known(newer)
+    assert known is not None
+    assert known.stamp > newer.stamp, "whoever heard the other hears this one too"
 
 
 def test_of_two_with_one_incarnation_one_comes_out_higher() -> None:
