@@ -282,7 +282,7 @@ class AgentCore:
             lacking = self._stage is StatusPhase.LEARNING
             self._actions += self._learning.questions(now_s, lacking=lacking)
             self._actions += self._speech.repeat(
-                lambda: self._status(now_s), now_s, learned=self._learning.ever
+                lambda: self._status(now_s), now_s, learned=self._hearing.at_work
             )
 
     @property

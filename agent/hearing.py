@@ -6,6 +6,7 @@ what follows for the vehicle (agent.core), for tasks (agent.tasking).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 from agent.events import Action
@@ -55,8 +56,10 @@ class Hearing:
         self._peers = peers
         self._speech = speech
         self._tasking = tasking
+        self._timing = timing
         self._answered: set[str] = set()
         self._insisted = False
+        self._insists_until_s = -math.inf
         self._echoes: list[Message] = []
         """Heard in the own name, though this life has not said so."""
 
@@ -88,25 +91,40 @@ class Hearing:
             told += snapshot.messages
         for message in told + self._echoes:
             actions += self._take_in(message, now_s)
+        self._expect_claimants(now_s)
         self._echoes.clear()
         self._learn_clock([snapshot.mission_s for snapshot in snapshots], now_s)
         somebody_knows = any(isinstance(message.body, Brief) for message in told)
         self.learning.take(enough=somebody_knows and not self.at_work)
         self._answered.update(snapshot.writer for snapshot in snapshots)
-        if self.learning.current and not self.at_work:
+        if self.learning.current:
             self._insist(now_s)
         return actions
 
     def _insist(self, now_s: float) -> None:
-        """Ask once more if somebody is there who has not answered: it may know the newest."""
-        silent = self._peers.membership.present - self._answered
-        if silent and not self._insisted:
+        """Ask again while somebody is there who has not answered: it may know the newest.
+
+        At the start once; after a link came back until the others' had the time to.
+        """
+        silent = self._peers.membership.present - self._answered - {self._uav}
+        if not silent:
+            return
+        if not self.at_work and not self._insisted:
             self._insisted = True
             self.learning.doubt(now_s)
+        elif self.at_work and now_s < self._insists_until_s:
+            self.learning.doubt(now_s + 2.0 * self._timing.ask_gap_s)
+
+    def _catch_up(self, now_s: float) -> None:
+        """What the others did meanwhile is unknown, and they may be back later than this one."""
+        self._answered.clear()
+        self._insists_until_s = now_s + self._timing.relink_grace_s
+        self.learning.doubt(now_s)
 
     def remember(self, memory: Snapshot, now_s: float) -> list[Action]:
         """An earlier life of this agent knew so."""
         actions = [a for message in memory.messages for a in self._take_in(message, now_s)]
+        self._expect_claimants(now_s)
         self._learn_clock([memory.mission_s], now_s)
         return actions
 
@@ -146,6 +164,10 @@ class Hearing:
             self._tasking.peer_claimed(now_s)
         return []
 
+    def _expect_claimants(self, now_s: float) -> None:
+        """Whose claim is known by hearsay must speak: it may hang since, with a living token."""
+        self._peers.membership.expect(self._replica.claims.keys() - {self._uav}, now_s)
+
     def _start_clock(self, epoch: Epoch, now_s: float) -> list[Action]:
         runs = epoch.phase is EpochPhase.RUNNING
         if not (runs and self._picture.set_clock(epoch.mission_s, now_s)):
@@ -176,13 +198,13 @@ class Hearing:
         self._peers.membership.link(up, now_s)
         if not up or not self.learning.ever:
             return []
-        self.learning.doubt(now_s)
-        return [*self._speech.announce(now_s)]
+        self._catch_up(now_s)
+        return self._announce(now_s)
 
     def held_up(self, now_s: float) -> list[Action]:
         """This process was stopped or starved; what the others did meanwhile is unread."""
         self._peers.membership.held_up(now_s)
-        self.learning.doubt(now_s)
+        self._catch_up(now_s)
         return [Note("held up")]
 
     def lose(self, now_s: float) -> list[Action]:
@@ -202,10 +224,14 @@ class Hearing:
         if back:
             actions.append(Note("back", {"writer": writer}))
         if self.learning.ever:
-            actions += self._speech.announce(now_s)
+            actions += self._announce(now_s)
             if back or writer == COORDINATOR:
                 self.learning.want(now_s)
         return actions
+
+    def _announce(self, now_s: float) -> list[Action]:
+        """Repeat the own registers; what an earlier life said is not this one's to repeat."""
+        return [*self._speech.announce(now_s)] if self.at_work else []
 
     def _awake(self, now_s: float) -> None:
         """A task may have opened: everyone who is free decides anew, in sequence order."""

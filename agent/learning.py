@@ -61,6 +61,7 @@ class Learning:
             self._again_at_s = None
         elif self._again_at_s is not None and self._again_at_s <= now_s:
             self._asking.want(now_s)
+            self._again_at_s = None  # until that question has been asked
         if not self._asking.due(now_s):
             return []
         self._open += 1

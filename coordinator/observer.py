@@ -138,6 +138,7 @@ class Observer:
                         self._zero_s = now_s - snapshot.mission_s
                     for message in snapshot.messages:
                         self._hear(message, now_s)
+                self._membership.expect(self.replica.claims, now_s)
             case PeerSeen(writer):
                 # What it said while one of us had no link has not come here.
                 ask |= self._membership.missing(writer)

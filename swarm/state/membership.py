@@ -9,6 +9,8 @@ proves nothing. Each process judges for itself. Leaves out: what follows from a 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from swarm.config import Timing
 from swarm.model.ids import COORDINATOR
 
@@ -22,7 +24,7 @@ class Membership:
         self._timing = timing
         self._linked = True
         self._heard: set[str] = set()
-        """Who has ever said something; silence means nothing of others."""
+        """Who has ever said something, here or elsewhere; silence means nothing of others."""
         self._gone_until_s: dict[str, float] = {}
         """Present writers without a token, and when each is lost unless it is seen again."""
         self._silent_at_s: dict[str, float] = {}
@@ -96,6 +98,13 @@ class Membership:
         if writer in self.present:
             self._silent_at_s[writer] = now_s + self._timing.silence_s
         return False
+
+    def expect(self, writers: Iterable[str], now_s: float) -> None:
+        """Others remember claims of ``writers``, so from now on those must speak, too."""
+        for writer in set(writers) - self._heard:
+            self._heard.add(writer)
+            if writer in self.present:
+                self._silent_at_s[writer] = now_s + self._timing.silence_s
 
     def spoke(self, writer: str) -> None:
         """``writer`` itself has just said what it claims."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from agent.events import Action
@@ -46,6 +48,13 @@ def answer_all(agent: LoneAgent) -> list[Action]:
     return [action for _ in range(5) for action in agent.learn_from_nobody()]
 
 
+def learn_from_all(agent: LoneAgent) -> list[Action]:
+    """Everyone who is there answers, and has no news."""
+    return agent.happen(
+        Learned(tuple(Snapshot(MISSION, who, 1, None, ()) for who in (COORDINATOR, "u1")))
+    )
+
+
 # -- held up ----------------------------------------------------------------------------
 
 
@@ -83,9 +92,45 @@ def test_an_answer_to_a_question_of_before_is_no_answer() -> None:
     agent.arrive(10.0)
     assert agent.phase is ClaimPhase.IDLE
 
-    agent.learn_from_nobody()
+    learn_from_all(agent)
     assert agent.phase is ClaimPhase.IDLE
-    agent.learn_from_nobody()
+    learn_from_all(agent)
+    assert agent.task == "far"
+
+
+@pytest.mark.parametrize("answered", [True, False])
+def test_after_an_outage_it_waits_for_those_whose_link_is_back_later(answered: bool) -> None:
+    agent = flying(NEAR, FAR, timing=replace(TIMING, pause_s=1e6))
+    agent.happen(LinkChanged(False), 9.0)
+    agent.happen(LinkChanged(True), 9.8)
+    agent.learn_from_nobody()  # nobody else has its link yet
+    agent.arrive(9.9)
+    assert agent.phase is ClaimPhase.IDLE
+
+    assert asks(agent.run_until(10.3)) == 1
+    if answered:
+        learn_from_all(agent)
+    else:
+        agent.learn_from_nobody()
+        assert agent.phase is ClaimPhase.IDLE
+        for _ in range(5):  # whoever is there and never answers holds nobody up for long
+            agent.run_until(agent.now_s - ZERO_S + 0.5)
+            agent.learn_from_nobody()
+        assert agent.now_s - ZERO_S <= 9.8 + TIMING.relink_grace_s + 1.5
+    assert agent.task == "far"
+
+
+def test_a_claim_known_by_hearsay_counts_no_longer_than_its_writer_may_be_silent() -> None:
+    agent = flying(NEAR, FAR, timing=Timing(pause_s=1e6))
+    agent.see("u2")
+    agent.learn(message("u2", held("far", 0.0, 0, 5.0)))
+    agent.arrive(1.0)
+    assert agent.task is None
+
+    for _ in range(4):  # u1 and the coordinator speak, u2 never does
+        agent.run_until(agent.now_s - ZERO_S + 1.5)
+        agent.hear("u1", IDLE)
+        agent.hear(COORDINATOR, epoch("u0", "u1"))
     assert agent.task == "far"
 
 

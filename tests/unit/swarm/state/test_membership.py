@@ -356,3 +356,16 @@ def test_a_writer_whose_token_has_gone_is_missing_until_it_is_seen_or_lost() -> 
     membership.gone("u1", 2.0)
     assert membership.lost(2.0 + TIMING.loss_delay_s) == ["u1"]
     assert not membership.missing("u1")
+
+
+def test_who_is_known_to_have_claimed_must_speak_though_it_was_never_heard_here() -> None:
+    membership = Membership(TIMING)
+    membership.seen("u1", 0.0)
+    membership.expect(["u1", "u2"], 1.0)
+    membership.seen("u2", 2.0)
+    membership.expect(["u1", "u2"], 3.0)  # again: no new grace
+
+    assert membership.next_deadline_s() == 1.0 + TIMING.silence_s
+    assert membership.lost(1.0 + TIMING.silence_s) == ["u1"]
+    assert membership.lost(2.0 + TIMING.silence_s) == ["u2"]
+    assert membership.mute("u1")
