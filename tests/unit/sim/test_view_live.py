@@ -77,7 +77,7 @@ def test_whole_mission_fits_and_tells_what_happens(size: tuple[int, int]) -> Non
     assert "greedy: uav1 > uav3 > uav2" in pictures[1]
     assert "3 taken" in pictures[1]
     assert "5 open" in pictures[1]
-    assert "uav3 ended t4: done" in pictures[2]
+    assert "uav3 ended t4: done" in pictures[3]
     assert "ENDED" in pictures[-1]
     assert "8 of 8 done" in pictures[-1]
     assert "118.49 of 118.49 planned, optimum 120.33" in pictures[-1]
