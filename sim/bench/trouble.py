@@ -58,7 +58,7 @@ class BadLink:
 
 BAD_LINKS = (
     BadLink(Quality(delay_s=0.03, loss_frac=0.05), Link.NORMAL),
-    BadLink(Quality(delay_s=0.05, loss_frac=0.10), Link.NORMAL),
+    BadLink(Quality(delay_s=0.05, loss_frac=0.10), Link.BAD),
     BadLink(Quality(delay_s=0.10, loss_frac=0.20), Link.BAD),
 )
 
