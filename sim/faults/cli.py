@@ -84,11 +84,12 @@ def soak(
     if bug and bug not in BUGS:
         raise InputError(Fault("--bug", bug, f"is none of {', '.join(BUGS)}", "choose one"))
     kinds, clock = kinds_of(faults, "--faults"), SystemClock()
+    began_s = clock.now_s()
     with _counting(seeds) as progress:
         breach = play_all(
             first, seeds, jobs or os.cpu_count() or 1, kinds, bug=bug, progress=progress
         )
-    elapsed_s = clock.now_s()
+    elapsed_s = clock.now_s() - began_s
     if breach is None:
         if json:
             print(dumps({"first": first, "seeds": seeds, "elapsed_s": elapsed_s, "broken": None}))

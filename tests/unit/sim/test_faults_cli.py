@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from swarm.cli import main
+from swarm.clock import SystemClock
 
 CUT = "1 cut uav1 for 0.5\n0.5 weather by 0.2 for 1  # rain\n"
 
@@ -19,9 +20,12 @@ def test_a_soak_without_a_breach_says_so(capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_two_workers_play_as_many_as_one(capsys: pytest.CaptureFixture[str]) -> None:
+    clock = SystemClock()
+    began_s = clock.now_s()
     assert main(["soak", "--seeds", "22", "--jobs", "2", "--faults", "blink", "--json"]) == 0
 
     told = json.loads(capsys.readouterr().out)
+    assert 0.0 < told["elapsed_s"] <= clock.now_s() - began_s
     assert (told["seeds"], told["broken"]) == (22, None)
 
 
