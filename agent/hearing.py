@@ -77,7 +77,9 @@ class Hearing:
             elif message != self._replica.known(message):
                 self._replica.stale += 1
             return []
-        actions = self._greet(writer, now_s) if self._peers.heard(writer, body, now_s) else []
+        actions = (
+            self._greet(writer, now_s) if self._peers.heard(message, self._replica, now_s) else []
+        )
         if not self.at_work and self._is_first(body):
             # Whoever answered before did not know the mission; now somebody may know more.
             self.learning.doubt(now_s)

@@ -12,7 +12,7 @@ from swarm.config import Timing
 from swarm.state.claims import winner
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
-from swarm.wire.messages import Body, Claim, ClaimPhase, Epoch, Outcome
+from swarm.wire.messages import Body, Claim, ClaimPhase, Epoch, Message, Outcome
 
 __all__ = ["Peers"]
 
@@ -33,10 +33,16 @@ class Peers:
         """Others whose claims count."""
         return self.membership.credible - {self._uav}
 
-    def heard(self, writer: str, body: Body, now_s: float) -> bool:
-        """``writer`` itself has just said something; whether it is thereby there anew."""
+    def heard(self, message: Message, replica: Replica, now_s: float) -> bool:
+        """Its writer itself has just said so; whether it is thereby there anew.
+
+        One that says less than is known of it does not remember what an earlier life, or
+        another process in its place, has said: it cannot answer for that yet.
+        """
+        writer, known = message.writer, replica.known(message)
         anew = self.membership.heard(writer, now_s)
-        if isinstance(body, Claim | Epoch):
+        forgets = known is not None and message.stamp < known.stamp
+        if isinstance(message.body, Claim | Epoch) and not forgets:
             self.membership.spoke(writer)
         return anew
 

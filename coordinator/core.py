@@ -107,7 +107,7 @@ class CoordinatorCore:
         )
         self._ending = Ending(self._board, self._membership, timing)
         self._replanning = Replanning(method, seed, timing.replan_interval_s)
-        self._inquiry = Inquiry(timing.ask_gap_s)
+        self._inquiry = Inquiry(timing.ask_gap_s, timing.silence_s)
         self._pulse = Pulse(timing.pause_s)
         self._actions: list[Action] = []
         self._began_s = 0.0
@@ -202,7 +202,9 @@ class CoordinatorCore:
             case Learned(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer) if writer != COORDINATOR:
-                if self._membership.seen(writer, now_s):
+                # What it has heard while one of us had no link has not come here.
+                missed = self._membership.missing(writer)
+                if self._membership.seen(writer, now_s) or missed:
                     self._welcome(writer, now_s)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
@@ -290,12 +292,20 @@ class CoordinatorCore:
         """Add what has become known to the mission in charge of.
 
         Newer statements from this seat than the own ones are of a coordinator that is gone:
-        they hold, unless it had only begun a mission that runs already.
+        they hold, unless it had only begun a mission that runs already. While one that has
+        come as far lives they are not outdone, or the two would outbid each other for ever
+        instead of one giving way.
         """
         heritage = inherit(snapshots)
         theirs = statements(heritage.replica.messages())
         mine, started = self._speech.incarnation, self._zero_s is not None
         newer = [m for m in theirs if m.stamp.incarnation > mine]
+        equals = any(standing_of(other) is self._standing for other in others)
+        if equals and (newer or any(m.stamp.incarnation > mine for m in self._overheard)):
+            messages = heritage.replica.messages()
+            self.replica.join_all(m for m in messages if m.writer != COORDINATOR)
+            self._inquiry.want(now_s, before_deciding=True)
+            return
         newer_hold = any(isinstance(message.body, Epoch) for message in newer)
         if newer_hold if started else heritage.runs:
             self._adopt(heritage, now_s)

@@ -5,6 +5,8 @@ Leaves out: when questions are due (swarm.asking), and what the answers are good
 
 from __future__ import annotations
 
+import math
+
 from swarm.asking import Asking
 
 __all__ = ["Inquiry"]
@@ -15,14 +17,17 @@ class Inquiry:
 
     Args:
         gap_s: shortest interval between two of them [s].
+        every_s: longest interval; answers may get lost, and with them the only reason to ask.
     """
 
-    def __init__(self, gap_s: float) -> None:
+    def __init__(self, gap_s: float, every_s: float = math.inf) -> None:
         self.unsure = True
         """Whether something may have happened that nobody has told yet: decide nothing."""
         self.ever = False
         """Whether any question has been answered, be it by nobody."""
         self._asking = Asking(gap_s)
+        self._every_s = every_s
+        self._again_at_s = math.inf
         self._open = 0
         """Questions without an answer."""
         self._outdated = 0
@@ -41,8 +46,12 @@ class Inquiry:
 
     def due(self, now_s: float) -> bool:
         """Whether to ask now; True once for each question."""
+        if self._again_at_s <= now_s:
+            self._asking.want(now_s)
         due = self._asking.due(now_s)
-        self._open += due
+        if due:
+            self._open += 1
+            self._again_at_s = now_s + self._every_s
         return due
 
     def answered(self) -> None:
@@ -54,4 +63,7 @@ class Inquiry:
 
     def next_deadline_s(self) -> float | None:
         """When `due` will next be true."""
-        return self._asking.next_deadline_s()
+        wanted_s = self._asking.next_deadline_s()
+        if wanted_s is not None:
+            return wanted_s
+        return None if math.isinf(self._again_at_s) else self._again_at_s

@@ -1,0 +1,49 @@
+"""Schedules that once broke an invariant, in the small form they were shrunk to."""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.faults.case import parse_case, play
+
+ONCE_BROKEN = {
+    "a new life repeats the claim that others remember of the old one": """
+        fleet seed=12219 uavs=4 tasks=4 popups=3 topology=mesh method=greedy
+        20 unplug u1 for 6
+        25 crash u1 for 1 with past
+    """,
+    "a claim known by hearsay is of one that hangs with a living token": """
+        fleet seed=10181 uavs=5 tasks=5 popups=1 topology=router method=greedy
+        9 blink
+        16 deadlock u1
+        17 hang u3
+        37 crash u2 for 6 with disk
+    """,
+    "who was cut off hears nothing of a coordinator that came and went": """
+        fleet seed=14600 uavs=2 tasks=1 popups=0 topology=router method=greedy standby=yes
+        7 cut coordinator u0 for 7
+        13 crash standby for 0.1 with disk
+    """,
+    "a coordinator speaks below what another said in its place": """
+        fleet seed=14600 uavs=2 tasks=1 popups=0 topology=mesh method=greedy standby=yes
+        7 cut coordinator u0 for 7
+        13 crash standby
+    """,
+    "two coordinators outbid each other": """
+        fleet seed=17137 uavs=4 tasks=2 popups=1 topology=router method=guided standby=yes
+        3 deadlock u3
+        9 cut coordinator u0 u1 for 19.7
+    """,
+    "two coordinators outbid each other by what they overhear": """
+        fleet seed=17137 uavs=4 tasks=3 popups=1 topology=routers method=guided standby=yes
+        3 deadlock u3
+        9 cut coordinator u0 u1 for 19.68
+    """,
+}
+
+
+@pytest.mark.parametrize("what", ONCE_BROKEN)
+def test_it_breaks_no_more(what: str) -> None:
+    lines = [line.strip() for line in ONCE_BROKEN[what].strip().splitlines()]
+
+    assert play(parse_case(lines, what)).broken is None
