@@ -33,7 +33,7 @@ LAYER_KEY = "peckorder"
 
 _WHAT = "a plan saved by QGroundControl"
 _HOME = "mission.plannedHomePosition"
-_LANDINGS = {"fwLandingPattern", "vtolLandingPattern"}
+_LANDINGS = ("fwLandingPattern", "vtolLandingPattern")
 _TRANSECTS = "TransectStyleComplexItem"
 _FIXED_WING = 1
 

@@ -582,6 +582,20 @@ def test_any_damage_to_a_json_file_gives_tasks_or_faults(name: str, data: st.Dat
         assert "; " in line
 
 
+@pytest.mark.parametrize("wrong", [[], {}, None, True, -1, 1e308, 10**400, ""])
+@pytest.mark.parametrize("name", ["orchard.plan", "trees.geojson"])
+def test_a_wrong_kind_of_value_anywhere_gives_tasks_or_faults(name: str, wrong: object) -> None:
+    document = json.loads((DATA / name).read_text())
+    for *above, last in places_in(document)[1:]:
+        damaged: Any = copy.deepcopy(document)
+        inner = damaged
+        for step in above:
+            inner = inner[step]
+        inner[last] = wrong
+        for line in lines(Path(name).suffix, json.dumps(damaged), HOME):
+            assert line.startswith("f: ")
+
+
 @settings(deadline=None)
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @given(data=st.data())
