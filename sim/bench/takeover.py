@@ -28,7 +28,15 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.scenario.write import format_scenario
 from swarm.wire.messages import Claim, ClaimPhase, Message
 
-__all__ = ["Blow", "Takeovers", "far_mission", "flying", "measure_takeovers", "options_for"]
+__all__ = [
+    "Blow",
+    "Takeovers",
+    "far_mission",
+    "flying",
+    "measure_takeovers",
+    "options_for",
+    "stuck_on_demand",
+]
 
 FAR_M = 10_000.0
 SPEED_M_S = 1.0
@@ -126,7 +134,7 @@ async def measure_takeovers(
     times_s: list[float] = []
     missed = 0
     mission = far_mission(n_uav=3, n_task=2)
-    with _stuck_on_demand() if blow is Blow.DEADLOCK else contextlib.nullcontext():
+    with stuck_on_demand() if blow is Blow.DEADLOCK else contextlib.nullcontext():
         async with flying(mission, link=link, bus=bus, relayed=blow is Blow.CUT) as flight:
             for trial in range(trials):
                 tell(f"{blow}: {trial} of {trials}")
@@ -270,7 +278,7 @@ async def _revive(flight: ChaosFlight, blow: Blow, victim: str) -> None:
 
 
 @contextlib.contextmanager
-def _stuck_on_demand() -> Iterator[None]:
+def stuck_on_demand() -> Iterator[None]:
     """Let Python programs started meanwhile stand still on SIGUSR1, until SIGUSR2."""
     before = os.environ.get("PYTHONPATH")
     with tempfile.TemporaryDirectory() as folder:

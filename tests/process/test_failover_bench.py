@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import signal
 import subprocess
 import sys
 
 import pytest
 
 from sim.bench.latency import measure_latencies
+from sim.bench.takeover import stuck_on_demand
 from sim.bench.trouble import BAD_LINKS, measure_false_losses
 
 pytestmark = [pytest.mark.process, pytest.mark.timeout(200)]
@@ -47,3 +50,35 @@ def test_decisions_are_timed() -> None:
     # Who hears of a better claim in time turns round, which is a decision more.
     assert len(measured.times_s) >= 6
     assert 0.0 < (measured.quantile_s(0.5) or 0.0) < 0.1
+
+
+def test_a_program_stands_still_on_demand_while_its_threads_go_on() -> None:
+    program = """
+import sys, threading, time
+def other():
+    while True:
+        print("other", flush=True); time.sleep(0.02)
+threading.Thread(target=other, daemon=True).start()
+while True:
+    print("main", flush=True); time.sleep(0.02)
+"""
+    before = os.environ.get("PYTHONPATH")
+    with stuck_on_demand():
+        process = subprocess.Popen(
+            [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
+        )
+        try:
+            assert process.stdout is not None
+            lines = process.stdout
+            while lines.readline() != "main\n":
+                pass
+            process.send_signal(signal.SIGUSR1)
+            said = [lines.readline() for _ in range(30)]
+            assert set(said[10:]) == {"other\n"}
+            process.send_signal(signal.SIGUSR2)
+            while lines.readline() != "main\n":
+                pass
+        finally:
+            process.kill()
+            process.communicate()
+    assert os.environ.get("PYTHONPATH") == before
