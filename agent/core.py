@@ -30,6 +30,7 @@ from agent.vehicle import (
     Prepare,
     Refused,
     Return,
+    ReturnAdvised,
     Telemetry,
     VehicleReady,
 )
@@ -218,6 +219,8 @@ class AgentCore:
                 self._give_up_order(order, reason, now_s)
             case HandedOver(reason):
                 self._leave_vehicle(reason, now_s, handed_over=True)
+            case ReturnAdvised(reason):
+                self._go_home(reason, now_s)
             case Home():
                 self._come_home(now_s)
 

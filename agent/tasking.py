@@ -14,7 +14,7 @@ from agent.events import Action, Order
 from agent.peers import Peers
 from agent.picture import Picture
 from agent.speech import Speech
-from agent.vehicle import GoTo
+from agent.vehicle import GoTo, Hold
 from swarm.allocation.lower_level import Decision, Rule
 from swarm.config import Timing
 from swarm.events import Note
@@ -104,7 +104,7 @@ class Tasking:
         self.airborne, self._ready_by_s = True, None
         task = self._task()
         if task is not None:
-            return [self._order_to(self._picture.in_layer(task.position_enu_m))]
+            return [self._order_to(self._picture.in_layer(task.position_enu_m), task.service_s)]
         self._become_free(self._picture.mission_s(now_s))
         return [self._say_idle()]
 
@@ -282,16 +282,16 @@ class Tasking:
             "completion_s": decision.completion_s,
         }
         return [
-            self._order_to(self._picture.in_layer(task.position_enu_m)),
+            self._order_to(self._picture.in_layer(task.position_enu_m), task.service_s),
             self._speech.say(claim),
             Note("decided", why),
         ]
 
     def _stay_idle(self, now_s: float) -> list[Action]:
-        actions, telemetry = self._give_up_claim(), self._picture.telemetry
-        if self._adrift and telemetry is not None:
+        actions = self._give_up_claim()
+        if self._adrift:
             # Nothing to fly to any more: stop here rather than at a lost target.
-            actions.append(self._order_to(telemetry.position_enu_m))
+            actions.append(Order(Hold("the task flown to is no longer this UAV's")))
         self._adrift = self._to_decide = False
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         self._awaits_peers = patience_ends_s is not None
@@ -311,9 +311,9 @@ class Tasking:
         claim = self.claim
         return None if claim is None or claim.task is None else self._replica.board.get(claim.task)
 
-    def _order_to(self, place_enu_m: Point) -> Action:
+    def _order_to(self, place_enu_m: Point, stay_s: float) -> Action:
         self._leg += 1
-        return Order(GoTo(self._leg, place_enu_m))
+        return Order(GoTo(self._leg, place_enu_m, stay_s))
 
     def _say_idle(self) -> Action:
         since_s = self._free_since_s

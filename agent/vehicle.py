@@ -13,6 +13,7 @@ __all__ = [
     "Arrived",
     "GoTo",
     "HandedOver",
+    "Hold",
     "Home",
     "NotReady",
     "Orders",
@@ -20,6 +21,7 @@ __all__ = [
     "Refused",
     "Report",
     "Return",
+    "ReturnAdvised",
     "Telemetry",
     "VehicleReady",
 ]
@@ -45,6 +47,20 @@ class GoTo:
     """Number of this order; `Arrived` repeats it, so that late news is recognised."""
     position_enu_m: tuple[float, float, float]
     """Target [m; mission origin, height included]."""
+    stay_s: float = 0.0
+    """How long the UAV is going to stay there [s]; a return home that stands on the vehicle
+    waits at least that long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Stop and hover where the vehicle is, in place of whatever it does; on the ground, stay there.
+
+    Targets are taken again afterwards; an unfinished preparation or return begins anew with
+    a new order.
+    """
+
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +72,7 @@ class Return:
     """An earlier life of this agent flew the vehicle: look whether it is in the air."""
 
 
-Orders = Prepare | GoTo | Return
+Orders = Prepare | GoTo | Hold | Return
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,8 +121,15 @@ class HandedOver:
 
 
 @dataclass(frozen=True, slots=True)
+class ReturnAdvised:
+    """The vehicle obeys, but should go home now: its battery is low, or it left its fence."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Home:
     """The vehicle has landed and disarmed."""
 
 
-Report = VehicleReady | NotReady | Arrived | Telemetry | Refused | HandedOver | Home
+Report = VehicleReady | NotReady | Arrived | Telemetry | Refused | HandedOver | ReturnAdvised | Home

@@ -20,7 +20,7 @@ from agent.mavlink.commands import CommandEnded, Commands
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import Action, Event, LinkDown, LinkUp, Received, Send, Tick
 from agent.mavlink.flavours import Flavour, flavour_of
-from agent.mavlink.leg import Leg
+from agent.mavlink.leg import TARGET_TAG, Leg
 from agent.mavlink.messages import (
     CommandAck,
     GroundHeartbeat,
@@ -39,6 +39,7 @@ from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    Hold,
     Home,
     NotReady,
     Orders,
@@ -96,6 +97,8 @@ class Bridge:
         self._to_return: Return | None = None
         """Ordered before the vehicle was heard, which may be in the air."""
         self._to_return_until_s = 0.0
+        self._speed_m_s = 0.0
+        """Cruise speed of the last preparation [m/s]."""
         self._order: GoTo | None = None
         self._leg: Leg | None = None
         self._link_up = False
@@ -115,7 +118,7 @@ class Bridge:
             case Received(data):
                 for heard in self.codec.decode(data):
                     self._hear(heard)
-            case Prepare() | GoTo() | Return():
+            case Prepare() | GoTo() | Hold() | Return():
                 self._obey(event)
             case LinkUp():
                 self._link_up = True
@@ -269,6 +272,8 @@ class Bridge:
                 self._begin_preparation(order)
             case GoTo():
                 self._go_to(order)
+            case Hold():
+                self._hold(order)
             case Return():
                 self._return(order)
 
@@ -282,6 +287,7 @@ class Bridge:
         self._drop_work()
         self.phase = Phase.PREPARING
         self._prepare = order
+        self._speed_m_s = order.speed_m_s
         self._told_not_ready = None
 
     def _go_to(self, order: GoTo) -> None:
@@ -292,10 +298,23 @@ class Bridge:
             self._actions.append(Refused(order, fault))
             return
         place = wgs84_from_enu(self.config.origin, order.position_enu_m)
-        leg = Leg(order.position_enu_m, self._flavour.reposition(*place), self.config)
+        message = self._flavour.reposition(*place, self._speed_m_s)
+        leg = Leg(order.position_enu_m, message, self.config)
         self._order, self._leg = order, leg
         self.phase = Phase.FLYING
         self._say(*leg.start(self._commands, self._now_s))
+
+    def _hold(self, order: Hold) -> None:
+        position = self._vehicle.position
+        if self.phase not in (Phase.HOVERING, Phase.FLYING) or position is None:
+            self._actions.append(Refused(order, f"the vehicle is {self.phase.value}"))
+            return
+        if self._flavour is None:
+            return
+        self._end_leg()
+        here = (position.lat_deg, position.lon_deg, position.alt_m)
+        message = self._flavour.reposition(*here, self._speed_m_s)
+        self._say(*self._commands.send(TARGET_TAG, message, self._now_s))
 
     def _return(self, order: Return) -> None:
         if self.phase is Phase.RETURNING:

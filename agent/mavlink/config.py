@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 
 from agent.mavlink.commands import CommandPolicy
 from swarm.model.frames import Origin
 
-__all__ = ["BridgeConfig"]
+__all__ = ["BridgeConfig", "CommandStyle"]
+
+
+class CommandStyle(StrEnum):
+    """How a vehicle is told where to fly."""
+
+    REPOSITION = "reposition"
+    """Each target by MAV_CMD_DO_REPOSITION: in force within one message."""
+    MISSION = "mission"
+    """Each target as a mission that ends in a return home: the vehicle comes home by itself
+    if nobody commands it any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +34,7 @@ class BridgeConfig:
     """MAVLink system id of the vehicle; any other vehicle is never commanded."""
     origin: Origin
     """Zero of the mission's local frame."""
+    command: CommandStyle = CommandStyle.REPOSITION
     ground_system_id: int = 255
     """Our own MAVLink system id."""
     ground_component_id: int = 190
@@ -60,6 +72,13 @@ class BridgeConfig:
     """A vehicle that stands still elsewhere than at its target for that long is told again."""
     stall_tries: int = 3
     """Times it is told again before the order is given up."""
+    mission_patience_s: float = 60.0
+    """Commanded by missions: how long the vehicle waits at its target, beyond its stay there,
+    for the next one before it returns home by itself."""
+    battery_reserve_frac: float | None = 0.2
+    """Charge below which the vehicle should go home, 0..1; None leaves that to the autopilot."""
+    position_timeout_s: float = 5.0
+    """A vehicle in the air that has told no position for that long is no longer commanded."""
     fence_radius_m: float = 20_000.0
     """Targets farther from the origin are refused [m, horizontally]."""
     fence_height_m: float = 1_000.0
@@ -87,12 +106,18 @@ class BridgeConfig:
             "takeoff_min_m",
             "stall_timeout_s",
             "stall_tries",
+            "mission_patience_s",
+            "position_timeout_s",
             "fence_radius_m",
             "fence_height_m",
         ):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be a number > 0, not {value}")
+
+        reserve_frac = self.battery_reserve_frac
+        if reserve_frac is not None and not 0.0 < reserve_frac < 1.0:
+            raise ValueError(f"battery_reserve_frac must be within 0..1, not {reserve_frac}")
 
     def out_of_bounds(self, position_enu_m: tuple[float, float, float]) -> str | None:
         """Why a target must not be sent to the vehicle, in words; None if it may be."""
@@ -124,6 +149,7 @@ class BridgeConfig:
             effect_timeout_s=max(self.effect_timeout_s, answer_s),
             climb_timeout_s=max(self.climb_timeout_s, 2.0 * answer_s),
             stall_timeout_s=max(self.stall_timeout_s, answer_s),
+            position_timeout_s=max(self.position_timeout_s, 3.0 * speedup),
             commands=replace(
                 self.commands,
                 ack_timeout_s=max(self.commands.ack_timeout_s, answer_s),

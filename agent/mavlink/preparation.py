@@ -202,7 +202,7 @@ class Preparation:
         out: list[Outbound] = []
         if self._leg is None and not self._resumes(vehicle):
             place = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
-            message = self._flavour.reposition(*place)
+            message = self._flavour.reposition(*place, self._order.speed_m_s)
             self._leg = Leg(self._order.position_enu_m, message, self._config)
             out += self._leg.start(self._commands, now_s)
         leg = self._leg

@@ -33,6 +33,7 @@ _AUTOPILOT_ARDUPILOT = 3
 _COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
 """MAV_TYPE of quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca- and decacopter."""
 
+_AUTO = 3
 _GUIDED = 4
 _RTL = 6
 _LAND = 9
@@ -42,7 +43,7 @@ _MODE_NAMES = {
     0: "STABILIZE",
     1: "ACRO",
     2: "ALT_HOLD",
-    3: "AUTO",
+    _AUTO: "AUTO",
     _GUIDED: "GUIDED",
     5: "LOITER",
     _RTL: "RTL",
@@ -115,6 +116,15 @@ class ArduCopter:
         """GUIDED takes our targets."""
         return custom_mode == _GUIDED
 
+    def is_taking_off(self, custom_mode: int) -> bool:
+        """Never: it takes off in GUIDED."""
+        del custom_mode
+        return False
+
+    def is_mission(self, custom_mode: int) -> bool:
+        """AUTO."""
+        return custom_mode == _AUTO
+
     def is_returning(self, custom_mode: int) -> bool:
         """RTL and its kin, and LAND."""
         return custom_mode in (_RTL, _LAND, _SMART_RTL, _AUTO_RTL)
@@ -147,6 +157,10 @@ class ArduCopter:
         """GUIDED."""
         return _set_mode(_GUIDED)
 
+    def set_mission_mode(self) -> CommandLong:
+        """AUTO; refused on the ground unless the mission begins with a takeoff."""
+        return _set_mode(_AUTO)
+
     def set_return_mode(self) -> CommandLong:
         """RTL, which climbs, returns, lands and disarms."""
         return _set_mode(_RTL)
@@ -163,13 +177,16 @@ class ArduCopter:
         """ArduCopter reads the height as above home."""
         return CommandLong(_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, alt_m - home_alt_m))
 
-    def reposition(self, lat_deg: float, lon_deg: float, alt_m: float) -> CommandInt:
-        """Fly there at once, in GUIDED only.
+    def reposition(
+        self, lat_deg: float, lon_deg: float, alt_m: float, speed_m_s: float
+    ) -> CommandInt:
+        """Fly there at once, in GUIDED only, at the speed set before.
 
         The altitude is given above mean sea level, like the mission's own, so that home's
         height does not matter. The flag that would let the command change the mode is not
         set: a pilot who just took over keeps the vehicle.
         """
+        del speed_m_s
         return CommandInt(
             _CMD_DO_REPOSITION,
             AltitudeFrame.MEAN_SEA_LEVEL,

@@ -48,6 +48,14 @@ class Flavour(Protocol):
         """Whether the vehicle takes our targets in that mode."""
         ...
 
+    def is_taking_off(self, custom_mode: int) -> bool:
+        """Whether the mode is one that the vehicle enters by itself to take off on our order."""
+        ...
+
+    def is_mission(self, custom_mode: int) -> bool:
+        """Whether the vehicle flies the mission that stands on it in that mode."""
+        ...
+
     def is_returning(self, custom_mode: int) -> bool:
         """Whether the vehicle returns or lands by itself in that mode."""
         ...
@@ -68,6 +76,10 @@ class Flavour(Protocol):
         """Switch to the mode that takes our targets."""
         ...
 
+    def set_mission_mode(self) -> CommandLong:
+        """Fly the mission that stands on the vehicle."""
+        ...
+
     def set_return_mode(self) -> CommandLong:
         """Return to launch and land."""
         ...
@@ -84,8 +96,17 @@ class Flavour(Protocol):
         """Climb straight up to ``alt_m``; both heights are above mean sea level [m]."""
         ...
 
-    def reposition(self, lat_deg: float, lon_deg: float, alt_m: float) -> CommandInt:
-        """Fly to a place at once; ``alt_m`` is above mean sea level."""
+    def reposition(
+        self, lat_deg: float, lon_deg: float, alt_m: float, speed_m_s: float
+    ) -> CommandInt:
+        """Fly to a place at once.
+
+        Args:
+            lat_deg: WGS84 latitude.
+            lon_deg: WGS84 longitude.
+            alt_m: height above mean sea level.
+            speed_m_s: cruise ground speed, for firmwares that take it with every target.
+        """
         ...
 
     def change_speed(self, speed_m_s: float) -> CommandLong:

@@ -30,6 +30,13 @@ def test_every_number_must_be_positive_and_finite(name: str, value: float) -> No
         replace(CONFIG, **changed)
 
 
+@pytest.mark.parametrize("value", [0.0, 1.0, -0.1, math.nan])
+def test_battery_reserve_is_a_share_or_left_to_the_autopilot(value: float) -> None:
+    with pytest.raises(ValueError, match="battery_reserve_frac"):
+        replace(CONFIG, battery_reserve_frac=value)
+    assert replace(CONFIG, battery_reserve_frac=None).battery_reserve_frac is None
+
+
 def test_fast_vehicle_time_leaves_wall_time_for_answers() -> None:
     fast = CONFIG.for_speedup(60.0)
     assert fast.commands.ack_timeout_s / 60.0 >= 0.5
