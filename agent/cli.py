@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -67,6 +68,26 @@ def agent(
             help="Within this distance of a task, and stopped, the UAV has arrived.",
         ),
     ] = 1.0,
+    signing_key: Annotated[
+        Path | None,
+        typer.Option(
+            "--signing-key",
+            metavar="FILE",
+            help="Key shared with the autopilot, 32 bytes or 64 hexadecimal digits: what is "
+            "said to it is signed, and what is not signed is not believed.",
+            show_default=False,
+        ),
+    ] = None,
+    forward: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--forward",
+            metavar="URL",
+            help="Show the vehicle to a ground station at udp:HOST:PORT, which cannot command "
+            "it there; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
     state: StateOption = None,
     rejoin: Annotated[
         bool,
@@ -102,7 +123,8 @@ def agent(
 
     from agent.core import AgentCore
     from agent.mavlink.config import BridgeConfig
-    from agent.mavlink.link_address import parse_link
+    from agent.mavlink.link_address import parse_forward, parse_link
+    from agent.mavlink.signing_key import load_signing_key
     from agent.mavlink.vehicle import MavlinkVehicle
     from agent.runner import Vehicle, run_agent, seat_or_stop
     from agent.vehicle import Report
@@ -120,6 +142,9 @@ def agent(
     config = bus_config(bus, listen, connect or (), network.lease_s)
     _check_ids(mission, uav)
     parse_link(mavlink)
+    for url in forward or ():
+        parse_forward(url)
+    key = None if signing_key is None else load_signing_key(signing_key)
     log = get_logger(uav, mission=mission)
 
     async def run() -> int:
@@ -132,7 +157,7 @@ def agent(
                 acceptance_radius_m=acceptance_radius_m,
                 position_rate_hz=position_rate_hz,
             ).for_speedup(speedup)
-            return MavlinkVehicle(settings, mavlink, clock, report)
+            return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
 
         async with stop_requests(lifeline=lifeline) as stop:
             seat = await seat_or_stop(

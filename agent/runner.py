@@ -9,7 +9,8 @@ out: every decision (agent.core) and flying (agent.mavlink).
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Protocol
 
 from agent.core import AgentCore
@@ -37,6 +38,11 @@ it returns on its own."""
 class Vehicle(Protocol):
     """A vehicle that can be commanded and reports back in the loop's thread."""
 
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """What was heard of it and dropped so far, by reason."""
+        ...
+
     async def start(self) -> None:
         """Open the link."""
         ...
@@ -48,6 +54,32 @@ class Vehicle(Protocol):
     async def close(self) -> None:
         """Close the link; the vehicle goes on with what it does."""
         ...
+
+
+class _Dropping(Protocol):
+    """Something that drops and counts."""
+
+    @property
+    def dropped(self) -> Mapping[str, int]: ...
+
+
+class _Dropped(Mapping[str, int]):
+    """What several have dropped, as it stands whenever it is read."""
+
+    def __init__(self, *parts: _Dropping) -> None:
+        self._parts = parts
+
+    def _now(self) -> Counter[str]:
+        return sum((Counter(part.dropped) for part in self._parts), Counter[str]())
+
+    def __getitem__(self, reason: str) -> int:
+        return self._now()[reason]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._now())
+
+    def __len__(self) -> int:
+        return len(self._now())
 
 
 async def seat_or_stop(
@@ -120,6 +152,7 @@ async def run_agent(
         flown = not isinstance(order, Return) or order.resume
         if vehicle is None and brief is not None and flown:
             vehicle = make_vehicle(Origin(*brief.origin), report)
+            core.dropped = _Dropped(shell, vehicle)
             starting = loop.create_task(vehicle.start())
             starting.add_done_callback(failed)
         if vehicle is not None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from agent.mavlink.bridge import Bridge
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import Event, LinkUp, Received, Send, Tick
+from agent.mavlink.signing import Signing, SigningKey
 from agent.vehicle import GoTo, NotReady, Orders, Prepare, Report, Telemetry, VehicleReady
 from swarm.model.frames import Origin
 from tests.fake_copter import FakeCopter
@@ -14,6 +15,8 @@ from tests.fake_copter import FakeCopter
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 START = Prepare((5.0, 0.0, 10.0), 4.0)
 STEP_S = 0.02
+UNIX_S = 1_420_170_400.0
+"""Wall time at the beginning, a day into 2015: signatures count from there."""
 
 Spoil = Callable[[bytes], list[bytes]]
 
@@ -30,11 +33,13 @@ class BridgeFlight:
         copter: FakeCopter | None = None,
         config: BridgeConfig | None = None,
         *,
+        key: SigningKey | None = None,
         to_vehicle: Spoil = untouched,
         to_bridge: Spoil = untouched,
     ) -> None:
         self.copter = copter or FakeCopter(ORIGIN)
-        self.bridge = Bridge(config or BridgeConfig(1, ORIGIN, position_rate_hz=50.0))
+        signing = None if key is None else Signing(key, lambda: UNIX_S + self.now_s)
+        self.bridge = Bridge(config or BridgeConfig(1, ORIGIN, position_rate_hz=50.0), signing)
         self.to_vehicle = to_vehicle
         self.to_bridge = to_bridge
         if self.copter.now_s == 0.0:
@@ -64,6 +69,10 @@ class BridgeFlight:
 
     def order(self, order: Orders) -> list[Report]:
         return self.happen(order)
+
+    def spoken(self, data: bytes) -> None:
+        """Something else on the link says that to the bridge."""
+        self.happen(Received(data))
 
     def _carry(self, answers: list[bytes]) -> None:
         for answer in answers:

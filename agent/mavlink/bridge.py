@@ -33,6 +33,7 @@ from agent.mavlink.messages import (
 )
 from agent.mavlink.preparation import Preparation
 from agent.mavlink.returning import Returning
+from agent.mavlink.signing import Signing
 from agent.mavlink.state import PositionNews, VehicleState
 from agent.mavlink.streams import Streams
 from agent.vehicle import (
@@ -75,7 +76,7 @@ class Phase(Enum):
 class Bridge:
     """One vehicle, as the agent's core sees it."""
 
-    def __init__(self, config: BridgeConfig) -> None:
+    def __init__(self, config: BridgeConfig, signing: Signing | None = None) -> None:
         self.config = config
         self.phase = Phase.IDLE
         self.foreign: dict[int, int] = {}
@@ -86,6 +87,7 @@ class Bridge:
             config.system_id,
             source_system_id=config.ground_system_id,
             source_component_id=config.ground_component_id,
+            signing=signing,
         )
         self._commands = Commands(config.commands)
         self._vehicle = VehicleState()
@@ -408,6 +410,8 @@ class Bridge:
                 return "no link to the autopilot"
             if self._wrong_autopilot is not None and heartbeat is None:
                 return f"heard the vehicle with system id {self._wrong_autopilot}, not {wanted}"
+            if heartbeat is None and (reasons := " and ".join(self.codec.distrusted)):
+                return f"heard only frames that are not to be believed: {reasons}"
             return f"waiting for a heartbeat of system id {wanted}"
         if self._flavour is None:
             return (

@@ -9,7 +9,7 @@ Wire units: https://mavlink.io/en/messages/common.html
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -45,6 +45,7 @@ from agent.mavlink.messages import (
     SystemStatus,
     Text,
 )
+from agent.mavlink.signing import Signing
 
 __all__ = ["MavlinkCodec"]
 
@@ -66,15 +67,23 @@ class MavlinkCodec:
         target_system_id: system id of the autopilot that is spoken to; 1..255.
         source_system_id: our own system id; 1..255.
         source_component_id: our own component id; 1..255.
+        signing: signs what is sent, and lets nothing be heard that is not signed. Without
+            it signatures are not looked at: signed frames are heard like others.
     """
 
     def __init__(
-        self, target_system_id: int, *, source_system_id: int = 255, source_component_id: int = 190
+        self,
+        target_system_id: int,
+        *,
+        source_system_id: int = 255,
+        source_component_id: int = 190,
+        signing: Signing | None = None,
     ) -> None:
         self._target = target_system_id
         self._own_system = source_system_id
         self._own_component = source_component_id
-        self._framer = Framer()
+        self._signing = signing
+        self._framer = Framer(signing)
         self._sender = mavlink.MAVLink(
             None, srcSystem=source_system_id, srcComponent=source_component_id
         )
@@ -82,6 +91,14 @@ class MavlinkCodec:
         """Messages addressed to another ground station."""
         self.implausible = 0
         """Messages with a valid checksum and contents that cannot be."""
+        self.keep_frames = False
+        """Whether to keep the vehicle's frames for `take_frames`."""
+        self._kept_frames: list[bytes] = []
+
+    @property
+    def distrusted(self) -> Mapping[str, int]:
+        """Frames dropped because of their signature or its absence, by reason."""
+        return self._framer.distrusted
 
     @property
     def bad_bytes(self) -> int:
@@ -96,8 +113,11 @@ class MavlinkCodec:
     def decode(self, data: bytes) -> list[Heard]:
         """Messages completed by ``data`` that the bridge knows; anything else is counted."""
         heard: list[Heard] = []
-        for raw in self._framer.feed(data):
-            convert = _CONVERTERS.get(raw.get_msgId())
+        for frame in self._framer.feed(data):
+            if self.keep_frames and frame.system_id == self._target:
+                self._kept_frames.append(frame.data)
+            raw = frame.message
+            convert = None if raw is None else _CONVERTERS.get(raw.get_msgId())
             if convert is None:
                 continue
             if not self._addressed_to_us(raw):
@@ -112,9 +132,15 @@ class MavlinkCodec:
 
     def encode(self, message: Outbound) -> bytes:
         """One MAVLink 2 frame; sequence numbers count up with every call."""
-        frame: bytearray = self._raw(message).pack(self._sender)
+        raw = self._raw(message)
+        frame = bytes(raw.pack(self._sender))
         self._sender.seq = (self._sender.seq + 1) % 256
-        return bytes(frame)
+        return frame if self._signing is None else self._signing.sign(frame, raw.crc_extra)
+
+    def take_frames(self) -> list[bytes]:
+        """The vehicle's frames as they came, unknown ones too, since the last call."""
+        frames, self._kept_frames = self._kept_frames, []
+        return frames
 
     def reset_link(self) -> None:
         """Forget a half-received frame, because the link is a new one."""

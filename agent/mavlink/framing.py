@@ -2,43 +2,63 @@
 
 The generated dialect can parse streams too, but drops the whole supposed frame
 when a checksum fails, and with it the good frames behind a stray start byte. Here a
-bad frame costs one byte: the search goes on right behind its start byte. Leaves
-out: meaning (agent.mavlink.codec) and signing.
+bad frame costs one byte: the search goes on right behind its start byte. With a signing
+key, frames that are not to be believed are dropped whole and counted. Leaves out:
+meaning (agent.mavlink.codec).
 
 Frame layout: https://mavlink.io/en/guide/serialization.html
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-__all__ = ["Framer"]
+from agent.mavlink.signing import SIGNATURE_BYTES, SIGNED, Signing, Verdict
+
+__all__ = ["Frame", "Framer"]
 
 _START_V1 = 0xFE
 _START_V2 = 0xFD
 _OVERHEAD_V1 = 8
 """Start byte, five header bytes and the checksum."""
 _OVERHEAD_V2 = 12
-_SIGNATURE_BYTES = 13
-_SIGNED = 0x01
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One frame as it came."""
+
+    data: bytes
+    system_id: int
+    message: Any
+    """Of the dialect; None if it does not have that message."""
 
 
 class Framer:
-    """Bytes in, decoded dialect messages out; never raises on any input."""
+    """Bytes in, frames out; never raises on any input.
 
-    def __init__(self) -> None:
+    Args:
+        signing: if given, only frames that it believes come out.
+    """
+
+    def __init__(self, signing: Signing | None = None) -> None:
+        self._signing = signing
         self._buffer = bytearray()
         self._parser = mavlink.MAVLink(None)
+        self.distrusted: Counter[str] = Counter()
+        """Whole frames dropped because of their signature or its absence."""
         self.bad_bytes = 0
         """Bytes that belonged to no valid frame."""
         self.unknown_frames = 0
         """Frames of messages that the dialect does not have."""
 
-    def feed(self, data: bytes) -> Iterator[Any]:
-        """Take in ``data`` and yield every message that is complete by now."""
+    def feed(self, data: bytes) -> Iterator[Frame]:
+        """Take in ``data`` and yield every frame that is complete by now."""
         buffer = self._buffer
         buffer += data
         start = 0
@@ -56,11 +76,10 @@ class Framer:
                         start += 1
                         self.bad_bytes += 1
                     else:
+                        frame = bytes(buffer[start : start + size])
                         start += size
-                        if message.get_msgId() < 0:
-                            self.unknown_frames += 1
-                        else:
-                            yield message
+                        if self._believes(frame):
+                            yield self._frame(frame, message)
         finally:
             del buffer[:start]
 
@@ -81,12 +100,28 @@ class Framer:
                 if len(buffer) - start < 3:
                     return 0
                 flags = buffer[start + 2]
-                if flags & ~_SIGNED:
+                if flags & ~SIGNED:
                     return None
-                signature = _SIGNATURE_BYTES if flags & _SIGNED else 0
+                signature = SIGNATURE_BYTES if flags & SIGNED else 0
                 return buffer[start + 1] + _OVERHEAD_V2 + signature
             case _:
                 return None
+
+    def _believes(self, frame: bytes) -> bool:
+        if self._signing is None:
+            return True
+        verdict = self._signing.judge(frame)
+        if verdict is Verdict.BELIEVED:
+            return True
+        self.distrusted[verdict.value] += 1
+        return False
+
+    def _frame(self, data: bytes, message: Any) -> Frame:
+        system_id = data[5] if data[0] == _START_V2 else data[3]
+        if message.get_msgId() < 0:
+            self.unknown_frames += 1
+            return Frame(data, system_id, None)
+        return Frame(data, system_id, message)
 
     def _decode(self, start: int, size: int) -> Any | None:
         """The message in that frame; None if the frame is not valid."""

@@ -1,12 +1,14 @@
 """Byte links to an autopilot by URL: TCP, UDP and serial, on an asyncio loop.
 
-    tcp:HOST:PORT       connects, and again whenever the connection is lost
+    tcp:HOST:PORT       connects, and again whenever the connection is lost or says nothing
     udpout:HOST:PORT    sends there, receives from there
     udpin:HOST:PORT     waits there and answers who speaks
     serial:DEVICE:BAUD  a serial port, opened again whenever it disappears
 
 A link reports what happens to three callbacks, in the loop's thread, and never raises
-because of its peer. Its own delays are wall seconds. Leaves out: what the bytes mean.
+because of its peer. Its own delays are wall seconds. A host is looked up whenever the
+link is opened, so it may become known later. A UDP link stays open once it is, whoever
+listens; its host is not looked up again. Leaves out: what the bytes mean.
 """
 
 from __future__ import annotations
@@ -26,13 +28,17 @@ from agent.mavlink.link_address import (
 )
 from swarm.log import get_logger
 
-__all__ = ["Link", "LinkCounts", "LinkListener", "open_link"]
+__all__ = ["SILENCE_S", "Link", "LinkCounts", "LinkListener", "open_link"]
 
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 2.0
 _CONNECT_TIMEOUT_S = 5.0
 _UNSENT_LIMIT_BYTES = 65_536
 """A peer that does not read loses what exceeds this, so that commands never grow old."""
+SILENCE_S = 10.0
+"""A TCP connection that has said nothing for that long may have lost its other end without
+a word, as when a machine is switched off: it is given up and dialled again. Every autopilot
+says something each second."""
 _PEER_SILENCE_S = 3.0
 """After that much silence of its peer a listening link turns to whoever speaks next."""
 
@@ -61,6 +67,8 @@ class LinkListener(Protocol):
 class LinkCounts:
     """What a link could not deliver."""
 
+    unsent: int = 0
+    """Pieces that were lost: the link was closed, full, or the network refused them."""
     unsent_bytes: int = 0
     foreign_datagrams: int = 0
     """Datagrams of others than the peer."""
@@ -78,6 +86,7 @@ class Link:
         self._listener = listener
         self._task: asyncio.Task[None] | None = None
         self._lost = asyncio.Event()
+        self._told_why = ""
         self._log = get_logger(__name__, link=url)
 
     def start(self) -> None:
@@ -89,6 +98,7 @@ class Link:
     def send(self, data: bytes) -> None:
         """Send ``data`` if the link is open and keeps up; else it is lost and counted."""
         if not self._write(data):
+            self.counts.unsent += 1
             self.counts.unsent_bytes += len(data)
 
     async def close(self) -> None:
@@ -107,12 +117,13 @@ class Link:
                     await self._open()
             except OSError as error:  # TimeoutError included
                 self._shut()
-                self._log.debug("link does not open", error=str(error), pause_s=pause_s)
+                self._tell_why(str(error) or "no answer")
                 await asyncio.sleep(pause_s)
                 pause_s = min(2.0 * pause_s, _LONGEST_PAUSE_S)
                 continue
             try:
                 self._log.debug("link is open")
+                self._told_why = ""
                 self._listener.link_up()
                 await self._lost.wait()
             finally:
@@ -122,6 +133,12 @@ class Link:
             # A peer that accepts and hangs up at once must not be hammered either.
             await asyncio.sleep(pause_s)
             pause_s = _FIRST_PAUSE_S
+
+    def _tell_why(self, reason: str) -> None:
+        """Tell people once why the link does not open: it is tried again for ever."""
+        if reason != self._told_why:
+            self._told_why = reason
+            self._log.info("link does not open, trying again", reason=reason)
 
     def _on_lost(self, error: Exception | None) -> None:
         """Called by transports, whoever closed them."""
@@ -142,18 +159,42 @@ class Link:
 class _TcpLink(Link):
     """A TCP client."""
 
-    def __init__(self, address: TcpAddress, listener: LinkListener) -> None:
+    def __init__(self, address: TcpAddress, listener: LinkListener, silence_s: float) -> None:
         super().__init__(str(address), listener)
         self._address = address
+        self._silence_s = silence_s
         self._transport: asyncio.Transport | None = None
+        self._heard_s = 0.0
+        self._watch: asyncio.TimerHandle | None = None
 
     async def _open(self) -> None:
         loop = asyncio.get_running_loop()
         self._transport, _ = await loop.create_connection(
-            lambda: _StreamProtocol(self._listener.received, self._on_lost),
+            lambda: _StreamProtocol(self._on_data, self._on_lost),
             self._address.host,
             self._address.port,
         )
+        self._heard_s = loop.time()
+        self._look_again_at(self._heard_s + self._silence_s)
+
+    def _on_data(self, data: bytes) -> None:
+        self._heard_s = asyncio.get_running_loop().time()
+        self._listener.received(data)
+
+    def _look_again_at(self, when_s: float) -> None:
+        self._watch = asyncio.get_running_loop().call_at(when_s, self._look)
+
+    def _look(self) -> None:
+        """Give up a connection that has been silent for too long.
+
+        After a pause of this process what has come meanwhile is read before timers ring.
+        """
+        silent_until_s = self._heard_s + self._silence_s
+        if asyncio.get_running_loop().time() < silent_until_s:
+            self._look_again_at(silent_until_s)
+        else:
+            self._log.info("link is silent, dialling again", silence_s=self._silence_s)
+            self._lost.set()
 
     def _write(self, data: bytes) -> bool:
         transport = self._transport
@@ -165,6 +206,9 @@ class _TcpLink(Link):
         return True
 
     def _shut(self) -> None:
+        if self._watch is not None:
+            self._watch.cancel()
+            self._watch = None
         if self._transport is not None:
             self._transport.abort()
             self._transport = None
@@ -193,6 +237,7 @@ class _UdpLink(Link):
         super().__init__(str(address), listener)
         self._address = address
         self._transport: asyncio.DatagramTransport | None = None
+        self._full = False
         self._peer: _Peer | None = None
         self._heard_s = 0.0
 
@@ -200,16 +245,17 @@ class _UdpLink(Link):
         loop = asyncio.get_running_loop()
         place = (self._address.host, self._address.port)
         self._peer = None
+        self._full = False
 
         def protocol() -> _DatagramProtocol:
-            return _DatagramProtocol(self._on_datagram, self._on_lost)
+            return _DatagramProtocol(self)
 
         if isinstance(self._address, UdpInAddress):
             self._transport, _ = await loop.create_datagram_endpoint(protocol, local_addr=place)
         else:
             self._transport, _ = await loop.create_datagram_endpoint(protocol, remote_addr=place)
 
-    def _on_datagram(self, data: bytes, sender: _Peer) -> None:
+    def on_datagram(self, data: bytes, sender: _Peer) -> None:
         if isinstance(self._address, UdpInAddress):
             now_s = asyncio.get_running_loop().time()
             if self._peer is None or now_s - self._heard_s > _PEER_SILENCE_S:
@@ -220,9 +266,22 @@ class _UdpLink(Link):
             self._heard_s = now_s
         self._listener.received(data)
 
+    def on_refused(self, error: Exception) -> None:
+        """The network did not take an earlier datagram; the peer may start later."""
+        self.counts.unsent += 1
+        self._log.debug("datagram refused", error=str(error))
+
+    def on_full(self, full: bool) -> None:
+        """The system takes no more datagrams for now, or takes them again."""
+        self._full = full
+
+    def on_lost(self, error: Exception | None) -> None:
+        """The socket is closed."""
+        self._on_lost(error)
+
     def _write(self, data: bytes) -> bool:
         transport = self._transport
-        if transport is None or transport.is_closing():
+        if transport is None or transport.is_closing() or self._full:
             return False
         if isinstance(self._address, UdpInAddress):
             if self._peer is None:
@@ -239,30 +298,43 @@ class _UdpLink(Link):
 
 
 class _DatagramProtocol(asyncio.DatagramProtocol):
-    """Hands datagrams on; "port unreachable" is no error, as a peer may start later."""
+    """Tells a link what its socket says; "port unreachable" closes nothing."""
 
-    def __init__(
-        self, received: Callable[[bytes, _Peer], None], lost: Callable[[Exception | None], None]
-    ) -> None:
-        self._received = received
-        self._lost = lost
+    def __init__(self, link: _UdpLink) -> None:
+        self._link = link
 
     def datagram_received(self, data: bytes, addr: _Peer) -> None:
-        self._received(data, addr)
+        self._link.on_datagram(data, addr)
+
+    def error_received(self, exc: Exception) -> None:
+        self._link.on_refused(exc)
+
+    def pause_writing(self) -> None:
+        self._link.on_full(True)
+
+    def resume_writing(self) -> None:
+        self._link.on_full(False)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._lost(exc)
+        self._link.on_lost(exc)
 
 
-def open_link(address: LinkAddress, listener: LinkListener) -> Link:
+def open_link(
+    address: LinkAddress, listener: LinkListener, *, silence_s: float = SILENCE_S
+) -> Link:
     """The link of that address, not started yet.
+
+    Args:
+        address: where the peer is.
+        listener: hears of the link.
+        silence_s: a TCP connection that says nothing for that long is dialled again.
 
     Raises:
         InputError: this machine cannot open such a link at all.
     """
     match address:
         case TcpAddress():
-            return _TcpLink(address, listener)
+            return _TcpLink(address, listener, silence_s)
         case UdpInAddress() | UdpOutAddress():
             return _UdpLink(address, listener)
         case SerialAddress():

@@ -7,20 +7,26 @@ the autopilot before `order` returns. Leaves out: every decision (agent.mavlink.
 from __future__ import annotations
 
 import asyncio
-from collections import deque
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
 
 from agent.mavlink.bridge import Bridge
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import Event, LinkDown, LinkUp, Received, Send, Tick
+from agent.mavlink.forwarding import Forwarding
 from agent.mavlink.link import Link, open_link
-from agent.mavlink.link_address import parse_link
+from agent.mavlink.link_address import parse_forward, parse_link
+from agent.mavlink.signing import Signing, SigningKey
 from agent.vehicle import Orders, Report
-from swarm.clock import Clock
+from swarm.clock import Clock, unix_s
+from swarm.log import get_logger
 
 __all__ = ["MavlinkVehicle"]
 
 _SHORTEST_WAIT_S = 0.001
+_REDIAL_TIMEOUTS = 2.0
+"""A link that has been silent for that many of the bridge's timeouts is dialled again: after
+the vehicle was handed over, never before."""
 
 
 class MavlinkVehicle:
@@ -32,9 +38,12 @@ class MavlinkVehicle:
         clock: vehicle time; a scaled one when the vehicle is simulated faster.
         on_report: hears every report, in order, in the loop's thread. It may give
             orders from inside the call.
+        key: shared with the autopilot: everything is signed, nothing unsigned believed.
+        forward: URLs of ground stations that are shown the vehicle; see
+            `agent.mavlink.forwarding`.
 
     Raises:
-        InputError: the URL is wrong, or this machine cannot open such a link.
+        InputError: a URL is wrong, or this machine cannot open such a link.
     """
 
     def __init__(
@@ -43,9 +52,17 @@ class MavlinkVehicle:
         url: str,
         clock: Clock,
         on_report: Callable[[Report], None],
+        *,
+        key: SigningKey | None = None,
+        forward: Sequence[str] = (),
     ) -> None:
-        self.bridge = Bridge(config)
-        self.link: Link = open_link(parse_link(url), self)
+        self.bridge = Bridge(config, None if key is None else Signing(key, unix_s))
+        redial_s = clock.wall_delay_s(_REDIAL_TIMEOUTS * config.silence_timeout_s)
+        self.link: Link = open_link(parse_link(url), self, silence_s=redial_s)
+        self._forwarding = Forwarding([parse_forward(each) for each in forward])
+        self.bridge.codec.keep_frames = bool(self._forwarding)
+        self._log = get_logger(__name__, link=self.link.url)
+        self._told_dropped: set[str] = set()
         self._clock = clock
         self._on_report = on_report
         self._events: deque[Event] = deque()
@@ -57,7 +74,15 @@ class MavlinkVehicle:
     async def start(self) -> None:
         """Open the link and go to work, in the running loop."""
         self.link.start()
+        self._forwarding.start()
         self._happen(Tick())
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Frames dropped so far, by reason."""
+        dropped = Counter(self.bridge.codec.distrusted)
+        dropped["not forwarded"] = self._forwarding.dropped
+        return +dropped
 
     def order(self, order: Orders) -> None:
         """Give the vehicle an order; what comes of it is reported."""
@@ -70,6 +95,7 @@ class MavlinkVehicle:
             self._timer.cancel()
             self._timer = None
         await self.link.close()
+        await self._forwarding.close()
 
     def link_up(self) -> None:
         """Called by the link."""
@@ -82,6 +108,15 @@ class MavlinkVehicle:
     def received(self, data: bytes) -> None:
         """Called by the link."""
         self._happen(Received(data))
+        self._forwarding.show(self.bridge.codec.take_frames())
+        self._tell_dropped()
+
+    def _tell_dropped(self) -> None:
+        """Tell people of every reason once: a hostile peer must not fill the log."""
+        for reason, count in self.bridge.codec.distrusted.items():
+            if reason not in self._told_dropped:
+                self._told_dropped.add(reason)
+                self._log.warning("frames are dropped", reason=reason, count=count)
 
     def _happen(self, event: Event) -> None:
         """Step the bridge; events that come up meanwhile follow in order."""

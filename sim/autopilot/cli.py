@@ -5,6 +5,7 @@ Leaves out: everything but options and output.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,6 +13,7 @@ import typer
 from swarm.options import JsonOption, LifelineOption, ScenarioArgument, SpeedupOption
 
 if TYPE_CHECKING:
+    from agent.mavlink.signing import SigningKey
     from sim.autopilot.endpoint import Endpoint
     from sim.autopilot.fleet import FleetMember
 
@@ -50,6 +52,16 @@ def autopilot(
             show_default=False,
         ),
     ] = None,
+    signing_key: Annotated[
+        Path | None,
+        typer.Option(
+            "--signing-key",
+            metavar="FILE",
+            help="Key of every vehicle, 32 bytes or 64 hexadecimal digits: it signs what it "
+            "says and hears nobody who does not.",
+            show_default=False,
+        ),
+    ] = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
 ) -> int:
@@ -64,6 +76,7 @@ def autopilot(
     """
     import asyncio
 
+    from agent.mavlink.signing_key import load_signing_key
     from sim.autopilot.endpoint import ENDPOINT_RULE, parse_endpoint
     from sim.autopilot.fleet import fleet_of
     from swarm.errors import Fault, InputError
@@ -85,13 +98,19 @@ def autopilot(
         )
     wanted = [UavId(name) for name in dict.fromkeys(uav)] if uav else None
     fleet = fleet_of(mission, wanted, system_id)
+    key = None if signing_key is None else load_signing_key(signing_key)
     return asyncio.run(
-        run_until_stopped(_serve(fleet, endpoint, speedup, quiet=json), lifeline=lifeline)
+        run_until_stopped(_serve(fleet, endpoint, speedup, key, quiet=json), lifeline=lifeline)
     )
 
 
 async def _serve(
-    fleet: tuple[FleetMember, ...], endpoint: Endpoint, speedup: float, *, quiet: bool
+    fleet: tuple[FleetMember, ...],
+    endpoint: Endpoint,
+    speedup: float,
+    key: SigningKey | None,
+    *,
+    quiet: bool,
 ) -> int:
     """Serve every vehicle until cancelled."""
     import asyncio
@@ -105,12 +124,13 @@ async def _serve(
     from swarm.errors import Fault, InputError
 
     clock = ScaledClock(speedup)
+    secret = None if key is None else key.secret
     servers: list[VehicleServer] = []
     try:
         for place, member in enumerate(fleet):
             vehicle = Vehicle(member.config, ArduCopter(), clock.now_s())
             own = endpoint.shifted(place)
-            server = VehicleServer(vehicle, own, clock)
+            server = VehicleServer(vehicle, own, clock, signing_secret=secret)
             servers.append(server)
             try:
                 await server.start()

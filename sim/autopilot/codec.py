@@ -1,13 +1,32 @@
 """Bytes <-> MAVLink 2 messages, on one channel.
 
-Anything malformed is dropped and counted. Leaves out: signing; sockets.
+Anything malformed is dropped and counted, and with a signing key so is what is not signed
+with it; every channel remembers for itself what it has heard. Signatures are pymavlink's
+own, so that the bridge's are checked by another implementation. Leaves out: sockets.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-__all__ = ["ChannelCodec"]
+__all__ = ["ChannelCodec", "ChannelSigning"]
+
+_EPOCH_UNIX_S = 1_420_070_400
+"""2015-01-01 GMT, from where MAVLink's signatures count."""
+_STAMPS_PER_S = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelSigning:
+    """What a channel signs with, and judges by."""
+
+    secret: bytes = field(repr=False)
+    """32 bytes."""
+    unix_s: float
+    """Wall time when the channel opens; its timestamps count on from there, and from the
+    newest heard, as those of an autopilot without a clock."""
 
 
 class ChannelCodec:
@@ -17,14 +36,26 @@ class ChannelCodec:
         system_id: whom our messages come from.
         component_id: whom our messages come from.
         datagrams: frames never reach from one piece of input into the next.
+        signing: key and first timestamp, if the conversation is signed.
     """
 
-    def __init__(self, system_id: int, component_id: int, *, datagrams: bool) -> None:
+    def __init__(
+        self,
+        system_id: int,
+        component_id: int,
+        *,
+        datagrams: bool,
+        signing: ChannelSigning | None = None,
+    ) -> None:
         self.garbage = 0
         """Pieces of input that were no message: noise, broken frames, unknown ids."""
         self._datagrams = datagrams
         self._mav = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         self._mav.robust_parsing = True
+        if signing is not None:
+            self._mav.signing.secret_key = signing.secret
+            self._mav.signing.timestamp = int((signing.unix_s - _EPOCH_UNIX_S) * _STAMPS_PER_S)
+            self._mav.signing.sign_outgoing = True
 
     def decode(self, data: bytes) -> list[mavlink.MAVLink_message]:
         """Messages completed by ``data``."""
@@ -51,3 +82,4 @@ class ChannelCodec:
         self._mav = mavlink.MAVLink(None, srcSystem=old.srcSystem, srcComponent=old.srcComponent)
         self._mav.robust_parsing = True
         self._mav.seq = old.seq
+        self._mav.signing = old.signing

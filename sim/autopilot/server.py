@@ -13,11 +13,11 @@ import itertools
 import socket
 from typing import Any, cast
 
-from sim.autopilot.codec import ChannelCodec
+from sim.autopilot.codec import ChannelCodec, ChannelSigning
 from sim.autopilot.endpoint import Endpoint, Transport
 from sim.autopilot.events import Connected, Disconnected, Event, Received, Tick
 from sim.autopilot.vehicle import COMPONENT_ID, Vehicle
-from swarm.clock import Clock
+from swarm.clock import Clock, unix_s
 
 __all__ = ["VehicleServer"]
 
@@ -38,10 +38,19 @@ class VehicleServer:
         vehicle: the machine.
         endpoint: where to offer it.
         clock: the vehicle's time.
+        signing_secret: signs what the vehicle says, and what is not signed so is not heard.
     """
 
-    def __init__(self, vehicle: Vehicle, endpoint: Endpoint, clock: Clock) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        endpoint: Endpoint,
+        clock: Clock,
+        *,
+        signing_secret: bytes | None = None,
+    ) -> None:
         self.vehicle = vehicle
+        self._signing_secret = signing_secret
         self._endpoint = endpoint
         self._clock = clock
         self._channels: dict[int, _Channel] = {}
@@ -133,6 +142,16 @@ class VehicleServer:
                 channel.send(batch)
         self._set_timer()
 
+    def new_codec(self, *, datagrams: bool) -> ChannelCodec:
+        """What a new channel speaks with."""
+        secret = self._signing_secret
+        return ChannelCodec(
+            self.vehicle.config.system_id,
+            COMPONENT_ID,
+            datagrams=datagrams,
+            signing=None if secret is None else ChannelSigning(secret, unix_s()),
+        )
+
     def wall_age_s(self, since_s: float) -> float:
         """Wall seconds since an instant of the vehicle's clock."""
         return self._clock.wall_delay_s(self._clock.now_s() - since_s)
@@ -177,7 +196,7 @@ class _TcpChannel(_Channel, asyncio.Protocol):
         self._server = server
         self._number = -1
         self._transport: asyncio.Transport | None = None
-        self.codec = _codec(server, datagrams=False)
+        self.codec = server.new_codec(datagrams=False)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.Transport", transport)
@@ -215,7 +234,7 @@ class _UdpPeer(_Channel):
         self._address = address
         self.number = -1
         self.heard_s = server.now_s()
-        self.codec = _codec(server, datagrams=True)
+        self.codec = server.new_codec(datagrams=True)
 
     def send(self, frames: list[bytes]) -> None:
         for frame in frames:
@@ -249,7 +268,7 @@ class _UdpSocket(asyncio.DatagramProtocol):
         peer = self._peers.get(key)
         if peer is None:
             # Noise makes nobody a peer; what is no message is dropped here.
-            if not _codec(self._server, datagrams=True).decode(data):
+            if not self._server.new_codec(datagrams=True).decode(data):
                 return
             self._make_room()
             peer = self._meet(key, addr)
@@ -281,10 +300,6 @@ class _UdpSocket(asyncio.DatagramProtocol):
             silent_s = self._server.wall_age_s(self._peers[key].heard_s)
             if place < crowded or silent_s > _PEER_SILENCE_WALL_S:
                 self._server.close_channel(self._peers.pop(key).number)
-
-
-def _codec(server: VehicleServer, *, datagrams: bool) -> ChannelCodec:
-    return ChannelCodec(server.vehicle.config.system_id, COMPONENT_ID, datagrams=datagrams)
 
 
 def _bracketed(host: str) -> str:

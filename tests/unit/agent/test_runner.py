@@ -49,6 +49,7 @@ class FakeVehicle:
     stays_away: bool = False
     orders: list[Orders] = field(default_factory=list)
     closed: int = 0
+    dropped: dict[str, int] = field(default_factory=dict)
 
     async def start(self) -> None:
         await asyncio.sleep(0)
@@ -323,13 +324,14 @@ def test_reports_that_come_after_the_end_do_no_harm() -> None:
 def test_the_core_is_told_what_was_dropped() -> None:
     async def scenario() -> None:
         async with at_work() as played:
-            await played.airborne()
+            vehicle = await played.airborne()
             played.coordinator.publish(KEYS.plan, b"nonsense")
             played.coordinator.publish(KEYS.claim("u1"), b"nonsense")
             played.say(message("u1", IDLE))
             await until(lambda: "u1" in played.core.replica.claims, "hearing u1")
+            vehicle.dropped["unsigned"] = 3
 
-            assert played.core.dropped == {"malformed": 2}
+            assert played.core.dropped == {"malformed": 2, "unsigned": 3}
 
     play(scenario)
 
