@@ -9,6 +9,7 @@ import pty
 import socket
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
+from typing import ParamSpec
 
 import pytest
 
@@ -25,6 +26,7 @@ from tests.fake_copter import FakeCopter
 pytestmark = pytest.mark.sitl
 
 PATIENCE_S = 10.0
+P = ParamSpec("P")
 
 
 class Listener:
@@ -45,12 +47,12 @@ class Listener:
         self.data += data
 
 
-def in_loop(test: Callable[[], Coroutine[None, None, None]]) -> Callable[[], None]:
+def in_loop(test: Callable[P, Coroutine[None, None, None]]) -> Callable[P, None]:
     """Run a test in a loop of its own."""
 
     @functools.wraps(test)
-    def run() -> None:
-        asyncio.run(test())
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        asyncio.run(test(*args, **kwargs))
 
     return run
 
@@ -290,6 +292,10 @@ class ServedCopter(asyncio.Protocol):
         self._say(self.copter.receive(data, self._clock.now_s()))
 
     def connection_lost(self, exc: Exception | None) -> None:
+        self._transport = None
+
+    def cut_silently(self) -> None:
+        """Say nothing more on this connection, which stays open; only a new one is served."""
         self._transport = None
 
     def _say(self, frames: list[bytes]) -> None:

@@ -1,0 +1,149 @@
+"""Bridge and simulated autopilot with a shared key, and others without it, through sockets."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.signing import SigningKey
+from agent.mavlink.vehicle import MavlinkVehicle
+from agent.vehicle import Arrived, GoTo, Home, NotReady, Report, Return, Telemetry, VehicleReady
+from sim.autopilot.config import VehicleConfig
+from sim.autopilot.endpoint import Endpoint, Transport
+from sim.autopilot.flavours.ardupilot import ArduCopter
+from sim.autopilot.server import VehicleServer
+from sim.autopilot.vehicle import Vehicle
+from swarm.clock import ScaledClock
+from tests.bridge_flight import ORIGIN, START
+from tests.sitl.test_bridge_link import until
+
+pytestmark = pytest.mark.sitl
+
+SPEEDUP = 20.0
+CONFIG = BridgeConfig(1, ORIGIN, position_rate_hz=20.0).for_speedup(SPEEDUP)
+KEY = SigningKey(bytes(range(32)))
+LAND_NOW = mavlink.MAVLink_command_long_message(1, 1, 176, 0, 1, 9, 0, 0, 0, 0, 0)
+
+
+class Fleet:
+    """One simulated vehicle, and the bridge that flies it."""
+
+    def __init__(self, server: VehicleServer, key: SigningKey | None, clock: ScaledClock) -> None:
+        self.server = server
+        self.reports: list[Report] = []
+        self.bridge = MavlinkVehicle(CONFIG, server.url, clock, self.reports.append, key=key)
+
+    @property
+    def news(self) -> list[Report]:
+        return [r for r in self.reports if not isinstance(r, Telemetry | NotReady)]
+
+
+@asynccontextmanager
+async def fleet(
+    transport: Transport, vehicle_key: SigningKey | None, bridge_key: SigningKey | None
+) -> AsyncIterator[Fleet]:
+    clock = ScaledClock(SPEEDUP)
+    machine = Vehicle(
+        VehicleConfig(1, start_enu_m=(5.0, 0.0, 0.0), origin=ORIGIN), ArduCopter(), clock.now_s()
+    )
+    secret = None if vehicle_key is None else vehicle_key.secret
+    endpoint = Endpoint(transport, "127.0.0.1", 0)
+    server = VehicleServer(machine, endpoint, clock, signing_secret=secret)
+    await server.start()
+    one = Fleet(server, bridge_key, clock)
+    try:
+        await one.bridge.start()
+        yield one
+    finally:
+        await one.bridge.close()
+        await server.close()
+
+
+@pytest.mark.parametrize("transport", [Transport.TCP, Transport.UDP_IN])
+def test_signed_mission_is_flown_and_a_station_without_the_key_is_not_heard(
+    transport: Transport,
+) -> None:
+    async def scenario() -> None:
+        async with fleet(transport, KEY, KEY) as one:
+            one.bridge.order(START)
+            await until(lambda: VehicleReady() in one.reports)
+            stranger = Stranger()
+            async with stranger.connected(one.server):
+                one.bridge.order(GoTo(1, (5.0, 40.0, 10.0)))
+                while Arrived(1) not in one.reports:
+                    stranger.say(LAND_NOW)
+                    await asyncio.sleep(0.02)
+            one.bridge.order(Return("done"))
+            await until(lambda: Home() in one.reports)
+            assert one.news == [VehicleReady(), Arrived(1), Home()]
+            assert "COMMAND_ACK" not in stranger.heard
+            assert "unsigned" not in one.bridge.dropped
+
+    asyncio.run(scenario())
+
+
+class Stranger(asyncio.DatagramProtocol, asyncio.Protocol):
+    """A ground station without the key, on a connection of its own."""
+
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+        self._mav = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+        self._mav.robust_parsing = True
+        self._write: Callable[[bytes], None] | None = None
+
+    @asynccontextmanager
+    async def connected(self, server: VehicleServer) -> AsyncIterator[None]:
+        kind, host, port = server.url.split(":")
+        loop = asyncio.get_running_loop()
+        transport: asyncio.BaseTransport
+        if kind == "tcp":
+            stream, _ = await loop.create_connection(lambda: self, host, int(port))
+            transport, self._write = stream, stream.write
+        else:
+            socket, _ = await loop.create_datagram_endpoint(
+                lambda: self, remote_addr=(host, int(port))
+            )
+            transport, self._write = socket, socket.sendto
+        try:
+            yield
+        finally:
+            transport.close()
+
+    def say(self, message: mavlink.MAVLink_message) -> None:
+        assert self._write is not None
+        self._write(bytes(message.pack(self._mav)))
+
+    def data_received(self, data: bytes) -> None:
+        self.heard += [m.get_type() for m in self._mav.parse_buffer(data) or ()]
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        self.data_received(data)
+
+
+def test_a_vehicle_without_the_key_is_not_believed() -> None:
+    async def scenario() -> None:
+        async with fleet(Transport.TCP, None, KEY) as one:
+            one.bridge.order(START)
+            reason = "heard only frames that are not to be believed: unsigned"
+            await until(lambda: NotReady(reason) in one.reports)
+            assert list(one.bridge.dropped) == ["unsigned"]
+            assert one.news == []
+            assert not one.server.vehicle.pilot.armed
+
+    asyncio.run(scenario())
+
+
+def test_a_bridge_without_the_key_hears_a_signed_vehicle_and_is_not_heard() -> None:
+    async def scenario() -> None:
+        async with fleet(Transport.TCP, KEY, None) as one:
+            one.bridge.order(START)
+            booted = NotReady("setting the guided mode refused (no answer), trying again")
+            await until(lambda: booted in one.reports)
+            assert one.server.garbage > 0
+
+    asyncio.run(scenario())

@@ -1,0 +1,231 @@
+"""Links that break, fall silent or cannot be opened at first, over real sockets."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import pty
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.link import Link, open_link
+from agent.mavlink.link_address import TcpAddress, UdpOutAddress, parse_link
+from agent.mavlink.vehicle import MavlinkVehicle
+from agent.vehicle import GoTo, HandedOver, Report, VehicleReady
+from swarm.clock import ScaledClock
+from tests.bridge_flight import ORIGIN, START
+from tests.sitl.test_bridge_link import (
+    Listener,
+    ServedCopter,
+    Server,
+    free_port,
+    in_loop,
+    opened,
+    until,
+)
+
+pytestmark = pytest.mark.sitl
+
+
+@asynccontextmanager
+async def impatient(url: str, listener: Listener, silence_s: float) -> AsyncIterator[Link]:
+    link = open_link(parse_link(url), listener, silence_s=silence_s)
+    link.start()
+    try:
+        yield link
+    finally:
+        await link.close()
+
+
+async def up(listener: Listener, times: int = 1) -> None:
+    await until(lambda: listener.ups == times)
+
+
+async def down(listener: Listener, times: int) -> None:
+    await until(lambda: listener.downs == times)
+
+
+async def heard(listener: Listener, size: int) -> None:
+    await until(lambda: len(listener.data) == size)
+
+
+@in_loop
+async def test_server_that_accepts_and_says_nothing_is_dialled_again() -> None:
+    server, listener = Server(), Listener()
+    port = await server.listen()
+    async with impatient(f"tcp:127.0.0.1:{port}", listener, 0.1):
+        await until(lambda: listener.ups >= 3)
+    assert listener.downs == listener.ups
+    await server.stop()
+
+
+@in_loop
+async def test_server_that_speaks_now_and_then_is_left_alone() -> None:
+    server, listener = Server(), Listener()
+    port = await server.listen()
+    async with impatient(f"tcp:127.0.0.1:{port}", listener, 0.5):
+        await until(lambda: server.writer is not None)
+        assert server.writer is not None
+        for _ in range(20):
+            server.writer.write(b"heartbeat")
+            await asyncio.sleep(0.05)
+        assert (listener.ups, listener.downs) == (1, 0)
+    await server.stop()
+
+
+@in_loop
+async def test_vehicle_behind_a_half_open_connection_is_handed_over_and_heard_again() -> None:
+    speedup = 20.0
+    clock = ScaledClock(speedup)
+    served = ServedCopter(clock)
+    port = await served.listen()
+    reports: list[Report] = []
+    config = BridgeConfig(1, ORIGIN, silence_timeout_s=10.0, position_rate_hz=20.0)
+    vehicle = MavlinkVehicle(config, f"tcp:127.0.0.1:{port}", clock, reports.append)
+    try:
+        await vehicle.start()
+        vehicle.order(START)
+        await until(lambda: VehicleReady() in reports)
+        vehicle.order(GoTo(1, (5.0, 500.0, 10.0)))
+        served.cut_silently()
+        silent = HandedOver("no heartbeat for 10 s")
+        await until(lambda: silent in reports)
+        before = len(reports)
+        await until(lambda: len(reports) > before)
+    finally:
+        await vehicle.close()
+        await served.stop()
+    assert [r for r in reports if isinstance(r, HandedOver)] == [silent]
+
+
+class Names:
+    """A resolver in whose place tests can say which names there are."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, name: str) -> None:
+        self.asked = 0
+        self.known = False
+        self._name = name
+        self._ask = loop.getaddrinfo
+
+    async def getaddrinfo(self, host: str, port: int, **how: Any) -> Any:
+        assert host == self._name
+        self.asked += 1
+        if not self.known:
+            raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+        return await self._ask("127.0.0.1", port, **how)
+
+    async def asked_more_than(self, times: int) -> None:
+        await until(lambda: self.asked > times)
+
+
+@in_loop
+async def test_host_that_becomes_known_later_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = asyncio.get_running_loop()
+    names = Names(loop, "drone.local")
+    monkeypatch.setattr(loop, "getaddrinfo", names.getaddrinfo)
+    server = Server()
+    port = await server.listen()
+    for address in (TcpAddress("drone.local", port), UdpOutAddress("drone.local", port)):
+        listener = Listener()
+        names.known = False
+        before = names.asked
+        async with opened(str(address), listener):
+            await names.asked_more_than(before)
+            assert listener.ups == 0
+            names.known = True
+            await up(listener)
+    await server.stop()
+
+
+@in_loop
+async def test_links_speak_ip_version_6() -> None:
+    listener, server = Listener(), await asyncio.start_server(_echo, "::1", 0)
+    port = server.sockets[0].getsockname()[1]
+    async with opened(f"tcp:[::1]:{port}", listener) as link:
+        await until(lambda: listener.ups == 1)
+        link.send(b"ping")
+        await until(lambda: listener.data == b"ping")
+    server.close()
+    await server.wait_closed()
+
+    here, there, port = Listener(), Listener(), free_port(socket.SOCK_DGRAM)
+    async with opened(f"udpin:[::1]:{port}", here) as waiting:
+        await until(lambda: here.ups == 1)
+        async with opened(f"udpout:[::1]:{port}", there) as calling:
+            await until(lambda: there.ups == 1)
+            calling.send(b"ping")
+            await until(lambda: here.data == b"ping")
+            waiting.send(b"pong")
+            await until(lambda: there.data == b"pong")
+
+
+async def _echo(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    while data := await reader.read(100):
+        writer.write(data)
+    writer.close()
+
+
+@in_loop
+async def test_listening_link_turns_to_a_vehicle_that_comes_back_from_another_port(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("agent.mavlink.link._PEER_SILENCE_S", 0.1)
+    port, listener = free_port(socket.SOCK_DGRAM), Listener()
+    async with opened(f"udpin:127.0.0.1:{port}", listener) as waiting:
+        await until(lambda: listener.ups == 1)
+        loop = asyncio.get_running_loop()
+        for place, word in enumerate((b"first", b"again"), start=1):
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+                peer.setblocking(False)
+                peer.connect(("127.0.0.1", port))
+                peer.send(word)
+                await heard(listener, 5 * place)
+                waiting.send(b"answer")
+                async with asyncio.timeout(5.0):
+                    assert await loop.sock_recv(peer, 100) == b"answer"
+            await asyncio.sleep(0.2)
+        assert (listener.ups, listener.downs) == (1, 0)
+
+
+@in_loop
+async def test_port_that_another_process_holds_is_waited_for() -> None:
+    port, listener = free_port(socket.SOCK_DGRAM), Listener()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
+        holder.bind(("127.0.0.1", port))
+        async with opened(f"udpin:127.0.0.1:{port}", listener):
+            await asyncio.sleep(0.15)
+            assert listener.ups == 0
+            holder.close()
+            await until(lambda: listener.ups == 1)
+
+
+@in_loop
+async def test_serial_device_that_is_plugged_in_again_is_opened_again(tmp_path: Path) -> None:
+    listener, device = Listener(), tmp_path / "ttyACM0"
+    async with opened(f"serial:{device}:115200", listener) as link:
+        for plugged in (1, 2):
+            far, near = pty.openpty()
+            device.symlink_to(os.ttyname(near))
+            os.close(near)
+            await up(listener, plugged)
+            link.send(b"ping")
+            assert os.read(far, 100) == b"ping"
+            os.close(far)
+            device.unlink()
+            await down(listener, plugged)
+
+
+@in_loop
+async def test_why_a_link_does_not_open_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+    port, listener = free_port(socket.SOCK_STREAM), Listener()
+    async with opened(f"tcp:127.0.0.1:{port}", listener):
+        await asyncio.sleep(0.5)
+    lines = [line for line in capsys.readouterr().err.splitlines() if "does not open" in line]
+    assert len(lines) == 1
+    assert "Connect call failed" in lines[0]
