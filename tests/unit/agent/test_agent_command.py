@@ -43,8 +43,6 @@ def test_a_key_that_cannot_be_used_is_told(
 def test_a_ground_station_that_is_no_address_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     good, bad = ["--forward", "udp:127.0.0.1:14550"], ["--forward", "udp:127.0.0.1"]
     assert main([*AGENT, *good, *bad]) == 2
-    assert capsys.readouterr() == (
-        "",
-        "--forward: udp:127.0.0.1: a part is missing; "
-        "give udp:HOST:PORT, such as udp:192.168.1.5:14550\n",
-    )
+    remedy = "give udp:HOST:PORT, such as udp:192.168.1.5:14550"
+    line = f"--forward: udp:127.0.0.1: a part is missing; {remedy}\n"
+    assert capsys.readouterr() == ("", line)
