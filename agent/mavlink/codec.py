@@ -43,9 +43,9 @@ from agent.mavlink.messages import (
     ParameterSet,
     Position,
     SystemStatus,
-    Text,
 )
 from agent.mavlink.signing import Signing
+from agent.mavlink.texts import TextJoiner
 
 __all__ = ["MavlinkCodec"]
 
@@ -84,6 +84,7 @@ class MavlinkCodec:
         self._own_component = source_component_id
         self._signing = signing
         self._framer = Framer(signing)
+        self._texts = TextJoiner()
         self._sender = mavlink.MAVLink(
             None, srcSystem=source_system_id, srcComponent=source_component_id
         )
@@ -117,7 +118,12 @@ class MavlinkCodec:
             if self.keep_frames and frame.system_id == self._target:
                 self._kept_frames.append(frame.data)
             raw = frame.message
-            convert = None if raw is None else _CONVERTERS.get(raw.get_msgId())
+            if raw is None:
+                continue
+            if raw.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+                heard += self._texts_of(raw)
+                continue
+            convert = _CONVERTERS.get(raw.get_msgId())
             if convert is None:
                 continue
             if not self._addressed_to_us(raw):
@@ -143,8 +149,17 @@ class MavlinkCodec:
         return frames
 
     def reset_link(self) -> None:
-        """Forget a half-received frame, because the link is a new one."""
+        """Forget a half-received frame or text, because the link is a new one."""
         self._framer.reset()
+        self._texts.forget()
+
+    def _texts_of(self, raw: Any) -> list[Heard]:
+        """Texts of the autopilot that are complete by this chunk; nobody else's are joined."""
+        sender = (raw.get_srcSystem(), raw.get_srcComponent())
+        if sender != (self._target, _AUTOPILOT_COMPONENT):
+            return []
+        texts = self._texts.add(raw.severity, str(raw.text), raw.id, raw.chunk_seq)
+        return [Heard(*sender, text) for text in texts]
 
     def _addressed_to_us(self, raw: Any) -> bool:
         """Whether ``raw`` is for us or for everybody (MAVLink 1 acknowledgements say 0)."""
@@ -243,8 +258,10 @@ def _battery_frac(remaining_percent: int) -> float | None:
 def _system_status(raw: Any) -> Inbound | None:
     bit = mavlink.MAV_SYS_STATUS_PREARM_CHECK
     reported = raw.onboard_control_sensors_present & raw.onboard_control_sensors_enabled & bit
+    healthy = bool(raw.onboard_control_sensors_health & bit)
     return SystemStatus(
-        prearm_ok=bool(raw.onboard_control_sensors_health & bit) if reported else None,
+        prearm_ok=healthy if reported else None,
+        prearm_healthy=healthy,
         battery_frac=_battery_frac(raw.battery_remaining),
     )
 
@@ -264,11 +281,6 @@ def _extended_state(raw: Any) -> Inbound | None:
 
 def _command_ack(raw: Any) -> Inbound | None:
     return CommandAck(raw.command, raw.result)
-
-
-def _text(raw: Any) -> Inbound | None:
-    printable = "".join(c if c.isprintable() else "?" for c in str(raw.text))
-    return Text(raw.severity, printable)
 
 
 def _parameter(raw: Any) -> Inbound | None:
@@ -325,7 +337,6 @@ _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_state,
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK: _command_ack,
-    mavlink.MAVLINK_MSG_ID_STATUSTEXT: _text,
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
     mavlink.MAVLINK_MSG_ID_PARAM_ERROR: _parameter_missing,
     mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: _mission_request,

@@ -26,8 +26,11 @@ __all__ = ["Preparation"]
 
 _CLIMB_PROGRESS_M = 0.2
 _CLIMB_TOLERANCE_FRAC = 0.05
+_CLIMB_TOLERANCE_M = 1.0
+"""Autopilots end a takeoff that much too low, and go on from there."""
 _PREARM_TEXT_AGE_S = 35.0
 """ArduPilot repeats what fails before arming every 30 s."""
+_CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
 _FLOWN_BY_PILOT = "its pilot flew and landed it; prepare it again to take off"
 
 
@@ -57,7 +60,8 @@ class Preparation:
         self._flavour = flavour
         _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
         wait_s = config.effect_timeout_s
-        self._mode = _Step("mode", "setting the guided mode", config.mode_tries, wait_s)
+        mode = flavour.commanded_mode_name
+        self._mode = _Step("mode", f"setting {mode}", config.mode_tries, wait_s)
         self._arm = _Step("arm", "arming", config.arm_tries, wait_s)
         # ArduCopter spools up for 3 to 4 s before it leaves the ground.
         self._takeoff = _Step("takeoff", "takeoff", config.takeoff_tries, 2.0 * wait_s)
@@ -65,6 +69,7 @@ class Preparation:
         self._highest_m = -math.inf
         self._climbed_at_s = math.inf
         self._climbing = False
+        self._saw_takeoff = False
         self._flew = False
         self._flown_by_pilot = False
         self._leg: Leg | None = None
@@ -122,12 +127,15 @@ class Preparation:
             return []
         if not flavour.has_booted(heartbeat):
             return self._wait("the autopilot is booting")
+        if heartbeat.armed and flavour.is_taking_off(heartbeat.custom_mode):
+            return self._follow_takeoff(now_s)
         if not flavour.is_commanded(heartbeat.custom_mode):
             if heartbeat.armed:
                 self._flown_by_pilot = True
                 mode = flavour.mode_name(heartbeat.custom_mode)
                 return self._wait(
-                    f"armed in {mode} by its pilot: land it, or switch it to the guided mode"
+                    f"armed in {mode} by its pilot: land it, "
+                    f"or switch it to {flavour.commanded_mode_name}"
                 )
             if self._flown_by_pilot:
                 return self._fail(_FLOWN_BY_PILOT)
@@ -140,13 +148,18 @@ class Preparation:
         position = vehicle.position
         if position is None:
             return self._wait("waiting for a position")
-        if not flavour.airborne(vehicle):
+        airborne = flavour.airborne(vehicle)
+        if airborne is None:
+            return self._wait("waiting to hear whether it flies (EXTENDED_SYS_STATE)")
+        if not airborne:
             return self._take_off(position, vehicle, now_s)
         self._flew = True
+        # Repeated now, it would interrupt what follows.
+        out: list[Outbound] = [*self._commands.cancel(self._takeoff.tag, now_s)]
         if self._climbing and not self._high_enough(position, now_s):
-            return []
+            return out
         self._climbing = False
-        return self._settle(vehicle, now_s)
+        return out + self._settle(vehicle, now_s)
 
     def _start_motors(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
         if self._flew:
@@ -186,13 +199,26 @@ class Preparation:
         command = self._flavour.takeoff(self._start_alt_m, _home_alt_m(position))
         return self._ask(self._takeoff, command, vehicle, now_s)
 
+    def _follow_takeoff(self, now_s: float) -> list[Outbound]:
+        """Wait for the end of a takeoff that the vehicle carries out in a mode of its own."""
+        self._saw_takeoff = True
+        if not self.took_off:
+            # An earlier life's, or a pilot's.
+            self._flown_by_pilot = not self._order.resume
+            return self._wait("waiting for the takeoff under way to end")
+        if now_s - self._climbed_at_s > self._config.climb_timeout_s:
+            return self._fail(_CLIMB_STOPPED)
+        return self._wait("climbing")
+
     def _high_enough(self, position: Position, now_s: float) -> bool:
         height_m = self._start_alt_m - _home_alt_m(position)
-        tolerance_m = max(self._config.acceptance_radius_m, _CLIMB_TOLERANCE_FRAC * height_m)
+        tolerance_m = max(
+            self._config.acceptance_radius_m, _CLIMB_TOLERANCE_M, _CLIMB_TOLERANCE_FRAC * height_m
+        )
         if position.alt_m >= self._start_alt_m - tolerance_m:
             return True
         if now_s - self._climbed_at_s > self._config.climb_timeout_s:
-            self._fail("the vehicle took off and then stopped climbing")
+            self._fail(_CLIMB_STOPPED)
         else:
             self._wait(f"climbing to {height_m:.0f} m")
         return False
@@ -219,7 +245,8 @@ class Preparation:
 
     def _resumes(self, vehicle: VehicleState) -> bool:
         """Whether it flies on orders of an earlier life, beyond its takeoff."""
-        return self._order.resume and not self.took_off and vehicle.landed is not Landed.TAKEOFF
+        taking_off = self._saw_takeoff or vehicle.landed is Landed.TAKEOFF
+        return self._order.resume and not self.took_off and not taking_off
 
     def _ask(
         self, step: _Step, command: Command, vehicle: VehicleState, now_s: float

@@ -53,7 +53,7 @@ class Returning:
         if self._flavour.is_returning(custom_mode):
             self._seen = True
             return True
-        return self._flavour.is_commanded(custom_mode) and not self._seen
+        return self._obeys(custom_mode) and not self._seen
 
     def advance(self, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
         """Set the mode as long as it is not seen and the vehicle still takes our orders."""
@@ -61,7 +61,7 @@ class Returning:
             self._disarmed_since_s = None
         elif self._disarmed_since_s is None:
             self._disarmed_since_s = now_s
-        if not heartbeat.armed or not self._flavour.is_commanded(heartbeat.custom_mode):
+        if not heartbeat.armed or not self._obeys(heartbeat.custom_mode):
             return []
         if self._commands.pending(_TAG) or now_s < self._next_at_s:
             return []
@@ -70,6 +70,11 @@ class Returning:
             return []
         self._tries += 1
         return [*self._commands.send(_TAG, self._flavour.set_return_mode(), now_s)]
+
+    def _obeys(self, custom_mode: int) -> bool:
+        """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
+        flavour = self._flavour
+        return flavour.is_commanded(custom_mode) or flavour.is_taking_off(custom_mode)
 
     def disarmed_long(self, now_s: float) -> bool:
         """Whether the motors have stood still for a while."""

@@ -102,6 +102,16 @@ class ArduCopter:
             (147, Battery),
         )
 
+    @property
+    def acknowledged_twice(self) -> frozenset[int]:
+        """None."""
+        return frozenset()
+
+    @property
+    def commanded_mode_name(self) -> str:
+        """GUIDED."""
+        return "GUIDED"
+
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether it is an ArduPilot copter."""
         return (
