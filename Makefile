@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
-.PHONY: demo test lint format kernels sanitize soak chaos clean help
+.PHONY: demo test lint format kernels sanitize soak chaos fuzz clean help
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
@@ -16,6 +16,7 @@ help:
 	@echo "make sanitize  test the kernels under the address and undefined-behaviour sanitizers"
 	@echo "make soak    play 10000 random missions with faults in virtual time (SEEDS=N for more)"
 	@echo "make chaos   kill and restart real processes at random moments of whole missions, 60 flights"
+	@echo "make fuzz    throw a million hostile inputs of each firmware at a bridge (STEPS=N for more)"
 	@echo "make clean   remove what was built and installed here"
 
 demo: $(VENV)/.installed
@@ -77,6 +78,11 @@ soak: $(VENV)/.installed
 
 chaos: $(VENV)/.installed
 	$(BIN)/python -m sim.chaos --jobs 2
+
+STEPS ?= 1000000
+SEED ?= 1
+fuzz: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.benchmarks.fuzz_bridge --steps $(STEPS) --seed $(SEED)
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

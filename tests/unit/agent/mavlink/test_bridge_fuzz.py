@@ -14,7 +14,7 @@ from swarm.model.frames import enu_from_wgs84
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.fake_copter import ARM, INTERVAL, REPOSITION, SET_MODE, SPEED, TAKEOFF, FakeCopter
 from tests.fake_px4 import FakePx4
-from tests.unit.agent.mavlink.test_codec import crafted
+from tests.mavlink_frames import crafted
 
 FAKES = (FakeCopter, FakePx4)
 TARGET = (5.0, 30.0, 10.0)

@@ -40,13 +40,9 @@ from agent.mavlink.messages import (
     SystemStatus,
     Text,
 )
+from tests.mavlink_frames import crafted, frame, rebuilt
 
 RECORDINGS = sorted(Path("tests/data/recordings").glob("arducopter-*.jsonl"))
-
-
-def frame(message: Any, system: int = 1, component: int = 1) -> bytes:
-    """That message as a vehicle sends it."""
-    return bytes(message.pack(mavlink.MAVLink(None, srcSystem=system, srcComponent=component)))
 
 
 def heartbeat(system: int = 1) -> bytes:
@@ -56,20 +52,6 @@ def heartbeat(system: int = 1) -> bytes:
 def recorded(path: Path, sender: str) -> list[dict[str, Any]]:
     rows = [json.loads(line) for line in path.read_text().splitlines()]
     return [row for row in rows if row["from"] == sender]
-
-
-def rebuilt(row: dict[str, Any]) -> Any:
-    """A recorded message, to be sent again."""
-    kind = getattr(mavlink, f"MAVLink_{row['msg'].lower()}_message")
-    fields = dict(row)
-    for name in kind.fieldnames:
-        value = fields.get(name)
-        if isinstance(value, str):
-            fields[name] = math.nan if value == "nan" else value.encode()
-        elif isinstance(value, list):
-            fields[name] = [math.nan if v == "nan" else v for v in value]
-    present = {name: fields[name] for name in kind.fieldnames if name in fields}
-    return kind(**present)
 
 
 @pytest.mark.parametrize("path", RECORDINGS, ids=lambda path: path.stem)
@@ -289,11 +271,3 @@ def test_any_contents_under_a_valid_checksum_never_raise(
 ) -> None:
     data = crafted(message_id, payload, system)
     MavlinkCodec(1).decode(data + heartbeat())
-
-
-def crafted(message_id: int, payload: bytes, system: int = 1) -> bytes:
-    """A frame of that message with any payload and a valid checksum."""
-    kind = mavlink.mavlink_map[message_id]
-    header = bytes([len(payload), 0, 0, 0, system, 1]) + message_id.to_bytes(3, "little")
-    crc: int = mavlink.x25crc(header + payload + bytes([kind.crc_extra])).crc
-    return b"\xfd" + header + payload + crc.to_bytes(2, "little")

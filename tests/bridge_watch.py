@@ -1,0 +1,300 @@
+"""What must hold after every step of a bridge, whatever it hears: all of it in one place.
+
+1. It never raises (who steps it sees to that).
+2. All it sends are whole MAVLink frames of its own, addressed to the configured vehicle
+   and to nobody else.
+3. Of the commands there are only those of its phase, and those give what was ordered: a
+   mode of ours, motors, a takeoff and targets.
+4. A target is one that was ordered and lies within the fence, or the place where the vehicle
+   said it was when it was told to hold.
+5. After a hand-over it says nothing but heartbeats and requests for messages, until it is
+   given a new order.
+6. It reports what was asked for: the leg under way, once; numbers that are numbers.
+7. It wants to be called again within a heartbeat's interval, and not at once for ever.
+8. It remembers no more for hearing more.
+
+Leaves out: whether it does anything useful.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from agent.mavlink.bridge import Bridge, Phase
+from agent.mavlink.config import CommandStyle
+from agent.mavlink.events import Action, Event, Send, Tick
+from agent.vehicle import (
+    Arrived,
+    GoTo,
+    HandedOver,
+    Hold,
+    Prepare,
+    Refused,
+    Report,
+    Return,
+    Telemetry,
+    VehicleReady,
+)
+from swarm.model.frames import enu_from_wgs84
+from tests.fake_copter import ARM, INTERVAL, REPOSITION, SET_MODE, SPEED, TAKEOFF, FakeCopter
+
+__all__ = ["BridgeWatch", "BrokenError"]
+
+_MODE_ENABLED = 1.0
+_TOLERANCE_M = 0.1
+"""Of places on the wire: 1e-7 degrees, and heights of 24 bits."""
+_MOST_REMEMBERED = 4_000
+"""Entries of all collections that a bridge holds, its constants included."""
+_MOST_BUFFERED_BYTES = 280
+"""The longest frame there is."""
+_MISSION_MESSAGES = {
+    "MISSION_COUNT",
+    "MISSION_ITEM_INT",
+    "MISSION_REQUEST_INT",
+    "MISSION_REQUEST_LIST",
+    "MISSION_ACK",
+    "MISSION_SET_CURRENT",
+}
+_WAYPOINT = 16
+_COMMANDS: dict[Phase, set[int]] = {
+    Phase.IDLE: {ARM},
+    Phase.PREPARING: {SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED},
+    Phase.HOVERING: {REPOSITION},
+    Phase.FLYING: {REPOSITION},
+    Phase.RETURNING: {SET_MODE},
+    Phase.HANDED_OVER: set(),
+}
+"""What may be commanded in each phase, beside requests for messages."""
+
+
+class BrokenError(AssertionError):
+    """A bridge did what it must not do."""
+
+
+def hold(condition: bool, what: str) -> None:
+    if not condition:
+        raise BrokenError(what)
+
+
+class BridgeWatch:
+    """Watches one bridge from its beginning.
+
+    Args:
+        bridge: steps are taken through `step` only.
+        fake: the kind of vehicle it flies, for the numbers of modes.
+    """
+
+    def __init__(self, bridge: Bridge, fake: type[FakeCopter]) -> None:
+        self.bridge = bridge
+        self.fake = fake
+        self.steps = 0
+        self._parser = mavlink.MAVLink(None)
+        self._places_m: list[tuple[float, float, float]] = []
+        """Where the vehicle may be sent: the last places ordered."""
+        self._here_m: tuple[float, float, float] | None = None
+        """Where the vehicle says it is."""
+        self._hold_m: tuple[float, float, float] | None = None
+        """Where it was told to hold."""
+        self._prepared = False
+        """Whether `Prepare` has been ordered and not been answered."""
+        self._leg: int | None = None
+        """Under way."""
+        self._leg_before: int | None = None
+        """Under way before this step."""
+        self._ordered: object = None
+        """In this step."""
+        self._silent = False
+        """Handed over, and nothing ordered since."""
+        self._mode_wanted: set[tuple[float, float]] = set()
+
+    def step(self, event: Event, now_s: float) -> list[Action]:
+        """Step the bridge and look at what it does."""
+        self.steps += 1
+        before = self.bridge.phase
+        self._leg_before, self._ordered = self._leg, event
+        if isinstance(event, Prepare | GoTo | Hold | Return):
+            self._note(event)
+        actions = self.bridge.step(event, now_s)
+        after = self.bridge.phase
+        for action in actions:
+            if isinstance(action, Send):
+                self._look_at(self._decoded(action.data), before, after)
+            else:
+                self._take(action)
+        actions += self._see_deadline(now_s)
+        self._see_size()
+        return actions
+
+    def _note(self, order: Prepare | GoTo | Hold | Return) -> None:
+        self._silent = False
+        match order:
+            case Prepare(position_enu_m):
+                self._places_m = [*self._places_m[-3:], position_enu_m]
+                self._prepared = True
+                self._leg = None
+            case GoTo(leg, position_enu_m):
+                self._places_m = [*self._places_m[-3:], position_enu_m]
+                self._leg = leg
+            case Hold():
+                self._hold_m = self._here_m
+                self._leg = None
+            case Return():
+                self._leg = None
+
+    # What it sends.
+
+    def _decoded(self, data: bytes) -> Any:
+        messages = self._parser.parse_buffer(data) or []
+        hold(len(messages) == 1, f"sent {len(messages)} messages as one: {data.hex()}")
+        message = messages[0]
+        config = self.bridge.config
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        hold(sender == (config.ground_system_id, config.ground_component_id), f"sent as {sender}")
+        if message.get_type() != "HEARTBEAT":
+            target = (message.target_system, message.target_component)
+            hold(target == (config.system_id, 1), f"{message.get_type()} sent to {target}")
+        return message
+
+    def _look_at(self, message: Any, before: Phase, after: Phase) -> None:
+        name = message.get_type()
+        phases = {before, after}
+        missions = self.bridge.config.command is CommandStyle.MISSION
+        if name == "HEARTBEAT":
+            hold(message.type == mavlink.MAV_TYPE_GCS, f"heartbeat of type {message.type}")
+            return
+        if name == "COMMAND_LONG" and message.command == INTERVAL:
+            hold(message.param2 > 0.0, f"message interval {message.param2}")
+            return
+        hold(not self._silent, f"{name} after a hand-over: {message}")
+        if name in ("PARAM_REQUEST_READ", "PARAM_SET"):
+            hold(Phase.PREPARING in phases, f"{name} while {before}, {after}")
+            hold(message.param_id in self.fake.speed_names, f"{name} of {message.param_id}")
+        elif name in _MISSION_MESSAGES:
+            hold(missions, f"{name}, though commanded by targets")
+            if name == "MISSION_ITEM_INT" and message.command == _WAYPOINT:
+                self._see_place(message)
+        elif name in ("COMMAND_LONG", "COMMAND_INT"):
+            self._see_command(message, phases, missions=missions)
+        else:
+            hold(False, f"sends {name}")
+
+    def _see_command(self, message: Any, phases: set[Phase], *, missions: bool) -> None:
+        allowed = set[int]().union(*(_COMMANDS[phase] for phase in phases))
+        if missions:
+            allowed |= {SET_MODE, SPEED}
+        hold(message.command in allowed, f"commands {message.command} while {phases}")
+        match message.command:
+            case 192:
+                hold(message.get_type() == "COMMAND_INT", "a target without a place")
+                self._see_place(message)
+            case 22:
+                self._see_takeoff(message)
+            case 400:
+                hold(message.param1 in (0.0, 1.0), f"motors {message.param1}")
+                hold(message.param2 == 0.0, "motors by force")
+                if message.param1 == 1.0:
+                    hold(Phase.PREPARING in phases, f"motors started while {phases}")
+            case 176:
+                hold(message.param1 == _MODE_ENABLED, f"mode of kind {message.param1}")
+            case 178:
+                hold(0.0 < message.param2 < 100.0, f"speed {message.param2} m/s")
+
+    def _see_place(self, message: Any) -> None:
+        config = self.bridge.config
+        place_m = enu_from_wgs84(config.origin, message.x / 1e7, message.y / 1e7, message.z)
+        hold(math.isfinite(message.z), f"sent to height {message.z}")
+        if self._hold_m is not None and _near(place_m, self._hold_m):
+            return
+        fault = config.out_of_bounds(place_m)
+        hold(fault is None, f"sent beyond the fence, to {place_m}: {fault}")
+        ordered = any(_near(place_m, place) for place in self._places_m)
+        hold(ordered, f"sent to {place_m}, not to {self._places_m}")
+
+    def _see_takeoff(self, message: Any) -> None:
+        """Above home on ArduPilot, above the sea on PX4: at most across the fence."""
+        config = self.bridge.config
+        height_m = message.param7
+        if self.fake.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+            height_m -= config.origin.alt_m
+            hold(abs(height_m) <= config.fence_height_m + 0.1, f"takeoff to {height_m} m")
+        else:
+            hold(0.0 < height_m <= 2.0 * config.fence_height_m, f"takeoff by {height_m} m")
+
+    # What it reports.
+
+    def _take(self, report: Report) -> None:
+        match report:
+            case HandedOver():
+                hold(not self._silent, "handed over twice")
+                self._silent = True
+                self._prepared = False
+                self._leg = None
+            case VehicleReady():
+                hold(self._prepared, "ready, though nobody asked")
+                self._prepared = False
+            case Arrived(leg):
+                hold(leg == self._leg, f"arrived on leg {leg}, under way is {self._leg}")
+                self._leg = None
+            case Refused(order):
+                # Refused at once, it changes nothing; refused later, it had been under way.
+                self._leg = self._leg_before if order == self._ordered else None
+            case Telemetry(position, velocity, battery_frac):
+                self._here_m = position
+                numbers = (*position, *velocity, battery_frac or 0.0)
+                hold(all(math.isfinite(n) for n in numbers), f"telemetry {report}")
+            case _:
+                pass
+
+    # How it goes on.
+
+    def _see_deadline(self, now_s: float) -> list[Action]:
+        more: list[Action] = []
+        for _ in range(3):
+            deadline_s = self.bridge.next_deadline_s()
+            latest_s = now_s + self.bridge.config.heartbeat_interval_s
+            hold(deadline_s <= latest_s, f"wants to be called at {deadline_s}, now is {now_s}")
+            if deadline_s > now_s:
+                return more
+            before = self.bridge.phase
+            for action in self.bridge.step(Tick(), now_s):
+                more.append(action)
+                if isinstance(action, Send):
+                    self._look_at(self._decoded(action.data), before, self.bridge.phase)
+                else:
+                    self._take(action)
+        raise BrokenError(f"wants to be called at {deadline_s} for ever, now is {now_s}")
+
+    def _see_size(self) -> None:
+        buffered = len(self.bridge.codec._framer._buffer)
+        hold(buffered <= _MOST_BUFFERED_BYTES, f"keeps {buffered} bytes")
+        if self.steps % 500 == 0:
+            size = sum(len(part) for part in _collections(self.bridge, set()))
+            hold(size <= _MOST_REMEMBERED, f"remembers {size} things")
+
+
+def _near(a: tuple[float, float, float], b: tuple[float, float, float]) -> bool:
+    return math.dist(a[:2], b[:2]) <= _TOLERANCE_M and abs(a[2] - b[2]) <= _TOLERANCE_M
+
+
+def _collections(thing: Any, seen: set[int]) -> Iterator[Any]:
+    """Every collection that ``thing`` holds, however deep, text and bytes left out."""
+    if id(thing) in seen or isinstance(thing, str | bytes | int | float | type):
+        return
+    seen.add(id(thing))
+    if isinstance(thing, dict):
+        yield thing
+        parts: Any = [*thing.keys(), *thing.values()]
+    elif isinstance(thing, list | tuple | set | frozenset) or type(thing).__name__ == "deque":
+        yield thing
+        parts = list(thing)
+    elif is_dataclass(thing):
+        parts = [getattr(thing, field.name) for field in fields(thing)]
+    else:
+        parts = list(getattr(thing, "__dict__", {}).values())
+    for part in parts:
+        yield from _collections(part, seen)

@@ -1,0 +1,122 @@
+"""Some of the episodes of `make fuzz`, and that they would notice something."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from agent.mavlink.bridge import Bridge, Phase
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.events import Action, Event, LinkUp, Send, Tick
+from agent.mavlink.messages import (
+    AltitudeFrame,
+    CommandInt,
+    CommandLong,
+    GroundHeartbeat,
+    MissionCount,
+    Outbound,
+    ParameterSet,
+)
+from agent.vehicle import Arrived, HandedOver, VehicleReady
+from tests.bridge_flight import ORIGIN
+from tests.bridge_fuzz import FLAVOURS, Episode, Setting, setting_of, settings
+from tests.bridge_watch import BridgeWatch, BrokenError
+from tests.fake_copter import FakeCopter
+
+EVERY_SETTING = [setting for flavour in FLAVOURS for setting in settings(flavour)]
+
+
+@pytest.mark.parametrize("setting", EVERY_SETTING, ids=str)
+@pytest.mark.parametrize("number", range(2))
+def test_everything_holds_whatever_is_heard(setting: Setting, number: int) -> None:
+    assert Episode(setting, 0, number).play() > 400
+
+
+def test_an_episode_is_the_same_every_time() -> None:
+    stories = []
+    for _ in range(2):
+        episode = Episode(EVERY_SETTING[0], 0, 3)
+        episode.play(100)
+        stories.append((episode.watch.steps, episode.now_s, episode.story))
+    assert stories[0] == stories[1]
+
+
+def test_settings_are_found_by_their_names() -> None:
+    assert [setting_of(str(setting)) for setting in EVERY_SETTING] == EVERY_SETTING
+
+
+CONFIG = BridgeConfig(1, ORIGIN)
+ZEROS = (0.0, 0.0, 0.0, 0.0, 0.0)
+LAND = CommandLong(21, (0.0, 0.0, *ZEROS))
+FORCED = CommandLong(400, (1.0, 21196.0, *ZEROS))
+ENDLESS_CLIMB = CommandLong(22, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e6))
+NO_HEIGHT = CommandLong(22, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, math.nan))
+ARMING = CommandLong(400, (1.0, 0.0, *ZEROS))
+ELSEWHERE = CommandInt(192, AltitudeFrame.MEAN_SEA_LEVEL, (-1.0, 0.0, 0.0, 0.0), 47.4, 8.5, 500.0)
+
+
+def encoded(message: Outbound, config: BridgeConfig = CONFIG) -> bytes:
+    return Bridge(config).codec.encode(message)
+
+
+class Misled(Bridge):
+    """A bridge that does one thing, whatever happens to it."""
+
+    def __init__(self, phase: Phase, action: Action) -> None:
+        super().__init__(CONFIG)
+        self.phase = phase
+        self._action = action
+
+    def step(self, event: Event, now_s: float) -> list[Action]:
+        super().step(event, now_s)
+        return [self._action]
+
+
+@pytest.mark.parametrize(
+    ("phase", "action", "complaint"),
+    [
+        (Phase.PREPARING, Send(encoded(LAND)), "commands 21 while"),
+        (Phase.PREPARING, Send(encoded(FORCED)), "motors by force"),
+        (Phase.PREPARING, Send(encoded(ENDLESS_CLIMB)), "takeoff by 1000000.0 m"),
+        (Phase.PREPARING, Send(encoded(NO_HEIGHT)), "takeoff by nan m"),
+        (Phase.HOVERING, Send(encoded(ARMING)), "commands 400 while"),
+        (Phase.IDLE, Send(encoded(ARMING)), "motors started while"),
+        (Phase.HANDED_OVER, Send(encoded(ELSEWHERE)), "commands 192 while"),
+        (Phase.FLYING, Send(encoded(ELSEWHERE)), "sent to .*, not to"),
+        (Phase.FLYING, Send(encoded(ParameterSet("WP_SPD", 4.0))), "PARAM_SET while"),
+        (Phase.FLYING, Send(encoded(MissionCount(3))), "MISSION_COUNT, though"),
+        (Phase.FLYING, Send(encoded(ELSEWHERE, replace(CONFIG, system_id=2))), r"to \(2, 1\)"),
+        (Phase.FLYING, Send(encoded(ELSEWHERE)[:-5]), "sent 0 messages as one"),
+        (Phase.FLYING, Send(2 * encoded(GroundHeartbeat())), "sent 2 messages as one"),
+        (Phase.FLYING, Arrived(7), "arrived on leg 7, under way is None"),
+        (Phase.IDLE, VehicleReady(), "ready, though nobody asked"),
+    ],
+)
+def test_what_must_not_be_is_noticed(phase: Phase, action: Action, complaint: str) -> None:
+    with pytest.raises(BrokenError, match=complaint):
+        BridgeWatch(Misled(phase, action), FakeCopter).step(LinkUp(), 0.0)
+
+
+def test_a_word_after_a_hand_over_is_noticed() -> None:
+    bridge = Misled(Phase.FLYING, HandedOver("a pilot"))
+    watch = BridgeWatch(bridge, FakeCopter)
+    watch.step(LinkUp(), 0.0)
+    with pytest.raises(BrokenError, match="handed over twice"):
+        watch.step(Tick(), 0.1)
+    bridge._action = Send(encoded(ELSEWHERE))
+    with pytest.raises(BrokenError, match="COMMAND_INT after a hand-over"):
+        watch.step(Tick(), 0.2)
+
+
+class Restless(Bridge):
+    """A bridge that never has enough."""
+
+    def next_deadline_s(self) -> float:
+        return 0.0
+
+
+def test_a_deadline_that_never_passes_is_noticed() -> None:
+    with pytest.raises(BrokenError, match="for ever"):
+        BridgeWatch(Restless(CONFIG), FakeCopter).step(LinkUp(), 10.0)
