@@ -187,6 +187,9 @@ class Preparation:
                 f"the start lies {height_m:.1f} m above the vehicle's home, "
                 f"at least {config.takeoff_min_m:g} m are needed"
             )
+        # Start and home both lie within the fence, or one of the two heights told is wrong.
+        if height_m > 2.0 * config.fence_height_m:
+            return f"the start lies {height_m:.0f} m above the vehicle's home"
         return None
 
     def _take_off(self, position: Position, vehicle: VehicleState, now_s: float) -> list[Outbound]:

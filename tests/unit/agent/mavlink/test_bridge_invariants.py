@@ -19,11 +19,11 @@ from agent.mavlink.messages import (
     Outbound,
     ParameterSet,
 )
-from agent.vehicle import Arrived, HandedOver, VehicleReady
-from tests.bridge_flight import ORIGIN
+from agent.vehicle import Arrived, HandedOver, Refused, VehicleReady
+from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.bridge_fuzz import FLAVOURS, Episode, Setting, setting_of, settings
 from tests.bridge_watch import BridgeWatch, BrokenError
-from tests.fake_copter import FakeCopter
+from tests.fake_copter import ARM, FakeCopter
 
 EVERY_SETTING = [setting for flavour in FLAVOURS for setting in settings(flavour)]
 
@@ -41,6 +41,14 @@ def test_an_episode_is_the_same_every_time() -> None:
         episode.play(100)
         stories.append((episode.watch.steps, episode.now_s, episode.story))
     assert stories[0] == stories[1]
+
+
+def test_a_home_that_cannot_be_ends_the_preparation_before_the_motors_start() -> None:
+    flight = BridgeFlight()
+    flight.copter.home_m = (0.0, 0.0, -5000.0)
+    flight.order(START)
+    flight.run_until(Refused(START, "the start lies 5010 m above the vehicle's home"))
+    assert not flight.copter.commands(ARM)
 
 
 def test_settings_are_found_by_their_names() -> None:
