@@ -242,7 +242,10 @@ class BridgeWatch:
                 self._leg = None
             case Refused(order):
                 # Refused at once, it changes nothing; refused later, it had been under way.
-                self._leg = self._leg_before if order == self._ordered else None
+                at_once = order is self._ordered
+                self._leg = self._leg_before if at_once else None
+                if at_once and isinstance(order, Prepare | GoTo):
+                    self._places_m.pop()
             case Telemetry(position, velocity, battery_frac):
                 self._here_m = position
                 numbers = (*position, *velocity, battery_frac or 0.0)
