@@ -8,7 +8,6 @@ episode are all it needs to be played again. What must hold is in tests.bridge_w
 
 from __future__ import annotations
 
-import json
 import math
 import struct
 from collections import Counter
@@ -30,7 +29,7 @@ from tests.bridge_flight import ORIGIN, UNIX_S
 from tests.bridge_watch import BridgeWatch
 from tests.fake_copter import ARM, INTERVAL, REPOSITION, SET_MODE, SPEED, TAKEOFF, FakeCopter
 from tests.fake_px4 import FakePx4
-from tests.mavlink_frames import crafted, frame, rebuilt
+from tests.mavlink_frames import crafted, frame, rebuilt, recorded
 
 __all__ = ["FLAVOURS", "Episode", "Hostile", "Setting", "setting_of", "settings"]
 
@@ -472,13 +471,12 @@ def _give_key(copter: FakeCopter) -> None:
 
 
 def _recorded_frames(flavour: str) -> list[bytes]:
-    """What the real vehicle said, as frames; the messages that this dialect knows."""
-    frames = []
-    for path in sorted(_RECORDINGS.glob(f"{flavour}-*.jsonl")):
-        for line in path.read_text().splitlines():
-            row = json.loads(line)
-            if row["from"] == "vehicle":
-                frames.append(frame(rebuilt(row), row["sys"], row["comp"]))
+    """What the real vehicle said, as frames."""
+    frames = [
+        frame(rebuilt(row), row["sys"], row["comp"])
+        for path in sorted(_RECORDINGS.glob(f"{flavour}-*.jsonl"))
+        for row in recorded(path, "vehicle")
+    ]
     if not frames:
         raise ValueError(f"no recordings of {flavour} in {_RECORDINGS}")
     return frames

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -11,6 +13,12 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 def frame(message: Any, system: int = 1, component: int = 1) -> bytes:
     """That message as a vehicle sends it."""
     return bytes(message.pack(mavlink.MAVLink(None, srcSystem=system, srcComponent=component)))
+
+
+def recorded(path: Path, sender: str) -> list[dict[str, Any]]:
+    """What that side said in a recording, "ground" or "vehicle"."""
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    return [row for row in rows if row["from"] == sender]
 
 
 def rebuilt(row: dict[str, Any]) -> Any:

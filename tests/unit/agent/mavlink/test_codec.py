@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,7 @@ from agent.mavlink.messages import (
     SystemStatus,
     Text,
 )
-from tests.mavlink_frames import crafted, frame, rebuilt
+from tests.mavlink_frames import crafted, frame, rebuilt, recorded
 
 FIRMWARES = sorted(Path("tests/data/recordings").glob("*.jsonl"))
 RECORDINGS = sorted(Path("tests/data/recordings").glob("arducopter-*.jsonl"))
@@ -48,11 +47,6 @@ RECORDINGS = sorted(Path("tests/data/recordings").glob("arducopter-*.jsonl"))
 
 def heartbeat(system: int = 1) -> bytes:
     return frame(mavlink.MAVLink_heartbeat_message(2, 3, 217, 4, 4, 3), system)
-
-
-def recorded(path: Path, sender: str) -> list[dict[str, Any]]:
-    rows = [json.loads(line) for line in path.read_text().splitlines()]
-    return [row for row in rows if row["from"] == sender]
 
 
 @pytest.mark.parametrize("path", FIRMWARES, ids=lambda path: path.stem)

@@ -29,7 +29,7 @@ from agent.mavlink.state import VehicleState
 from agent.vehicle import GoTo, HandedOver, Home, Prepare, Refused, Return, VehicleReady
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.fake_px4 import AUTO_LOITER, AUTO_TAKEOFF, POSCTL, FakePx4
-from tests.unit.agent.mavlink.test_codec import frame, rebuilt, recorded
+from tests.mavlink_frames import frame, rebuilt, recorded
 
 MISSION, RETARGET = (
     Path(f"tests/data/recordings/px4-1.17-{name}.jsonl") for name in ("mission", "retarget")
