@@ -83,6 +83,8 @@ class Bridge:
         """Messages heard from other systems, by system id; all ignored."""
         self.stale_positions = 0
         """Positions dropped because they were late or doubled."""
+        self.strange_heartbeats = 0
+        """Heartbeats dropped in flight: another kind of vehicle, under the same ids."""
         self.codec = MavlinkCodec(
             config.system_id,
             source_system_id=config.ground_system_id,
@@ -181,6 +183,9 @@ class Bridge:
 
     def _on_heartbeat(self, heartbeat: Heartbeat) -> None:
         vehicle, before = self._vehicle, self._vehicle.heartbeat
+        if self._in_our_hands() and self._flavour and not self._flavour.flies(heartbeat):
+            self.strange_heartbeats += 1
+            return
         if (
             before is not None
             and self._flavour is not None

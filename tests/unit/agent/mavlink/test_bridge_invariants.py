@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.mavlink.bridge import Bridge, Phase
 from agent.mavlink.config import BridgeConfig
@@ -19,11 +20,12 @@ from agent.mavlink.messages import (
     Outbound,
     ParameterSet,
 )
-from agent.vehicle import Arrived, HandedOver, Refused, VehicleReady
+from agent.vehicle import Arrived, HandedOver, Hold, Refused, VehicleReady
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.bridge_fuzz import FLAVOURS, Episode, Setting, setting_of, settings
 from tests.bridge_watch import BridgeWatch, BrokenError
-from tests.fake_copter import ARM, FakeCopter
+from tests.fake_copter import ARM, REPOSITION, FakeCopter
+from tests.mavlink_frames import frame
 
 EVERY_SETTING = [setting for flavour in FLAVOURS for setting in settings(flavour)]
 
@@ -49,6 +51,15 @@ def test_a_home_that_cannot_be_ends_the_preparation_before_the_motors_start() ->
     flight.order(START)
     flight.run_until(Refused(START, "the start lies 5010 m above the vehicle's home"))
     assert not flight.copter.commands(ARM)
+
+
+def test_a_heartbeat_of_another_kind_of_vehicle_does_not_make_a_flying_one_deaf() -> None:
+    flight = BridgeFlight().flying()
+    flight.spoken(frame(mavlink.MAVLink_heartbeat_message(1, 8, 209, 4, 4, 3)))
+    flight.copter.heard.clear()
+    flight.order(Hold("wait"))
+    assert len(flight.copter.commands(REPOSITION)) == 1
+    assert flight.bridge.strange_heartbeats == 1
 
 
 def test_settings_are_found_by_their_names() -> None:
