@@ -55,7 +55,7 @@ def test_a_home_that_cannot_be_ends_the_preparation_before_the_motors_start() ->
 
 def test_a_heartbeat_of_another_kind_of_vehicle_does_not_make_a_flying_one_deaf() -> None:
     flight = BridgeFlight().flying()
-    flight.spoken(frame(mavlink.MAVLink_heartbeat_message(1, 8, 209, 4, 4, 3)))
+    flight.spoken(frame(mavlink.MAVLink_heartbeat_message(1, 12, 209, 4, 4, 3)))
     flight.copter.heard.clear()
     flight.order(Hold("wait"))
     assert len(flight.copter.commands(REPOSITION)) == 1
