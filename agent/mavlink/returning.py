@@ -21,12 +21,27 @@ _DISARMED_LONG_S = 5.0
 
 
 class Returning:
-    """Carries out one `Return`."""
+    """Carries out one `Return`.
+
+    Args:
+        order: the order.
+        config: patience.
+        commands: carries the mode.
+        flavour: the firmware.
+        from_mission: the vehicle may fly a mission of ours.
+    """
 
     def __init__(
-        self, order: Return, config: BridgeConfig, commands: Commands, flavour: Flavour
+        self,
+        order: Return,
+        config: BridgeConfig,
+        commands: Commands,
+        flavour: Flavour,
+        *,
+        from_mission: bool = False,
     ) -> None:
         self.order = order
+        self._from_mission = from_mission
         self._config = config
         self._commands = commands
         self._flavour = flavour
@@ -53,7 +68,7 @@ class Returning:
         if self._flavour.is_returning(custom_mode):
             self._seen = True
             return True
-        return self._flavour.is_commanded(custom_mode) and not self._seen
+        return self._obeys(custom_mode) and not self._seen
 
     def advance(self, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
         """Set the mode as long as it is not seen and the vehicle still takes our orders."""
@@ -61,7 +76,7 @@ class Returning:
             self._disarmed_since_s = None
         elif self._disarmed_since_s is None:
             self._disarmed_since_s = now_s
-        if not heartbeat.armed or not self._flavour.is_commanded(heartbeat.custom_mode):
+        if not heartbeat.armed or not self._obeys(heartbeat.custom_mode):
             return []
         if self._commands.pending(_TAG) or now_s < self._next_at_s:
             return []
@@ -70,6 +85,13 @@ class Returning:
             return []
         self._tries += 1
         return [*self._commands.send(_TAG, self._flavour.set_return_mode(), now_s)]
+
+    def _obeys(self, custom_mode: int) -> bool:
+        """Whether the vehicle flies on our orders in that mode."""
+        flavour = self._flavour
+        return flavour.is_commanded(custom_mode) or (
+            self._from_mission and flavour.is_mission(custom_mode)
+        )
 
     def disarmed_long(self, now_s: float) -> bool:
         """Whether the motors have stood still for a while."""

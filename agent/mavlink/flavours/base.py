@@ -36,6 +36,11 @@ class Flavour(Protocol):
         """Message ids to ask for beside the position, and what each becomes."""
         ...
 
+    @property
+    def mission_vehicle_items(self) -> int:
+        """Leading items of a mission that belong to the vehicle and cannot be chosen."""
+        ...
+
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether this flavour is the right one for that vehicle."""
         ...
@@ -107,6 +112,10 @@ class Flavour(Protocol):
             alt_m: height above mean sea level.
             speed_m_s: cruise ground speed, for firmwares that take it with every target.
         """
+        ...
+
+    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
+        """Parameters of a mission's waypoint at which to wait so long, heading as it comes."""
         ...
 
     def change_speed(self, speed_m_s: float) -> CommandLong:
