@@ -1,7 +1,8 @@
 """A small scripted ArduCopter for tests of the bridge, in virtual time.
 
 Written from the recordings and from nothing of the simulated autopilot, so that the two
-cannot share a mistake. Its knobs make it refuse, forget and misbehave.
+cannot share a mistake. Its knobs make it refuse, forget and misbehave. What a PX4 does
+otherwise is in tests.fake_px4; link, motion and knobs are the same.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -29,6 +30,18 @@ _RTL_ALT_M = 15.0
 class FakeCopter:
     """One vehicle; `receive` and `advance` give back the bytes it says."""
 
+    mav_type, autopilot = 2, 3
+    boot_mode, own_mode, pilot_mode = STABILIZE, GUIDED, LOITER
+    """What it boots into, what takes targets, and what a pilot flies in."""
+    return_mode, land_mode = RTL, LAND
+    mode_names: ClassVar = {GUIDED: "GUIDED", LOITER: "LOITER", RTL: "RTL", LAND: "LAND"}
+    takeoff_mode = GUIDED
+    """The mode it takes off in."""
+    streams_asked = frozenset({33, 1, 193, 245, 42, 147})
+    """Message ids that have to be asked for."""
+    speed_names: tuple[str, ...] = ("WP_SPD", "WPNAV_SPEED")
+    """Names that the parameter of the cruise speed may have."""
+
     def __init__(
         self,
         origin: Origin,
@@ -45,7 +58,6 @@ class FakeCopter:
         self.boot_s = boot_s
         self.ready_s = ready_s
         self.default_speed_m_s = default_speed_m_s
-        self.mav_type, self.autopilot = 2, 3
         self.heard: list[Any] = []
         """Every message heard, decoded."""
         self.verdicts: dict[int, list[int | None]] = {}
@@ -56,6 +68,9 @@ class FakeCopter:
         self.stuck = False
         """Acknowledges targets and does not move."""
         self.prearm_ok = True
+        self.battery_percent = 80
+        self.system_status: int | None = None
+        """MAV_STATE to say instead of the true one."""
         self.parameters: dict[str, float] = {"WP_SPD": default_speed_m_s}
         self.ground_m = ground_m
         self.home_m: Point = (0.0, 0.0, ground_m)
@@ -76,7 +91,7 @@ class FakeCopter:
     def power_on(self, now_s: float) -> None:
         """Begin anew, where the vehicle is."""
         self.on_at_s = now_s
-        self.mode = STABILIZE
+        self.mode = self.boot_mode
         self.armed = False
         self.armed_at_s = 0.0
         self.airborne = self.position_m[2] > self.ground_m + 0.1
@@ -103,6 +118,7 @@ class FakeCopter:
     def heartbeat(self) -> None:
         booted = self.now_s - self.on_at_s >= self.boot_s
         status = 1 if not booted else 4 if self.airborne else 3
+        status = status if self.system_status is None else self.system_status
         base_mode = 81 | (128 if self.armed else 0)
         self.say(
             mavlink.MAVLink_heartbeat_message(
@@ -143,7 +159,7 @@ class FakeCopter:
                 self.position()
             case 1:
                 health = bit if self.ready and self.prearm_ok else 0
-                fields = (bit, bit, health, 0, 12600, 0, 80, 0, 0, 0, 0, 0, 0)
+                fields = (bit, bit, health, 0, 12600, 0, self.battery_percent, 0, 0, 0, 0, 0, 0)
                 self.say(mavlink.MAVLink_sys_status_message(*fields))
             case 193:
                 flags = 831 if self.ready else 167
@@ -232,9 +248,12 @@ class FakeCopter:
         """By command, by the pilot's switch or by a failsafe."""
         self.mode = mode
         self.target_m = None
-        if mode == RTL:
+        if mode == self.return_mode:
             east, north, _ = self.position_m
             self.target_m = (east, north, max(self.position_m[2], self.home_m[2] + _RTL_ALT_M))
+        self._tell_change()
+
+    def _tell_change(self) -> None:
         self.heartbeat()
 
     def _on_param_read(self, message: Any) -> None:
@@ -280,18 +299,21 @@ class FakeCopter:
         moved = [(b - a) / duration_s for a, b in zip(before, self.position_m, strict=True)]
         still = share >= 1.0
         self.velocity_m_s = (0.0, 0.0, 0.0) if still else (moved[0], moved[1], moved[2])
-        if still and self.mode == RTL:
+        if still and self.mode == self.return_mode:
             self._next_of_return()
 
     def _next_of_return(self) -> None:
         east, north, _ = self.home_m
         if self.position_m == self.home_m:
-            self.airborne = self.armed = False
-            self.target_m = None
+            self._land()
         elif math.dist(self.position_m[:2], (east, north)) < 1e-6:
             self.target_m = self.home_m
         else:
             self.target_m = (east, north, self.position_m[2])
+
+    def _land(self) -> None:
+        self.airborne = self.armed = False
+        self.target_m = None
 
     def _flush(self) -> list[bytes]:
         said, self._buffer = self._buffer, []

@@ -191,6 +191,8 @@ class Bridge:
         if self._flavour is None or not self._flavour.flies(heartbeat):
             self._flavour = flavour_of(heartbeat)
             self._streams = Streams(self.config, self._flavour) if self._flavour else None
+            if self._flavour is not None:
+                self._commands.acknowledged_twice = self._flavour.acknowledged_twice
         self._check_authority(heartbeat)
 
     def _check_authority(self, heartbeat: Heartbeat) -> None:
@@ -199,7 +201,7 @@ class Bridge:
         if flavour is None or not self._in_our_hands():
             return
         mode = heartbeat.custom_mode
-        ours = flavour.is_commanded(mode)
+        ours = flavour.is_commanded(mode) or (flavour.is_taking_off(mode) and self._took_off())
         if self._returning is not None:
             ours = not heartbeat.armed or self._returning.expects(mode)
         elif self.phase is not Phase.PREPARING and not heartbeat.armed:
@@ -319,9 +321,7 @@ class Bridge:
     def _return(self, order: Return) -> None:
         if self.phase is Phase.RETURNING:
             return
-        took_off = self.phase in (Phase.HOVERING, Phase.FLYING) or (
-            self._preparation is not None and self._preparation.took_off
-        )
+        took_off = self.phase in (Phase.HOVERING, Phase.FLYING) or self._took_off()
         motors_asked_for = self._preparation is not None and self._preparation.engaged
         flavour, heartbeat = self._flavour, self._vehicle.heartbeat
         self._drop_work()
@@ -334,8 +334,10 @@ class Bridge:
             else:
                 self._actions.append(Home())
             return
-        commanded = flavour.is_commanded(heartbeat.custom_mode)
-        aloft = heartbeat.armed and (took_off or flavour.airborne(self._vehicle))
+        mode = heartbeat.custom_mode
+        taking_off = flavour.is_taking_off(mode) and (took_off or order.resume)
+        commanded = flavour.is_commanded(mode) or taking_off
+        aloft = heartbeat.armed and (took_off or flavour.airborne(self._vehicle) is not False)
         if not aloft:
             # That it was armed may not have been heard yet.
             if commanded and (heartbeat.armed or motors_asked_for):
@@ -344,8 +346,8 @@ class Bridge:
             return
         if self._silent():
             self._refuse_return(order, "the autopilot is silent")
-        elif not (commanded or flavour.is_returning(heartbeat.custom_mode)):
-            self._hand_over(f"its pilot flies it in {flavour.mode_name(heartbeat.custom_mode)}")
+        elif not (commanded or flavour.is_returning(mode)):
+            self._hand_over(f"its pilot flies it in {flavour.mode_name(mode)}")
         else:
             self._returning = Returning(order, self.config, self._commands, flavour)
             self.phase = Phase.RETURNING
@@ -453,6 +455,10 @@ class Bridge:
         if self.phase is Phase.PREPARING:
             return self._preparation is not None and self._preparation.engaged
         return self.phase in (Phase.HOVERING, Phase.FLYING, Phase.RETURNING)
+
+    def _took_off(self) -> bool:
+        """Whether the preparation under way has asked for takeoff."""
+        return self._preparation is not None and self._preparation.took_off
 
     def _silent(self) -> bool:
         heard_s = self._vehicle.heartbeat_at_s

@@ -43,8 +43,8 @@ from agent.mavlink.messages import (
     ParameterSet,
     Position,
     SystemStatus,
-    Text,
 )
+from agent.mavlink.texts import TextJoiner
 
 __all__ = ["MavlinkCodec"]
 
@@ -76,6 +76,7 @@ class MavlinkCodec:
         self._own_system = source_system_id
         self._own_component = source_component_id
         self._framer = Framer()
+        self._texts = TextJoiner()
         self._sender = mavlink.MAVLink(
             None, srcSystem=source_system_id, srcComponent=source_component_id
         )
@@ -98,6 +99,9 @@ class MavlinkCodec:
         """Messages completed by ``data`` that the bridge knows; anything else is counted."""
         heard: list[Heard] = []
         for raw in self._framer.feed(data):
+            if raw.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+                heard += self._texts_of(raw)
+                continue
             convert = _CONVERTERS.get(raw.get_msgId())
             if convert is None:
                 continue
@@ -118,8 +122,17 @@ class MavlinkCodec:
         return bytes(frame)
 
     def reset_link(self) -> None:
-        """Forget a half-received frame, because the link is a new one."""
+        """Forget a half-received frame or text, because the link is a new one."""
         self._framer.reset()
+        self._texts.forget()
+
+    def _texts_of(self, raw: Any) -> list[Heard]:
+        """Texts of the autopilot that are complete by this chunk; nobody else's are joined."""
+        sender = (raw.get_srcSystem(), raw.get_srcComponent())
+        if sender != (self._target, _AUTOPILOT_COMPONENT):
+            return []
+        texts = self._texts.add(raw.severity, str(raw.text), raw.id, raw.chunk_seq)
+        return [Heard(*sender, text) for text in texts]
 
     def _addressed_to_us(self, raw: Any) -> bool:
         """Whether ``raw`` is for us or for everybody (MAVLink 1 acknowledgements say 0)."""
@@ -218,8 +231,10 @@ def _battery_frac(remaining_percent: int) -> float | None:
 def _system_status(raw: Any) -> Inbound | None:
     bit = mavlink.MAV_SYS_STATUS_PREARM_CHECK
     reported = raw.onboard_control_sensors_present & raw.onboard_control_sensors_enabled & bit
+    healthy = bool(raw.onboard_control_sensors_health & bit)
     return SystemStatus(
-        prearm_ok=bool(raw.onboard_control_sensors_health & bit) if reported else None,
+        prearm_ok=healthy if reported else None,
+        prearm_healthy=healthy,
         battery_frac=_battery_frac(raw.battery_remaining),
     )
 
@@ -239,11 +254,6 @@ def _extended_state(raw: Any) -> Inbound | None:
 
 def _command_ack(raw: Any) -> Inbound | None:
     return CommandAck(raw.command, raw.result)
-
-
-def _text(raw: Any) -> Inbound | None:
-    printable = "".join(c if c.isprintable() else "?" for c in str(raw.text))
-    return Text(raw.severity, printable)
 
 
 def _parameter(raw: Any) -> Inbound | None:
@@ -300,7 +310,6 @@ _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_state,
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK: _command_ack,
-    mavlink.MAVLINK_MSG_ID_STATUSTEXT: _text,
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
     mavlink.MAVLINK_MSG_ID_PARAM_ERROR: _parameter_missing,
     mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: _mission_request,

@@ -2,7 +2,9 @@
 
 An acknowledgement names only the command's number, so one command of a number is in
 flight at a time and others of that number wait in line. Acknowledgements still owed
-for earlier transmissions are counted and not mistaken for the newest one's. Leaves
+for earlier transmissions are counted and not mistaken for the newest one's, as long as
+they come in order. Where a firmware acknowledges twice, two are owed: if one is lost,
+the next command's own answers are taken for the old one's, and it is sent again. Leaves
 out: what a command is for, and whether its effect is *seen* (agent.mavlink.bridge).
 
 Protocol: https://mavlink.io/en/services/command.html
@@ -121,6 +123,8 @@ class Commands:
         self._lines: dict[int, deque[_Pending]] = {}
         self._owed: dict[int, deque[_Owed]] = {}
         self._serial = 0
+        self.acknowledged_twice: frozenset[int] = frozenset()
+        """Numbers of the commands that the firmware acknowledges twice."""
         self.stray_acks = 0
         """Acknowledgements that belonged to nothing in flight."""
 
@@ -143,6 +147,15 @@ class Commands:
     def pending(self, tag: str) -> bool:
         """Whether a command of that tag is in flight or in line."""
         return any(entry.tag == tag for line in self._lines.values() for entry in line)
+
+    def cancel(self, tag: str, now_s: float) -> list[Command]:
+        """Forget the command of that tag; gives what to transmit, if one waited for it."""
+        for line in self._lines.values():
+            for place, entry in enumerate(line):
+                if entry.tag == tag:
+                    del line[place]
+                    return self._transmit(line[0], now_s) if place == 0 and line else []
+        return []
 
     def cancel_all(self) -> None:
         """Forget everything in flight and in line; acknowledgements to come are stray."""
@@ -198,7 +211,9 @@ class Commands:
         pending.silent_tries += 1
         pending.deadline_s = now_s + self._policy.ack_timeout_s
         owed = self._owed.setdefault(message.command, deque(maxlen=64))
-        owed.append(_Owed(pending.serial, now_s + _OWED_TIMEOUTS * self._policy.ack_timeout_s))
+        expires_s = now_s + _OWED_TIMEOUTS * self._policy.ack_timeout_s
+        for _ in range(2 if message.command in self.acknowledged_twice else 1):
+            owed.append(_Owed(pending.serial, expires_s))
         return [message]
 
     def _settle(self, ack: CommandAck, now_s: float) -> int | None:

@@ -97,6 +97,8 @@ class SystemStatus:
 
     prearm_ok: bool | None
     """Pre-arm checks pass; None when the autopilot does not report them."""
+    prearm_healthy: bool
+    """The bit of the pre-arm checks among the healthy sensors, reported as present or not."""
     battery_frac: float | None
 
 

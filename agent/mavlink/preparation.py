@@ -3,8 +3,9 @@
 No script: every time something is heard, the next step follows from the state *seen*,
 so an overwritten mode, an automatic disarming on the ground or a vehicle that flies
 already need no cases of their own. Every step has a limit. A vehicle that is resumed in
-the air keeps its old target meanwhile: only its speed is set. Leaves out: who may give
-the vehicle orders (agent.mavlink.bridge).
+the air keeps its old target meanwhile: only its speed is set, and not even that if it
+flies a mission of ours. Leaves out: who may give the vehicle orders
+(agent.mavlink.bridge).
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from dataclasses import dataclass
 from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, result_text
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours import Flavour
-from agent.mavlink.leg import Leg
+from agent.mavlink.leg import RepositionLeg
 from agent.mavlink.messages import Heartbeat, Inbound, Landed, Outbound, Position
 from agent.mavlink.speed import SpeedSetting
+from agent.mavlink.standing_mission import StandingMission
 from agent.mavlink.state import VehicleState
 from agent.vehicle import Prepare
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
@@ -26,8 +28,11 @@ __all__ = ["Preparation"]
 
 _CLIMB_PROGRESS_M = 0.2
 _CLIMB_TOLERANCE_FRAC = 0.05
+_CLIMB_TOLERANCE_M = 1.0
+"""Autopilots end a takeoff that much too low, and go on from there."""
 _PREARM_TEXT_AGE_S = 35.0
 """ArduPilot repeats what fails before arming every 30 s."""
+_CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
 _FLOWN_BY_PILOT = "its pilot flew and landed it; prepare it again to take off"
 
 
@@ -46,18 +51,34 @@ class _Step:
 
 
 class Preparation:
-    """Carries out one `Prepare`."""
+    """Carries out one `Prepare`.
+
+    Args:
+        order: the order.
+        config: patience.
+        commands: carries what is told.
+        flavour: the firmware.
+        mission: what an earlier life may have left on the vehicle; None if missions are
+            not our way to command it.
+    """
 
     def __init__(
-        self, order: Prepare, config: BridgeConfig, commands: Commands, flavour: Flavour
+        self,
+        order: Prepare,
+        config: BridgeConfig,
+        commands: Commands,
+        flavour: Flavour,
+        mission: StandingMission | None = None,
     ) -> None:
         self._order = order
+        self._mission = mission
         self._config = config
         self._commands = commands
         self._flavour = flavour
         _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
         wait_s = config.effect_timeout_s
-        self._mode = _Step("mode", "setting the guided mode", config.mode_tries, wait_s)
+        mode = flavour.commanded_mode_name
+        self._mode = _Step("mode", f"setting {mode}", config.mode_tries, wait_s)
         self._arm = _Step("arm", "arming", config.arm_tries, wait_s)
         # ArduCopter spools up for 3 to 4 s before it leaves the ground.
         self._takeoff = _Step("takeoff", "takeoff", config.takeoff_tries, 2.0 * wait_s)
@@ -65,9 +86,10 @@ class Preparation:
         self._highest_m = -math.inf
         self._climbed_at_s = math.inf
         self._climbing = False
+        self._saw_takeoff = False
         self._flew = False
         self._flown_by_pilot = False
-        self._leg: Leg | None = None
+        self._leg: RepositionLeg | None = None
         self._speed = SpeedSetting(order.speed_m_s, flavour, config)
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
@@ -112,8 +134,7 @@ class Preparation:
         place_enu_m = enu_from_wgs84(
             self._config.origin, position.lat_deg, position.lon_deg, position.alt_m
         )
-        told = self._leg.on_position(place_enu_m, position.velocity_enu_m_s, self._commands, now_s)
-        return [*told]
+        return [*self._leg.on_position(place_enu_m, position.velocity_enu_m_s, now_s)]
 
     def advance(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
         """Do what the state seen asks for next."""
@@ -122,12 +143,17 @@ class Preparation:
             return []
         if not flavour.has_booted(heartbeat):
             return self._wait("the autopilot is booting")
+        if heartbeat.armed and flavour.is_taking_off(heartbeat.custom_mode):
+            return self._follow_takeoff(now_s)
         if not flavour.is_commanded(heartbeat.custom_mode):
+            if self._may_fly_our_mission(vehicle, heartbeat):
+                return self._take_on_mission(now_s)
             if heartbeat.armed:
                 self._flown_by_pilot = True
                 mode = flavour.mode_name(heartbeat.custom_mode)
                 return self._wait(
-                    f"armed in {mode} by its pilot: land it, or switch it to the guided mode"
+                    f"armed in {mode} by its pilot: land it, "
+                    f"or switch it to {flavour.commanded_mode_name}"
                 )
             if self._flown_by_pilot:
                 return self._fail(_FLOWN_BY_PILOT)
@@ -140,13 +166,18 @@ class Preparation:
         position = vehicle.position
         if position is None:
             return self._wait("waiting for a position")
-        if not flavour.airborne(vehicle):
+        airborne = flavour.airborne(vehicle)
+        if airborne is None:
+            return self._wait("waiting to hear whether it flies (EXTENDED_SYS_STATE)")
+        if not airborne:
             return self._take_off(position, vehicle, now_s)
         self._flew = True
+        # Repeated now, it would interrupt what follows.
+        out: list[Outbound] = [*self._commands.cancel(self._takeoff.tag, now_s)]
         if self._climbing and not self._high_enough(position, now_s):
-            return []
+            return out
         self._climbing = False
-        return self._settle(vehicle, now_s)
+        return out + self._settle(vehicle, now_s)
 
     def _start_motors(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
         if self._flew:
@@ -186,13 +217,47 @@ class Preparation:
         command = self._flavour.takeoff(self._start_alt_m, _home_alt_m(position))
         return self._ask(self._takeoff, command, vehicle, now_s)
 
+    def _follow_takeoff(self, now_s: float) -> list[Outbound]:
+        """Wait for the end of a takeoff that the vehicle carries out in a mode of its own."""
+        self._saw_takeoff = True
+        if not self.took_off:
+            # An earlier life's, or a pilot's.
+            self._flown_by_pilot = not self._order.resume
+            return self._wait("waiting for the takeoff under way to end")
+        if now_s - self._climbed_at_s > self._config.climb_timeout_s:
+            return self._fail(_CLIMB_STOPPED)
+        return self._wait("climbing")
+
+    def _may_fly_our_mission(self, vehicle: VehicleState, heartbeat: Heartbeat) -> bool:
+        return (
+            self._mission is not None
+            and self._mission.is_ours is not False
+            and self._order.resume
+            and not self._flown_by_pilot
+            and heartbeat.armed
+            and self._flavour.is_mission(heartbeat.custom_mode)
+            and bool(self._flavour.airborne(vehicle))
+        )
+
+    def _take_on_mission(self, now_s: float) -> list[Outbound]:
+        """Find out whether the mission flown is one of ours; the vehicle flies on meanwhile."""
+        if self._mission is None:
+            return []
+        if self._mission.is_ours:
+            self._flew = self.done = True
+            return []
+        self._wait("reading the mission that the vehicle flies")
+        return self._mission.look(now_s)
+
     def _high_enough(self, position: Position, now_s: float) -> bool:
         height_m = self._start_alt_m - _home_alt_m(position)
-        tolerance_m = max(self._config.acceptance_radius_m, _CLIMB_TOLERANCE_FRAC * height_m)
+        tolerance_m = max(
+            self._config.acceptance_radius_m, _CLIMB_TOLERANCE_M, _CLIMB_TOLERANCE_FRAC * height_m
+        )
         if position.alt_m >= self._start_alt_m - tolerance_m:
             return True
         if now_s - self._climbed_at_s > self._config.climb_timeout_s:
-            self._fail("the vehicle took off and then stopped climbing")
+            self._fail(_CLIMB_STOPPED)
         else:
             self._wait(f"climbing to {height_m:.0f} m")
         return False
@@ -203,8 +268,10 @@ class Preparation:
         if self._leg is None and not self._resumes(vehicle):
             place = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
             message = self._flavour.reposition(*place, self._order.speed_m_s)
-            self._leg = Leg(self._order.position_enu_m, message, self._config)
-            out += self._leg.start(self._commands, now_s)
+            self._leg = RepositionLeg(
+                self._order.position_enu_m, message, self._config, self._commands
+            )
+            out += self._leg.start(now_s)
         leg = self._leg
         # ArduPilot forgets a speed set before the first target after takeoff.
         if (leg is None or leg.accepted) and not self._speed.begun:
@@ -219,7 +286,8 @@ class Preparation:
 
     def _resumes(self, vehicle: VehicleState) -> bool:
         """Whether it flies on orders of an earlier life, beyond its takeoff."""
-        return self._order.resume and not self.took_off and vehicle.landed is not Landed.TAKEOFF
+        taking_off = self._saw_takeoff or vehicle.landed is Landed.TAKEOFF
+        return self._order.resume and not self.took_off and not taking_off
 
     def _ask(
         self, step: _Step, command: Command, vehicle: VehicleState, now_s: float

@@ -87,10 +87,12 @@ class Returning:
         return [*self._commands.send(_TAG, self._flavour.set_return_mode(), now_s)]
 
     def _obeys(self, custom_mode: int) -> bool:
-        """Whether the vehicle flies on our orders in that mode."""
+        """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
         flavour = self._flavour
-        return flavour.is_commanded(custom_mode) or (
-            self._from_mission and flavour.is_mission(custom_mode)
+        return (
+            flavour.is_commanded(custom_mode)
+            or flavour.is_taking_off(custom_mode)
+            or (self._from_mission and flavour.is_mission(custom_mode))
         )
 
     def disarmed_long(self, now_s: float) -> bool:

@@ -53,6 +53,7 @@ class VehicleState:
     position: Position | None = None
     """The newest known position."""
     prearm_ok: bool | None = None
+    prearm_healthy: bool = False
     prearm_heard: bool = False
     """Whether SYS_STATUS has come at all: an autopilot may leave pre-arm checks out."""
     ekf_flags: int | None = None
@@ -81,10 +82,11 @@ class VehicleState:
             case Heartbeat():
                 self.heartbeat = message
                 self.heartbeat_at_s = now_s
-            case SystemStatus(prearm_ok, battery_frac):
-                self.prearm_ok = prearm_ok
+            case SystemStatus():
+                self.prearm_ok = message.prearm_ok
+                self.prearm_healthy = message.prearm_healthy
                 self.prearm_heard = True
-                self.battery_frac = battery_frac
+                self.battery_frac = message.battery_frac
             case Battery(battery_frac) if battery_frac is not None:
                 self.battery_frac = battery_frac
             case EkfStatus(flags):

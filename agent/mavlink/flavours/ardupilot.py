@@ -107,6 +107,16 @@ class ArduCopter:
         """Item 0 is home, whatever is sent as such."""
         return 1
 
+    @property
+    def acknowledged_twice(self) -> frozenset[int]:
+        """None."""
+        return frozenset()
+
+    @property
+    def commanded_mode_name(self) -> str:
+        """GUIDED."""
+        return "GUIDED"
+
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether it is an ArduPilot copter."""
         return (

@@ -41,6 +41,16 @@ class Flavour(Protocol):
         """Leading items of a mission that belong to the vehicle and cannot be chosen."""
         ...
 
+    @property
+    def acknowledged_twice(self) -> frozenset[int]:
+        """Numbers of the commands that the firmware acknowledges twice."""
+        ...
+
+    @property
+    def commanded_mode_name(self) -> str:
+        """The mode in which the vehicle takes our targets, for people."""
+        ...
+
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether this flavour is the right one for that vehicle."""
         ...
@@ -69,8 +79,8 @@ class Flavour(Protocol):
         """Whether the autopilot is past booting and calibrating."""
         ...
 
-    def airborne(self, vehicle: VehicleState) -> bool:
-        """Whether the vehicle is off the ground, as far as it said."""
+    def airborne(self, vehicle: VehicleState) -> bool | None:
+        """Whether the vehicle is off the ground; None if it has not told yet."""
         ...
 
     def unready(self, vehicle: VehicleState) -> str | None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from agent.mavlink.bridge import Phase
+from agent.mavlink.commands import CommandPolicy
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import LinkDown, LinkUp, Tick
 from agent.vehicle import Arrived, GoTo, HandedOver, Home, Refused, Return, VehicleReady
@@ -17,14 +18,12 @@ from tests.fake_copter import (
     BUSY,
     DENIED,
     FAILED,
-    GUIDED,
     INTERVAL,
-    LAND,
-    LOITER,
     REPOSITION,
-    RTL,
     SET_MODE,
+    FakeCopter,
 )
+from tests.fake_px4 import FakePx4
 
 HERE = (5.0, 0.0, 10.0)
 NORTH = (5.0, 40.0, 12.0)
@@ -37,20 +36,21 @@ def last_target_enu_m(flight: BridgeFlight) -> tuple[float, float, float]:
     return target_m
 
 
-def test_target_is_sent_in_the_step_of_its_order() -> None:
-    flight = BridgeFlight().prepared()
+def test_target_is_sent_in_the_step_of_its_order(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.copter.heard.clear()
     flight.order(GoTo(1, NORTH))
 
     [sent] = flight.copter.commands(REPOSITION)
-    assert (sent.get_type(), sent.frame, sent.param1) == ("COMMAND_INT", 5, -1.0)
+    speed_m_s, flags = {FakeCopter: (-1.0, 0.0), FakePx4: (4.0, 1.0)}[fake]
+    assert (sent.get_type(), sent.frame) == ("COMMAND_INT", 5)
+    assert (sent.param1, sent.param2) == (speed_m_s, flags)
     assert sent.z == pytest.approx(ORIGIN.alt_m + 12.0)
-    assert not int(sent.param2) & 1, "a pilot's mode must not be overruled"
     assert last_target_enu_m(flight) == pytest.approx(NORTH, abs=0.02)
 
 
-def test_vehicle_arrives_once_and_stands_at_the_target() -> None:
-    flight = BridgeFlight().prepared()
+def test_vehicle_arrives_once_and_stands_at_the_target(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     before_s = flight.now_s
     flight.order(GoTo(1, NORTH))
     flight.run_until(Arrived(1))
@@ -61,24 +61,24 @@ def test_vehicle_arrives_once_and_stands_at_the_target() -> None:
     assert flight.reports == [Arrived(1)]
 
 
-def test_legs_follow_each_other_without_mixing_up_arrivals() -> None:
-    flight = BridgeFlight().prepared()
+def test_legs_follow_each_other_without_mixing_up_arrivals(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     for leg, target in enumerate((NORTH, SOUTH, NORTH, HERE), start=1):
         flight.order(GoTo(leg, target))
         flight.run_until(Arrived(leg))
     assert flight.reports == [Arrived(1), Arrived(2), Arrived(3), Arrived(4)]
 
 
-def test_target_at_the_present_place_is_arrived_at_too() -> None:
-    flight = BridgeFlight().prepared()
+def test_target_at_the_present_place_is_arrived_at_too(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.order(GoTo(1, HERE))
     flight.run_until(Arrived(1), limit_s=1.0)
     flight.order(GoTo(2, HERE))
     flight.run_until(Arrived(2), limit_s=1.0)
 
 
-def test_retarget_in_mid_flight_leads_to_the_new_target_only() -> None:
-    flight = BridgeFlight().prepared()
+def test_retarget_in_mid_flight_leads_to_the_new_target_only(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.order(GoTo(1, NORTH))
     flight.run(3.0)
     flight.order(GoTo(2, SOUTH))
@@ -87,9 +87,9 @@ def test_retarget_in_mid_flight_leads_to_the_new_target_only() -> None:
     assert math.dist(flight.copter.position_m, SOUTH) < 1.0
 
 
-def test_passing_by_the_target_is_no_arrival() -> None:
+def test_passing_by_the_target_is_no_arrival(fake: type[FakeCopter]) -> None:
     config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, acceptance_radius_m=5.0)
-    flight = BridgeFlight(config=config).prepared()
+    flight = BridgeFlight(fake(ORIGIN), config=config).prepared()
     flight.order(GoTo(1, (5.0, 60.0, 10.0)))
     flight.run(6.0)
     # The vehicle is told a place ahead; near it, but still moving, it has not arrived.
@@ -100,8 +100,8 @@ def test_passing_by_the_target_is_no_arrival() -> None:
     flight.run_until(Arrived(2))
 
 
-def test_target_that_was_not_taken_yet_is_not_arrived_at() -> None:
-    flight = BridgeFlight().prepared()
+def test_target_that_was_not_taken_yet_is_not_arrived_at(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.copter.verdicts[REPOSITION] = [None]
     flight.order(GoTo(1, HERE))  # the vehicle stands there, but does not know
     flight.run(0.9)
@@ -109,8 +109,10 @@ def test_target_that_was_not_taken_yet_is_not_arrived_at() -> None:
     flight.run_until(Arrived(1))
 
 
-def test_acknowledgement_of_the_old_target_is_not_taken_for_the_new_one() -> None:
-    flight = BridgeFlight().prepared()
+def test_acknowledgement_of_the_old_target_is_not_taken_for_the_new_one(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     copter = flight.copter
     copter.verdicts[REPOSITION] = [None, None, ACCEPTED]  # both lost, then a third answered
     flight.order(GoTo(1, NORTH))
@@ -121,8 +123,8 @@ def test_acknowledgement_of_the_old_target_is_not_taken_for_the_new_one() -> Non
     flight.run_until(Arrived(2))
 
 
-def test_lost_target_is_sent_again() -> None:
-    flight = BridgeFlight().prepared()
+def test_lost_target_is_sent_again(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.copter.verdicts[REPOSITION] = [None, None, BUSY, BUSY]
     flight.order(GoTo(1, NORTH))
     flight.run_until(Arrived(1))
@@ -138,9 +140,9 @@ def test_lost_target_is_sent_again() -> None:
     ],
 )
 def test_target_that_is_refused_for_good_is_reported(
-    verdicts: list[int | None], words: str
+    fake: type[FakeCopter], verdicts: list[int | None], words: str
 ) -> None:
-    flight = BridgeFlight().prepared()
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.copter.verdicts[REPOSITION] = list(verdicts)
     order = GoTo(1, NORTH)
     flight.order(order)
@@ -155,8 +157,10 @@ def test_target_that_is_refused_for_good_is_reported(
     flight.run_until(Arrived(2))
 
 
-def test_vehicle_that_stands_still_elsewhere_is_told_again_and_then_given_up() -> None:
-    flight = BridgeFlight().prepared()
+def test_vehicle_that_stands_still_elsewhere_is_told_again_and_then_given_up(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.copter.stuck = True
     flight.copter.heard.clear()
     flight.order(GoTo(1, NORTH))
@@ -166,8 +170,8 @@ def test_vehicle_that_stands_still_elsewhere_is_told_again_and_then_given_up() -
     assert len(flight.copter.commands(REPOSITION)) == 4
 
 
-def test_vehicle_that_forgot_its_target_gets_there_after_all() -> None:
-    flight = BridgeFlight().prepared()
+def test_vehicle_that_forgot_its_target_gets_there_after_all(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.order(GoTo(1, NORTH))
     flight.run(2.0)
     flight.copter.target_m = None
@@ -178,8 +182,10 @@ def test_vehicle_that_forgot_its_target_gets_there_after_all() -> None:
     "target",
     [(math.nan, 0.0, 10.0), (0.0, math.inf, 10.0), (25_000.0, 0.0, 10.0), (0.0, 0.0, -1_500.0)],
 )
-def test_target_outside_the_fence_is_never_sent(target: tuple[float, float, float]) -> None:
-    flight = BridgeFlight().prepared()
+def test_target_outside_the_fence_is_never_sent(
+    fake: type[FakeCopter], target: tuple[float, float, float]
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.order(GoTo(1, NORTH))
     flight.copter.heard.clear()
     [refused] = flight.order(GoTo(2, target))
@@ -188,16 +194,16 @@ def test_target_outside_the_fence_is_never_sent(target: tuple[float, float, floa
     flight.run_until(Arrived(1))  # what was flown to before still is
 
 
-def test_order_before_the_vehicle_is_prepared_is_refused() -> None:
-    flight = BridgeFlight()
+def test_order_before_the_vehicle_is_prepared_is_refused(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     order = GoTo(1, NORTH)
     assert flight.order(order) == [Refused(order, "the vehicle is idle")]
     flight.order(START)
     assert flight.order(order) == [Refused(order, "the vehicle is preparing")]
 
 
-def test_doubled_and_late_positions_change_nothing() -> None:
-    flight = BridgeFlight().prepared()
+def test_doubled_and_late_positions_change_nothing(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.order(GoTo(1, NORTH))
     flight.run_until(Arrived(1))
     flight.order(GoTo(2, SOUTH))
@@ -215,8 +221,8 @@ def test_doubled_and_late_positions_change_nothing() -> None:
     flight.run_until(Arrived(2))
 
 
-def test_telemetry_is_in_the_missions_frame() -> None:
-    flight = BridgeFlight().prepared()
+def test_telemetry_is_in_the_missions_frame(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.order(GoTo(1, NORTH))
     flight.run(4.0)
     newest = flight.telemetry[-1]
@@ -225,13 +231,15 @@ def test_telemetry_is_in_the_missions_frame() -> None:
     assert newest.battery_frac == pytest.approx(0.8)
 
 
-@pytest.mark.parametrize(("mode", "name"), [(LOITER, "LOITER"), (LAND, "LAND"), (RTL, "RTL")])
-def test_pilot_who_takes_over_keeps_the_vehicle(mode: int, name: str) -> None:
-    flight = BridgeFlight().flying()
+@pytest.mark.parametrize("kind", ["pilot_mode", "land_mode", "return_mode"])
+def test_pilot_who_takes_over_keeps_the_vehicle(fake: type[FakeCopter], kind: str) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.copter.text(2, "Radio Failsafe")
+    mode: int = getattr(fake, kind)
     flight.copter.set_mode(mode)
     flight.copter.heard.clear()
     handed = flight.run_until(HandedOver)
+    name = fake.mode_names[mode]
     assert handed == HandedOver(f"its pilot or a failsafe switched it to {name} (Radio Failsafe)")
     order = GoTo(2, NORTH)
     assert flight.order(order) == [Refused(order, "the vehicle is handed over")]
@@ -240,28 +248,45 @@ def test_pilot_who_takes_over_keeps_the_vehicle(mode: int, name: str) -> None:
     assert len([r for r in flight.reports if isinstance(r, HandedOver)]) == 1
 
 
-def test_target_sent_before_the_take_over_is_seen_does_not_pull_the_vehicle_back() -> None:
-    flight = BridgeFlight().prepared()
-    flight.copter.mode = LOITER  # no heartbeat has said so yet
+def test_target_sent_before_the_take_over_is_seen_does_not_pull_an_ardupilot_back() -> None:
+    flight = BridgeFlight(FakeCopter(ORIGIN)).prepared()
+    flight.copter.mode = FakeCopter.pilot_mode  # no heartbeat has said so yet
     flight.order(GoTo(1, NORTH))
     flight.run_until(HandedOver)
-    assert flight.copter.mode == LOITER
+    assert flight.copter.mode == FakeCopter.pilot_mode
     assert flight.copter.target_m is None or flight.copter.target_m[1] < 1.0
 
 
-def test_return_leaves_the_vehicle_to_a_pilot_who_flies_it() -> None:
-    flight = BridgeFlight().flying()
-    flight.copter.set_mode(LOITER)
+def test_a_px4_can_be_pulled_back_only_until_a_heartbeat_has_told_of_the_take_over() -> None:
+    flight = BridgeFlight(FakePx4(ORIGIN)).prepared()
+    flight.copter.set_mode(FakePx4.pilot_mode)
+    flight.order(GoTo(1, NORTH))
+    assert flight.copter.mode == FakePx4.own_mode, "no heartbeat has told of it yet"
+
+    flight.copter.set_mode(FakePx4.pilot_mode)  # by the sticks
+    flight.run_until(HandedOver, limit_s=1.0)
+    flight.order(GoTo(2, SOUTH))
+    flight.run(10.0)
+    assert flight.copter.mode == FakePx4.pilot_mode
+
+
+def test_return_leaves_the_vehicle_to_a_pilot_who_flies_it(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
+    flight.copter.set_mode(fake.pilot_mode)
     flight.run_until(HandedOver)
     flight.copter.heard.clear()
-    assert flight.order(Return("mission ended")) == [HandedOver("its pilot flies it in LOITER")]
+    assert flight.order(Return("mission ended")) == [
+        HandedOver(f"its pilot flies it in {fake.mode_names[fake.pilot_mode]}")
+    ]
     flight.run(5.0)
     assert not flight.copter.commands(SET_MODE)
 
 
-def test_return_of_a_vehicle_that_returns_by_failsafe_waits_for_the_landing() -> None:
-    flight = BridgeFlight().flying()
-    flight.copter.set_mode(RTL)
+def test_return_of_a_vehicle_that_returns_by_failsafe_waits_for_the_landing(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
+    flight.copter.set_mode(fake.return_mode)
     flight.run_until(HandedOver)
     flight.copter.heard.clear()
     flight.order(Return("mission ended"))
@@ -270,21 +295,21 @@ def test_return_of_a_vehicle_that_returns_by_failsafe_waits_for_the_landing() ->
     assert not flight.copter.commands(SET_MODE)
 
 
-def test_vehicle_that_a_pilot_gives_back_returns() -> None:
-    flight = BridgeFlight().flying()
-    flight.copter.set_mode(LOITER)
+def test_vehicle_that_a_pilot_gives_back_returns(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
+    flight.copter.set_mode(fake.pilot_mode)
     flight.run_until(HandedOver)
-    flight.copter.set_mode(GUIDED)
+    flight.copter.set_mode(fake.own_mode)
     flight.run(1.0)
     flight.order(Return("mission ended"))
     flight.run_until(Home())
 
 
-def test_reboot_in_flight_hands_over() -> None:
-    flight = BridgeFlight().flying()
+def test_reboot_in_flight_hands_over(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.copter.boot_s = 0.0  # its heartbeat does not give it away
     flight.copter.power_on(flight.now_s)
-    flight.copter.mode, flight.copter.armed = GUIDED, True
+    flight.copter.mode, flight.copter.armed = fake.own_mode, True
     flight.copter._intervals_s = {33: 0.1}
     flight.copter._due_s = {33: flight.now_s}
     flight.copter.heard.clear()
@@ -293,28 +318,32 @@ def test_reboot_in_flight_hands_over() -> None:
     assert set(flight.copter.count()) == {INTERVAL}
 
 
-def test_reboot_is_seen_in_the_heartbeat_too() -> None:
-    flight = BridgeFlight().flying()
+def test_reboot_is_seen_in_the_heartbeat_too(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.copter.power_on(flight.now_s)
     flight.run_until(HandedOver("the autopilot rebooted"), limit_s=2.0)
 
 
-def test_vehicle_that_disarms_in_flight_is_handed_over() -> None:
-    flight = BridgeFlight().flying()
+def test_vehicle_that_disarms_in_flight_is_handed_over(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.copter.armed = False
     flight.run_until(HandedOver("the vehicle disarmed by itself"))
 
 
-def test_a_bridge_that_was_itself_held_up_does_not_take_its_vehicle_for_silent() -> None:
-    flight = BridgeFlight().flying()
+def test_a_bridge_that_was_itself_held_up_does_not_take_its_vehicle_for_silent(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.now_s += 30.0  # nobody steps the bridge meanwhile, and nothing is read
     reports = flight.happen(Tick())
     flight.run_until(Arrived(1))
     assert not any(isinstance(report, HandedOver) for report in [*reports, *flight.reports])
 
 
-def test_a_vehicle_that_stays_silent_after_the_bridge_was_held_up_is_handed_over() -> None:
-    flight = BridgeFlight().flying()
+def test_a_vehicle_that_stays_silent_after_the_bridge_was_held_up_is_handed_over(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.copter.silent = True
     flight.now_s += 30.0
     held_up_s = flight.now_s
@@ -322,8 +351,8 @@ def test_a_vehicle_that_stays_silent_after_the_bridge_was_held_up_is_handed_over
     assert 4.0 <= flight.now_s - held_up_s <= 6.0
 
 
-def test_silent_vehicle_is_handed_over_and_can_be_prepared_again() -> None:
-    flight = BridgeFlight().flying()
+def test_silent_vehicle_is_handed_over_and_can_be_prepared_again(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.copter.silent = True
     before_s = flight.now_s
     assert flight.run_until(HandedOver) == HandedOver("no heartbeat for 5 s")
@@ -339,8 +368,8 @@ def test_silent_vehicle_is_handed_over_and_can_be_prepared_again() -> None:
     assert not flight.copter.commands(SET_MODE)
 
 
-def test_silent_vehicle_that_speaks_again_can_be_called_home() -> None:
-    flight = BridgeFlight().flying()
+def test_silent_vehicle_that_speaks_again_can_be_called_home(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.copter.silent = True
     flight.run_until(HandedOver)
     flight.copter.silent = False
@@ -349,8 +378,8 @@ def test_silent_vehicle_that_speaks_again_can_be_called_home() -> None:
     flight.run_until(Home())
 
 
-def test_short_loss_of_the_link_is_ridden_out() -> None:
-    flight = BridgeFlight().prepared()
+def test_short_loss_of_the_link_is_ridden_out(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.order(GoTo(1, NORTH))
     flight.happen(LinkDown())
     flight.copter.silent = True
@@ -359,32 +388,33 @@ def test_short_loss_of_the_link_is_ridden_out() -> None:
     flight.copter.heard.clear()
     flight.happen(LinkUp())
     flight.run_until(Arrived(1))
-    assert len(flight.copter.commands(INTERVAL)) >= 6
+    assert len(flight.copter.commands(INTERVAL)) >= len(fake.streams_asked)
     assert flight.reports == [Arrived(1)]
 
 
-def test_position_stream_that_stops_in_flight_is_asked_for_again() -> None:
-    flight = BridgeFlight().flying(east_m=40.0)
+def test_position_stream_that_stops_in_flight_is_asked_for_again(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying(east_m=40.0)
     del flight.copter._intervals_s[33]
     flight.run_until(Arrived(1))
 
 
-def test_vehicle_returns_lands_and_disarms() -> None:
-    flight = BridgeFlight().flying()
+def test_vehicle_returns_lands_and_disarms(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
+    flight.copter.heard.clear()
     flight.order(Return("mission ended"))
     flight.run(2.0)
-    assert flight.copter.mode == RTL
+    assert flight.copter.mode == fake.return_mode
     assert not flight.reports
     flight.order(Return("again"))
     flight.run_until(Home())
     assert not flight.copter.armed
     assert flight.reports == [Home()]
-    assert len(flight.copter.commands(SET_MODE)) == 2
+    assert len(flight.copter.commands(SET_MODE)) == 1
     assert flight.order(Return("again")) == [Home()]
 
 
-def test_return_mode_that_is_refused_is_set_again_and_then_reported() -> None:
-    flight = BridgeFlight().prepared()
+def test_return_mode_that_is_refused_is_set_again_and_then_reported(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.copter.verdicts[SET_MODE] = [FAILED] * 99
     order = Return("mission ended")
     flight.order(order)
@@ -392,9 +422,9 @@ def test_return_mode_that_is_refused_is_set_again_and_then_reported() -> None:
     assert refused == Refused(order, "the return mode cannot be set (failed)")
 
 
-def test_pilot_who_stops_the_return_keeps_the_vehicle() -> None:
-    for mode in (LOITER, GUIDED):
-        flight = BridgeFlight().flying()
+def test_pilot_who_stops_the_return_keeps_the_vehicle(fake: type[FakeCopter]) -> None:
+    for mode in (fake.pilot_mode, fake.own_mode):
+        flight = BridgeFlight(fake(ORIGIN)).flying()
         flight.order(Return("mission ended"))
         flight.run(2.0)
         flight.copter.set_mode(mode)
@@ -404,12 +434,12 @@ def test_pilot_who_stops_the_return_keeps_the_vehicle() -> None:
         assert not flight.copter.commands(SET_MODE)
 
 
-def test_return_of_a_vehicle_never_heard_is_home_at_once() -> None:
-    assert BridgeFlight().order(Return("abort")) == [Home()]
+def test_return_of_a_vehicle_never_heard_is_home_at_once(fake: type[FakeCopter]) -> None:
+    assert BridgeFlight(fake(ORIGIN)).order(Return("abort")) == [Home()]
 
 
-def test_second_mission_follows_the_first() -> None:
-    flight = BridgeFlight().flying()
+def test_second_mission_follows_the_first(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.order(Return("mission ended"))
     flight.run_until(Home())
     flight.order(START)
@@ -417,13 +447,16 @@ def test_second_mission_follows_the_first() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_lossy_doubling_link_delays_but_does_not_break_a_flight(seed: int) -> None:
+def test_lossy_doubling_link_delays_but_does_not_break_a_flight(
+    fake: type[FakeCopter], seed: int
+) -> None:
     chance = np.random.default_rng(seed)
 
     def spoil(data: bytes) -> list[bytes]:
         return [data] * int(chance.choice([0, 1, 2], p=[0.2, 0.7, 0.1]))
 
-    flight = BridgeFlight(to_vehicle=spoil, to_bridge=spoil)
+    config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, commands=CommandPolicy(tries=9))
+    flight = BridgeFlight(fake(ORIGIN), config, to_vehicle=spoil, to_bridge=spoil)
     flight.order(START)
     flight.run_until(VehicleReady(), limit_s=120.0)
     for leg, target in enumerate((NORTH, SOUTH, HERE), start=1):

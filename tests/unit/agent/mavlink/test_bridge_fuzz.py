@@ -12,9 +12,11 @@ from agent.mavlink.events import Received
 from agent.vehicle import Arrived, GoTo, HandedOver
 from swarm.model.frames import enu_from_wgs84
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
-from tests.fake_copter import ARM, INTERVAL, REPOSITION, SET_MODE, SPEED, TAKEOFF
+from tests.fake_copter import ARM, INTERVAL, REPOSITION, SET_MODE, SPEED, TAKEOFF, FakeCopter
+from tests.fake_px4 import FakePx4
 from tests.unit.agent.mavlink.test_codec import crafted
 
+FAKES = (FakeCopter, FakePx4)
 TARGET = (5.0, 30.0, 10.0)
 
 known_frames = st.builds(
@@ -32,10 +34,13 @@ any_frames = st.builds(
 noise = st.lists(st.one_of(known_frames, any_frames, st.binary(max_size=40)), max_size=30)
 
 
+@pytest.mark.parametrize("fake", FAKES)
 @settings(max_examples=60, deadline=None)
-@given(noise)
-def test_noise_in_flight_never_raises_and_sends_no_new_target(pieces: list[bytes]) -> None:
-    flight = BridgeFlight().prepared()
+@given(pieces=noise)
+def test_noise_in_flight_never_raises_and_sends_no_new_target(
+    fake: type[FakeCopter], pieces: list[bytes]
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
     flight.order(GoTo(1, TARGET))
     flight.copter.heard.clear()
     for piece in pieces:
@@ -50,10 +55,11 @@ def test_noise_in_flight_never_raises_and_sends_no_new_target(pieces: list[bytes
     assert len(arrivals) <= 1
 
 
+@pytest.mark.parametrize("fake", FAKES)
 @settings(max_examples=60, deadline=None)
-@given(noise)
-def test_noise_in_preparation_never_raises(pieces: list[bytes]) -> None:
-    flight = BridgeFlight()
+@given(pieces=noise)
+def test_noise_in_preparation_never_raises(fake: type[FakeCopter], pieces: list[bytes]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.order(START)
     for piece in pieces:
         flight.happen(Received(piece))
@@ -62,9 +68,10 @@ def test_noise_in_preparation_never_raises(pieces: list[bytes]) -> None:
     assert set(flight.copter.count()) <= wanted
 
 
+@pytest.mark.parametrize("fake", FAKES)
 @settings(max_examples=30, deadline=None)
-@given(st.binary(min_size=1, max_size=200))
-def test_bit_errors_on_the_link_are_survived(garbage: bytes) -> None:
+@given(garbage=st.binary(min_size=1, max_size=200))
+def test_bit_errors_on_the_link_are_survived(fake: type[FakeCopter], garbage: bytes) -> None:
     flips = list(garbage)
 
     def spoil(data: bytes) -> list[bytes]:
@@ -75,6 +82,6 @@ def test_bit_errors_on_the_link_are_survived(garbage: bytes) -> None:
         damaged[flip % len(damaged)] ^= 1 << (flip % 8)
         return [bytes(damaged)]
 
-    flight = BridgeFlight(to_bridge=spoil).prepared()
+    flight = BridgeFlight(fake(ORIGIN), to_bridge=spoil).prepared()
     flight.order(GoTo(1, TARGET))
     flight.run_until(Arrived, HandedOver)

@@ -17,21 +17,19 @@ from tests.fake_copter import (
     BUSY,
     DENIED,
     FAILED,
-    GUIDED,
     INTERVAL,
-    LOITER,
     REPOSITION,
     SET_MODE,
     SPEED,
-    STABILIZE,
     TAKEOFF,
     UNSUPPORTED,
     FakeCopter,
 )
+from tests.fake_px4 import FakePx4
 
 
-def test_vehicle_is_prepared_step_by_step_and_hovers_at_its_start() -> None:
-    flight = BridgeFlight()
+def test_vehicle_is_prepared_step_by_step_and_hovers_at_its_start(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.order(START)
     flight.run_until(VehicleReady())
 
@@ -39,24 +37,26 @@ def test_vehicle_is_prepared_step_by_step_and_hovers_at_its_start() -> None:
     assert flight.copter.speed_m_s == START.speed_m_s
     order = [m.command for m in flight.copter.heard if hasattr(m, "command")]
     steps = [c for c in order if c != INTERVAL]
-    assert steps == [SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED]
+    boots_into_another_mode = [SET_MODE] if fake.boot_mode != fake.own_mode else []
+    assert steps == [*boots_into_another_mode, ARM, TAKEOFF, REPOSITION, SPEED]
     assert flight.bridge.phase is Phase.HOVERING
 
 
-def test_reasons_for_waiting_change_as_the_vehicle_gets_ready() -> None:
-    flight = BridgeFlight()
+def test_reasons_for_waiting_change_as_the_vehicle_gets_ready(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.order(START)
     flight.run_until(VehicleReady())
 
     reasons = flight.reasons()
     assert reasons[0] == "waiting for a heartbeat of system id 1"
-    for words in ("booting", "guided mode", "position estimate", "arming", "climbing", "start"):
+    ardupilots = ("setting GUIDED", "position estimate") if fake is FakeCopter else ()
+    for words in ("booting", *ardupilots, "arming", "climbing", "start"):
         assert any(words in reason for reason in reasons), (words, reasons)
     assert all(a != b for a, b in itertools.pairwise(reasons))
 
 
-def test_mode_is_not_set_before_boot_has_ended() -> None:
-    flight = BridgeFlight(FakeCopter(ORIGIN, boot_s=5.0, ready_s=6.0))
+def test_mode_is_not_set_before_boot_has_ended(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN, boot_s=5.0, ready_s=6.0))
     flight.order(START)
     flight.run(4.5)
     assert not flight.copter.commands(SET_MODE)
@@ -64,16 +64,16 @@ def test_mode_is_not_set_before_boot_has_ended() -> None:
     flight.run_until(VehicleReady())
 
 
-def test_ground_station_heartbeat_comes_every_second() -> None:
-    flight = BridgeFlight()
+def test_ground_station_heartbeat_comes_every_second(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.run(10.0)
     beats = [m for m in flight.copter.heard if m.get_type() == "HEARTBEAT"]
     assert 10 <= len(beats) <= 11
     assert {(m.type, m.get_srcSystem(), m.get_srcComponent()) for m in beats} == {(6, 255, 190)}
 
 
-def test_refused_arming_is_tried_again_and_the_reason_is_told() -> None:
-    flight = BridgeFlight()
+def test_refused_arming_is_tried_again_and_the_reason_is_told(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.copter.verdicts[ARM] = [FAILED, FAILED]
     flight.order(START)
     flight.run_until(VehicleReady())
@@ -82,8 +82,8 @@ def test_refused_arming_is_tried_again_and_the_reason_is_told() -> None:
     assert any("arming refused (failed)" in reason for reason in flight.reasons())
 
 
-def test_arming_that_is_refused_for_ever_ends_the_preparation() -> None:
-    flight = BridgeFlight()
+def test_arming_that_is_refused_for_ever_ends_the_preparation(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.copter.verdicts[ARM] = [FAILED] * 1000
     flight.order(START)
     refused = flight.run_until(Refused, limit_s=120.0)
@@ -95,8 +95,8 @@ def test_arming_that_is_refused_for_ever_ends_the_preparation() -> None:
     assert not [m for m in flight.copter.heard[heard:] if getattr(m, "command", None) == ARM]
 
 
-def test_text_of_the_autopilot_explains_a_failing_check() -> None:
-    copter = FakeCopter(ORIGIN)
+def test_text_of_the_autopilot_explains_a_failing_check(fake: type[FakeCopter]) -> None:
+    copter = fake(ORIGIN)
     copter.prearm_ok = False
     flight = BridgeFlight(copter)
     flight.order(START)
@@ -108,16 +108,16 @@ def test_text_of_the_autopilot_explains_a_failing_check() -> None:
     assert not copter.commands(ARM)
 
 
-def test_takeoff_that_is_refused_briefly_is_asked_again() -> None:
-    flight = BridgeFlight()
+def test_takeoff_that_is_refused_briefly_is_asked_again(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.copter.verdicts[TAKEOFF] = [BUSY, FAILED, DENIED]
     flight.order(START)
     flight.run_until(VehicleReady())
     assert len(flight.copter.commands(TAKEOFF)) == 4
 
 
-def test_vehicle_that_disarms_itself_on_the_ground_is_armed_again() -> None:
-    flight = BridgeFlight()
+def test_vehicle_that_disarms_itself_on_the_ground_is_armed_again(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.copter.verdicts[TAKEOFF] = [None] * 12  # silent for longer than it stays armed
     flight.order(START)
     flight.run_until(VehicleReady())
@@ -125,8 +125,11 @@ def test_vehicle_that_disarms_itself_on_the_ground_is_armed_again() -> None:
 
 
 @pytest.mark.parametrize("command", [SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, INTERVAL])
-def test_lost_acknowledgement_is_made_good_by_sending_again(command: int) -> None:
-    flight = BridgeFlight()
+def test_lost_acknowledgement_is_made_good_by_sending_again(
+    fake: type[FakeCopter], command: int
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
+    flight.copter.mode = fake.pilot_mode
     flight.copter.verdicts[command] = [None, None]
     flight.order(START)
     flight.run_until(VehicleReady())
@@ -137,7 +140,7 @@ def test_lost_acknowledgement_is_made_good_by_sending_again(command: int) -> Non
         assert [m.confirmation for m in again[:3]] == [0, 1, 2]
 
 
-def test_acknowledgement_lost_after_the_deed_does_no_harm() -> None:
+def test_acknowledgement_lost_after_the_deed_does_no_harm(fake: type[FakeCopter]) -> None:
     lost: list[bytes] = []
 
     def lose_first_acks(data: bytes) -> list[bytes]:
@@ -146,14 +149,14 @@ def test_acknowledgement_lost_after_the_deed_does_no_harm() -> None:
             return []
         return [data]
 
-    flight = BridgeFlight(to_bridge=lose_first_acks)
+    flight = BridgeFlight(fake(ORIGIN), to_bridge=lose_first_acks)
     flight.order(START)
     flight.run_until(VehicleReady())
     assert len(lost) == 12
 
 
-def test_wrong_system_id_is_never_commanded_and_named() -> None:
-    flight = BridgeFlight(FakeCopter(ORIGIN, system_id=7))
+def test_wrong_system_id_is_never_commanded_and_named(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN, system_id=7))
     flight.order(START)
     flight.run(10.0)
 
@@ -162,8 +165,8 @@ def test_wrong_system_id_is_never_commanded_and_named() -> None:
     assert {m.get_type() for m in flight.copter.heard} == {"HEARTBEAT"}
 
 
-def test_other_component_of_the_right_system_is_not_the_autopilot() -> None:
-    copter = FakeCopter(ORIGIN)
+def test_other_component_of_the_right_system_is_not_the_autopilot(fake: type[FakeCopter]) -> None:
+    copter = fake(ORIGIN)
     copter.component_id = 154
     flight = BridgeFlight(copter)
     flight.order(START)
@@ -171,9 +174,11 @@ def test_other_component_of_the_right_system_is_not_the_autopilot() -> None:
     assert {m.get_type() for m in copter.heard} == {"HEARTBEAT"}
 
 
-@pytest.mark.parametrize(("mav_type", "autopilot"), [(1, 3), (2, 12)])
-def test_unsupported_vehicle_is_named_and_left_alone(mav_type: int, autopilot: int) -> None:
-    copter = FakeCopter(ORIGIN)
+@pytest.mark.parametrize(("mav_type", "autopilot"), [(1, 3), (1, 12), (22, 12), (2, 18)])
+def test_unsupported_vehicle_is_named_and_left_alone(
+    fake: type[FakeCopter], mav_type: int, autopilot: int
+) -> None:
+    copter = fake(ORIGIN)
     copter.mav_type, copter.autopilot = mav_type, autopilot
     flight = BridgeFlight(copter)
     flight.order(START)
@@ -182,65 +187,80 @@ def test_unsupported_vehicle_is_named_and_left_alone(mav_type: int, autopilot: i
     assert not copter.count()
 
 
-def test_stream_that_does_not_come_is_asked_for_again() -> None:
-    flight = BridgeFlight()
-    flight.copter.deaf_to = {193}
+@pytest.mark.parametrize(
+    ("fake", "stream", "name"),
+    [
+        (FakeCopter, 193, "EKF_STATUS_REPORT"),
+        (FakeCopter, 1, "SYS_STATUS"),
+        (FakePx4, 1, "SYS_STATUS"),
+        (FakePx4, 33, "position"),
+    ],
+)
+def test_stream_that_does_not_come_is_asked_for_again(
+    fake: type[FakeCopter], stream: int, name: str
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
+    flight.copter.deaf_to = {stream}
     flight.order(START)
     flight.run(15.0)
-    asked = [m for m in flight.copter.commands(INTERVAL) if m.param1 == 193]
+    asked = [m for m in flight.copter.commands(INTERVAL) if m.param1 == stream]
     assert len(asked) >= 3
-    assert "EKF_STATUS_REPORT" in flight.reasons()[-1]
+    assert name in flight.reasons()[-1]
 
     flight.copter.deaf_to = set()
     flight.run_until(VehicleReady())
 
 
-def test_streams_are_asked_for_at_the_configured_rates() -> None:
-    flight = BridgeFlight(config=BridgeConfig(1, ORIGIN, position_rate_hz=10.0))
+def test_streams_are_asked_for_at_the_configured_rates(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN), config=BridgeConfig(1, ORIGIN, position_rate_hz=10.0))
     flight.run(3.0)
     asked = {int(m.param1): m.param2 for m in flight.copter.commands(INTERVAL)}
     assert asked[33] == 100_000.0
-    assert set(asked) == {33, 1, 193, 245, 42, 147}
+    assert set(asked) == fake.streams_asked
 
 
-def test_speed_goes_by_parameter_if_the_command_is_refused() -> None:
-    copter = FakeCopter(ORIGIN)
+def test_speed_goes_by_parameter_if_the_command_is_refused(fake: type[FakeCopter]) -> None:
+    copter = fake(ORIGIN)
     copter.verdicts[SPEED] = [UNSUPPORTED] * 99
-    copter.parameters = {"WPNAV_SPEED": 1000.0}
+    name = fake.speed_names[-1]
+    copter.parameters = {name: 1000.0}
     flight = BridgeFlight(copter)
     flight.order(START)
     flight.run_until(VehicleReady())
 
-    assert copter.parameters == {"WPNAV_SPEED": 400.0}
+    assert copter.parameters == {name: 400.0 if name == "WPNAV_SPEED" else 4.0}
     asked = {m.param_id for m in copter.heard if m.get_type() == "PARAM_REQUEST_READ"}
-    assert asked == {"WP_SPD", "WPNAV_SPEED"}
+    assert asked == set(fake.speed_names)
 
 
-def test_speed_that_cannot_be_set_at_all_is_said() -> None:
-    copter = FakeCopter(ORIGIN)
+def test_speed_that_cannot_be_set_at_all_is_said(fake: type[FakeCopter]) -> None:
+    copter = fake(ORIGIN)
     copter.verdicts[SPEED] = [FAILED] * 99
     copter.parameters = {}
     flight = BridgeFlight(copter)
     flight.order(START)
     refused = flight.run_until(Refused)
     assert isinstance(refused, Refused)
-    assert "WP_SPD or WPNAV_SPEED" in refused.reason
+    assert " or ".join(fake.speed_names) in refused.reason
 
 
-def test_height_of_takeoff_follows_from_home_not_from_the_origin() -> None:
-    flight = BridgeFlight(FakeCopter(ORIGIN, ground_m=-20.0))
+def test_height_of_takeoff_follows_from_home_not_from_the_origin(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN, ground_m=-20.0))
     flight.order(START)
     flight.run_until(VehicleReady())
     [takeoff] = flight.copter.commands(TAKEOFF)
-    assert takeoff.param7 == pytest.approx(30.0, abs=0.01)
+    takeoff_m = {FakeCopter: 30.0, FakePx4: ORIGIN.alt_m + 10.0}[fake]
+    assert takeoff.param7 == pytest.approx(takeoff_m, abs=0.01)
     assert flight.copter.position_m[2] == pytest.approx(10.0, abs=1.0)
 
 
 @pytest.mark.parametrize(
     ("ground_m", "words"), [(9.8, "0.2 m above"), (50.0, "-40.0 m above the vehicle's home")]
 )
-def test_start_at_or_below_the_ground_is_refused_before_arming(ground_m: float, words: str) -> None:
-    flight = BridgeFlight(FakeCopter(ORIGIN, ground_m=ground_m))
+def test_start_at_or_below_the_ground_is_refused_before_arming(
+    fake: type[FakeCopter], ground_m: float, words: str
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN, ground_m=ground_m))
     flight.order(START)
     refused = flight.run_until(Refused)
     assert isinstance(refused, Refused)
@@ -248,9 +268,9 @@ def test_start_at_or_below_the_ground_is_refused_before_arming(ground_m: float, 
     assert not flight.copter.commands(ARM)
 
 
-def test_vehicle_at_the_other_end_of_the_world_is_refused() -> None:
+def test_vehicle_at_the_other_end_of_the_world_is_refused(fake: type[FakeCopter]) -> None:
     elsewhere = replace(ORIGIN, lat_deg=-35.0, lon_deg=149.0)
-    flight = BridgeFlight(FakeCopter(elsewhere))
+    flight = BridgeFlight(fake(elsewhere))
     flight.order(START)
     refused = flight.run_until(Refused)
     assert isinstance(refused, Refused)
@@ -268,15 +288,15 @@ def test_vehicle_at_the_other_end_of_the_world_is_refused() -> None:
         Prepare((0.0, 0.0, 2_000.0), 4.0),
     ],
 )
-def test_impossible_start_is_refused_at_once(order: Prepare) -> None:
-    flight = BridgeFlight()
+def test_impossible_start_is_refused_at_once(fake: type[FakeCopter], order: Prepare) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     [refused] = flight.order(order)
     assert isinstance(refused, Refused)
     assert flight.bridge.phase is Phase.IDLE
 
 
-def test_vehicle_that_flies_already_does_not_take_off_again() -> None:
-    flight = BridgeFlight().flying()
+def test_vehicle_that_flies_already_does_not_take_off_again(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     again = BridgeFlight(flight.copter)  # the agent was restarted, its autopilot flew on
     flight.copter.heard.clear()
     again.order(Prepare((60.0, 0.0, 12.0), 5.0))
@@ -288,24 +308,27 @@ def test_vehicle_that_flies_already_does_not_take_off_again() -> None:
     assert again.copter.speed_m_s == 5.0
 
 
-def test_vehicle_flown_by_its_pilot_is_waited_for_and_not_touched() -> None:
-    flight = BridgeFlight().flying()
-    flight.copter.set_mode(LOITER)
+def test_vehicle_flown_by_its_pilot_is_waited_for_and_not_touched(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
+    flight.copter.set_mode(fake.pilot_mode)
     again = BridgeFlight(flight.copter)
     flight.copter.heard.clear()
     again.order(START)
     again.run(5.0)
-    assert again.reasons()[-1].startswith("armed in LOITER by its pilot")
+    assert again.reasons()[-1].startswith(
+        f"armed in {fake.mode_names[fake.pilot_mode]} by its pilot: land it, or switch it to "
+    )
     assert set(again.copter.count()) == {INTERVAL}
 
-    flight.copter.set_mode(GUIDED)  # the pilot hands it to us
+    flight.copter.set_mode(fake.own_mode)  # the pilot hands it to us
     again.run_until(VehicleReady())
 
 
-def test_vehicle_landed_by_its_pilot_does_not_start_by_itself() -> None:
-    copter = FakeCopter(ORIGIN, ready_s=1.0)
+def test_vehicle_landed_by_its_pilot_does_not_start_by_itself(fake: type[FakeCopter]) -> None:
+    copter = fake(ORIGIN, ready_s=1.0)
     flight = BridgeFlight(copter)
     flight.run(3.0)
+    copter.set_mode(fake.pilot_mode)
     copter.armed, copter.armed_at_s = True, copter.now_s
     flight.run(1.5)
     flight.order(START)
@@ -317,22 +340,23 @@ def test_vehicle_landed_by_its_pilot_does_not_start_by_itself() -> None:
     assert not copter.commands(ARM)
 
 
-def test_pilot_who_takes_over_during_takeoff_keeps_the_vehicle() -> None:
-    flight = BridgeFlight()
+def test_pilot_who_takes_over_during_takeoff_keeps_the_vehicle(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.order(START)
     while not flight.copter.airborne:
         flight.step()
     flight.run(1.0)
-    flight.copter.set_mode(STABILIZE)
+    flight.copter.set_mode(fake.pilot_mode)
     handed = flight.run_until(HandedOver)
-    assert handed == HandedOver("its pilot or a failsafe switched it to STABILIZE")
+    name = fake.mode_names[fake.pilot_mode]
+    assert handed == HandedOver(f"its pilot or a failsafe switched it to {name}")
     flight.copter.heard.clear()
     flight.run(10.0)
     assert set(flight.copter.count()) <= {INTERVAL}
 
 
-def test_reboot_before_arming_begins_the_preparation_anew() -> None:
-    copter = FakeCopter(ORIGIN, ready_s=20.0)
+def test_reboot_before_arming_begins_the_preparation_anew(fake: type[FakeCopter]) -> None:
+    copter = fake(ORIGIN, ready_s=20.0)
     flight = BridgeFlight(copter)
     flight.order(START)
     flight.run(10.0)
@@ -342,8 +366,8 @@ def test_reboot_before_arming_begins_the_preparation_anew() -> None:
     assert not [r for r in flight.reports if isinstance(r, HandedOver)]
 
 
-def test_silence_before_arming_is_waited_out() -> None:
-    copter = FakeCopter(ORIGIN, ready_s=20.0)
+def test_silence_before_arming_is_waited_out(fake: type[FakeCopter]) -> None:
+    copter = fake(ORIGIN, ready_s=20.0)
     flight = BridgeFlight(copter)
     flight.order(START)
     flight.run(5.0)
@@ -354,8 +378,8 @@ def test_silence_before_arming_is_waited_out() -> None:
     flight.run_until(VehicleReady())
 
 
-def test_return_during_preparation_on_the_ground_is_home_at_once() -> None:
-    flight = BridgeFlight()
+def test_return_during_preparation_on_the_ground_is_home_at_once(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.order(START)
     flight.run(2.0)
     assert flight.order(Return("abort")) == [Home()]
@@ -364,8 +388,8 @@ def test_return_during_preparation_on_the_ground_is_home_at_once() -> None:
     assert set(flight.copter.count()) <= {INTERVAL}
 
 
-def test_return_of_an_armed_vehicle_on_the_ground_disarms_it() -> None:
-    flight = BridgeFlight()
+def test_return_of_an_armed_vehicle_on_the_ground_disarms_it(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.copter.verdicts[TAKEOFF] = [None] * 99
     flight.order(START)
     while not flight.copter.armed:
@@ -375,8 +399,8 @@ def test_return_of_an_armed_vehicle_on_the_ground_disarms_it() -> None:
     assert not flight.copter.armed
 
 
-def test_climb_that_stops_ends_the_preparation() -> None:
-    flight = BridgeFlight()
+def test_climb_that_stops_ends_the_preparation(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.order(START)
     while flight.copter.position_m[2] < 4.0:
         flight.step()

@@ -20,10 +20,7 @@ from agent.vehicle import (
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.fake_copter import (
     ARM,
-    GUIDED,
-    LOITER,
     REPOSITION,
-    RTL,
     SET_MODE,
     SPEED,
     TAKEOFF,
@@ -34,9 +31,9 @@ RESUME = replace(START, resume=True)
 RETURN = Return("the mission is over", resume=True)
 
 
-def crashed() -> BridgeFlight:
+def crashed(fake: type[FakeCopter]) -> BridgeFlight:
     """A bridge that was killed on the way to a far place, and started anew."""
-    flight = BridgeFlight().flying(leg=7).restart()
+    flight = BridgeFlight(fake(ORIGIN)).flying(leg=7).restart()
     flight.copter.heard.clear()
     return flight
 
@@ -44,8 +41,10 @@ def crashed() -> BridgeFlight:
 # -- in a running mission ---------------------------------------------------------------
 
 
-def test_a_vehicle_in_the_air_flies_on_while_the_new_life_takes_over() -> None:
-    flight = crashed()
+def test_a_vehicle_in_the_air_flies_on_while_the_new_life_takes_over(
+    fake: type[FakeCopter],
+) -> None:
+    flight = crashed(fake)
     east_m = [flight.copter.position_m[0]]
     flight.order(RESUME)
     while not any(isinstance(r, VehicleReady) for r in flight.reports):
@@ -58,8 +57,10 @@ def test_a_vehicle_in_the_air_flies_on_while_the_new_life_takes_over() -> None:
     assert flight.copter.count()[SPEED] == 1
 
 
-def test_it_says_where_the_vehicle_is_before_it_says_that_it_is_ready() -> None:
-    flight = crashed()
+def test_it_says_where_the_vehicle_is_before_it_says_that_it_is_ready(
+    fake: type[FakeCopter],
+) -> None:
+    flight = crashed(fake)
     flight.telemetry.clear()
     flight.order(RESUME)
     flight.run_until(VehicleReady())
@@ -68,8 +69,8 @@ def test_it_says_where_the_vehicle_is_before_it_says_that_it_is_ready() -> None:
     assert flight.telemetry[-1].position_enu_m[0] > START.position_enu_m[0] + 4.0
 
 
-def test_the_old_target_ordered_again_is_reached() -> None:
-    flight = crashed()
+def test_the_old_target_ordered_again_is_reached(fake: type[FakeCopter]) -> None:
+    flight = crashed(fake)
     flight.order(RESUME)
     flight.run_until(VehicleReady())
     flight.order(GoTo(1, (100.0, 0.0, 10.0)))
@@ -77,8 +78,8 @@ def test_the_old_target_ordered_again_is_reached() -> None:
     flight.run_until(Arrived(1))
 
 
-def test_a_vehicle_that_arrived_meanwhile_arrives_again_at_once() -> None:
-    flight = BridgeFlight().flying(leg=7, east_m=12.0).restart(down_s=10.0)
+def test_a_vehicle_that_arrived_meanwhile_arrives_again_at_once(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying(leg=7, east_m=12.0).restart(down_s=10.0)
     flight.order(RESUME)
     flight.run_until(VehicleReady())
     began_s = flight.now_s
@@ -88,8 +89,8 @@ def test_a_vehicle_that_arrived_meanwhile_arrives_again_at_once() -> None:
     assert flight.now_s - began_s < 1.0
 
 
-def test_a_vehicle_on_the_ground_takes_off_as_usual() -> None:
-    flight = BridgeFlight()
+def test_a_vehicle_on_the_ground_takes_off_as_usual(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.order(RESUME)
     flight.run_until(VehicleReady())
 
@@ -97,8 +98,8 @@ def test_a_vehicle_on_the_ground_takes_off_as_usual() -> None:
     assert flight.bridge.phase is Phase.HOVERING
 
 
-def test_a_vehicle_that_was_taking_off_is_prepared_to_the_end() -> None:
-    flight = BridgeFlight()
+def test_a_vehicle_that_was_taking_off_is_prepared_to_the_end(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     flight.order(START)
     while not flight.copter.airborne:
         flight.step()
@@ -112,9 +113,9 @@ def test_a_vehicle_that_was_taking_off_is_prepared_to_the_end() -> None:
     assert flight.copter.speed_m_s == START.speed_m_s
 
 
-def test_a_vehicle_its_pilot_flies_is_waited_for_and_not_commanded() -> None:
-    flight = BridgeFlight().flying()
-    flight.copter.set_mode(LOITER)
+def test_a_vehicle_its_pilot_flies_is_waited_for_and_not_commanded(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
+    flight.copter.set_mode(fake.pilot_mode)
     flight.restart()
     flight.copter.heard.clear()
     flight.order(RESUME)
@@ -122,18 +123,20 @@ def test_a_vehicle_its_pilot_flies_is_waited_for_and_not_commanded() -> None:
 
     assert not {SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED} & flight.copter.count().keys()
     assert not any(isinstance(r, VehicleReady) for r in flight.reports)
-    assert "LOITER" in flight.reasons()[-1]
+    assert fake.mode_names[fake.pilot_mode] in flight.reasons()[-1]
 
-    flight.copter.set_mode(GUIDED)
+    flight.copter.set_mode(fake.own_mode)
     flight.run_until(VehicleReady())
 
 
-def test_a_pilot_who_takes_over_while_it_is_resumed_keeps_the_vehicle() -> None:
-    flight = crashed()
+def test_a_pilot_who_takes_over_while_it_is_resumed_keeps_the_vehicle(
+    fake: type[FakeCopter],
+) -> None:
+    flight = crashed(fake)
     flight.copter.verdicts[SPEED] = [None] * 9
     flight.order(RESUME)
     flight.run(2.0)
-    flight.copter.set_mode(LOITER)
+    flight.copter.set_mode(fake.pilot_mode)
 
     flight.run_until(HandedOver)
 
@@ -141,8 +144,8 @@ def test_a_pilot_who_takes_over_while_it_is_resumed_keeps_the_vehicle() -> None:
 # -- after the mission ------------------------------------------------------------------
 
 
-def test_a_return_finds_the_vehicle_in_the_air_and_brings_it_home() -> None:
-    flight = crashed()
+def test_a_return_finds_the_vehicle_in_the_air_and_brings_it_home(fake: type[FakeCopter]) -> None:
+    flight = crashed(fake)
     assert Home() not in flight.order(RETURN)
     flight.run_until(Home())
 
@@ -150,11 +153,13 @@ def test_a_return_finds_the_vehicle_in_the_air_and_brings_it_home() -> None:
     assert flight.copter.count()[SET_MODE] == 1
 
 
-def test_a_return_waits_for_a_vehicle_that_is_on_its_way_home_already() -> None:
-    flight = BridgeFlight().flying()
+def test_a_return_waits_for_a_vehicle_that_is_on_its_way_home_already(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.order(Return("over"))
     flight.run(2.0)
-    assert flight.copter.mode == RTL
+    assert flight.copter.mode == fake.return_mode
     flight.restart()
     flight.copter.heard.clear()
     flight.order(RETURN)
@@ -164,27 +169,33 @@ def test_a_return_waits_for_a_vehicle_that_is_on_its_way_home_already() -> None:
     assert not flight.copter.armed
 
 
-def test_a_return_leaves_a_pilot_the_vehicle() -> None:
-    flight = BridgeFlight().flying()
-    flight.copter.set_mode(LOITER)
+def test_a_return_leaves_a_pilot_the_vehicle(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
+    flight.copter.set_mode(fake.pilot_mode)
     flight.restart()
     flight.order(RETURN)
-    assert flight.run_until(HandedOver) == HandedOver("its pilot flies it in LOITER")
+    assert flight.run_until(HandedOver) == HandedOver(
+        f"its pilot flies it in {fake.mode_names[fake.pilot_mode]}"
+    )
 
     flight.run(10.0)
-    assert flight.copter.mode == LOITER
+    assert flight.copter.mode == fake.pilot_mode
 
 
-def test_a_return_of_a_vehicle_on_the_ground_is_over_once_it_is_heard() -> None:
-    flight = BridgeFlight()
+def test_a_return_of_a_vehicle_on_the_ground_is_over_once_it_is_heard(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
     assert Home() not in flight.order(RETURN)
     flight.run_until(Home())
 
     assert not {SET_MODE, ARM, TAKEOFF} & flight.copter.count().keys()
 
 
-def test_a_vehicle_that_is_never_heard_is_reported_and_not_taken_for_home() -> None:
-    copter = FakeCopter(ORIGIN)
+def test_a_vehicle_that_is_never_heard_is_reported_and_not_taken_for_home(
+    fake: type[FakeCopter],
+) -> None:
+    copter = fake(ORIGIN)
     copter.silent = True
     flight = BridgeFlight(copter)
     flight.order(RETURN)

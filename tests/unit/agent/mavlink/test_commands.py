@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from agent.mavlink.commands import (
+    Command,
     CommandEnded,
     CommandPolicy,
     Commands,
@@ -19,6 +23,8 @@ from agent.mavlink.messages import AltitudeFrame, CommandAck, CommandInt, Comman
 ARM = CommandLong(400, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 STREAM = CommandLong(511, (33.0, 1e5, 0.0, 0.0, 0.0, 0.0, 0.0))
 TARGET = CommandInt(192, AltitudeFrame.HOME, (-1.0, 0.0, 0.0, math.nan), 47.0, 8.0, 12.0)
+HOLD = CommandLong(176, (1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0))
+RTL = CommandLong(176, (1.0, 4.0, 5.0, 0.0, 0.0, 0.0, 0.0))
 ACCEPTED, BUSY, DENIED, IN_PROGRESS = 0, 1, 2, 5
 
 
@@ -120,6 +126,101 @@ def test_cancelled_commands_are_silent() -> None:
     commands.cancel_all()
     assert commands.on_ack(CommandAck(400, ACCEPTED), 0.1) == ([], [])
     assert commands.on_time(10.0) == ([], [])
+
+
+def test_a_second_acknowledgement_does_not_answer_the_next_command() -> None:
+    commands = machine()
+    commands.acknowledged_twice = frozenset({176})
+    commands.send("mode", HOLD, 0.0)
+    assert commands.on_ack(CommandAck(176, ACCEPTED), 0.1)[1] == [
+        CommandEnded("mode", Ending.ACCEPTED, 0)
+    ]
+    assert commands.send("return", RTL, 0.1) == [RTL]
+    assert commands.on_ack(CommandAck(176, ACCEPTED), 0.1) == ([], [])
+    assert commands.pending("return")
+    assert commands.on_ack(CommandAck(176, DENIED), 0.2)[1] == [
+        CommandEnded("return", Ending.REFUSED, DENIED)
+    ]
+
+
+def test_a_second_acknowledgement_that_is_lost_delays_the_next_command_by_one_repetition() -> None:
+    commands = machine()
+    commands.acknowledged_twice = frozenset({176})
+    commands.send("mode", HOLD, 0.0)
+    commands.on_ack(CommandAck(176, ACCEPTED), 0.1)
+    commands.send("return", RTL, 0.2)
+    assert commands.on_ack(CommandAck(176, DENIED), 0.3) == ([], [])  # may be the first one's
+    assert commands.on_ack(CommandAck(176, DENIED), 0.3)[1] == [
+        CommandEnded("return", Ending.REFUSED, DENIED)
+    ]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["send a", "send b", "send c", "wait", "wait"]),
+            st.floats(0.0, 1.5),
+            st.lists(st.booleans(), min_size=2, max_size=2),
+            st.floats(0.0, 1.99),
+        ),
+        max_size=40,
+    )
+)
+def test_no_command_is_ended_by_the_answer_to_another(
+    steps: list[tuple[str, float, list[bool], float]],
+) -> None:
+    """Two acknowledgements each, lost or late by less than two timeouts, but in order."""
+    commands = machine()
+    commands.acknowledged_twice = frozenset({176})
+    on_their_way: deque[tuple[float, int]] = deque()
+    results: dict[str, int] = {}
+    now_s, latest_s, sent = 0.0, 0.0, 0
+
+    def transmit(out: list[Command], arrive: list[bool], delay_s: float) -> None:
+        nonlocal latest_s
+        for message in out:
+            assert isinstance(message, CommandLong)
+            latest_s = max(latest_s, now_s + delay_s)
+            answer = (latest_s, int(message.params[1]))
+            on_their_way.extend(answer for arrives in arrive if arrives)
+
+    def judge(ended: list[CommandEnded]) -> None:
+        for one in ended:
+            assert one.result in (None, results[one.tag])
+
+    for what, wait_s, arrive, delay_s in steps:
+        if what != "wait":
+            sent += 1
+            # Every command has an answer of its own, so that it cannot be mixed up unseen.
+            results[what] = 100 + sent
+            message = replace(RTL, params=(1.0, 100.0 + sent, *RTL.params[2:]))
+            transmit(commands.send(what, message, now_s), arrive, delay_s)
+        end_s = now_s + wait_s
+        while True:
+            ack_s = on_their_way[0][0] if on_their_way else math.inf
+            due_s = commands.next_deadline_s()
+            next_s = min(ack_s, math.inf if due_s is None else due_s)
+            if next_s > end_s:
+                break
+            now_s = max(now_s, next_s)
+            if ack_s <= next_s:
+                out, ended = commands.on_ack(CommandAck(176, on_their_way.popleft()[1]), now_s)
+            else:
+                out, ended = commands.on_time(now_s)
+            judge(ended)
+            transmit(out, arrive, delay_s)
+        now_s = end_s
+
+
+def test_a_cancelled_command_makes_room_for_the_next() -> None:
+    commands = machine()
+    commands.send("mode", HOLD, 0.0)
+    commands.send("return", RTL, 0.0)
+    assert commands.cancel("return", 0.1) == []
+    assert not commands.pending("return")
+    commands.send("return", RTL, 0.2)
+    assert commands.cancel("mode", 0.3) == [RTL]
+    assert commands.cancel("mode", 0.4) == []
 
 
 def test_results_are_named() -> None:
