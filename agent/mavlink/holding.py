@@ -117,9 +117,7 @@ class Holding:
             return []
         if self._place is None:
             self._place = (position.lat_deg, position.lon_deg, position.alt_m)
-        return self._ask(
-            TARGET_TAG, self._flavour.reposition(*self._place, self._speed_m_s), now_s
-        )
+        return self._ask(TARGET_TAG, self._flavour.reposition(*self._place, self._speed_m_s), now_s)
 
     def _ask(self, tag: str, command: Command, now_s: float) -> list[Outbound]:
         if self._commands.pending(tag) or now_s < self._next_s.get(tag, -math.inf):

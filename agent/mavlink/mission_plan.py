@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.messages import AltitudeFrame, MissionItem
 
-__all__ = ["MissionPlan", "MissionSeqs", "longest_hold_s", "recognise"]
+__all__ = ["LONGEST_HOLD_S", "MissionPlan", "MissionSeqs", "recognise"]
 
 _CMD_NAV_WAYPOINT = 16
 _CMD_NAV_RETURN_TO_LAUNCH = 20

@@ -236,7 +236,7 @@ class Preparation:
             and not self._flown_by_pilot
             and heartbeat.armed
             and self._flavour.is_mission(heartbeat.custom_mode)
-            and bool(self._flavour.airborne(vehicle))
+            and self._flavour.airborne(vehicle) is not False
         )
 
     def _take_on_mission(self, now_s: float) -> list[Outbound]:

@@ -132,7 +132,7 @@ class StandingMission:
     def abort(self, reason: str) -> None:
         """Say nothing more, because link or vehicle are somebody else's."""
         self.stand_down()
-        self._sent = None
+        self._sent = self.is_ours = None
         self._transfer.abort(reason)
 
     def look(self, now_s: float) -> list[Outbound]:
@@ -250,9 +250,7 @@ class StandingMission:
     def _begin(self, now_s: float, *, again: bool = False) -> None:
         self._stage = _Stage.STARTING
         self._near_since_s = None
-        self._start = MissionStart(
-            self._config, self._commands, self._flavour, now_s, again=again
-        )
+        self._start = MissionStart(self._config, self._commands, self._flavour, now_s, again=again)
 
     def _become_flown(self, now_s: float) -> None:
         self._stage, self._start = _Stage.FLOWN, None
