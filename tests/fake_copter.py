@@ -256,11 +256,12 @@ class FakeCopter:
         return ACCEPTED
 
     def _obey_mode(self, mode: int) -> int:
-        if mode == self.mission_mode and mode != self.mode and (why := self.mission.refusal()):
+        if mode == self.mode:
+            return ACCEPTED
+        if mode == self.mission_mode and (why := self.mission.refusal()):
             self.text(2, why)
             return FAILED
-        if mode != self.mode or mode != self.mission_mode:
-            self.set_mode(mode)
+        self.set_mode(mode)
         return ACCEPTED
 
     def set_mode(self, mode: int) -> None:

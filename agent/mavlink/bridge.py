@@ -352,8 +352,9 @@ class Bridge:
         )
 
     def _go_to(self, order: GoTo) -> None:
+        by_mission = self._mission is not None and self._returning is None
         takes_targets = self.phase in (Phase.HOVERING, Phase.FLYING) or (
-            self.phase is Phase.HOLDING and not self._must_stop_first()
+            self.phase is Phase.HOLDING and (by_mission or not self._must_stop_first())
         )
         if not takes_targets or self._flavour is None:
             self._actions.append(Refused(order, f"the vehicle is {self.phase.value}"))
@@ -364,7 +365,8 @@ class Bridge:
         if not (math.isfinite(order.stay_s) and order.stay_s >= 0.0):
             self._actions.append(Refused(order, f"a stay of {order.stay_s} s is not >= 0"))
             return
-        self._holding = None
+        if self._holding is not None:
+            self._drop_work()
         self._order, self._leg = order, self._leg_to(order, self._flavour)
         self.phase = Phase.FLYING
         self._say(*self._leg.start(self._now_s))
@@ -410,7 +412,7 @@ class Bridge:
         self._drop_work()
         self._returning = returning  # goes on if the vehicle cannot be stopped
         if self._mission is not None:
-            self._mission.stand_down()
+            self._mission.suspend()
         self._holding = Holding(
             order,
             self.config,
@@ -634,9 +636,13 @@ class Bridge:
         self._say(*holding.advance(self._vehicle, heartbeat, self._now_s))
         if not holding.done and holding.failure is None:
             return
-        prepare, returning = self._prepare_next, self._returning
+        prepare, returning, mission = self._prepare_next, self._returning, self._mission
         self._drop_work()
         self.phase = Phase.HOVERING if holding.aloft else Phase.IDLE
+        if holding.failure is None and mission is not None:
+            mission.stand_down()
+        elif mission is not None and returning is None:
+            mission.carry_on()
         if holding.failure is not None:
             self._actions.append(Refused(holding.order, holding.failure))
             if prepare is not None:

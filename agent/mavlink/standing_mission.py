@@ -111,6 +111,9 @@ class StandingMission:
         plan = MissionPlan(*place, speed_m_s, min(max(1, hold_s), LONGEST_HOLD_S))
         self._awaited, self._renewing = True, False
         self.failure, self.reached, self.unverified = None, False, False
+        if self._stage is _Stage.IDLE and self._mode_seen:
+            # It was being taken out of the mission mode: whether it was is still to be seen.
+            self._mode_seen, self._mode_asked = False, True
         return self._want(plan, now_s)
 
     def restart(self, now_s: float) -> None:
@@ -122,12 +125,22 @@ class StandingMission:
         """The leg is over: keep the vehicle waiting until something else is wanted."""
         self._awaited = False
 
-    def stand_down(self) -> None:
-        """The vehicle is going to be flown in another mode; a transfer under way goes on."""
+    def suspend(self) -> None:
+        """The vehicle is to be taken out of the mission mode; a transfer under way goes on."""
         self._stage = _Stage.IDLE
         self._wanted = self._start = None
-        self._mode_asked = self._mode_seen = self._awaited = self._renewing = False
+        self._awaited = self._renewing = False
         self.unverified = self.coming_home = False
+
+    def stand_down(self) -> None:
+        """The vehicle flies in another mode, or is going to; what stands on it just stands."""
+        self.suspend()
+        self._mode_asked = self._mode_seen = False
+
+    def carry_on(self) -> None:
+        """The vehicle could not be taken out of the mission mode after all."""
+        if self._mode_seen and self._standing is not None:
+            self._stage, self._wanted = _Stage.FLOWN, self._standing
 
     def abort(self, reason: str) -> None:
         """Say nothing more, because link or vehicle are somebody else's."""
