@@ -15,11 +15,13 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from agent.mavlink.authority import intervention
 from agent.mavlink.codec import MavlinkCodec
 from agent.mavlink.commands import CommandEnded, Commands
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import Action, Event, LinkDown, LinkUp, Received, Send, Tick
 from agent.mavlink.flavours import Flavour, flavour_of
+from agent.mavlink.guards import Guards
 from agent.mavlink.leg import TARGET_TAG, Leg
 from agent.mavlink.messages import (
     CommandAck,
@@ -46,6 +48,7 @@ from agent.vehicle import (
     Prepare,
     Refused,
     Return,
+    ReturnAdvised,
     Telemetry,
     VehicleReady,
 )
@@ -89,6 +92,7 @@ class Bridge:
         )
         self._commands = Commands(config.commands)
         self._vehicle = VehicleState()
+        self._guards = Guards(config)
         self._flavour: Flavour | None = None
         self._streams: Streams | None = None
         self._prepare: Prepare | None = None
@@ -114,6 +118,7 @@ class Bridge:
         self._now_s = now_s
         if self._pulse.late(now_s):
             self._vehicle.excuse_silence(now_s)
+            self._guards.excuse_silence(now_s)
         match event:
             case Received(data):
                 for heard in self.codec.decode(data):
@@ -158,6 +163,7 @@ class Bridge:
         if heard.component_id != _AUTOPILOT_COMPONENT:
             return
         message = heard.message
+        self._guards.on_message(message, self._now_s)
         if self._streams is not None:
             self._streams.on_message(message, self._now_s)
         match message:
@@ -194,6 +200,7 @@ class Bridge:
             if self._flavour is not None:
                 self._commands.acknowledged_twice = self._flavour.acknowledged_twice
         self._check_authority(heartbeat)
+        self._check_guards()
 
     def _check_authority(self, heartbeat: Heartbeat) -> None:
         """Hand over a vehicle that somebody else flies now."""
@@ -204,15 +211,28 @@ class Bridge:
         ours = flavour.is_commanded(mode) or (flavour.is_taking_off(mode) and self._took_off())
         if self._returning is not None:
             ours = not heartbeat.armed or self._returning.expects(mode)
-        elif self.phase is not Phase.PREPARING and not heartbeat.armed:
-            self._hand_over("the vehicle disarmed by itself")
+        reason = intervention(
+            self._vehicle,
+            heartbeat,
+            flavour,
+            self._now_s,
+            expected=ours,
+            may_disarm=self.phase in (Phase.PREPARING, Phase.RETURNING),
+        )
+        if reason is not None:
+            self._hand_over(reason)
+
+    def _check_guards(self) -> None:
+        """Let go of a vehicle that has lost its way, and advise one in trouble to go home."""
+        flavour = self._flavour
+        if flavour is None or not self._in_our_hands() or self._returning is not None:
             return
-        if not ours:
-            warning = self._vehicle.recent_warning(self._now_s)
-            said = f" ({warning})" if warning else ""
-            self._hand_over(
-                f"its pilot or a failsafe switched it to {flavour.mode_name(mode)}{said}"
-            )
+        if not flavour.airborne(self._vehicle):
+            return
+        if (lost := self._guards.position_lost(self._now_s)) is not None:
+            self._hand_over(lost)
+        elif (advice := self._guards.advice(self._vehicle, flavour, self._now_s)) is not None:
+            self._actions.append(ReturnAdvised(advice))
 
     def _on_position(self, position: Position) -> None:
         match self._vehicle.on_position(position):
@@ -230,6 +250,8 @@ class Bridge:
             self.config.origin, position.lat_deg, position.lon_deg, position.alt_m
         )
         velocity = position.velocity_enu_m_s
+        fault = self._flavour.position_fault(self._vehicle) if self._flavour else None
+        self._guards.on_position(place_enu_m, fault, self._now_s)
         self._actions.append(Telemetry(place_enu_m, velocity, self._vehicle.battery_frac))
         if self._preparation is not None:
             self._say(*self._preparation.on_position(position, self._now_s))
@@ -248,6 +270,7 @@ class Bridge:
         if self._in_our_hands():
             self._hand_over("the autopilot rebooted")
         self._vehicle = VehicleState()
+        self._guards = Guards(self.config)
         self._flavour = None
         self._streams = None
         self._preparation = None
@@ -287,6 +310,7 @@ class Bridge:
             self._actions.append(Refused(order, f"speed {order.speed_m_s} m/s is not > 0"))
             return
         self._drop_work()
+        self._guards.begin()
         self.phase = Phase.PREPARING
         self._prepare = order
         self._speed_m_s = order.speed_m_s
@@ -388,7 +412,9 @@ class Bridge:
         if heartbeat is None or self._flavour is None:
             return
         if self._preparation is None:
-            self._preparation = Preparation(order, self.config, self._commands, self._flavour)
+            self._preparation = Preparation(
+                order, self.config, self._commands, self._flavour, self._guards
+            )
         preparation = self._preparation
         self._say(*preparation.advance(self._vehicle, heartbeat, self._now_s))
         if preparation.failure is not None:
@@ -471,7 +497,8 @@ class Bridge:
 
     def _refuse_leg(self, order: GoTo, reason: str) -> None:
         self._end_leg()
-        self._actions.append(Refused(order, reason))
+        text = self._vehicle.recent_warning(self._now_s)
+        self._actions.append(Refused(order, f"{reason}: {text}" if text else reason))
 
     def _end_leg(self) -> None:
         self._leg = self._order = None

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, result_text
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours import Flavour
+from agent.mavlink.guards import Guards
 from agent.mavlink.leg import Leg
 from agent.mavlink.messages import Heartbeat, Inbound, Landed, Outbound, Position
 from agent.mavlink.speed import SpeedSetting
@@ -52,12 +53,18 @@ class Preparation:
     """Carries out one `Prepare`."""
 
     def __init__(
-        self, order: Prepare, config: BridgeConfig, commands: Commands, flavour: Flavour
+        self,
+        order: Prepare,
+        config: BridgeConfig,
+        commands: Commands,
+        flavour: Flavour,
+        guards: Guards,
     ) -> None:
         self._order = order
         self._config = config
         self._commands = commands
         self._flavour = flavour
+        self._guards = guards
         _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
         wait_s = config.effect_timeout_s
         mode = flavour.commanded_mode_name
@@ -165,6 +172,8 @@ class Preparation:
         if self._flew:
             return self._fail("the vehicle disarmed after takeoff")
         unready = self._flavour.unready(vehicle)
+        if unready is None and (grounds := self._guards.grounds(vehicle, now_s)):
+            return self._wait(grounds)
         if unready is not None:
             text = vehicle.recent_warning(now_s, _PREARM_TEXT_AGE_S)
             return self._wait(f"{unready} ({text})" if text else unready)
@@ -194,6 +203,8 @@ class Preparation:
         self._climbed_at_s = now_s
         self._highest_m = position.alt_m
         # Also here, as a vehicle found armed on the ground comes straight to takeoff.
+        if grounds := self._guards.grounds(vehicle, now_s):
+            return self._wait(grounds)
         if fault := self._misplaced(position):
             return self._fail(fault)
         command = self._flavour.takeoff(self._start_alt_m, _home_alt_m(position))

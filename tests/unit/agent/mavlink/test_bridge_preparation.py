@@ -349,7 +349,7 @@ def test_pilot_who_takes_over_during_takeoff_keeps_the_vehicle(fake: type[FakeCo
     flight.copter.set_mode(fake.pilot_mode)
     handed = flight.run_until(HandedOver)
     name = fake.mode_names[fake.pilot_mode]
-    assert handed == HandedOver(f"its pilot or a failsafe switched it to {name}")
+    assert handed == HandedOver(f"its pilot switched it to {name}")
     flight.copter.heard.clear()
     flight.run(10.0)
     assert set(flight.copter.count()) <= {INTERVAL}
