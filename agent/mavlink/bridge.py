@@ -19,6 +19,7 @@ from agent.mavlink.authority import intervention
 from agent.mavlink.codec import MavlinkCodec
 from agent.mavlink.commands import CommandEnded, Commands
 from agent.mavlink.config import BridgeConfig
+from agent.mavlink.contact import Contact
 from agent.mavlink.events import Action, Event, LinkDown, LinkUp, Received, Send, Tick
 from agent.mavlink.flavours import Flavour, flavour_of
 from agent.mavlink.guards import Guards
@@ -57,7 +58,6 @@ from swarm.pulse import Pulse
 
 __all__ = ["Bridge", "Phase"]
 
-_AUTOPILOT_COMPONENT = 1
 _POLL_S = 0.25
 """While something is waited for, look that often even if nothing is heard."""
 _UNHEARD_TIMEOUTS = 3.0
@@ -81,8 +81,7 @@ class Bridge:
     def __init__(self, config: BridgeConfig) -> None:
         self.config = config
         self.phase = Phase.IDLE
-        self.foreign: dict[int, int] = {}
-        """Messages heard from other systems, by system id; all ignored."""
+        self.contact = Contact(config.system_id)
         self.stale_positions = 0
         """Positions dropped because they were late or doubled."""
         self.codec = MavlinkCodec(
@@ -105,8 +104,6 @@ class Bridge:
         """Cruise speed of the last preparation [m/s]."""
         self._order: GoTo | None = None
         self._leg: Leg | None = None
-        self._link_up = False
-        self._wrong_autopilot: int | None = None
         self._told_not_ready: str | None = None
         self._heartbeat_at_s = -math.inf
         self._pulse = Pulse(config.silence_timeout_s / 2.0)
@@ -126,12 +123,12 @@ class Bridge:
             case Prepare() | GoTo() | Hold() | Return():
                 self._obey(event)
             case LinkUp():
-                self._link_up = True
+                self.contact.link_up = True
                 self.codec.reset_link()
                 if self._streams is not None:
                     self._streams.ask_anew()
             case LinkDown():
-                self._link_up = False
+                self.contact.link_up = False
             case Tick():
                 pass
         self._advance()
@@ -154,13 +151,7 @@ class Bridge:
     # What is heard.
 
     def _hear(self, heard: Heard) -> None:
-        if heard.system_id != self.config.system_id:
-            count = self.foreign.get(heard.system_id, 0)
-            self.foreign[heard.system_id] = count + 1
-            if isinstance(heard.message, Heartbeat):
-                self._wrong_autopilot = heard.system_id
-            return
-        if heard.component_id != _AUTOPILOT_COMPONENT:
+        if not self.contact.is_from_vehicle(heard):
             return
         message = heard.message
         self._guards.on_message(message, self._now_s)
@@ -208,7 +199,7 @@ class Bridge:
         if flavour is None or not self._in_our_hands():
             return
         mode = heartbeat.custom_mode
-        ours = flavour.is_commanded(mode) or (flavour.is_taking_off(mode) and self._took_off())
+        ours = self._obeys(mode)
         if self._returning is not None:
             ours = not heartbeat.armed or self._returning.expects(mode)
         reason = intervention(
@@ -418,9 +409,15 @@ class Bridge:
         preparation = self._preparation
         self._say(*preparation.advance(self._vehicle, heartbeat, self._now_s))
         if preparation.failure is not None:
+            aloft = heartbeat.armed and self._flavour.airborne(self._vehicle)
+            obeys = self._obeys(heartbeat.custom_mode)
             self._drop_work()
-            self.phase = Phase.IDLE
-            self._actions.append(Refused(order, preparation.failure))
+            if aloft and obeys:
+                self.phase = Phase.HOVERING  # nobody else would bring it down
+                self._actions.append(ReturnAdvised(preparation.failure))
+            else:
+                self.phase = Phase.IDLE
+                self._actions.append(Refused(order, preparation.failure))
         elif preparation.done:
             self._drop_work()
             self.phase = Phase.HOVERING
@@ -430,19 +427,8 @@ class Bridge:
 
     def _unheard(self) -> str | None:
         """Why there is no vehicle to prepare yet; None if there is one."""
-        heartbeat, wanted = self._vehicle.heartbeat, self.config.system_id
-        if heartbeat is None or self._silent():
-            if not self._link_up:
-                return "no link to the autopilot"
-            if self._wrong_autopilot is not None and heartbeat is None:
-                return f"heard the vehicle with system id {self._wrong_autopilot}, not {wanted}"
-            return f"waiting for a heartbeat of system id {wanted}"
-        if self._flavour is None:
-            return (
-                f"autopilot {heartbeat.autopilot} on vehicle type {heartbeat.vehicle_type} "
-                "(MAV_AUTOPILOT, MAV_TYPE) is not supported"
-            )
-        return None
+        heartbeat = self._vehicle.heartbeat
+        return self.contact.missing(heartbeat, self._flavour, silent=self._silent())
 
     def _tell_not_ready(self, reason: str) -> None:
         if reason != self._told_not_ready:
@@ -481,6 +467,14 @@ class Bridge:
         if self.phase is Phase.PREPARING:
             return self._preparation is not None and self._preparation.engaged
         return self.phase in (Phase.HOVERING, Phase.FLYING, Phase.RETURNING)
+
+    def _obeys(self, custom_mode: int) -> bool:
+        """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
+        flavour = self._flavour
+        return flavour is not None and (
+            flavour.is_commanded(custom_mode)
+            or (flavour.is_taking_off(custom_mode) and self._took_off())
+        )
 
     def _took_off(self) -> bool:
         """Whether the preparation under way has asked for takeoff."""
