@@ -71,6 +71,7 @@ class FakeCopter:
         """Acknowledges targets and does not move."""
         self.prearm_ok = True
         self.battery_percent = 80
+        self.ekf_flags = 831
         self.system_status: int | None = None
         """MAV_STATE to say instead of the true one."""
         self.parameters: dict[str, float] = {"WP_SPD": default_speed_m_s}
@@ -171,7 +172,7 @@ class FakeCopter:
                 fields = (bit, bit, health, 0, 12600, 0, self.battery_percent, 0, 0, 0, 0, 0, 0)
                 self.say(mavlink.MAVLink_sys_status_message(*fields))
             case 193:
-                flags = 831 if self.ready else 167
+                flags = self.ekf_flags if self.ready else 167
                 self.say(mavlink.MAVLink_ekf_status_report_message(flags, 0, 0, 0, 0, 0))
             case 245:
                 landed = 1 if not self.airborne else 3 if self.in_takeoff else 2

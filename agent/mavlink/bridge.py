@@ -19,11 +19,14 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from agent.mavlink.authority import intervention
 from agent.mavlink.codec import MavlinkCodec
 from agent.mavlink.commands import CommandEnded, Commands
 from agent.mavlink.config import BridgeConfig, CommandStyle
+from agent.mavlink.contact import Contact
 from agent.mavlink.events import Action, Event, LinkDown, LinkUp, Received, Send, Tick
 from agent.mavlink.flavours import Flavour, flavour_of
+from agent.mavlink.guards import Guards
 from agent.mavlink.holding import Holding
 from agent.mavlink.leg import Leg, RepositionLeg
 from agent.mavlink.messages import (
@@ -62,7 +65,6 @@ from swarm.pulse import Pulse
 
 __all__ = ["Bridge", "Phase"]
 
-_AUTOPILOT_COMPONENT = 1
 _POLL_S = 0.25
 """While something is waited for, look that often even if nothing is heard."""
 _UNHEARD_TIMEOUTS = 3.0
@@ -87,8 +89,7 @@ class Bridge:
     def __init__(self, config: BridgeConfig) -> None:
         self.config = config
         self.phase = Phase.IDLE
-        self.foreign: dict[int, int] = {}
-        """Messages heard from other systems, by system id; all ignored."""
+        self.contact = Contact(config.system_id)
         self.stale_positions = 0
         """Positions dropped because they were late or doubled."""
         self.codec = MavlinkCodec(
@@ -98,6 +99,7 @@ class Bridge:
         )
         self._commands = Commands(config.commands)
         self._vehicle = VehicleState()
+        self._guards = Guards(config)
         self._flavour: Flavour | None = None
         self._streams: Streams | None = None
         self._prepare: Prepare | None = None
@@ -115,8 +117,6 @@ class Bridge:
         """Cruise speed of the last preparation [m/s]."""
         self._order: GoTo | None = None
         self._leg: Leg | None = None
-        self._link_up = False
-        self._wrong_autopilot: int | None = None
         self._told_not_ready: str | None = None
         self._heartbeat_at_s = -math.inf
         self._pulse = Pulse(config.silence_timeout_s / 2.0)
@@ -128,6 +128,7 @@ class Bridge:
         self._now_s = now_s
         if self._pulse.late(now_s):
             self._vehicle.excuse_silence(now_s)
+            self._guards.excuse_silence(now_s)
         match event:
             case Received(data):
                 for heard in self.codec.decode(data):
@@ -135,12 +136,12 @@ class Bridge:
             case Prepare() | GoTo() | Hold() | Return():
                 self._obey(event)
             case LinkUp():
-                self._link_up = True
+                self.contact.link_up = True
                 self.codec.reset_link()
                 if self._streams is not None:
                     self._streams.ask_anew()
             case LinkDown():
-                self._link_up = False
+                self.contact.link_up = False
             case Tick():
                 pass
         self._advance()
@@ -167,15 +168,10 @@ class Bridge:
     # What is heard.
 
     def _hear(self, heard: Heard) -> None:
-        if heard.system_id != self.config.system_id:
-            count = self.foreign.get(heard.system_id, 0)
-            self.foreign[heard.system_id] = count + 1
-            if isinstance(heard.message, Heartbeat):
-                self._wrong_autopilot = heard.system_id
-            return
-        if heard.component_id != _AUTOPILOT_COMPONENT:
+        if not self.contact.is_from_vehicle(heard):
             return
         message = heard.message
+        self._guards.on_message(message, self._now_s)
         if self._streams is not None:
             self._streams.on_message(message, self._now_s)
         match message:
@@ -215,6 +211,7 @@ class Bridge:
                 self._commands.acknowledged_twice = self._flavour.acknowledged_twice
             self._forget_mission()
         self._check_authority(heartbeat)
+        self._check_guards()
 
     def _check_authority(self, heartbeat: Heartbeat) -> None:
         """Hand over a vehicle that somebody else flies now."""
@@ -222,20 +219,34 @@ class Bridge:
         if flavour is None or not self._in_our_hands():
             return
         mode = heartbeat.custom_mode
-        ours = self._flies_for_us(mode) or (flavour.is_taking_off(mode) and self._took_off())
+        ours = self._obeys(mode)
         if self._holding is not None:
             ours = not heartbeat.armed or self._holding.expects(mode)
         elif self._returning is not None:
             ours = not heartbeat.armed or self._returning.expects(mode)
-        elif self.phase is not Phase.PREPARING and not heartbeat.armed:
-            self._hand_over("the vehicle disarmed by itself")
+        reason = intervention(
+            self._vehicle,
+            heartbeat,
+            flavour,
+            self._now_s,
+            expected=ours,
+            may_disarm=self.phase in (Phase.PREPARING, Phase.RETURNING)
+            or (self._holding is not None and not self._holding.aloft),
+        )
+        if reason is not None:
+            self._hand_over(reason)
+
+    def _check_guards(self) -> None:
+        """Let go of a vehicle that has lost its way, and advise one in trouble to go home."""
+        flavour = self._flavour
+        if flavour is None or not self._in_our_hands() or self._returning is not None:
             return
-        if not ours:
-            warning = self._vehicle.recent_warning(self._now_s)
-            said = f" ({warning})" if warning else ""
-            self._hand_over(
-                f"its pilot or a failsafe switched it to {flavour.mode_name(mode)}{said}"
-            )
+        if not flavour.airborne(self._vehicle):
+            return
+        if (lost := self._guards.position_lost(self._now_s)) is not None:
+            self._hand_over(lost)
+        elif (advice := self._guards.advice(self._vehicle, flavour, self._now_s)) is not None:
+            self._actions.append(ReturnAdvised(advice))
 
     def _flies_for_us(self, custom_mode: int) -> bool:
         """Whether that mode is our doing, as far as targets go."""
@@ -259,6 +270,8 @@ class Bridge:
             self.config.origin, position.lat_deg, position.lon_deg, position.alt_m
         )
         velocity = position.velocity_enu_m_s
+        fault = self._flavour.position_fault(self._vehicle) if self._flavour else None
+        self._guards.on_position(place_enu_m, fault, self._now_s)
         self._actions.append(Telemetry(place_enu_m, velocity, self._vehicle.battery_frac))
         if self._preparation is not None:
             self._say(*self._preparation.on_position(position, self._now_s))
@@ -279,13 +292,16 @@ class Bridge:
             self._actions.append(Arrived(order.leg))
         elif leg.failure is not None:
             self._end_leg()
-            self._actions.append(Refused(order, leg.failure))
+            text = self._vehicle.recent_warning(self._now_s)
+            reason = f"{leg.failure}: {text}" if text else leg.failure
+            self._actions.append(Refused(order, reason))
 
     def _on_reboot(self) -> None:
         """Forget what is no longer true of an autopilot that began anew."""
         if self._in_our_hands():
             self._hand_over("the autopilot rebooted")
         self._vehicle = VehicleState()
+        self._guards = Guards(self.config)
         self._flavour = None
         self._streams = None
         self._preparation = None
@@ -334,6 +350,7 @@ class Bridge:
             return
         self._drop_work()
         self._forget_mission()
+        self._guards.begin()
         self.phase = Phase.PREPARING
         self._prepare = order
         self._speed_m_s = order.speed_m_s
@@ -515,14 +532,20 @@ class Bridge:
             return
         if self._preparation is None:
             self._preparation = Preparation(
-                order, self.config, self._commands, self._flavour, self._mission
+                order, self.config, self._commands, self._flavour, self._guards, self._mission
             )
         preparation = self._preparation
         self._say(*preparation.advance(self._vehicle, heartbeat, self._now_s))
         if preparation.failure is not None:
+            aloft = heartbeat.armed and self._flavour.airborne(self._vehicle)
+            obeys = self._obeys(heartbeat.custom_mode)
             self._drop_work()
-            self.phase = Phase.IDLE
-            self._actions.append(Refused(order, preparation.failure))
+            if aloft and obeys:
+                self.phase = Phase.HOVERING  # nobody else would bring it down
+                self._actions.append(ReturnAdvised(preparation.failure))
+            else:
+                self.phase = Phase.IDLE
+                self._actions.append(Refused(order, preparation.failure))
         elif preparation.done:
             self._drop_work()
             self.phase = Phase.HOVERING
@@ -532,19 +555,8 @@ class Bridge:
 
     def _unheard(self) -> str | None:
         """Why there is no vehicle to prepare yet; None if there is one."""
-        heartbeat, wanted = self._vehicle.heartbeat, self.config.system_id
-        if heartbeat is None or self._silent():
-            if not self._link_up:
-                return "no link to the autopilot"
-            if self._wrong_autopilot is not None and heartbeat is None:
-                return f"heard the vehicle with system id {self._wrong_autopilot}, not {wanted}"
-            return f"waiting for a heartbeat of system id {wanted}"
-        if self._flavour is None:
-            return (
-                f"autopilot {heartbeat.autopilot} on vehicle type {heartbeat.vehicle_type} "
-                "(MAV_AUTOPILOT, MAV_TYPE) is not supported"
-            )
-        return None
+        heartbeat = self._vehicle.heartbeat
+        return self.contact.missing(heartbeat, self._flavour, silent=self._silent())
 
     def _tell_not_ready(self, reason: str) -> None:
         if reason != self._told_not_ready:
@@ -674,6 +686,14 @@ class Bridge:
         if self.phase is Phase.PREPARING:
             return self._preparation is not None and self._preparation.engaged
         return self.phase in (Phase.HOVERING, Phase.FLYING, Phase.HOLDING, Phase.RETURNING)
+
+    def _obeys(self, custom_mode: int) -> bool:
+        """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
+        flavour = self._flavour
+        return flavour is not None and (
+            self._flies_for_us(custom_mode)
+            or (flavour.is_taking_off(custom_mode) and self._took_off())
+        )
 
     def _took_off(self) -> bool:
         """Whether the preparation under way has asked for takeoff."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, result_text
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours import Flavour
+from agent.mavlink.guards import Guards
 from agent.mavlink.leg import RepositionLeg
 from agent.mavlink.messages import Heartbeat, Inbound, Landed, Outbound, Position
 from agent.mavlink.speed import SpeedSetting
@@ -68,6 +69,7 @@ class Preparation:
         config: BridgeConfig,
         commands: Commands,
         flavour: Flavour,
+        guards: Guards,
         mission: StandingMission | None = None,
     ) -> None:
         self._order = order
@@ -75,6 +77,7 @@ class Preparation:
         self._config = config
         self._commands = commands
         self._flavour = flavour
+        self._guards = guards
         _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
         wait_s = config.effect_timeout_s
         mode = flavour.commanded_mode_name
@@ -183,6 +186,8 @@ class Preparation:
         if self._flew:
             return self._fail("the vehicle disarmed after takeoff")
         unready = self._flavour.unready(vehicle)
+        if unready is None and (grounds := self._guards.grounds(vehicle, now_s)):
+            return self._wait(grounds)
         if unready is not None:
             text = vehicle.recent_warning(now_s, _PREARM_TEXT_AGE_S)
             return self._wait(f"{unready} ({text})" if text else unready)
@@ -212,6 +217,8 @@ class Preparation:
         self._climbed_at_s = now_s
         self._highest_m = position.alt_m
         # Also here, as a vehicle found armed on the ground comes straight to takeoff.
+        if grounds := self._guards.grounds(vehicle, now_s):
+            return self._wait(grounds)
         if fault := self._misplaced(position):
             return self._fail(fault)
         command = self._flavour.takeoff(self._start_alt_m, _home_alt_m(position))

@@ -83,6 +83,14 @@ class Flavour(Protocol):
         """Whether the vehicle is off the ground; None if it has not told yet."""
         ...
 
+    def position_fault(self, vehicle: VehicleState) -> str | None:
+        """Why the autopilot does not trust the position that it tells; None if it does."""
+        ...
+
+    def alarmed(self, heartbeat: Heartbeat) -> bool:
+        """Whether a failsafe acts, or is about to, that the mode does not show."""
+        ...
+
     def unready(self, vehicle: VehicleState) -> str | None:
         """What keeps the vehicle from being armed, in words; None if nothing does."""
         ...

@@ -58,7 +58,7 @@ _MODE_NAMES = {
     (10, 0): "TERMINATION",
 }
 
-_STATE_STANDBY = 3
+_STATE_STANDBY, _STATE_CRITICAL, _STATE_EMERGENCY = 3, 5, 6
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_SET_MODE = 176
 _CMD_DO_CHANGE_SPEED = 178
@@ -144,6 +144,15 @@ class Px4Copter:
         if vehicle.landed is Landed.UNDEFINED:
             return None if vehicle.armed else False
         return vehicle.landed is not Landed.ON_GROUND
+
+    def position_fault(self, vehicle: VehicleState) -> str | None:
+        """None: PX4 stops telling a position that it does not trust."""
+        del vehicle
+        return None
+
+    def alarmed(self, heartbeat: Heartbeat) -> bool:
+        """CRITICAL or EMERGENCY: PX4 warns, or holds for some seconds before it acts."""
+        return heartbeat.system_status in (_STATE_CRITICAL, _STATE_EMERGENCY)
 
     def unready(self, vehicle: VehicleState) -> str | None:
         """Pre-arm checks, whose bit PX4 sets in the health of SYS_STATUS alone, then a position.
