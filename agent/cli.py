@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from agent.mavlink.config import CommandStyle
 from swarm.config import Link
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
@@ -88,6 +89,46 @@ def agent(
             show_default=False,
         ),
     ] = None,
+    command: Annotated[
+        CommandStyle,
+        typer.Option(
+            "--command",
+            help="How targets are told: each at once, or each as a mission that ends in a "
+            "return home, so that the vehicle comes back if its companion dies.",
+        ),
+    ] = CommandStyle.REPOSITION,
+    battery_reserve: Annotated[
+        float,
+        typer.Option(
+            "--battery-reserve",
+            min=0.0,
+            max=0.99,
+            metavar="FRAC",
+            help="Below this charge (0.2 is 20 %) the UAV goes home, and is not armed; 0 leaves "
+            "the battery to the autopilot.",
+        ),
+    ] = 0.2,
+    fence_radius_m: Annotated[
+        float,
+        typer.Option(
+            "--fence-radius-m",
+            min=1.0,
+            max=1e6,
+            metavar="M",
+            help="Farther than this from the mission's origin no target is flown to, and a UAV "
+            "that is there goes home.",
+        ),
+    ] = 20_000.0,
+    fence_height_m: Annotated[
+        float,
+        typer.Option(
+            "--fence-height-m",
+            min=1.0,
+            max=1e5,
+            metavar="M",
+            help="The same for the height above the origin, or below it.",
+        ),
+    ] = 1_000.0,
     state: StateOption = None,
     rejoin: Annotated[
         bool,
@@ -154,8 +195,12 @@ def agent(
             settings = BridgeConfig(
                 system_id=system_id,
                 origin=origin,
+                command=command,
                 acceptance_radius_m=acceptance_radius_m,
                 position_rate_hz=position_rate_hz,
+                battery_reserve_frac=battery_reserve or None,
+                fence_radius_m=fence_radius_m,
+                fence_height_m=fence_height_m,
             ).for_speedup(speedup)
             return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
 

@@ -220,7 +220,8 @@ class AgentCore:
             case HandedOver(reason):
                 self._leave_vehicle(reason, now_s, handed_over=True)
             case ReturnAdvised(reason):
-                self._go_home(reason, now_s)
+                if self.phase is not StatusPhase.OUT:
+                    self._go_home(reason, now_s)
             case Home():
                 self._come_home(now_s)
 

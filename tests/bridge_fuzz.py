@@ -47,6 +47,7 @@ _PHASES = (
     Phase.PREPARING,
     Phase.HOVERING,
     Phase.FLYING,
+    Phase.HOLDING,
     Phase.RETURNING,
     Phase.HANDED_OVER,
 )
@@ -68,8 +69,8 @@ class Setting:
 
 
 def settings(flavour: str) -> list[Setting]:
-    """Every setting of that flavour that the bridge can fly."""
-    return [Setting(flavour, signed) for signed in (False, True)]
+    """Every setting of that flavour."""
+    return [Setting(flavour, signed, style) for style in CommandStyle for signed in (False, True)]
 
 
 def setting_of(name: str) -> Setting:
@@ -200,6 +201,7 @@ class Hostile:
                 fake.own_mode,
                 fake.takeoff_mode,
                 fake.return_mode,
+                fake.mission_mode,
                 fake.pilot_mode,
                 fake.boot_mode,
                 random.getrandbits(32),
@@ -344,6 +346,8 @@ class Episode:
             self._happen(self._go_to(inside=True))
         elif phase is Phase.RETURNING:
             self._happen(Return("enough"))
+        elif phase is Phase.HOLDING:
+            self._happen(Hold("wait"))
         elif phase is Phase.HANDED_OVER:
             self.copter.set_mode(self.copter.pilot_mode)
         self._fly(_BRING_UP_STEP_S)
@@ -397,13 +401,13 @@ class Episode:
 
     def _order(self) -> Orders:
         random = self.random
-        match random.randrange(8):
+        match random.randrange(9):
             case 0 | 1:
                 speed_m_s = random.choice((4.0, 4.0, 4.0, 0.0, -1.0, math.nan, math.inf))
                 return Prepare(self._place(), speed_m_s, resume=random.random() < 0.5)
             case 2 | 3 | 4 | 5:
                 return self._go_to(inside=random.random() < 0.7)
-            case 6:
+            case 6 | 7:
                 return Hold("wait")
             case _:
                 return Return("enough", resume=random.random() < 0.5)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -52,6 +52,7 @@ _MOST_REMEMBERED = 4_000
 """Entries of all collections that a bridge holds, its constants included."""
 _MOST_BUFFERED_BYTES = 280
 """The longest frame there is."""
+_PLACES = 50
 _MISSION_MESSAGES = {
     "MISSION_COUNT",
     "MISSION_ITEM_INT",
@@ -66,10 +67,22 @@ _COMMANDS: dict[Phase, set[int]] = {
     Phase.PREPARING: {SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED},
     Phase.HOVERING: {REPOSITION},
     Phase.FLYING: {REPOSITION},
+    Phase.HOLDING: {SET_MODE, REPOSITION, ARM},
     Phase.RETURNING: {SET_MODE},
     Phase.HANDED_OVER: set(),
 }
-"""What may be commanded in each phase, beside requests for messages."""
+"""What may be commanded in each phase, beside requests for messages; motors are started
+while preparing only."""
+_COMMANDS_OF_MISSIONS: dict[Phase, set[int]] = {
+    Phase.HOVERING: {SET_MODE, SPEED},
+    Phase.FLYING: {SET_MODE, SPEED},
+}
+"""What else, if targets are missions."""
+_MISSION_ITEMS = {_WAYPOINT, 20, SPEED}
+"""A place, and the speed and the way home around it."""
+
+
+Point = tuple[float, float, float]
 
 
 class BrokenError(AssertionError):
@@ -79,6 +92,19 @@ class BrokenError(AssertionError):
 def hold(condition: bool, what: str) -> None:
     if not condition:
         raise BrokenError(what)
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """What a bridge has been ordered to do."""
+
+    places_m: tuple[Point, ...] = ()
+    """Where the vehicle may be sent: the last places ordered. A new mission that the vehicle
+    does not take leaves an older one in force."""
+    leg: int | None = None
+    """Under way."""
+    hold_m: list[Point] | None = None
+    """Told to hold: where the vehicle said it was then, and since."""
 
 
 class BridgeWatch:
@@ -94,20 +120,15 @@ class BridgeWatch:
         self.fake = fake
         self.steps = 0
         self._parser = mavlink.MAVLink(None)
-        self._places_m: list[tuple[float, float, float]] = []
-        """Where the vehicle may be sent: the last places ordered."""
-        self._here_m: tuple[float, float, float] | None = None
+        self._here_m: Point | None = None
         """Where the vehicle says it is."""
-        self._hold_m: tuple[float, float, float] | None = None
-        """Where it was told to hold."""
-        self._prepared = False
-        """Whether `Prepare` has been ordered and not been answered."""
-        self._leg: int | None = None
-        """Under way."""
-        self._leg_before: int | None = None
-        """Under way before this step."""
+        self._task = _Task()
+        self._task_before = self._task
+        """As it was before this step."""
         self._ordered: object = None
         """In this step."""
+        self._prepared = False
+        """Whether `Prepare` has been ordered and not been answered."""
         self._silent = False
         """Handed over, and nothing ordered since."""
         self._mode_wanted: set[tuple[float, float]] = set()
@@ -116,7 +137,7 @@ class BridgeWatch:
         """Step the bridge and look at what it does."""
         self.steps += 1
         before = self.bridge.phase
-        self._leg_before, self._ordered = self._leg, event
+        self._task_before, self._ordered = self._task, event
         if isinstance(event, Prepare | GoTo | Hold | Return):
             self._note(event)
         actions = self.bridge.step(event, now_s)
@@ -132,19 +153,18 @@ class BridgeWatch:
 
     def _note(self, order: Prepare | GoTo | Hold | Return) -> None:
         self._silent = False
+        places_m = self._task.places_m
         match order:
             case Prepare(position_enu_m):
-                self._places_m = [*self._places_m[-3:], position_enu_m]
                 self._prepared = True
-                self._leg = None
+                self._task = _Task((*places_m[-_PLACES:], position_enu_m))
             case GoTo(leg, position_enu_m):
-                self._places_m = [*self._places_m[-3:], position_enu_m]
-                self._leg = leg
+                self._task = _Task((*places_m[-_PLACES:], position_enu_m), leg)
             case Hold():
-                self._hold_m = self._here_m
-                self._leg = None
+                here_m = [] if self._here_m is None else [self._here_m]
+                self._task = _Task(places_m, None, here_m)
             case Return():
-                self._leg = None
+                self._task = _Task(places_m)
 
     # What it sends.
 
@@ -176,8 +196,10 @@ class BridgeWatch:
             hold(message.param_id in self.fake.speed_names, f"{name} of {message.param_id}")
         elif name in _MISSION_MESSAGES:
             hold(missions, f"{name}, though commanded by targets")
-            if name == "MISSION_ITEM_INT" and message.command == _WAYPOINT:
-                self._see_place(message)
+            if name == "MISSION_ITEM_INT":
+                hold(message.command in _MISSION_ITEMS, f"mission item {message.command}")
+                if message.command == _WAYPOINT:
+                    self._see_place(message)
         elif name in ("COMMAND_LONG", "COMMAND_INT"):
             self._see_command(message, phases, missions=missions)
         else:
@@ -186,7 +208,7 @@ class BridgeWatch:
     def _see_command(self, message: Any, phases: set[Phase], *, missions: bool) -> None:
         allowed = set[int]().union(*(_COMMANDS[phase] for phase in phases))
         if missions:
-            allowed |= {SET_MODE, SPEED}
+            allowed |= set[int]().union(*(_COMMANDS_OF_MISSIONS.get(p, set()) for p in phases))
         hold(message.command in allowed, f"commands {message.command} while {phases}")
         match message.command:
             case 192:
@@ -201,19 +223,31 @@ class BridgeWatch:
                     hold(Phase.PREPARING in phases, f"motors started while {phases}")
             case 176:
                 hold(message.param1 == _MODE_ENABLED, f"mode of kind {message.param1}")
+                self._see_mode(message, phases, missions=missions)
             case 178:
                 hold(0.0 < message.param2 < 100.0, f"speed {message.param2} m/s")
+
+    def _see_mode(self, message: Any, phases: set[Phase], *, missions: bool) -> None:
+        """The guided mode, that of missions if there are, and that of the return for it."""
+        mode = int(message.param2)
+        if self.fake.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+            mode = mode << 16 | int(message.param3) << 24
+        if mode == self.fake.return_mode:
+            hold(Phase.RETURNING in phases, f"sent home while {phases}")
+        elif mode != self.fake.own_mode:
+            hold(missions and mode == self.fake.mission_mode, f"mode {mode}")
 
     def _see_place(self, message: Any) -> None:
         config = self.bridge.config
         place_m = enu_from_wgs84(config.origin, message.x / 1e7, message.y / 1e7, message.z)
         hold(math.isfinite(message.z), f"sent to height {message.z}")
-        if self._hold_m is not None and _near(place_m, self._hold_m):
+        if any(_near(place_m, place) for place in self._task.hold_m or ()):
             return
         fault = config.out_of_bounds(place_m)
         hold(fault is None, f"sent beyond the fence, to {place_m}: {fault}")
-        ordered = any(_near(place_m, place) for place in self._places_m)
-        hold(ordered, f"sent to {place_m}, not to {self._places_m}")
+        places_m = self._task.places_m
+        ordered = any(_near(place_m, place) for place in places_m)
+        hold(ordered, f"sent to {place_m}, not to {places_m[-3:]}")
 
     def _see_takeoff(self, message: Any) -> None:
         """Above home on ArduPilot, above the sea on PX4: at most across the fence."""
@@ -233,21 +267,22 @@ class BridgeWatch:
                 hold(not self._silent, "handed over twice")
                 self._silent = True
                 self._prepared = False
-                self._leg = None
+                self._task = _Task()
             case VehicleReady():
                 hold(self._prepared, "ready, though nobody asked")
                 self._prepared = False
             case Arrived(leg):
-                hold(leg == self._leg, f"arrived on leg {leg}, under way is {self._leg}")
-                self._leg = None
-            case Refused(order):
-                # Refused at once, it changes nothing; refused later, it had been under way.
-                at_once = order is self._ordered
-                self._leg = self._leg_before if at_once else None
-                if at_once and isinstance(order, Prepare | GoTo):
-                    self._places_m.pop()
+                under_way = self._task.leg
+                hold(leg == under_way, f"arrived on leg {leg}, under way is {under_way}")
+                self._task = replace(self._task, leg=None)
+            case Refused(order) if order is self._ordered:
+                self._task = self._task_before  # it changes nothing
+            case Refused():
+                self._task = replace(self._task, leg=None)
             case Telemetry(position, velocity, battery_frac):
                 self._here_m = position
+                if self._task.hold_m is not None:
+                    self._task.hold_m.append(position)
                 numbers = (*position, *velocity, battery_frac or 0.0)
                 hold(all(math.isfinite(n) for n in numbers), f"telemetry {report}")
             case _:
@@ -280,7 +315,7 @@ class BridgeWatch:
             hold(size <= _MOST_REMEMBERED, f"remembers {size} things")
 
 
-def _near(a: tuple[float, float, float], b: tuple[float, float, float]) -> bool:
+def _near(a: Point, b: Point) -> bool:
     return math.dist(a[:2], b[:2]) <= _TOLERANCE_M and abs(a[2] - b[2]) <= _TOLERANCE_M
 
 

@@ -5,6 +5,10 @@ brings it home. It commands no other vehicle, does not fight a pilot and trusts 
 sees over what was acknowledged. Leaves out: transports (agent.mavlink.link), waiting
 (agent.mavlink.vehicle) and what to fly to (agent.core).
 
+Targets are told one by one or stand on the vehicle as missions (`CommandStyle`); the way
+of telling is the leg's, and what the vehicle may do by itself meanwhile is asked of
+`StandingMission`.
+
 The vehicle is *handed over* when a pilot or a failsafe changes its mode, when it
 disarms or reboots in flight, or when it falls silent. From then on nothing is commanded
 until a new `Prepare`, or a `Return` that finds it still in the guided mode.
@@ -15,12 +19,16 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from agent.mavlink.authority import intervention
 from agent.mavlink.codec import MavlinkCodec
 from agent.mavlink.commands import CommandEnded, Commands
-from agent.mavlink.config import BridgeConfig
+from agent.mavlink.config import BridgeConfig, CommandStyle
+from agent.mavlink.contact import Contact
 from agent.mavlink.events import Action, Event, LinkDown, LinkUp, Received, Send, Tick
 from agent.mavlink.flavours import Flavour, flavour_of
-from agent.mavlink.leg import TARGET_TAG, Leg
+from agent.mavlink.guards import Guards
+from agent.mavlink.holding import Holding
+from agent.mavlink.leg import Leg, RepositionLeg
 from agent.mavlink.messages import (
     CommandAck,
     GroundHeartbeat,
@@ -31,9 +39,11 @@ from agent.mavlink.messages import (
     Outbound,
     Position,
 )
+from agent.mavlink.mission_leg import MissionLeg
 from agent.mavlink.preparation import Preparation
 from agent.mavlink.returning import Returning
 from agent.mavlink.signing import Signing
+from agent.mavlink.standing_mission import StandingMission
 from agent.mavlink.state import PositionNews, VehicleState
 from agent.mavlink.streams import Streams
 from agent.vehicle import (
@@ -47,6 +57,7 @@ from agent.vehicle import (
     Prepare,
     Refused,
     Return,
+    ReturnAdvised,
     Telemetry,
     VehicleReady,
 )
@@ -55,7 +66,6 @@ from swarm.pulse import Pulse
 
 __all__ = ["Bridge", "Phase"]
 
-_AUTOPILOT_COMPONENT = 1
 _POLL_S = 0.25
 """While something is waited for, look that often even if nothing is heard."""
 _UNHEARD_TIMEOUTS = 3.0
@@ -69,6 +79,7 @@ class Phase(Enum):
     PREPARING = "preparing"
     HOVERING = "hovering"
     FLYING = "flying"
+    HOLDING = "being stopped"
     RETURNING = "returning"
     HANDED_OVER = "handed over"
 
@@ -79,8 +90,7 @@ class Bridge:
     def __init__(self, config: BridgeConfig, signing: Signing | None = None) -> None:
         self.config = config
         self.phase = Phase.IDLE
-        self.foreign: dict[int, int] = {}
-        """Messages heard from other systems, by system id; all ignored."""
+        self.contact = Contact(config.system_id)
         self.stale_positions = 0
         """Positions dropped because they were late or doubled."""
         self.strange_heartbeats = 0
@@ -93,20 +103,24 @@ class Bridge:
         )
         self._commands = Commands(config.commands)
         self._vehicle = VehicleState()
+        self._guards = Guards(config)
         self._flavour: Flavour | None = None
         self._streams: Streams | None = None
         self._prepare: Prepare | None = None
         self._preparation: Preparation | None = None
         self._returning: Returning | None = None
-        self._to_return: Return | None = None
-        """Ordered before the vehicle was heard, which may be in the air."""
-        self._to_return_until_s = 0.0
+        self._holding: Holding | None = None
+        self._mission: StandingMission | None = None
+        """What stands on the vehicle; None if missions are not our way to command it."""
+        self._awaited: Return | Hold | None = None
+        """Ordered before it was known what the vehicle does, which may be in the air."""
+        self._awaited_until_s = 0.0
+        self._prepare_next: Prepare | None = None
+        """Ordered of a vehicle that has to be stopped first."""
         self._speed_m_s = 0.0
         """Cruise speed of the last preparation [m/s]."""
         self._order: GoTo | None = None
         self._leg: Leg | None = None
-        self._link_up = False
-        self._wrong_autopilot: int | None = None
         self._told_not_ready: str | None = None
         self._heartbeat_at_s = -math.inf
         self._pulse = Pulse(config.silence_timeout_s / 2.0)
@@ -118,6 +132,7 @@ class Bridge:
         self._now_s = now_s
         if self._pulse.late(now_s):
             self._vehicle.excuse_silence(now_s)
+            self._guards.excuse_silence(now_s)
         match event:
             case Received(data):
                 for heard in self.codec.decode(data):
@@ -125,12 +140,12 @@ class Bridge:
             case Prepare() | GoTo() | Hold() | Return():
                 self._obey(event)
             case LinkUp():
-                self._link_up = True
+                self.contact.link_up = True
                 self.codec.reset_link()
                 if self._streams is not None:
                     self._streams.ask_anew()
             case LinkDown():
-                self._link_up = False
+                self.contact.link_up = False
             case Tick():
                 pass
         self._advance()
@@ -143,8 +158,12 @@ class Bridge:
         deadlines_s = [self._heartbeat_at_s]
         if (commands_s := self._commands.next_deadline_s()) is not None:
             deadlines_s.append(commands_s)
-        if self.phase in (Phase.PREPARING, Phase.RETURNING) or self._to_return is not None:
+        busy = (Phase.PREPARING, Phase.HOLDING, Phase.RETURNING)
+        starting = self._mission is not None and self._mission.is_starting
+        if self.phase in busy or self._awaited is not None or starting:
             deadlines_s.append(self._now_s + _POLL_S)
+        if self._mission is not None and (at_s := self._mission.next_deadline_s()) is not None:
+            deadlines_s.append(max(at_s, self._now_s))
         heard_s = self._vehicle.heartbeat_at_s
         if heard_s is not None and self._in_our_hands() and not self._silent():
             deadlines_s.append(heard_s + self.config.silence_timeout_s)
@@ -153,15 +172,10 @@ class Bridge:
     # What is heard.
 
     def _hear(self, heard: Heard) -> None:
-        if heard.system_id != self.config.system_id:
-            count = self.foreign.get(heard.system_id, 0)
-            self.foreign[heard.system_id] = count + 1
-            if isinstance(heard.message, Heartbeat):
-                self._wrong_autopilot = heard.system_id
-            return
-        if heard.component_id != _AUTOPILOT_COMPONENT:
+        if not self.contact.is_from_vehicle(heard):
             return
         message = heard.message
+        self._guards.on_message(message, self._now_s)
         if self._streams is not None:
             self._streams.on_message(message, self._now_s)
         match message:
@@ -175,11 +189,13 @@ class Bridge:
                 self._on_ended(ended)
             case _:
                 self._vehicle.on_message(message, self._now_s)
-                self._pass_to_preparation(message)
+                self._pass_on(message)
 
-    def _pass_to_preparation(self, message: Inbound) -> None:
+    def _pass_on(self, message: Inbound) -> None:
         if self._preparation is not None:
             self._say(*self._preparation.on_message(message, self._now_s))
+        if self._mission is not None:
+            self._say(*self._mission.on_message(message, self._now_s))
 
     def _on_heartbeat(self, heartbeat: Heartbeat) -> None:
         vehicle, before = self._vehicle, self._vehicle.heartbeat
@@ -200,7 +216,9 @@ class Bridge:
             self._streams = Streams(self.config, self._flavour) if self._flavour else None
             if self._flavour is not None:
                 self._commands.acknowledged_twice = self._flavour.acknowledged_twice
+            self._forget_mission()
         self._check_authority(heartbeat)
+        self._check_guards()
 
     def _check_authority(self, heartbeat: Heartbeat) -> None:
         """Hand over a vehicle that somebody else flies now."""
@@ -208,18 +226,40 @@ class Bridge:
         if flavour is None or not self._in_our_hands():
             return
         mode = heartbeat.custom_mode
-        ours = flavour.is_commanded(mode) or (flavour.is_taking_off(mode) and self._took_off())
-        if self._returning is not None:
+        ours = self._obeys(mode)
+        if self._holding is not None:
+            ours = not heartbeat.armed or self._holding.expects(mode)
+        elif self._returning is not None:
             ours = not heartbeat.armed or self._returning.expects(mode)
-        elif self.phase is not Phase.PREPARING and not heartbeat.armed:
-            self._hand_over("the vehicle disarmed by itself")
+        reason = intervention(
+            self._vehicle,
+            heartbeat,
+            flavour,
+            self._now_s,
+            expected=ours,
+            may_disarm=self.phase in (Phase.PREPARING, Phase.RETURNING)
+            or (self._holding is not None and not self._holding.aloft),
+        )
+        if reason is not None:
+            self._hand_over(reason)
+
+    def _check_guards(self) -> None:
+        """Let go of a vehicle that has lost its way, and advise one in trouble to go home."""
+        flavour = self._flavour
+        if flavour is None or not self._in_our_hands() or self._returning is not None:
             return
-        if not ours:
-            warning = self._vehicle.recent_warning(self._now_s)
-            said = f" ({warning})" if warning else ""
-            self._hand_over(
-                f"its pilot or a failsafe switched it to {flavour.mode_name(mode)}{said}"
-            )
+        if not flavour.airborne(self._vehicle):
+            return
+        if (lost := self._guards.position_lost(self._now_s)) is not None:
+            self._hand_over(lost)
+        elif (advice := self._guards.advice(self._vehicle, flavour, self._now_s)) is not None:
+            self._actions.append(ReturnAdvised(advice))
+
+    def _flies_for_us(self, custom_mode: int) -> bool:
+        """Whether that mode is our doing, as far as targets go."""
+        if self._mission is not None:
+            return self._mission.expects(custom_mode, self._now_s)
+        return self._flavour is not None and self._flavour.is_commanded(custom_mode)
 
     def _on_position(self, position: Position) -> None:
         match self._vehicle.on_position(position):
@@ -237,27 +277,42 @@ class Bridge:
             self.config.origin, position.lat_deg, position.lon_deg, position.alt_m
         )
         velocity = position.velocity_enu_m_s
+        fault = self._flavour.position_fault(self._vehicle) if self._flavour else None
+        self._guards.on_position(place_enu_m, fault, self._now_s)
         self._actions.append(Telemetry(place_enu_m, velocity, self._vehicle.battery_frac))
         if self._preparation is not None:
             self._say(*self._preparation.on_position(position, self._now_s))
+        if self._holding is not None:
+            self._holding.on_position(position)
+        if self._mission is not None:
+            self._mission.on_position(place_enu_m, self._now_s)
+        if self._leg is not None:
+            self._say(*self._leg.on_position(place_enu_m, velocity, self._now_s))
+            self._judge_leg()
+
+    def _judge_leg(self) -> None:
         leg, order = self._leg, self._order
         if leg is None or order is None:
             return
-        self._say(*leg.on_position(place_enu_m, velocity, self._commands, self._now_s))
         if leg.arrived:
             self._end_leg()
             self._actions.append(Arrived(order.leg))
         elif leg.failure is not None:
-            self._refuse_leg(order, leg.failure)
+            self._end_leg()
+            text = self._vehicle.recent_warning(self._now_s)
+            reason = f"{leg.failure}: {text}" if text else leg.failure
+            self._actions.append(Refused(order, reason))
 
     def _on_reboot(self) -> None:
         """Forget what is no longer true of an autopilot that began anew."""
         if self._in_our_hands():
             self._hand_over("the autopilot rebooted")
         self._vehicle = VehicleState()
+        self._guards = Guards(self.config)
         self._flavour = None
         self._streams = None
         self._preparation = None
+        self._mission = None
         self._commands.cancel_all()
 
     def _on_ended(self, ended: list[CommandEnded]) -> None:
@@ -268,10 +323,13 @@ class Bridge:
                 self._say(*self._preparation.on_ended(one, self._now_s))
             if self._returning is not None:
                 self._returning.on_ended(one, self._now_s)
-            if self._leg is not None and self._order is not None:
+            if self._holding is not None:
+                self._holding.on_ended(one, self._now_s)
+            if self._mission is not None:
+                self._mission.on_ended(one, self._now_s)
+            if self._leg is not None:
                 self._leg.on_ended(one)
-                if self._leg.failure is not None:
-                    self._refuse_leg(self._order, self._leg.failure)
+                self._judge_leg()
 
     # What is ordered.
 
@@ -293,57 +351,129 @@ class Bridge:
         if not (math.isfinite(order.speed_m_s) and order.speed_m_s > 0.0):
             self._actions.append(Refused(order, f"speed {order.speed_m_s} m/s is not > 0"))
             return
+        if self._must_stop_first() and not self._silent():
+            self._hold(Hold("to be prepared anew"))
+            self._prepare_next = order
+            return
         self._drop_work()
+        self._forget_mission()
+        self._guards.begin()
         self.phase = Phase.PREPARING
         self._prepare = order
         self._speed_m_s = order.speed_m_s
         self._told_not_ready = None
 
+    def _must_stop_first(self) -> bool:
+        """Whether the vehicle flies on our orders, but takes no targets."""
+        flavour, heartbeat = self._flavour, self._vehicle.heartbeat
+        return (
+            self.phase in (Phase.RETURNING, Phase.HOLDING)
+            and flavour is not None
+            and heartbeat is not None
+            and heartbeat.armed
+            and not flavour.is_commanded(heartbeat.custom_mode)
+            and self._vehicle.landed is not Landed.ON_GROUND
+        )
+
     def _go_to(self, order: GoTo) -> None:
-        if self.phase not in (Phase.HOVERING, Phase.FLYING) or self._flavour is None:
+        by_mission = self._mission is not None and self._returning is None
+        takes_targets = self.phase in (Phase.HOVERING, Phase.FLYING) or (
+            self.phase is Phase.HOLDING and (by_mission or not self._must_stop_first())
+        )
+        if not takes_targets or self._flavour is None:
             self._actions.append(Refused(order, f"the vehicle is {self.phase.value}"))
             return
         if fault := self.config.out_of_bounds(order.position_enu_m):
             self._actions.append(Refused(order, fault))
             return
-        place = wgs84_from_enu(self.config.origin, order.position_enu_m)
-        message = self._flavour.reposition(*place, self._speed_m_s)
-        leg = Leg(order.position_enu_m, message, self.config)
-        self._order, self._leg = order, leg
+        if not (math.isfinite(order.stay_s) and order.stay_s >= 0.0):
+            self._actions.append(Refused(order, f"a stay of {order.stay_s} s is not >= 0"))
+            return
+        if self._holding is not None:
+            self._drop_work()
+        self._order, self._leg = order, self._leg_to(order, self._flavour)
         self.phase = Phase.FLYING
-        self._say(*leg.start(self._commands, self._now_s))
+        self._say(*self._leg.start(self._now_s))
+
+    def _leg_to(self, order: GoTo, flavour: Flavour) -> Leg:
+        target_enu_m, config = order.position_enu_m, self.config
+        if self._mission is not None:
+            return MissionLeg(target_enu_m, order.stay_s, self._speed_m_s, config, self._mission)
+        place = wgs84_from_enu(config.origin, target_enu_m)
+        message = flavour.reposition(*place, self._speed_m_s)
+        return RepositionLeg(target_enu_m, message, config, self._commands)
 
     def _hold(self, order: Hold) -> None:
-        position = self._vehicle.position
-        if self.phase not in (Phase.HOVERING, Phase.FLYING) or position is None:
+        if self.phase is Phase.HANDED_OVER:
             self._actions.append(Refused(order, f"the vehicle is {self.phase.value}"))
+        elif not self._in_our_hands():
+            # It may fly on the orders of an earlier life, or be somebody else's.
+            self._drop_work()
+            self.phase = Phase.IDLE
+            self._await(order)
+        elif self._silent():
+            self._actions.append(Refused(order, "the autopilot is silent"))
+        elif self._returning is None or self._vehicle.armed:
+            self._begin_holding(order)
+
+    def _begin_holding(self, order: Hold) -> None:
+        """Stop a vehicle that flies on our orders, or is about to."""
+        flavour, heartbeat = self._flavour, self._vehicle.heartbeat
+        if flavour is None or heartbeat is None:
             return
-        if self._flavour is None:
-            return
-        self._end_leg()
-        here = (position.lat_deg, position.lon_deg, position.alt_m)
-        message = self._flavour.reposition(*here, self._speed_m_s)
-        self._say(*self._commands.send(TARGET_TAG, message, self._now_s))
+        took_off, returning = self._took_off(), self._returning
+        on_missions = self._mission is not None and self.phase is not Phase.PREPARING
+        motors_asked = self._preparation is not None and self._preparation.engaged
+
+        def leaves(mode: int) -> bool:
+            return (
+                mode == heartbeat.custom_mode
+                or (took_off and flavour.is_taking_off(mode))
+                or (on_missions and flavour.is_mission(mode))
+                or (returning is not None and flavour.is_returning(mode))
+            )
+
+        self._drop_work()
+        self._returning = returning  # goes on if the vehicle cannot be stopped
+        if self._mission is not None:
+            self._mission.suspend()
+        self._holding = Holding(
+            order,
+            self.config,
+            self._commands,
+            flavour,
+            self._speed_m_s,
+            leaves,
+            motors_asked=motors_asked,
+        )
+        self.phase = Phase.HOLDING
 
     def _return(self, order: Return) -> None:
         if self.phase is Phase.RETURNING:
             return
-        took_off = self.phase in (Phase.HOVERING, Phase.FLYING) or self._took_off()
+        in_air = (Phase.HOVERING, Phase.FLYING, Phase.HOLDING)
+        took_off = self.phase in in_air or self._took_off()
         motors_asked_for = self._preparation is not None and self._preparation.engaged
-        flavour, heartbeat = self._flavour, self._vehicle.heartbeat
+        flavour, heartbeat, holding = self._flavour, self._vehicle.heartbeat, self._holding
         self._drop_work()
         self.phase = Phase.IDLE
         if flavour is None or heartbeat is None:
             if order.resume:
-                patience_s = _UNHEARD_TIMEOUTS * self.config.silence_timeout_s
-                self._to_return, self._to_return_until_s = order, self._now_s + patience_s
-                self._told_not_ready = None
+                self._await(order)
             else:
                 self._actions.append(Home())
             return
         mode = heartbeat.custom_mode
+        if self._reads_mission(heartbeat):
+            self._await(order)
+            return
         taking_off = flavour.is_taking_off(mode) and (took_off or order.resume)
-        commanded = flavour.is_commanded(mode) or taking_off
+        on_mission = self._mission is not None and (
+            self._flies_for_us(mode) or (holding is not None and holding.expects(mode))
+        )
+        commanded = flavour.is_commanded(mode) or taking_off or on_mission
+        if self._mission is not None:
+            self._mission.stand_down()
         aloft = heartbeat.armed and (took_off or flavour.airborne(self._vehicle) is not False)
         if not aloft:
             # That it was armed may not have been heard yet.
@@ -356,8 +486,17 @@ class Bridge:
         elif not (commanded or flavour.is_returning(mode)):
             self._hand_over(f"its pilot flies it in {flavour.mode_name(mode)}")
         else:
-            self._returning = Returning(order, self.config, self._commands, flavour)
-            self.phase = Phase.RETURNING
+            self._come_home(order, flavour)
+
+    def _come_home(self, order: Return, flavour: Flavour) -> None:
+        self._returning = Returning(
+            order,
+            self.config,
+            self._commands,
+            flavour,
+            from_mission=self._mission is not None,
+        )
+        self.phase = Phase.RETURNING
 
     def _refuse_return(self, order: Return, reason: str) -> None:
         self.phase = Phase.HANDED_OVER
@@ -378,12 +517,16 @@ class Bridge:
             self._hand_over(f"no heartbeat for {self.config.silence_timeout_s:g} s")
         if self._streams is not None and not silent:
             self._say(*self._streams.advance(self._commands, now_s))
+        if not silent:
+            self._advance_mission()
         if self.phase is Phase.PREPARING:
             self._advance_preparation()
+        elif self.phase is Phase.HOLDING:
+            self._advance_holding()
         elif self.phase is Phase.RETURNING:
             self._advance_return()
-        elif self._to_return is not None:
-            self._look_for_vehicle(self._to_return)
+        elif self._awaited is not None:
+            self._look_for_vehicle(self._awaited)
 
     def _advance_preparation(self) -> None:
         heartbeat, order = self._vehicle.heartbeat, self._prepare
@@ -395,13 +538,21 @@ class Bridge:
         if heartbeat is None or self._flavour is None:
             return
         if self._preparation is None:
-            self._preparation = Preparation(order, self.config, self._commands, self._flavour)
+            self._preparation = Preparation(
+                order, self.config, self._commands, self._flavour, self._guards, self._mission
+            )
         preparation = self._preparation
         self._say(*preparation.advance(self._vehicle, heartbeat, self._now_s))
         if preparation.failure is not None:
+            aloft = heartbeat.armed and self._flavour.airborne(self._vehicle)
+            obeys = self._obeys(heartbeat.custom_mode)
             self._drop_work()
-            self.phase = Phase.IDLE
-            self._actions.append(Refused(order, preparation.failure))
+            if aloft and obeys:
+                self.phase = Phase.HOVERING  # nobody else would bring it down
+                self._actions.append(ReturnAdvised(preparation.failure))
+            else:
+                self.phase = Phase.IDLE
+                self._actions.append(Refused(order, preparation.failure))
         elif preparation.done:
             self._drop_work()
             self.phase = Phase.HOVERING
@@ -411,36 +562,118 @@ class Bridge:
 
     def _unheard(self) -> str | None:
         """Why there is no vehicle to prepare yet; None if there is one."""
-        heartbeat, wanted = self._vehicle.heartbeat, self.config.system_id
-        if heartbeat is None or self._silent():
-            if not self._link_up:
-                return "no link to the autopilot"
-            if self._wrong_autopilot is not None and heartbeat is None:
-                return f"heard the vehicle with system id {self._wrong_autopilot}, not {wanted}"
-            if heartbeat is None and (reasons := " and ".join(self.codec.distrusted)):
-                return f"heard only frames that are not to be believed: {reasons}"
-            return f"waiting for a heartbeat of system id {wanted}"
-        if self._flavour is None:
-            return (
-                f"autopilot {heartbeat.autopilot} on vehicle type {heartbeat.vehicle_type} "
-                "(MAV_AUTOPILOT, MAV_TYPE) is not supported"
-            )
-        return None
+        return self.contact.missing(
+            self._vehicle.heartbeat,
+            self._flavour,
+            silent=self._silent(),
+            distrusted=self.codec.distrusted,
+        )
 
     def _tell_not_ready(self, reason: str) -> None:
         if reason != self._told_not_ready:
             self._told_not_ready = reason
             self._actions.append(NotReady(reason))
 
-    def _look_for_vehicle(self, order: Return) -> None:
-        """Return the vehicle once it is heard; it has this long to be."""
-        if (reason := self._unheard()) is None:
-            self._return(order)
-        elif self._now_s < self._to_return_until_s:
+    def _await(self, order: Return | Hold) -> None:
+        """Carry the order out once it is known what the vehicle does."""
+        patience_s = _UNHEARD_TIMEOUTS * self.config.silence_timeout_s
+        self._awaited, self._awaited_until_s = order, self._now_s + patience_s
+        self._told_not_ready = None
+
+    def _look_for_vehicle(self, order: Return | Hold) -> None:
+        """Return or stop the vehicle once it is heard; it has this long to be."""
+        reason = self._unheard() or self._unclear(order)
+        if reason is None:
+            self._awaited = None
+            if isinstance(order, Return):
+                self._return(order)
+            else:
+                self._hold_found(order)
+        elif self._now_s < self._awaited_until_s:
             self._tell_not_ready(reason)
         else:
             self._drop_work()
-            self._refuse_return(order, reason)
+            if isinstance(order, Return):
+                self._refuse_return(order, reason)
+            else:
+                self._actions.append(Refused(order, reason))
+
+    def _unclear(self, order: Return | Hold) -> str | None:
+        """What is still to be learned of a vehicle that is heard; None if it is enough."""
+        flavour, heartbeat, mission = self._flavour, self._vehicle.heartbeat, self._mission
+        if flavour is None or heartbeat is None or not heartbeat.armed:
+            return None
+        if isinstance(order, Hold) and self._vehicle.landed is Landed.UNDEFINED:
+            return "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
+        if mission is not None and self._reads_mission(heartbeat):
+            self._say(*mission.look(self._now_s))
+            return "reading the mission that the vehicle flies"
+        return None
+
+    def _reads_mission(self, heartbeat: Heartbeat) -> bool:
+        """Whether the vehicle flies a mission of which it is not known whose it is."""
+        return (
+            self._flavour is not None
+            and self._mission is not None
+            and heartbeat.armed
+            and self._flavour.is_mission(heartbeat.custom_mode)
+            and self._mission.is_ours is None
+            and not self._flies_for_us(heartbeat.custom_mode)
+        )
+
+    def _hold_found(self, order: Hold) -> None:
+        """Stop a vehicle that an earlier life left in the air."""
+        flavour, heartbeat = self._flavour, self._vehicle.heartbeat
+        aloft = self._vehicle.landed is not Landed.ON_GROUND
+        if flavour is None or heartbeat is None or not (heartbeat.armed and aloft):
+            return
+        mode = heartbeat.custom_mode
+        if self._flies_for_us(mode) or flavour.is_taking_off(mode):
+            self._begin_holding(order)
+        else:
+            name = flavour.mode_name(mode)
+            self._actions.append(Refused(order, f"its pilot flies it in {name}"))
+
+    def _advance_mission(self) -> None:
+        mission, flavour = self._mission, self._flavour
+        heartbeat, heard_s = self._vehicle.heartbeat, self._vehicle.heartbeat_at_s
+        if mission is None or flavour is None or heartbeat is None or heard_s is None:
+            return
+        self._say(*mission.advance(heartbeat, heard_s, self._now_s))
+        self._judge_leg()
+        if self.phase not in (Phase.HOVERING, Phase.FLYING):
+            return
+        if mission.coming_home:
+            reason = "nothing followed its last target in time, so it comes home by itself"
+            self._drop_work()
+            mission.stand_down()
+            self._actions.append(ReturnAdvised(reason))
+            self._come_home(Return(reason), flavour)
+        elif mission.unverified:
+            self._begin_holding(Hold("which mission it flies is not known"))
+
+    def _advance_holding(self) -> None:
+        holding, heartbeat = self._holding, self._vehicle.heartbeat
+        if holding is None or heartbeat is None:
+            return
+        self._say(*holding.advance(self._vehicle, heartbeat, self._now_s))
+        if not holding.done and holding.failure is None:
+            return
+        prepare, returning, mission = self._prepare_next, self._returning, self._mission
+        self._drop_work()
+        self.phase = Phase.HOVERING if holding.aloft else Phase.IDLE
+        if holding.failure is None and mission is not None:
+            mission.stand_down()
+        elif mission is not None and returning is None:
+            mission.carry_on()
+        if holding.failure is not None:
+            self._actions.append(Refused(holding.order, holding.failure))
+            if prepare is not None:
+                self._actions.append(Refused(prepare, holding.failure))
+            if returning is not None:
+                self._returning, self.phase = returning, Phase.RETURNING
+        elif prepare is not None:
+            self._begin_preparation(prepare)
 
     def _advance_return(self) -> None:
         returning, heartbeat = self._returning, self._vehicle.heartbeat
@@ -463,7 +696,15 @@ class Bridge:
         """Whether the vehicle is, or may be, in the air on our orders."""
         if self.phase is Phase.PREPARING:
             return self._preparation is not None and self._preparation.engaged
-        return self.phase in (Phase.HOVERING, Phase.FLYING, Phase.RETURNING)
+        return self.phase in (Phase.HOVERING, Phase.FLYING, Phase.HOLDING, Phase.RETURNING)
+
+    def _obeys(self, custom_mode: int) -> bool:
+        """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
+        flavour = self._flavour
+        return flavour is not None and (
+            self._flies_for_us(custom_mode)
+            or (flavour.is_taking_off(custom_mode) and self._took_off())
+        )
 
     def _took_off(self) -> bool:
         """Whether the preparation under way has asked for takeoff."""
@@ -475,21 +716,32 @@ class Bridge:
 
     def _hand_over(self, reason: str) -> None:
         self._drop_work()
+        if self._mission is not None:
+            self._mission.abort(reason)
         self.phase = Phase.HANDED_OVER
         self._actions.append(HandedOver(reason))
-
-    def _refuse_leg(self, order: GoTo, reason: str) -> None:
-        self._end_leg()
-        self._actions.append(Refused(order, reason))
 
     def _end_leg(self) -> None:
         self._leg = self._order = None
         self.phase = Phase.HOVERING
+        if self._mission is not None:
+            self._mission.wait_there()
+
+    def _forget_mission(self) -> None:
+        """Know nothing of what stands on the vehicle."""
+        missions = self.config.command is CommandStyle.MISSION
+        flavour = self._flavour
+        self._mission = (
+            StandingMission(self.config, self._commands, flavour)
+            if missions and flavour is not None
+            else None
+        )
 
     def _drop_work(self) -> None:
         """Give up whatever is under way; nothing is sent about it any more."""
         self._leg = self._order = None
-        self._prepare = self._preparation = self._returning = self._to_return = None
+        self._prepare = self._preparation = self._prepare_next = None
+        self._returning = self._holding = self._awaited = None
         self._commands.cancel_all()
 
     def _say(self, *messages: Outbound) -> None:

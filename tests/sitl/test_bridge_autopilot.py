@@ -151,7 +151,7 @@ def test_pilot_takes_over_the_simulated_vehicle() -> None:
     flight.run_until(VehicleReady())
     flight.to_bridge(GoTo(1, (5.0, 200.0, 10.0)))
     flight.vehicle.pilot.set_mode(Mode.LOITER, flight.now_s)
-    flight.run_until(HandedOver("its pilot or a failsafe switched it to LOITER"))
+    flight.run_until(HandedOver("its pilot switched it to LOITER"))
     with pytest.raises(AssertionError, match="no"):
         flight.run_until(Arrived(1), limit_s=60.0)
     assert flight.vehicle.pilot.mode is Mode.LOITER

@@ -103,6 +103,11 @@ class ArduCopter:
         )
 
     @property
+    def mission_vehicle_items(self) -> int:
+        """Item 0 is home, whatever is sent as such."""
+        return 1
+
+    @property
     def acknowledged_twice(self) -> frozenset[int]:
         """None."""
         return frozenset()
@@ -149,13 +154,29 @@ class ArduCopter:
             return vehicle.landed is not Landed.ON_GROUND
         return vehicle.heartbeat is not None and vehicle.heartbeat.system_status >= _STATE_ACTIVE
 
+    def position_fault(self, vehicle: VehicleState) -> str | None:
+        """By the EKF's flags: a lost position is told on, from dead reckoning."""
+        flags = vehicle.ekf_flags
+        if flags is None or _knows_position(flags):
+            return None
+        return "the position estimate is lost"
+
+    def alarmed(self, heartbeat: Heartbeat) -> bool:
+        """Never: a failsafe that acts changes the mode.
+
+        CRITICAL in GUIDED means that the vehicle's owner lets it fly on, for one without
+        a remote control (FS_OPTIONS).
+        """
+        del heartbeat
+        return False
+
     def unready(self, vehicle: VehicleState) -> str | None:
         """Pre-arm checks of SYS_STATUS, then the EKF's absolute horizontal position."""
         if not vehicle.prearm_heard:
             return "waiting for the pre-arm checks (SYS_STATUS)"
         if vehicle.ekf_flags is None:
             return "waiting for the position estimate's status (EKF_STATUS_REPORT)"
-        if not vehicle.ekf_flags & _EKF_POS_HORIZ_ABS or vehicle.ekf_flags & _EKF_CONST_POS_MODE:
+        if not _knows_position(vehicle.ekf_flags):
             return "no position estimate yet"
         if vehicle.prearm_ok is False:
             return "pre-arm checks do not pass"
@@ -206,12 +227,20 @@ class ArduCopter:
             alt_m,
         )
 
+    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
+        """Copters keep the hold time only; their radius is WPNAV_RADIUS."""
+        return (hold_s, 0.0, 0.0, 0.0)
+
     def change_speed(self, speed_m_s: float) -> CommandLong:
         """Ground speed; forgotten when GUIDED is entered or takeoff ends, so set it after."""
         return CommandLong(
             _CMD_DO_CHANGE_SPEED,
             (_GROUND_SPEED, speed_m_s, _UNCHANGED, 0.0, 0.0, 0.0, 0.0),
         )
+
+
+def _knows_position(ekf_flags: int) -> bool:
+    return bool(ekf_flags & _EKF_POS_HORIZ_ABS) and not ekf_flags & _EKF_CONST_POS_MODE
 
 
 def _set_mode(custom_mode: int) -> CommandLong:

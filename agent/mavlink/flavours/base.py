@@ -37,6 +37,11 @@ class Flavour(Protocol):
         ...
 
     @property
+    def mission_vehicle_items(self) -> int:
+        """Leading items of a mission that belong to the vehicle and cannot be chosen."""
+        ...
+
+    @property
     def acknowledged_twice(self) -> frozenset[int]:
         """Numbers of the commands that the firmware acknowledges twice."""
         ...
@@ -78,6 +83,14 @@ class Flavour(Protocol):
         """Whether the vehicle is off the ground; None if it has not told yet."""
         ...
 
+    def position_fault(self, vehicle: VehicleState) -> str | None:
+        """Why the autopilot does not trust the position that it tells; None if it does."""
+        ...
+
+    def alarmed(self, heartbeat: Heartbeat) -> bool:
+        """Whether a failsafe acts, or is about to, that the mode does not show."""
+        ...
+
     def unready(self, vehicle: VehicleState) -> str | None:
         """What keeps the vehicle from being armed, in words; None if nothing does."""
         ...
@@ -117,6 +130,10 @@ class Flavour(Protocol):
             alt_m: height above mean sea level.
             speed_m_s: cruise ground speed, for firmwares that take it with every target.
         """
+        ...
+
+    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
+        """Parameters of a mission's waypoint at which to wait so long, heading as it comes."""
         ...
 
     def change_speed(self, speed_m_s: float) -> CommandLong:

@@ -58,7 +58,7 @@ _MODE_NAMES = {
     (10, 0): "TERMINATION",
 }
 
-_STATE_STANDBY = 3
+_STATE_STANDBY, _STATE_CRITICAL, _STATE_EMERGENCY = 3, 5, 6
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_SET_MODE = 176
 _CMD_DO_CHANGE_SPEED = 178
@@ -69,6 +69,8 @@ _GROUND_SPEED = 1.0
 _UNCHANGED = -1.0
 _CHANGE_MODE = 1.0
 """MAV_DO_REPOSITION_FLAGS_CHANGE_MODE."""
+_WAYPOINT_RADIUS_M = 2.0
+"""As ArduCopter's, within which a vehicle is as good as at its waypoint."""
 
 
 class Px4Copter:
@@ -87,6 +89,11 @@ class Px4Copter:
         either, PX4 answers "failed".
         """
         return ((1, SystemStatus), (245, ExtendedState))
+
+    @property
+    def mission_vehicle_items(self) -> int:
+        """None: item 0 is flown like any other."""
+        return 0
 
     @property
     def acknowledged_twice(self) -> frozenset[int]:
@@ -137,6 +144,15 @@ class Px4Copter:
         if vehicle.landed is Landed.UNDEFINED:
             return None if vehicle.armed else False
         return vehicle.landed is not Landed.ON_GROUND
+
+    def position_fault(self, vehicle: VehicleState) -> str | None:
+        """None: PX4 stops telling a position that it does not trust."""
+        del vehicle
+        return None
+
+    def alarmed(self, heartbeat: Heartbeat) -> bool:
+        """CRITICAL or EMERGENCY: PX4 warns, or holds for some seconds before it acts."""
+        return heartbeat.system_status in (_STATE_CRITICAL, _STATE_EMERGENCY)
 
     def unready(self, vehicle: VehicleState) -> str | None:
         """Pre-arm checks, whose bit PX4 sets in the health of SYS_STATUS alone, then a position.
@@ -195,6 +211,10 @@ class Px4Copter:
             lon_deg,
             alt_m,
         )
+
+    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
+        """The hold begins within a radius of 10 m (NAV_ACC_RAD) unless told another."""
+        return (hold_s, _WAYPOINT_RADIUS_M, 0.0, math.nan)
 
     def change_speed(self, speed_m_s: float) -> CommandLong:
         """Cruise speed of what is flown now; targets bring their own."""

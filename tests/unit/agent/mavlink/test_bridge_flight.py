@@ -234,13 +234,12 @@ def test_telemetry_is_in_the_missions_frame(fake: type[FakeCopter]) -> None:
 @pytest.mark.parametrize("kind", ["pilot_mode", "land_mode", "return_mode"])
 def test_pilot_who_takes_over_keeps_the_vehicle(fake: type[FakeCopter], kind: str) -> None:
     flight = BridgeFlight(fake(ORIGIN)).flying()
-    flight.copter.text(2, "Radio Failsafe")
     mode: int = getattr(fake, kind)
     flight.copter.set_mode(mode)
     flight.copter.heard.clear()
     handed = flight.run_until(HandedOver)
-    name = fake.mode_names[mode]
-    assert handed == HandedOver(f"its pilot or a failsafe switched it to {name} (Radio Failsafe)")
+    who = "its pilot" if kind == "pilot_mode" else "its pilot or a failsafe"
+    assert handed == HandedOver(f"{who} switched it to {fake.mode_names[mode]}")
     order = GoTo(2, NORTH)
     assert flight.order(order) == [Refused(order, "the vehicle is handed over")]
     flight.run(20.0)

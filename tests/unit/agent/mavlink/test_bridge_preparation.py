@@ -10,7 +10,16 @@ import pytest
 
 from agent.mavlink.bridge import Phase
 from agent.mavlink.config import BridgeConfig
-from agent.vehicle import HandedOver, Home, NotReady, Prepare, Refused, Return, VehicleReady
+from agent.vehicle import (
+    HandedOver,
+    Home,
+    NotReady,
+    Prepare,
+    Refused,
+    Return,
+    ReturnAdvised,
+    VehicleReady,
+)
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.fake_copter import (
     ARM,
@@ -161,7 +170,7 @@ def test_wrong_system_id_is_never_commanded_and_named(fake: type[FakeCopter]) ->
     flight.run(10.0)
 
     assert flight.reasons()[-1] == "heard the vehicle with system id 7, not 1"
-    assert flight.bridge.foreign[7] >= 9
+    assert flight.bridge.contact.foreign[7] >= 9
     assert {m.get_type() for m in flight.copter.heard} == {"HEARTBEAT"}
 
 
@@ -239,9 +248,9 @@ def test_speed_that_cannot_be_set_at_all_is_said(fake: type[FakeCopter]) -> None
     copter.parameters = {}
     flight = BridgeFlight(copter)
     flight.order(START)
-    refused = flight.run_until(Refused)
-    assert isinstance(refused, Refused)
-    assert " or ".join(fake.speed_names) in refused.reason
+    advised = flight.run_until(ReturnAdvised)
+    assert isinstance(advised, ReturnAdvised)
+    assert " or ".join(fake.speed_names) in advised.reason
 
 
 def test_height_of_takeoff_follows_from_home_not_from_the_origin(fake: type[FakeCopter]) -> None:
@@ -349,7 +358,7 @@ def test_pilot_who_takes_over_during_takeoff_keeps_the_vehicle(fake: type[FakeCo
     flight.copter.set_mode(fake.pilot_mode)
     handed = flight.run_until(HandedOver)
     name = fake.mode_names[fake.pilot_mode]
-    assert handed == HandedOver(f"its pilot or a failsafe switched it to {name}")
+    assert handed == HandedOver(f"its pilot switched it to {name}")
     flight.copter.heard.clear()
     flight.run(10.0)
     assert set(flight.copter.count()) <= {INTERVAL}
@@ -405,5 +414,8 @@ def test_climb_that_stops_ends_the_preparation(fake: type[FakeCopter]) -> None:
     while flight.copter.position_m[2] < 4.0:
         flight.step()
     flight.copter.target_m = None
-    refused = flight.run_until(Refused)
-    assert refused == Refused(START, "the vehicle took off and then stopped climbing")
+    advised = flight.run_until(ReturnAdvised)
+    assert advised == ReturnAdvised("the vehicle took off and then stopped climbing")
+
+    flight.order(Return("it failed"))
+    flight.run_until(Home())

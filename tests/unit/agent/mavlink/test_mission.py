@@ -18,7 +18,13 @@ from agent.mavlink.messages import (
     MissionRequestList,
     Outbound,
 )
-from agent.mavlink.mission import MissionFailed, MissionInForce, MissionPolicy, MissionTransfer
+from agent.mavlink.mission import (
+    MissionFailed,
+    MissionInForce,
+    MissionPolicy,
+    MissionRead,
+    MissionTransfer,
+)
 
 
 def mission(*heights_m: float) -> tuple[MissionItem, ...]:
@@ -97,6 +103,7 @@ def transfer(
             for _ in range(down(answer)):
                 outbox += machine.on_message(answer, now_s)
         if machine.result is not None:
+            assert not isinstance(machine.result, MissionRead)
             return machine.result
         now_s += 0.1
         outbox += machine.on_time(now_s)

@@ -26,7 +26,7 @@ from agent.mavlink.messages import (
     Text,
 )
 from agent.mavlink.state import VehicleState
-from agent.vehicle import GoTo, HandedOver, Home, Prepare, Refused, Return, VehicleReady
+from agent.vehicle import GoTo, HandedOver, Home, Prepare, Return, ReturnAdvised, VehicleReady
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.fake_px4 import AUTO_LOITER, AUTO_TAKEOFF, POSCTL, FakePx4
 from tests.mavlink_frames import frame, rebuilt, recorded
@@ -199,8 +199,10 @@ def test_a_takeoff_that_is_repeated_late_does_not_interrupt_what_follows() -> No
 def test_a_takeoff_that_never_ends_is_given_up() -> None:
     flight = taking_off()
     flight.copter.target_m = None
-    refused = flight.run_until(Refused)
-    assert refused == Refused(START, "the vehicle took off and then stopped climbing")
+    advised = flight.run_until(ReturnAdvised)
+    assert advised == ReturnAdvised("the vehicle took off and then stopped climbing")
+    flight.order(Return("it failed"))
+    flight.run_until(Home())
 
 
 def test_called_home_while_it_takes_off_it_returns() -> None:

@@ -1,0 +1,94 @@
+"""How sure the guards are before they speak."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.flavours.ardupilot import ArduCopter
+from agent.mavlink.guards import Guards
+from agent.mavlink.messages import Battery, Heartbeat, SystemStatus
+from agent.mavlink.state import VehicleState
+from tests.bridge_flight import ORIGIN
+
+CONFIG = BridgeConfig(1, ORIGIN, fence_radius_m=100.0, fence_height_m=50.0)
+BEAT = Heartbeat(vehicle_type=2, autopilot=3, armed=True, custom_mode=4, system_status=4)
+FLAVOUR = ArduCopter()
+charges = st.one_of(st.none(), st.floats(0.0, 1.0))
+
+
+def advice(guards: Guards, now_s: float = 0.0) -> str | None:
+    return guards.advice(VehicleState(heartbeat=BEAT), FLAVOUR, now_s)
+
+
+@given(st.lists(st.tuples(charges, st.booleans()), max_size=30))
+def test_a_battery_is_low_if_its_last_five_known_readings_are(
+    readings: list[tuple[float | None, bool]],
+) -> None:
+    guards = Guards(CONFIG)
+    known: list[float] = []
+    told = False
+    for number, (frac, by_battery) in enumerate(readings):
+        guards.on_message(
+            Battery(frac) if by_battery else SystemStatus(True, True, frac), float(number)
+        )
+        known += [] if frac is None else [frac]
+        last = known[-5:]
+        low = [frac for frac in last if frac < 0.2]
+        assert (guards.grounds(VehicleState(), float(number)) is not None) == bool(low)
+        assert (advice(guards) is not None) == (len(low) == 5 and not told)
+        told = told or len(low) == 5
+
+
+@given(st.lists(st.booleans(), max_size=40), st.floats(0.05, 0.5))
+def test_a_vehicle_is_outside_if_it_was_for_a_second_and_five_positions(
+    outside: list[bool], interval_s: float
+) -> None:
+    guards = Guards(CONFIG)
+    run, told = 0, False
+    for number, out in enumerate(outside):
+        now_s = number * interval_s
+        guards.on_position((111.0 if out else 109.0, 0.0, 10.0), None, now_s)
+        run = run + 1 if out else 0
+        due = run >= 5 and now_s - (number - run + 1) * interval_s >= 1.0
+        assert (advice(guards, now_s) is not None) == (due and not told)
+        told = told or due
+
+
+def test_what_was_advised_in_one_flight_is_advised_again_in_the_next() -> None:
+    guards = Guards(CONFIG)
+    for _ in range(5):
+        guards.on_message(Battery(0.1), 0.0)
+    assert advice(guards) == "battery at 10%, below the reserve of 20%"
+    assert advice(guards) is None
+    guards.begin()
+    assert advice(guards) == "battery at 10%, below the reserve of 20%"
+
+
+def test_height_is_fenced_above_and_below() -> None:
+    for up_m, words in ((70.0, "70 m above"), (-70.0, "70 m below")):
+        guards = Guards(CONFIG)
+        for number in range(6):
+            guards.on_position((0.0, 0.0, up_m), None, float(number))
+        assert advice(guards, 5.0) == f"{words} the origin, outside the fence of 50 m"
+
+
+def test_a_position_is_lost_only_if_heartbeats_come() -> None:
+    guards = Guards(CONFIG)
+    guards.on_position((0.0, 0.0, 10.0), None, 0.0)
+    assert guards.position_lost(60.0) is None
+    for number in range(3):
+        guards.on_message(BEAT, 60.0 + number)
+    assert guards.position_lost(62.0) == "no valid position for 5 s"
+    guards.on_position((0.0, 0.0, 10.0), "the estimate is lost", 63.0)
+    assert guards.position_lost(63.0) == "no valid position for 5 s (the estimate is lost)"
+    guards.on_position((0.0, 0.0, 10.0), None, 64.0)
+    assert guards.position_lost(64.0) is None
+
+
+def test_a_vehicle_that_never_told_a_position_has_none() -> None:
+    guards = Guards(CONFIG)
+    for number in range(7):
+        guards.on_message(BEAT, float(number))
+    assert guards.position_lost(6.0) == "no valid position for 5 s"
