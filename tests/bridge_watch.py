@@ -5,8 +5,8 @@
    and to nobody else.
 3. Of the commands there are only those of its phase, and those give what was ordered: a
    mode of ours, motors, a takeoff and targets.
-4. A target is one that was ordered and lies within the fence, or the place where the vehicle
-   said it was when it was told to hold.
+4. A target is one that was ordered and lies within the fence, or, while the vehicle is
+   being stopped, a place where it said it was since the order.
 5. After a hand-over it says nothing but heartbeats and requests for messages, until it is
    given a new order.
 6. It reports what was asked for: the leg under way, once; numbers that are numbers.
@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -28,6 +28,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from agent.mavlink.bridge import Bridge, Phase
 from agent.mavlink.config import CommandStyle
 from agent.mavlink.events import Action, Event, Send, Tick
+from agent.mavlink.flavours.ardupilot import ArduCopter
+from agent.mavlink.flavours.px4 import Px4Copter
 from agent.vehicle import (
     Arrived,
     GoTo,
@@ -42,6 +44,7 @@ from agent.vehicle import (
 )
 from swarm.model.frames import enu_from_wgs84
 from tests.fake_copter import ARM, INTERVAL, REPOSITION, SET_MODE, SPEED, TAKEOFF, FakeCopter
+from tests.fake_px4 import FakePx4
 
 __all__ = ["BridgeWatch", "BrokenError"]
 
@@ -53,6 +56,7 @@ _MOST_REMEMBERED = 4_000
 _MOST_BUFFERED_BYTES = 280
 """The longest frame there is."""
 _PLACES = 50
+_FAKES: dict[type, type[FakeCopter]] = {ArduCopter: FakeCopter, Px4Copter: FakePx4}
 _MISSION_MESSAGES = {
     "MISSION_COUNT",
     "MISSION_ITEM_INT",
@@ -103,8 +107,8 @@ class _Task:
     does not take leaves an older one in force."""
     leg: int | None = None
     """Under way."""
-    hold_m: list[Point] | None = None
-    """Told to hold: where the vehicle said it was then, and since."""
+    told_m: list[Point] = field(default_factory=list)
+    """Where the vehicle said it was when it was ordered, and since."""
 
 
 class BridgeWatch:
@@ -112,7 +116,8 @@ class BridgeWatch:
 
     Args:
         bridge: steps are taken through `step` only.
-        fake: the kind of vehicle it flies, for the numbers of modes.
+        fake: the kind of vehicle it flies, for the numbers of modes; a heartbeat that says
+            otherwise is believed as long as the vehicle is not flown.
     """
 
     def __init__(self, bridge: Bridge, fake: type[FakeCopter]) -> None:
@@ -141,6 +146,7 @@ class BridgeWatch:
         if isinstance(event, Prepare | GoTo | Hold | Return):
             self._note(event)
         actions = self.bridge.step(event, now_s)
+        self.fake = _FAKES.get(type(self.bridge._flavour), self.fake)
         after = self.bridge.phase
         for action in actions:
             if isinstance(action, Send):
@@ -160,11 +166,10 @@ class BridgeWatch:
                 self._task = _Task((*places_m[-_PLACES:], position_enu_m))
             case GoTo(leg, position_enu_m):
                 self._task = _Task((*places_m[-_PLACES:], position_enu_m), leg)
-            case Hold():
-                here_m = [] if self._here_m is None else [self._here_m]
-                self._task = _Task(places_m, None, here_m)
-            case Return():
+            case Hold() | Return():
                 self._task = _Task(places_m)
+        if self._here_m is not None:
+            self._task.told_m.append(self._here_m)
 
     # What it sends.
 
@@ -199,7 +204,7 @@ class BridgeWatch:
             if name == "MISSION_ITEM_INT":
                 hold(message.command in _MISSION_ITEMS, f"mission item {message.command}")
                 if message.command == _WAYPOINT:
-                    self._see_place(message)
+                    self._see_place(message, phases)
         elif name in ("COMMAND_LONG", "COMMAND_INT"):
             self._see_command(message, phases, missions=missions)
         else:
@@ -213,7 +218,7 @@ class BridgeWatch:
         match message.command:
             case 192:
                 hold(message.get_type() == "COMMAND_INT", "a target without a place")
-                self._see_place(message)
+                self._see_place(message, phases)
             case 22:
                 self._see_takeoff(message)
             case 400:
@@ -237,11 +242,11 @@ class BridgeWatch:
         elif mode != self.fake.own_mode:
             hold(missions and mode == self.fake.mission_mode, f"mode {mode}")
 
-    def _see_place(self, message: Any) -> None:
+    def _see_place(self, message: Any, phases: set[Phase]) -> None:
         config = self.bridge.config
         place_m = enu_from_wgs84(config.origin, message.x / 1e7, message.y / 1e7, message.z)
         hold(math.isfinite(message.z), f"sent to height {message.z}")
-        if any(_near(place_m, place) for place in self._task.hold_m or ()):
+        if Phase.HOLDING in phases and any(_near(place_m, told) for told in self._task.told_m):
             return
         fault = config.out_of_bounds(place_m)
         hold(fault is None, f"sent beyond the fence, to {place_m}: {fault}")
@@ -281,8 +286,7 @@ class BridgeWatch:
                 self._task = replace(self._task, leg=None)
             case Telemetry(position, velocity, battery_frac):
                 self._here_m = position
-                if self._task.hold_m is not None:
-                    self._task.hold_m.append(position)
+                self._task.told_m.append(position)
                 numbers = (*position, *velocity, battery_frac or 0.0)
                 hold(all(math.isfinite(n) for n in numbers), f"telemetry {report}")
             case _:
@@ -331,7 +335,7 @@ def _collections(thing: Any, seen: set[int]) -> Iterator[Any]:
         yield thing
         parts = list(thing)
     elif is_dataclass(thing):
-        parts = [getattr(thing, field.name) for field in fields(thing)]
+        parts = [getattr(thing, each.name) for each in fields(thing)]
     else:
         parts = list(getattr(thing, "__dict__", {}).values())
     for part in parts:
