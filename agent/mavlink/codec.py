@@ -103,6 +103,11 @@ class MavlinkCodec:
         return self._framer.distrusted
 
     @property
+    def unchecked_frames(self) -> int:
+        """Signed frames taken without a key to check them with."""
+        return self._framer.unchecked_frames
+
+    @property
     def bad_bytes(self) -> int:
         """Bytes received that belonged to no valid frame."""
         return self._framer.bad_bytes

@@ -56,6 +56,8 @@ class Framer:
         """Bytes that belonged to no valid frame."""
         self.unknown_frames = 0
         """Frames of messages that the dialect does not have."""
+        self.unchecked_frames = 0
+        """Signed frames taken without a key to check them with."""
 
     def feed(self, data: bytes) -> Iterator[Frame]:
         """Take in ``data`` and yield every frame that is complete by now."""
@@ -109,6 +111,7 @@ class Framer:
 
     def _believes(self, frame: bytes) -> bool:
         if self._signing is None:
+            self.unchecked_frames += frame[0] == _START_V2 and bool(frame[2] & SIGNED)
             return True
         verdict = self._signing.judge(frame)
         if verdict is Verdict.BELIEVED:

@@ -63,6 +63,7 @@ class MavlinkVehicle:
         self.bridge.codec.keep_frames = bool(self._forwarding)
         self._log = get_logger(__name__, link=self.link.url)
         self._told_dropped: set[str] = set()
+        self._told_unchecked = False
         self._clock = clock
         self._on_report = on_report
         self._events: deque[Event] = deque()
@@ -109,14 +110,19 @@ class MavlinkVehicle:
         """Called by the link."""
         self._happen(Received(data))
         self._forwarding.show(self.bridge.codec.take_frames())
-        self._tell_dropped()
+        self._tell_of_signatures()
 
-    def _tell_dropped(self) -> None:
+    def _tell_of_signatures(self) -> None:
         """Tell people of every reason once: a hostile peer must not fill the log."""
         for reason, count in self.bridge.codec.distrusted.items():
             if reason not in self._told_dropped:
                 self._told_dropped.add(reason)
                 self._log.warning("frames are dropped", reason=reason, count=count)
+        if self.bridge.codec.unchecked_frames and not self._told_unchecked:
+            self._told_unchecked = True
+            self._log.warning(
+                "the vehicle signs, and may obey nobody who does not; give --signing-key"
+            )
 
     def _happen(self, event: Event) -> None:
         """Step the bridge; events that come up meanwhile follow in order."""

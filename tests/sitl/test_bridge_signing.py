@@ -138,12 +138,15 @@ def test_a_vehicle_without_the_key_is_not_believed() -> None:
     asyncio.run(scenario())
 
 
-def test_a_bridge_without_the_key_hears_a_signed_vehicle_and_is_not_heard() -> None:
+def test_a_bridge_without_the_key_hears_a_signed_vehicle_is_not_heard_and_says_why(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     async def scenario() -> None:
         async with fleet(Transport.TCP, KEY, None) as one:
             one.bridge.order(START)
-            booted = NotReady("setting the guided mode refused (no answer), trying again")
-            await until(lambda: booted in one.reports)
+            deaf = NotReady("setting GUIDED refused (no answer), trying again")
+            await until(lambda: deaf in one.reports)
             assert one.server.garbage > 0
 
     asyncio.run(scenario())
+    assert capsys.readouterr().err.count("the vehicle signs, and may obey nobody who does not") == 1
