@@ -103,8 +103,8 @@ class _Task:
     """What a bridge has been ordered to do."""
 
     places_m: tuple[Point, ...] = ()
-    """Where the vehicle may be sent: the last places ordered. A new mission that the vehicle
-    does not take leaves an older one in force."""
+    """Where the vehicle may be sent: the last places ordered. An older mission stays in force
+    if the vehicle does not take a newer one, and may be taken up again after a hand-over."""
     leg: int | None = None
     """Under way."""
     told_m: list[Point] = field(default_factory=list)
@@ -272,7 +272,7 @@ class BridgeWatch:
                 hold(not self._silent, "handed over twice")
                 self._silent = True
                 self._prepared = False
-                self._task = _Task()
+                self._task = _Task(self._task.places_m)
             case VehicleReady():
                 hold(self._prepared, "ready, though nobody asked")
                 self._prepared = False
