@@ -6,8 +6,9 @@ sees over what was acknowledged. Leaves out: transports (agent.mavlink.link), wa
 (agent.mavlink.vehicle) and what to fly to (agent.core).
 
 The vehicle is *handed over* when a pilot or a failsafe changes its mode, when it
-disarms or reboots in flight, or when it falls silent. From then on nothing is commanded
-until a new `Prepare`, or a `Return` that finds it still in the guided mode.
+disarms, reboots, ends its flight or loses its position, or when it falls silent. From
+then on nothing is commanded until a new `Prepare`, or a `Return` that finds it still in
+the mode that takes our targets. One that obeys and is in trouble is *advised to return*.
 """
 
 from __future__ import annotations
@@ -471,10 +472,10 @@ class Bridge:
     def _obeys(self, custom_mode: int) -> bool:
         """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
         flavour = self._flavour
-        return flavour is not None and (
-            flavour.is_commanded(custom_mode)
-            or (flavour.is_taking_off(custom_mode) and self._took_off())
-        )
+        if flavour is None:
+            return False
+        taking_off = flavour.is_taking_off(custom_mode) and self._took_off()
+        return flavour.is_commanded(custom_mode) or taking_off
 
     def _took_off(self) -> bool:
         """Whether the preparation under way has asked for takeoff."""
