@@ -472,10 +472,10 @@ class Bridge:
     def _obeys(self, custom_mode: int) -> bool:
         """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
         flavour = self._flavour
-        if flavour is None:
-            return False
-        taking_off = flavour.is_taking_off(custom_mode) and self._took_off()
-        return flavour.is_commanded(custom_mode) or taking_off
+        return flavour is not None and (
+            flavour.is_commanded(custom_mode)
+            or (flavour.is_taking_off(custom_mode) and self._took_off())
+        )
 
     def _took_off(self) -> bool:
         """Whether the preparation under way has asked for takeoff."""
