@@ -9,6 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import Connected, Event, Received, Tick
+from sim.autopilot.faults import VehicleFault
+from sim.autopilot.faulty_vehicle import FaultyVehicle
 from sim.autopilot.flavours.ardupilot import ArduCopter
 from sim.autopilot.vehicle import Vehicle
 from swarm.model.frames import wgs84_from_enu
@@ -20,8 +22,15 @@ ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 class GroundStation:
     """Speaks to a vehicle in frames, as a link would carry them, and keeps what it says."""
 
-    def __init__(self, vehicle: Vehicle, channel: int = 0, now_s: float = 0.0) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        channel: int = 0,
+        now_s: float = 0.0,
+        faults: tuple[VehicleFault, ...] = (),
+    ) -> None:
         self.vehicle = vehicle
+        self._machine = FaultyVehicle(vehicle, faults, now_s) if faults else vehicle
         self.now_s = now_s
         self.heard: list[Any] = []
         """Messages of the vehicle on this channel, oldest first."""
@@ -36,9 +45,9 @@ class GroundStation:
     def step(self, event: Event) -> list[Any]:
         """Let the vehicle take a step now; what it says on this channel."""
         said: list[Any] = []
-        for send in self.vehicle.step(event, self.now_s):
+        for send in self._machine.step(event, self.now_s):
             if send.channel in (None, self._channel):
-                frame = self._to_vehicle.encode(send.message)
+                frame = self._to_vehicle.encode(send.message, send.system_id)
                 said += self._to_ground.decode(frame)
         self.heard += said
         self.heard_s += [self.now_s] * len(said)
@@ -53,7 +62,7 @@ class GroundStation:
         """Let time pass, calling the vehicle when it asks for it."""
         end_s = self.now_s + duration_s
         said: list[Any] = []
-        while (deadline_s := self.vehicle.next_deadline_s()) <= end_s:
+        while (deadline_s := self._machine.next_deadline_s()) <= end_s:
             self.now_s = max(self.now_s, deadline_s)
             said += self.step(Tick())
         self.now_s = end_s

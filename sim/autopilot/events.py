@@ -65,6 +65,8 @@ class Send:
     message: mavlink.MAVLink_message
     channel: int | None = None
     """None: every channel there is."""
+    system_id: int | None = None
+    """Whom it is said to come from; None: the vehicle's own id."""
 
 
 @dataclass(frozen=True, slots=True)

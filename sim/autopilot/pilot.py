@@ -12,8 +12,10 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sim.autopilot.battery import Battery
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import Outbox
+from sim.autopilot.failsafes import FailSafes
 from sim.autopilot.flavours.base import Flavour
 from sim.autopilot.flight import Flight, Milestone
 from sim.autopilot.geo import place_enu_m, place_wgs84_e7
@@ -23,7 +25,7 @@ from sim.autopilot.mission_run import MissionRun, RunState
 from sim.autopilot.modes import Mode
 from sim.autopilot.params import ParameterServer, ParameterTable, Setting
 from sim.autopilot.readiness import Readiness, Stage
-from sim.kinematics import IdealMotion, Point
+from sim.kinematics import Point
 
 __all__ = ["Pilot"]
 
@@ -40,6 +42,7 @@ class Pilot:
         parameters: what the ground set; outlasts a reboot.
         store: the mission on the vehicle; outlasts a reboot.
         outbox: takes what it says.
+        battery: what it flies on; outlasts a reboot.
         boot_s: when it is powered up [s].
         mode_changed: called with the time [s] as soon as the mode is another one.
     """
@@ -51,6 +54,7 @@ class Pilot:
         parameters: ParameterTable,
         store: MissionStore,
         outbox: Outbox,
+        battery: Battery,
         boot_s: float,
         mode_changed: Callable[[float], None],
     ) -> None:
@@ -65,7 +69,7 @@ class Pilot:
             unanswered=flavour.unanswered_parameters,
         )
         self.readiness = Readiness(config.delays, boot_s)
-        self.flight = Flight(config, self.parameters, IdealMotion(config.start_enu_m))
+        self.flight = Flight(config, self.parameters, config.motion())
         self.store = store
         self.run = MissionRun(self.store, self, outbox, flavour.first_item)
         self.mode = flavour.boot_mode
@@ -78,9 +82,8 @@ class Pilot:
         """A place was flown to since GUIDED was entered or the vehicle took off."""
         self._disarm_s: float | None = None
         self._prearm_text_s = boot_s + _PREARM_TEXT_S
-        self._armed_s = 0.0
-        """Armed time of finished flights [s]."""
-        self._armed_since_s: float | None = None
+        self.battery = battery
+        self.failsafes = FailSafes(self, battery)
 
     # --- Time -------------------------------------------------------------------
 
@@ -105,6 +108,7 @@ class Pilot:
             (self.flight.deadline_s(), self._advance_flight),
             (self.run.deadline_s(), self.run.advance),
             (self._disarm_s, self._disarm),
+            (self.failsafes.deadline_s(), self.failsafes.advance),
         ):
             if deadline_s is not None:
                 due.append((deadline_s, happen))
@@ -148,14 +152,11 @@ class Pilot:
         """Where the vehicle is [m]."""
         return self.flight.motion.position_enu_m(now_s)
 
-    def battery_frac(self, now_s: float) -> float:
-        """Remaining charge, 0..1."""
-        if self.config.endurance_s is None:
-            return 1.0
-        armed_s = self._armed_s
-        if self._armed_since_s is not None:
-            armed_s += now_s - self._armed_since_s
-        return max(0.0, 1.0 - armed_s / self.config.endurance_s)
+    def told_enu_m(self, now_s: float) -> Point:
+        """Where the vehicle says it is [m]: without GPS, above or below the last fix."""
+        place_enu_m = self.position_enu_m(now_s)
+        last_fix_enu_m = self.readiness.last_fix_enu_m
+        return place_enu_m if last_fix_enu_m is None else (*last_fix_enu_m[:2], place_enu_m[2])
 
     def set_mode(self, mode: Mode, now_s: float) -> bool:
         """Change the mode; False, with a text, where the autopilot refuses."""
@@ -214,7 +215,7 @@ class Pilot:
             self.outbox.text(mavlink.MAV_SEVERITY_CRITICAL, self.flavour.cannot_arm(obstacle))
             return False
         self.armed = True
-        self._armed_since_s = now_s
+        self.battery.start(now_s)
         self._arm_delay(now_s)
         self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(now_s)))
         here_enu_m = self.position_enu_m(now_s)
@@ -246,9 +247,7 @@ class Pilot:
         if not self.armed:
             return
         self.armed = False
-        if self._armed_since_s is not None:
-            self._armed_s += now_s - self._armed_since_s
-        self._armed_since_s = None
+        self.battery.stop(now_s)
         self._auto_armed = False
         self.run.reset()
         self.flight.fall(now_s)

@@ -9,6 +9,7 @@ from enum import Enum
 
 from sim.autopilot.config import Delays
 from sim.autopilot.modes import Mode
+from sim.kinematics import Point
 
 __all__ = ["Readiness", "Stage"]
 
@@ -39,6 +40,15 @@ class Readiness:
             (boot_s + delays.position_s, Stage.POSITION),
         ]
         self._passed: set[Stage] = set()
+        self.last_fix_enu_m: Point | None = None
+        """Where the receiver lost the satellites [m]; None while it sees them."""
+        self.defect: str | None = None
+        """What a check found that keeps the vehicle from arming, if any."""
+
+    @property
+    def gps_lost(self) -> bool:
+        """Whether the receiver has lost the satellites."""
+        return self.last_fix_enu_m is not None
 
     @property
     def booted(self) -> bool:
@@ -53,7 +63,7 @@ class Readiness:
     @property
     def has_position(self) -> bool:
         """Whether the position estimate is good enough to navigate by."""
-        return Stage.POSITION in self._passed
+        return Stage.POSITION in self._passed and not self.gps_lost
 
     def deadline_s(self) -> float | None:
         """When the next stage is due [s]; None once all are passed."""
@@ -79,4 +89,4 @@ class Readiness:
             return "Accels inconsistent"
         if mode.needs_position and not self.has_position:
             return "Need Position Estimate"
-        return None
+        return self.defect

@@ -47,9 +47,6 @@ _EKF_WITH_POSITION = (
     | mavlink.EKF_PRED_POS_HORIZ_ABS
 )
 
-_BATTERY_MV = 12600
-_HOVER_CA = 3000
-"""Current drawn while armed [10 mA]."""
 _UTC_AT_BOOT_US = 1_735_689_600_000_000
 """Simulated GPS time at boot: 2025-01-01 UTC. The core knows no wall clock."""
 _INT16_MAX = 32767
@@ -146,6 +143,7 @@ class Telemetry:
     def _sys_status(self, now_s: float) -> mavlink.MAVLink_message:
         pilot = self._pilot
         seen = _GPS if pilot.readiness.has_origin else 0
+        gps_healthy = 0 if pilot.readiness.gps_lost else seen
         running = _AHRS if pilot.readiness.has_origin else 0
         if pilot.mode.controls_position:
             running |= _POSITION_CONTROL
@@ -153,30 +151,34 @@ class Telemetry:
         return mavlink.MAVLink_sys_status_message(
             _PRESENT | seen,
             _ENABLED | seen | running,
-            _HEALTHY | seen | running | prearm,
+            _HEALTHY | gps_healthy | running | prearm,
             0,
-            _BATTERY_MV,
+            self._battery_mv(now_s),
             self._current_ca(),
             self._battery_percent(now_s),
             *(0, 0, 0, 0, 0, 0),
         )
 
     def _current_ca(self) -> int:
-        return _HOVER_CA if self._pilot.armed and not self._pilot.flight.on_ground else 0
+        return round(self._pilot.battery.current_a * 100.0)
+
+    def _battery_mv(self, now_s: float) -> int:
+        return round(self._pilot.battery.voltage_v(now_s) * 1e3)
 
     def _battery_percent(self, now_s: float) -> int:
-        return math.ceil(self._pilot.battery_frac(now_s) * 100.0)
+        return math.ceil(self._pilot.battery.remaining_frac(now_s) * 100.0)
 
     def _battery(self, now_s: float) -> mavlink.MAVLink_message:
         unknown_mv = [65535] * 9
+        consumed_mah = self._pilot.battery.consumed_mah(now_s)
         return mavlink.MAVLink_battery_status_message(
             0,
             mavlink.MAV_BATTERY_FUNCTION_ALL,
             mavlink.MAV_BATTERY_TYPE_LIPO,
             _INT16_MAX,
-            [_BATTERY_MV, *unknown_mv],
+            [self._battery_mv(now_s), *unknown_mv],
             self._current_ca(),
-            -1,
+            -1 if consumed_mah is None else round(consumed_mah),
             -1,
             self._battery_percent(now_s),
         )
@@ -188,7 +190,7 @@ class Telemetry:
         return mavlink.MAVLink_system_time_message(utc_us, self._boot_ms(now_s))
 
     def _gps_raw(self, now_s: float) -> mavlink.MAVLink_message:
-        fixed = self._pilot.readiness.has_origin
+        fixed = self._pilot.readiness.has_origin and not self._pilot.readiness.gps_lost
         lat_e7, lon_e7, alt_mm = self._place(now_s)
         return mavlink.MAVLink_gps_raw_int_message(
             int(self._boot_s(now_s) * 1e6),
@@ -203,10 +205,12 @@ class Telemetry:
     def _place(self, now_s: float) -> tuple[int, int, int]:
         if not self._pilot.readiness.has_origin:
             return 0, 0, 0
-        return place_wgs84_e7(self._pilot.config.origin, self._pilot.position_enu_m(now_s))
+        return place_wgs84_e7(self._pilot.config.origin, self._pilot.told_enu_m(now_s))
 
     def _velocity_ned_m_s(self, now_s: float) -> tuple[float, float, float]:
         east_m_s, north_m_s, up_m_s = self._pilot.flight.motion.velocity_enu_m_s(now_s)
+        if self._pilot.readiness.gps_lost:
+            east_m_s = north_m_s = 0.0
         return north_m_s, east_m_s, 0.0 - up_m_s
 
     def _ground_speed_m_s(self, now_s: float) -> float:
@@ -228,7 +232,7 @@ class Telemetry:
         )
 
     def _local_position(self, now_s: float) -> mavlink.MAVLink_message:
-        east_m, north_m, up_m = self._pilot.position_enu_m(now_s)
+        east_m, north_m, up_m = self._pilot.told_enu_m(now_s)
         return mavlink.MAVLink_local_position_ned_message(
             self._boot_ms(now_s), north_m, east_m, 0.0 - up_m, *self._velocity_ned_m_s(now_s)
         )

@@ -15,6 +15,7 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sim.autopilot.battery import Battery
 from sim.autopilot.commands import Commands, command_from_message
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import (
@@ -69,6 +70,7 @@ class Vehicle:
         self._streams = Streams()
         self._parameters = ParameterTable(flavour.parameters(config))
         self._store = MissionStore()
+        self._battery = Battery(config.endurance_s, config.battery_failsafe)
         self._now_s = start_s
         self._power_up(config, start_s)
 
@@ -79,6 +81,7 @@ class Vehicle:
             self._parameters,
             self._store,
             self._outbox,
+            self._battery,
             now_s,
             mode_changed=self._say_heartbeat,
         )
@@ -195,6 +198,7 @@ class Vehicle:
             self._streams.close(channel)
             self._streams.open(channel, self._flavour.unasked_streams, now_s)
         self._outbox.take()
+        self._battery.stop(now_s)
         self._power_up(here, now_s)
 
     def _receive(self, channel: int, message: mavlink.MAVLink_message, now_s: float) -> None:

@@ -214,11 +214,13 @@ def test_client_that_hangs_up_is_forgotten_and_can_come_back() -> None:
             for _ in range(3):
                 async with connected(server.url) as client:
                     await client.until("HEARTBEAT")
+            vehicle = server.vehicle
+            assert isinstance(vehicle, Vehicle)
             for _ in range(100):
-                if not server.vehicle._streams.channels:
+                if not vehicle._streams.channels:
                     break
                 await asyncio.sleep(0.01)
-            assert not server.vehicle._streams.channels
+            assert not vehicle._streams.channels
 
     asyncio.run(talk())
 
