@@ -151,7 +151,8 @@ class Vehicle:
                 self._reboot(now_s)
             case Tick():
                 pass
-        self._advance(now_s)
+        if not isinstance(event, Tick):  # which has brought about nothing more that is due
+            self._advance(now_s)
         self._report(now_s)
         return self._outbox.take()
 

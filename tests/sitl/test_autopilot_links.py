@@ -317,6 +317,23 @@ def test_command_serves_one_uav_under_another_system_id(start: Started) -> None:
     assert process.stdout.read() == process.stderr.read() == ""
 
 
+def test_command_gives_its_vehicles_the_faults_and_physics_asked_for(start: Started) -> None:
+    process = start(
+        *("--fault", "a:wrong-id@0", "--fault", "b:silent@0+2", "--acceleration-m-s2", "2"),
+        *("--wind-m-s", "1,-1", "--gust-m-s", "2", "--seed", "3", "--endurance-s", "600"),
+        *("--battery-failsafe", "--position-failsafe-s", "5"),
+    )
+    first, second = ready_lines(process, 2)
+
+    async def id_heard(url: str) -> int:
+        async with connected(url) as client:
+            heartbeat = await client.until("HEARTBEAT")
+            return int(heartbeat.get_srcSystem())
+
+    assert asyncio.run(id_heard(first["url"])) == 2
+    assert asyncio.run(id_heard(second["url"])) == 2
+
+
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
@@ -324,6 +341,14 @@ def test_command_serves_one_uav_under_another_system_id(start: Started) -> None:
         (["--listen", "tcp:x"], "--listen: 'tcp:x' is no endpoint; write tcp:HOST:PORT"),
         (["--listen", "tcp:192.0.2.1:5760"], "--listen: tcp:192.0.2.1:5760: cannot be opened"),
         (["--listen", "tcp:127.0.0.1:65535"], "--listen: tcp:127.0.0.1:65536: cannot be opened"),
+        (
+            ["--fault", "a:explode@3"],
+            "--fault: a:explode@3: no kind of fault 'explode'; write",
+        ),
+        (["--fault", "c:stuck@3"], "--fault: c:stuck@3: no UAV 'c'; the scenario has a, b"),
+        (["--wind-m-s", "6,0"], "--wind-m-s: a: 6 m/s is too much for a vehicle of 6 m/s"),
+        (["--wind-m-s", "west"], "--wind-m-s: west: no wind; write EAST,NORTH"),
+        (["--endurance-s", "inf"], "--endurance-s: inf is no number to go by"),
     ],
 )
 def test_wrong_usage_is_one_clear_line(start: Started, options: list[str], complaint: str) -> None:
