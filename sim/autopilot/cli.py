@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sim.autopilot.flavours import FlavourName
 from swarm.options import JsonOption, LifelineOption, ScenarioArgument, SpeedupOption
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ def autopilot(
             "udpout:HOST:PORT; the next ones take the ports that follow. Port 0 takes free ones.",
         ),
     ] = "tcp:127.0.0.1:0",
+    flavour: Annotated[
+        FlavourName, typer.Option("--flavour", help="Whose firmware the vehicles behave like.")
+    ] = FlavourName.ARDUPILOT,
     speedup: SpeedupOption = 1.0,
     system_id: Annotated[
         int | None,
@@ -53,7 +57,7 @@ def autopilot(
     json: JsonOption = False,
     lifeline: LifelineOption = False,
 ) -> int:
-    """Simulate the autopilots of a scenario's UAVs, speaking MAVLink 2 like ArduCopter.
+    """Simulate the autopilots of a scenario's UAVs, speaking MAVLink 2 like ArduCopter or PX4.
 
     Prints one JSON object per vehicle with the address to connect to, then runs
     until interrupted. With --json nothing else is printed.
@@ -61,6 +65,7 @@ def autopilot(
     Examples:
         swarm autopilot table-1
         swarm autopilot table-1 --uav uav1 --listen udpin:127.0.0.1:14550 --speedup 5
+        swarm autopilot table-1 --flavour px4
     """
     import asyncio
 
@@ -86,19 +91,24 @@ def autopilot(
     wanted = [UavId(name) for name in dict.fromkeys(uav)] if uav else None
     fleet = fleet_of(mission, wanted, system_id)
     return asyncio.run(
-        run_until_stopped(_serve(fleet, endpoint, speedup, quiet=json), lifeline=lifeline)
+        run_until_stopped(_serve(fleet, endpoint, flavour, speedup, quiet=json), lifeline=lifeline)
     )
 
 
 async def _serve(
-    fleet: tuple[FleetMember, ...], endpoint: Endpoint, speedup: float, *, quiet: bool
+    fleet: tuple[FleetMember, ...],
+    endpoint: Endpoint,
+    flavour: FlavourName,
+    speedup: float,
+    *,
+    quiet: bool,
 ) -> int:
     """Serve every vehicle until cancelled."""
     import asyncio
     import json
     import sys
 
-    from sim.autopilot.flavours.ardupilot import ArduCopter
+    from sim.autopilot.flavours import flavour_of
     from sim.autopilot.server import VehicleServer
     from sim.autopilot.vehicle import Vehicle
     from swarm.clock import ScaledClock
@@ -108,7 +118,7 @@ async def _serve(
     servers: list[VehicleServer] = []
     try:
         for place, member in enumerate(fleet):
-            vehicle = Vehicle(member.config, ArduCopter(), clock.now_s())
+            vehicle = Vehicle(member.config, flavour_of(flavour), clock.now_s())
             own = endpoint.shifted(place)
             server = VehicleServer(vehicle, own, clock)
             servers.append(server)
