@@ -12,6 +12,7 @@ from sim.autopilot.events import Connected, Event, Received, Tick
 from sim.autopilot.faults import VehicleFault
 from sim.autopilot.faulty_vehicle import FaultyVehicle
 from sim.autopilot.flavours.ardupilot import ArduCopter
+from sim.autopilot.flavours.base import Flavour
 from sim.autopilot.vehicle import Vehicle
 from swarm.model.frames import wgs84_from_enu
 
@@ -72,7 +73,7 @@ class GroundStation:
         """Send a COMMAND_LONG; the result in its acknowledgement."""
         filled = [*params, *[0.0] * (7 - len(params))]
         answer = self.send(mavlink.MAVLink_command_long_message(1, 1, command, 0, *filled))
-        return the(answer, "COMMAND_ACK").result  # type: ignore[no-any-return]  # generated code
+        return the_result(answer)
 
     def command_int(
         self, command: int, frame: int, x: int, y: int, z: float, *params: float
@@ -82,11 +83,11 @@ class GroundStation:
         answer = self.send(
             mavlink.MAVLink_command_int_message(1, 1, frame, command, 0, 0, *filled, x, y, z)
         )
-        return the(answer, "COMMAND_ACK").result  # type: ignore[no-any-return]  # generated code
+        return the_result(answer)
 
-    def set_mode(self, custom_mode: int) -> int:
+    def set_mode(self, custom_mode: int, sub_mode: int = 0) -> int:
         """Ask for a mode."""
-        return self.command(mavlink.MAV_CMD_DO_SET_MODE, 1, custom_mode)
+        return self.command(mavlink.MAV_CMD_DO_SET_MODE, 1, custom_mode, sub_mode)
 
     def arm(self) -> int:
         """Ask for the motors."""
@@ -125,7 +126,8 @@ class GroundStation:
         """Upload a mission the vehicle asks for item by item; the type of its MISSION_ACK."""
         answer = self.send(mavlink.MAVLink_mission_count_message(1, 1, len(items)))
         while not (acks := only(answer, "MISSION_ACK")):
-            answer = self.send(items[the(answer, "MISSION_REQUEST").seq])
+            [request] = only(answer, "MISSION_REQUEST") + only(answer, "MISSION_REQUEST_INT")
+            answer = self.send(items[request.seq])
         return acks[0].type  # type: ignore[no-any-return]  # generated code
 
     def item(
@@ -155,12 +157,10 @@ class GroundStation:
         return [message.text for message in only(self.heard, "STATUSTEXT")]
 
 
-def ground_station(**config: Any) -> GroundStation:
-    """A ground station connected to a vehicle that has just been powered up."""
-    vehicle = Vehicle(
-        VehicleConfig(**{"system_id": 1, "spool_up_s": 0.0, **config}), ArduCopter(), 0.0
-    )
-    return GroundStation(vehicle)
+def ground_station(flavour: Flavour | None = None, **config: Any) -> GroundStation:
+    """A ground station connected to a vehicle (ArduCopter) that has just been powered up."""
+    settings = VehicleConfig(**{"system_id": 1, "spool_up_s": 0.0, **config})
+    return GroundStation(Vehicle(settings, flavour or ArduCopter(), 0.0))
 
 
 def only(messages: list[Any], name: str) -> list[Any]:
@@ -172,3 +172,9 @@ def the(messages: list[Any], name: str) -> Any:
     """The one message of that name."""
     [message] = only(messages, name)
     return message
+
+
+def the_result(messages: list[Any]) -> int:
+    """The result in the acknowledgement, which may come more than once."""
+    [result] = {message.result for message in only(messages, "COMMAND_ACK")}
+    return int(result)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sim.autopilot.flavours import FlavourName
 from swarm.options import (
     JsonOption,
     LifelineOption,
@@ -50,6 +51,9 @@ def autopilot(
             "udpout:HOST:PORT; the next ones take the ports that follow. Port 0 takes free ones.",
         ),
     ] = "tcp:127.0.0.1:0",
+    flavour: Annotated[
+        FlavourName, typer.Option("--flavour", help="Whose firmware the vehicles behave like.")
+    ] = FlavourName.ARDUPILOT,
     speedup: SpeedupOption = 1.0,
     system_id: Annotated[
         int | None,
@@ -121,7 +125,7 @@ def autopilot(
     json: JsonOption = False,
     lifeline: LifelineOption = False,
 ) -> int:
-    """Simulate the autopilots of a scenario's UAVs, speaking MAVLink 2 like ArduCopter.
+    """Simulate the autopilots of a scenario's UAVs, speaking MAVLink 2 like ArduCopter or PX4.
 
     Prints one JSON object per vehicle with the address to connect to, then runs
     until interrupted. With --json nothing else is printed.
@@ -129,6 +133,7 @@ def autopilot(
     Examples:
         swarm autopilot table-1
         swarm autopilot table-1 --uav uav1 --listen udpin:127.0.0.1:14550 --speedup 5
+        swarm autopilot table-1 --flavour px4
         swarm autopilot table-1 --acceleration-m-s2 2.5 --fault uav2:gps-lost@30+10
     """
     import asyncio
@@ -175,7 +180,9 @@ def autopilot(
     faults = faults_by_uav(fault or (), known)
     fleet = fleet_of(mission, wanted, system_id, physics)
     return asyncio.run(
-        run_until_stopped(_serve(fleet, faults, endpoint, speedup, quiet=json), lifeline=lifeline)
+        run_until_stopped(
+            _serve(fleet, faults, endpoint, flavour, speedup, quiet=json), lifeline=lifeline
+        )
     )
 
 
@@ -183,6 +190,7 @@ async def _serve(
     fleet: tuple[FleetMember, ...],
     faults: dict[str, tuple[VehicleFault, ...]],
     endpoint: Endpoint,
+    flavour: FlavourName,
     speedup: float,
     *,
     quiet: bool,
@@ -193,7 +201,7 @@ async def _serve(
     import sys
 
     from sim.autopilot.faulty_vehicle import FaultyVehicle
-    from sim.autopilot.flavours.ardupilot import ArduCopter
+    from sim.autopilot.flavours import flavour_of
     from sim.autopilot.server import Machine, VehicleServer
     from sim.autopilot.vehicle import Vehicle
     from swarm.clock import ScaledClock
@@ -204,7 +212,7 @@ async def _serve(
     try:
         for place, member in enumerate(fleet):
             start_s = clock.now_s()
-            sound = Vehicle(member.config, ArduCopter(), start_s)
+            sound = Vehicle(member.config, flavour_of(flavour), start_s)
             own_faults = faults.get(member.uav)
             vehicle: Machine = FaultyVehicle(sound, own_faults, start_s) if own_faults else sound
             own = endpoint.shifted(place)

@@ -102,9 +102,10 @@ class Flight:
         elif self.activity is not Activity.SPOOLING_UP:
             self._lift(now_s)
 
-    def navigate(self, target_enu_m: Point, now_s: float) -> None:
+    def navigate(self, target_enu_m: Point, now_s: float, speed_m_s: float | None = None) -> None:
         """Fly straight to a place, in place of whatever was being done."""
-        self._leave(Activity.NAVIGATING, target_enu_m, self.cruise_m_s, now_s)
+        speed_m_s = self.cruise_m_s if speed_m_s is None else speed_m_s
+        self._leave(Activity.NAVIGATING, target_enu_m, speed_m_s, now_s)
 
     def hold(self, now_s: float) -> None:
         """Stay in the air where the vehicle is; on the ground, stay there."""
@@ -182,7 +183,7 @@ class Flight:
     def _lift(self, now_s: float) -> None:
         east_m, north_m, _ = self._stopped_enu_m(now_s)
         target_enu_m = (east_m, north_m, self._take_off_up_m)
-        self._leave(Activity.TAKING_OFF, target_enu_m, self._speed(Setting.CLIMB_M_S), now_s)
+        self._leave(Activity.TAKING_OFF, target_enu_m, self._speed(Setting.TAKE_OFF_M_S), now_s)
 
     def _speed(self, setting: Setting) -> float:
         return max(_LEAST_SPEED_M_S, self._parameters.value_si(setting))

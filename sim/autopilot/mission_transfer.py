@@ -13,7 +13,13 @@ from dataclasses import dataclass, field
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import Outbox, Sender
-from sim.autopilot.mission_items import MAX_ITEMS, MissionItem, MissionStore, item_from_message
+from sim.autopilot.mission_items import (
+    MAX_ITEMS,
+    MissionItem,
+    MissionStore,
+    int_frame,
+    item_from_message,
+)
 
 __all__ = ["MissionTransfer"]
 
@@ -41,6 +47,7 @@ class MissionTransfer:
         outbox: Outbox,
         *,
         asks_for_int: bool,
+        int_frames: bool,
         home_item: Callable[[], MissionItem] | None,
         uploaded: Callable[[tuple[MissionItem, ...], float], None],
         clear: Callable[[], bool],
@@ -48,6 +55,8 @@ class MissionTransfer:
         self._store = store
         self._outbox = outbox
         self._asks_for_int = asks_for_int
+        self._int_frames = int_frames
+        """Whether items are given back in the ``_INT`` variant of their frame."""
         self._home_item = home_item
         """Gives item 0, where that is home and not the first waypoint."""
         self._uploaded = uploaded
@@ -196,7 +205,7 @@ class MissionTransfer:
                 sender.system,
                 sender.component,
                 seq,
-                item.frame,
+                int_frame(item.frame) if as_int and self._int_frames else item.frame,
                 item.command,
                 0,
                 item.autocontinue,

@@ -1,8 +1,8 @@
 """What a vehicle reports about itself, message by message.
 
-Sources: https://mavlink.io/en/messages/common.html and the recordings of
-ArduCopter 4.8, from which the sensor bits are taken. Leaves out: attitude other
-than heading, raw sensors, RC channels.
+Source: https://mavlink.io/en/messages/common.html. Leaves out: what firmwares say
+differently (sim.autopilot.flavours), attitude other than heading, raw sensors,
+RC channels.
 """
 
 from __future__ import annotations
@@ -12,25 +12,14 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sim.autopilot.flavours.base import MissionView
 from sim.autopilot.flight import Activity
 from sim.autopilot.geo import place_wgs84_e7
 from sim.autopilot.messages import home_position, origin_position
 from sim.autopilot.mission_run import RunState
-from sim.autopilot.modes import Mode
 from sim.autopilot.pilot import Pilot
 
 __all__ = ["DATA_STREAMS", "Telemetry"]
-
-_PRESENT = 0x5371FC0F
-_ENABLED = 0x53419C0F
-_HEALTHY = 0x47519C0F
-_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
-_AHRS = mavlink.MAV_SYS_STATUS_AHRS
-_PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-_POSITION_CONTROL = (
-    mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
-    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
-)
 
 _EKF_ALIGNED = (
     mavlink.EKF_ATTITUDE
@@ -47,6 +36,7 @@ _EKF_WITH_POSITION = (
     | mavlink.EKF_PRED_POS_HORIZ_ABS
 )
 
+_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
 _UTC_AT_BOOT_US = 1_735_689_600_000_000
 """Simulated GPS time at boot: 2025-01-01 UTC. The core knows no wall clock."""
 _INT16_MAX = 32767
@@ -101,11 +91,11 @@ class Telemetry:
     @property
     def known(self) -> frozenset[int]:
         """Message ids that can be asked for."""
-        return frozenset(self._builders)
+        return frozenset(self._builders) - self._pilot.flavour.missing_messages
 
     def build(self, message_id: int, now_s: float) -> mavlink.MAVLink_message | None:
         """The message as of now; None if there is none of that id, or nothing to say yet."""
-        if message_id not in self._builders:
+        if message_id not in self.known:
             return None
         if not self._pilot.readiness.has_origin and message_id in (
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
@@ -125,10 +115,6 @@ class Telemetry:
         pilot = self._pilot
         on_ground = pilot.flight.on_ground
         booted = pilot.readiness.booted
-        if not booted:
-            status = mavlink.MAV_STATE_BOOT
-        else:
-            status = mavlink.MAV_STATE_STANDBY if on_ground else mavlink.MAV_STATE_ACTIVE
         return mavlink.MAVLink_heartbeat_message(
             mavlink.MAV_TYPE_QUADROTOR,
             pilot.flavour.autopilot,
@@ -136,22 +122,22 @@ class Telemetry:
                 pilot.mode, armed=pilot.armed, on_ground=on_ground, booted=booted
             ),
             pilot.flavour.custom_mode(pilot.mode),
-            status,
+            pilot.flavour.system_status(armed=pilot.armed, on_ground=on_ground, booted=booted),
             3,
         )
 
     def _sys_status(self, now_s: float) -> mavlink.MAVLink_message:
         pilot = self._pilot
-        seen = _GPS if pilot.readiness.has_origin else 0
-        gps_healthy = 0 if pilot.readiness.gps_lost else seen
-        running = _AHRS if pilot.readiness.has_origin else 0
-        if pilot.mode.controls_position:
-            running |= _POSITION_CONTROL
-        prearm = _PREARM if pilot.readiness.obstacle(pilot.mode) is None else 0
+        sensors = pilot.flavour.sensors(
+            pilot.mode,
+            has_origin=pilot.readiness.has_origin,
+            can_arm=pilot.readiness.obstacle(pilot.mode) is None,
+        )
+        lost = _GPS if pilot.readiness.gps_lost else 0
         return mavlink.MAVLink_sys_status_message(
-            _PRESENT | seen,
-            _ENABLED | seen | running,
-            _HEALTHY | gps_healthy | running | prearm,
+            sensors.present,
+            sensors.enabled,
+            sensors.health & ~lost,
             0,
             self._battery_mv(now_s),
             self._current_ca(),
@@ -278,17 +264,21 @@ class Telemetry:
         del now_s
         pilot = self._pilot
         run = pilot.run
-        states = {
-            RunState.NOT_STARTED: mavlink.MISSION_STATE_NOT_STARTED,
-            RunState.RUNNING: mavlink.MISSION_STATE_ACTIVE,
-            RunState.STOPPED: mavlink.MISSION_STATE_PAUSED,
-            RunState.COMPLETE: mavlink.MISSION_STATE_COMPLETE,
-        }
+        view = MissionView(
+            mode=pilot.mode,
+            current=run.current,
+            items=max(0, len(pilot.store.items) - pilot.flavour.missions.first_item),
+            present=run.present,
+            running=run.state is RunState.RUNNING,
+            stopped=run.state is RunState.STOPPED,
+            over=run.state is RunState.COMPLETE,
+            task_done=pilot.task_done,
+        )
         return mavlink.MAVLink_mission_current_message(
-            run.current or 0,
-            max(0, len(pilot.store.items) - pilot.flavour.first_item),
-            states[run.state] if run.present else mavlink.MISSION_STATE_NO_MISSION,
-            1 if pilot.mode is Mode.AUTO else 0,
+            run.told,
+            pilot.flavour.mission_total(view),
+            pilot.flavour.mission_state(view),
+            pilot.flavour.mission_mode(view),
         )
 
     def _version(self, now_s: float) -> mavlink.MAVLink_message:
@@ -321,7 +311,7 @@ class Telemetry:
             Activity.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
         }
         return mavlink.MAVLink_extended_sys_state_message(
-            mavlink.MAV_VTOL_STATE_MC,
+            self._pilot.flavour.vtol_state,
             landed.get(self._pilot.flight.activity, mavlink.MAV_LANDED_STATE_IN_AIR),
         )
 

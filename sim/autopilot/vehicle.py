@@ -66,7 +66,7 @@ class Vehicle:
         self.unknown = 0
         """Messages dropped because this vehicle doesn't know them."""
         self._flavour = flavour
-        self._outbox = Outbox()
+        self._outbox = Outbox(numbers_texts=flavour.numbers_texts)
         self._streams = Streams()
         self._parameters = ParameterTable(flavour.parameters(config))
         self._store = MissionStore()
@@ -83,15 +83,16 @@ class Vehicle:
             self._outbox,
             self._battery,
             now_s,
-            mode_changed=self._say_heartbeat,
+            mode_changed=self._on_mode_changed,
         )
         self._telemetry = Telemetry(self._pilot)
         self._commands = Commands(self._pilot, self._telemetry, self._streams, self._outbox)
         self._transfer = MissionTransfer(
             self._store,
             self._outbox,
-            asks_for_int=self._flavour.uploads_by_int,
-            home_item=self._pilot.home_item if self._flavour.first_item > 0 else None,
+            asks_for_int=self._flavour.missions.asks_for_int,
+            int_frames=self._flavour.missions.int_frames,
+            home_item=self._pilot.home_item if self._flavour.missions.first_item > 0 else None,
             uploaded=self._pilot.mission_uploaded,
             clear=self._pilot.run.clear,
         )
@@ -177,6 +178,10 @@ class Vehicle:
             self._heartbeat_s = next_s if next_s > now_s else now_s + _HEARTBEAT_S
         for channel, message_id in self._streams.take_due(now_s):
             self._say(message_id, channel, now_s)
+
+    def _on_mode_changed(self, now_s: float) -> None:
+        if self._flavour.modes.told_at_once:
+            self._say_heartbeat(now_s)
 
     def _say_heartbeat(self, now_s: float) -> None:
         for channel in self._streams.channels:
