@@ -21,8 +21,8 @@ from tests.unit.sim.test_autopilot_fleet import mission
 GUSTY = Wind((3.0, -2.0), gusts_of(4.0, np.random.default_rng(7)))
 
 
-def real(**more: float) -> GroundStation:
-    return ground_station(acceleration_m_s2=2.5, wind=GUSTY, **more)
+def real() -> GroundStation:
+    return ground_station(acceleration_m_s2=2.5, wind=GUSTY)
 
 
 def test_vehicle_in_wind_takes_off_reaches_its_target_returns_and_lands_at_home() -> None:
