@@ -25,7 +25,7 @@ __all__ = ["FailSafePilot", "FailSafes"]
 _Texts = list[tuple[int, str]]
 """MAV_SEVERITY and text of each line."""
 
-_PX4: _Texts = [(mavlink.MAV_SEVERITY_CRITICAL, "Failsafe activated\t")]
+_PX4: _Texts = [(mavlink.MAV_SEVERITY_CRITICAL, "Failsafe activated")]
 _RADIO: _Texts = [(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe")]
 _POSITION: _Texts = [(mavlink.MAV_SEVERITY_CRITICAL, "EKF Failsafe: changed to Land Mode")]
 
