@@ -86,14 +86,14 @@ class FailSafes:
     def lose_gps(self, now_s: float) -> None:
         """Be without a position from now on."""
         pilot = self._pilot
-        if pilot.readiness.last_fix_enu_m is None:
-            pilot.readiness.last_fix_enu_m = pilot.position_enu_m(now_s)
+        if not pilot.readiness.gps_lost:
+            pilot.readiness.lose_gps(pilot.position_enu_m(now_s), now_s)
             patience_s = pilot.config.position_failsafe_s
             self._position_s = None if patience_s is None else now_s + patience_s
 
-    def regain_gps(self) -> None:
+    def regain_gps(self, now_s: float) -> None:
         """Have a position again; a mode that was changed meanwhile stays."""
-        self._pilot.readiness.last_fix_enu_m = None
+        self._pilot.readiness.regain_gps(now_s)
         self._position_s = None
 
     def lose_radio(self, now_s: float) -> None:

@@ -135,7 +135,7 @@ class FaultyVehicle:
             hindered |= _NEEDS_POSITION
             pilot.failsafes.lose_gps(now_s)
         else:
-            pilot.failsafes.regain_gps()
+            pilot.failsafes.regain_gps(now_s)
         pilot.flight.hinder(hindered, now_s)
 
     def _fly_by_hand(self, pilot: Pilot, now_s: float) -> None:

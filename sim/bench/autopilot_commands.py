@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from sim.bench.trouble_commands import progress
+from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, SeedOption
 
 __all__ = ["AUTOPILOT_HELP", "autopilot"]
@@ -43,11 +44,15 @@ def autopilot(
     """See `AUTOPILOT_HELP`."""
     import asyncio
     from json import dumps
+    from pathlib import Path
 
     from rich.console import Console
 
     from sim.bench.autopilot_load import load_as_json, load_as_rich, measure_load
 
+    if not Path("/proc/self/stat").exists():
+        problem = "there is no /proc that tells processor time"
+        raise InputError(Fault("swarm bench autopilot", "", problem, "run it on Linux"))
     with progress() as tell:
         done = asyncio.run(measure_load(vehicles, seconds, seed, tell))
     if json:

@@ -15,7 +15,7 @@ import os
 import struct
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -31,7 +31,8 @@ from sim.bench.machine import Machine, this_machine
 from sim.bench.trouble import survey
 from sim.launch.process import Child
 from swarm.clock import Clock, SystemClock
-from swarm.model import Origin
+from swarm.model import Mission, Origin
+from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.scenario.write import format_scenario
 
 __all__ = [
@@ -220,53 +221,33 @@ async def measure_load(
     """
     tell = on_progress or (lambda _: None)
     machine, clock = this_machine(), SystemClock()
-    rng = np.random.default_rng(seed)
     mission = survey(vehicles, 1, seed)
-    origin = mission.origin
-    if origin is None:
-        raise ValueError("a survey has an origin")
-    lat_e7, lon_e7 = round(origin.lat_deg * 1e7), round(origin.lon_deg * 1e7)
-    asked_hz, rtts_s = rates_asked_hz(origin), list[float]()
-    async with contextlib.AsyncExitStack() as stack:
-        scenario = stack.enter_context(_file(format_scenario(mission)))
-        child = Child("autopilots", ["autopilot", str(scenario), "--json"])
-        stack.push_async_callback(child.stop)
-        tell(f"starting {vehicles} vehicles")
-        await child.start()
-        clients = []
-        for said in await child.ready(vehicles):
-            _, host, port = str(said["url"]).split(":")
-            factory = functools.partial(_Client, int(said["system_id"]), clock, rtts_s)
-            loop = asyncio.get_running_loop()
-            _, client = await loop.create_connection(factory, host, int(port))
-            stack.callback(client.close)
-            clients.append(client)
+    origin = mission.origin or DEFAULT_ORIGIN
+    asked_hz = rates_asked_hz(origin)
+    # Vehicles of a fleet are not asked in step.
+    pauses_s = np.random.default_rng(seed).uniform(0.0, 1.0, vehicles).tolist()
+    rtts_s: list[float] = []
+    async with _served(mission, clock, rtts_s, tell) as (pid, clients):
         await asyncio.sleep(READY_S)
-
-        async def prepare(client: _Client, pause_s: float) -> None:
-            await asyncio.sleep(pause_s)  # vehicles of a fleet are not asked in step
-            client.ask_for(asked_hz)
-            client.take_off()
-            await asyncio.sleep(TAKEN_OFF_S)
-            client.fly_away(lat_e7 + FAR_E7, lon_e7 + FAR_E7)
-            await asyncio.sleep(SETTLE_S)
-
-        async def time_answers(client: _Client, pause_s: float) -> None:
-            await asyncio.sleep(pause_s)
-            while True:
-                client.time_answer()
-                await asyncio.sleep(1.0)
-
-        pauses_s = rng.uniform(0.0, 1.0, vehicles).tolist()
         tell(f"taking off with {vehicles} vehicles")
-        await asyncio.gather(*map(prepare, clients, pauses_s))
-        timing = [asyncio.ensure_future(each) for each in map(time_answers, clients, pauses_s)]
-        stack.callback(lambda: [task.cancel() for task in timing])
+        flights = [
+            _fly(client, asked_hz, origin, pause_s)
+            for client, pause_s in zip(clients, pauses_s, strict=True)
+        ]
+        await asyncio.gather(*flights)
         tell(f"flying {vehicles} vehicles")
-        began_s, before, cpu_s = clock.now_s(), _heard(clients), _cpu_s(child.pid)
-        await asyncio.sleep(seconds)
-        passed_s = clock.now_s() - began_s
-        heard, cpu_s = _heard(clients), _cpu_s(child.pid) - cpu_s
+        timing = [asyncio.ensure_future(each) for each in map(_time_answers, clients, pauses_s)]
+        try:
+            await asyncio.sleep(SETTLE_S)
+            rtts_s.clear()
+            began_s, before, cpu_s = clock.now_s(), _heard(clients), _cpu_s(pid)
+            await asyncio.sleep(seconds)
+            passed_s = clock.now_s() - began_s
+            heard, cpu_s = _heard(clients), _cpu_s(pid) - cpu_s
+        finally:
+            for task in timing:
+                task.cancel()
+            await asyncio.gather(*timing, return_exceptions=True)
     heard.subtract(before)
     n_heard = sum(heard[message_id] for message_id in asked_hz)
     times_s = np.array(rtts_s)
@@ -282,6 +263,45 @@ async def measure_load(
         latency_p99_s=float(np.quantile(times_s, 0.99)) if times_s.size else None,
         latency_largest_s=float(times_s.max()) if times_s.size else None,
     )
+
+
+@contextlib.asynccontextmanager
+async def _served(
+    mission: Mission, clock: Clock, rtts_s: list[float], tell: Callable[[str], None]
+) -> AsyncIterator[tuple[int, list[_Client]]]:
+    """The process that simulates the UAVs of a mission, and a client of each."""
+    tell(f"starting {len(mission.uavs)} vehicles")
+    loop = asyncio.get_running_loop()
+    async with contextlib.AsyncExitStack() as stack:
+        scenario = stack.enter_context(_file(format_scenario(mission)))
+        child = Child("autopilots", ["autopilot", str(scenario), "--json"])
+        stack.push_async_callback(child.stop)
+        await child.start()
+        clients = []
+        for said in await child.ready(len(mission.uavs)):
+            _, host, port = str(said["url"]).split(":")
+            factory = functools.partial(_Client, int(said["system_id"]), clock, rtts_s)
+            _, client = await loop.create_connection(factory, host, int(port))
+            stack.callback(client.close)
+            clients.append(client)
+        yield child.pid, clients
+
+
+async def _fly(client: _Client, asked_hz: dict[int, float], origin: Origin, pause_s: float) -> None:
+    """Ask for telemetry, take off and leave for a place that is never reached."""
+    await asyncio.sleep(pause_s)
+    client.ask_for(asked_hz)
+    client.take_off()
+    await asyncio.sleep(TAKEN_OFF_S)
+    client.fly_away(round(origin.lat_deg * 1e7) + FAR_E7, round(origin.lon_deg * 1e7) + FAR_E7)
+
+
+async def _time_answers(client: _Client, pause_s: float) -> None:
+    """Ask for an answer once a second, until cancelled."""
+    await asyncio.sleep(pause_s)
+    while True:
+        client.time_answer()
+        await asyncio.sleep(1.0)
 
 
 def load_as_rich(load: AutopilotLoad) -> RenderableType:

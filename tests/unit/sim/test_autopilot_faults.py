@@ -163,6 +163,20 @@ def test_vehicle_flies_on_when_gps_is_back() -> None:
     assert flags & mavlink.EKF_POS_HORIZ_ABS
 
 
+def test_vehicle_that_never_saw_gps_knows_no_place_until_it_does() -> None:
+    ground = with_faults("gps-lost@0+20")
+    ground.wait(20.0)
+    assert asked(ground, POSITION).lat == 0
+    assert ground.texts() == ["ArduPilot Ready"]
+    ground.set_mode(GUIDED)
+    assert ground.arm() == FAILED
+    assert ground.texts()[-1] == "Arm: Need Position Estimate"
+
+    ground.wait(3.0)  # as long as after power-up
+    assert "EKF3 IMU0 is using GPS" in ground.texts()
+    assert ground.arm() == ACCEPTED
+
+
 def test_firmware_lands_after_a_while_without_a_position_where_that_is_asked_for() -> None:
     ground = with_faults("gps-lost@10", position_failsafe_s=3.0)
     ground.take_off(10.0)
