@@ -315,6 +315,20 @@ def test_command_serves_one_uav_under_another_system_id(start: Started) -> None:
     assert process.stdout.read() == process.stderr.read() == ""
 
 
+@pytest.mark.parametrize(("flavour", "autopilot"), [("ardupilot", 3), ("px4", 12)])
+def test_command_flies_the_firmware_it_is_told(
+    start: Started, flavour: str, autopilot: int
+) -> None:
+    process = start("--uav", "a", "--flavour", flavour)
+    [line] = ready_lines(process, 1)
+
+    async def hear() -> None:
+        async with connected(line["url"]) as client:
+            assert (await client.until("HEARTBEAT")).autopilot == autopilot
+
+    asyncio.run(hear())
+
+
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
