@@ -245,6 +245,8 @@ class Pilot:
         self.mode = mode
         if mode in _TASKS:
             self.task_done = False
+        if mode is not Mode.TAKEOFF:
+            self._take_off_up_m = None
         self._mode_changed(now_s)
         self._position_control = False
         self._mission.begin()
@@ -362,7 +364,10 @@ class Pilot:
             if self.mode is own_mode and self.armed:
                 self._fly(own_mode, now_s)
                 return True
-            return self.set_mode(own_mode, now_s)
+            accepted = self.set_mode(own_mode, now_s)
+            if not accepted:
+                self._take_off_up_m = None
+            return accepted
         ready = self.armed and self.mode is Mode.GUIDED and self.flight.on_ground
         if not ready or not self.readiness.has_position or up_m is None:
             return False

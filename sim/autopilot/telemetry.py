@@ -69,7 +69,7 @@ class Telemetry:
     def __init__(self, pilot: Pilot) -> None:
         self._pilot = pilot
         self._heading_deg = 0.0
-        self._builders: dict[int, Callable[[float], mavlink.MAVLink_message]] = {
+        builders: dict[int, Callable[[float], mavlink.MAVLink_message]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
@@ -87,15 +87,17 @@ class Telemetry:
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._origin,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home,
         }
+        missing = pilot.flavour.missing_messages
+        self._builders = {key: build for key, build in builders.items() if key not in missing}
 
     @property
     def known(self) -> frozenset[int]:
         """Message ids that can be asked for."""
-        return frozenset(self._builders) - self._pilot.flavour.missing_messages
+        return frozenset(self._builders)
 
     def build(self, message_id: int, now_s: float) -> mavlink.MAVLink_message | None:
         """The message as of now; None if there is none of that id, or nothing to say yet."""
-        if message_id not in self.known:
+        if message_id not in self._builders:
             return None
         if not self._pilot.readiness.has_origin and message_id in (
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,

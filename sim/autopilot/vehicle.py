@@ -90,8 +90,8 @@ class Vehicle:
         self._transfer = MissionTransfer(
             self._store,
             self._outbox,
-            asks_for_int=self._flavour.missions.asks_for_int,
-            int_frames=self._flavour.missions.int_frames,
+            habits=self._flavour.missions,
+            current=lambda: self._pilot.run.told,
             home_item=self._pilot.home_item if self._flavour.missions.first_item > 0 else None,
             uploaded=self._pilot.mission_uploaded,
             clear=self._pilot.run.clear,

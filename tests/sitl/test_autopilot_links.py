@@ -334,6 +334,20 @@ def test_command_gives_its_vehicles_the_faults_and_physics_asked_for(start: Star
     assert asyncio.run(id_heard(second["url"])) == 2
 
 
+@pytest.mark.parametrize(("flavour", "autopilot"), [("ardupilot", 3), ("px4", 12)])
+def test_command_flies_the_firmware_it_is_told(
+    start: Started, flavour: str, autopilot: int
+) -> None:
+    process = start("--uav", "a", "--flavour", flavour)
+    [line] = ready_lines(process, 1)
+
+    async def hear() -> None:
+        async with connected(line["url"]) as client:
+            assert (await client.until("HEARTBEAT")).autopilot == autopilot
+
+    asyncio.run(hear())
+
+
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [

@@ -27,4 +27,4 @@ def flavour_of(name: FlavourName) -> Flavour:
     from sim.autopilot.flavours.ardupilot import ArduCopter
     from sim.autopilot.flavours.px4 import Px4
 
-    return Px4() if name is FlavourName.PX4 else ArduCopter()
+    return Px4() if name == FlavourName.PX4 else ArduCopter()

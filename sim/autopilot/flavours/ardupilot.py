@@ -102,6 +102,7 @@ class ArduCopter:
     missions: MissionHabits = MissionHabits(
         asks_for_int=False,
         int_frames=False,
+        marks_current=False,
         first_item=1,
         check_s=0.0,
         restarts=True,

@@ -68,6 +68,8 @@ class MissionHabits:
     """Whether items are asked for by MISSION_REQUEST_INT."""
     int_frames: bool
     """Whether items are given back in the ``_INT`` variant of their frame."""
+    marks_current: bool
+    """Whether the current item says so when it is given back."""
     first_item: int
     """Number of the first item that is flown: 1 where item 0 is home."""
     check_s: float

@@ -94,6 +94,7 @@ class Px4:
     missions: MissionHabits = MissionHabits(
         asks_for_int=True,
         int_frames=True,
+        marks_current=True,
         first_item=0,
         check_s=1.9,
         restarts=False,

@@ -142,6 +142,29 @@ def test_a_change_of_mode_is_acknowledged_twice_and_seen_in_the_next_heartbeat()
     assert mode(ground) == POSITION
 
 
+def test_the_older_message_changes_the_mode_too_and_is_acknowledged_as_the_command() -> None:
+    ground = ground_station()
+    ground.wait(5.0)
+    answer = ground.send(mavlink.MAVLink_set_mode_message(1, 1, POSITION[0] << 16))
+
+    assert the(answer, "COMMAND_ACK").command == mavlink.MAV_CMD_DO_SET_MODE
+    assert mode(ground) == POSITION
+
+
+def test_a_refused_take_off_leaves_no_height_for_a_later_one() -> None:
+    ground = ground_station(delays=Delays(0.1, 0.1, 0.2, 20.0))
+    ground.wait(5.0)
+    ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, 21196)
+    assert take_off(ground, home_alt_m(ground) + 50.0) == TEMPORARILY_REJECTED
+    assert ground.texts()[-2:] == ["Switching to mode 'Takeoff' is currently not avail", "able\t"]
+    ground.wait(20.0)
+    ground.arm()
+    ground.set_mode(*TAKEOFF)
+    ground.wait(10.0)
+
+    assert ground.position_enu_m[2] == pytest.approx(2.5)
+
+
 def test_unknown_modes_are_denied() -> None:
     ground = ground_station()
     ground.wait(5.0)
@@ -455,7 +478,7 @@ def set_parameter(ground: GroundStation, name: bytes, value: float, kind: int) -
 
 
 def test_integer_parameters_travel_by_their_bytes() -> None:
-    ground = ground_station(delays=Delays())
+    ground = ground_station()
     int32 = mavlink.MAV_PARAM_TYPE_INT32
     answer = set_parameter(
         ground, b"NAV_DLL_ACT", struct.unpack("<f", struct.pack("<i", 2))[0], int32
@@ -463,7 +486,9 @@ def test_integer_parameters_travel_by_their_bytes() -> None:
     value = the(answer, "PARAM_VALUE")
 
     assert struct.unpack("<i", struct.pack("<f", value.param_value)) == (2,)
-    assert ground.vehicle.pilot.parameters.get("NAV_DLL_ACT").value == 2.0  # type: ignore[union-attr]  # it is there
+    parameter = ground.vehicle.pilot.parameters.get("NAV_DLL_ACT")
+    assert parameter is not None
+    assert parameter.value == 2.0
     assert set_parameter(ground, b"NAV_DLL_ACT", 3.0, mavlink.MAV_PARAM_TYPE_REAL32) == []
 
 

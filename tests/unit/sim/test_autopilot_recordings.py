@@ -184,7 +184,7 @@ class Play:
     delays: Delays
     alt_m: float
     """Height of home above the sea [m]."""
-    config: dict[str, float]
+    config: dict[str, Any]
     """Speeds and delays of `VehicleConfig`."""
     power_up: int = 0
     asked: tuple[str, ...] = ()
@@ -206,7 +206,7 @@ class Play:
             system_id=1,
             origin=Origin(47.3977, 8.5456, self.alt_m),
             delays=self.delays,
-            **self.config,  # type: ignore[arg-type]  # numbers all
+            **self.config,
         )
         return Vehicle(config, self.flavour, 0.0)
 
