@@ -11,15 +11,16 @@ import asyncio
 import contextlib
 import itertools
 import socket
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 from sim.autopilot.codec import ChannelCodec
+from sim.autopilot.config import VehicleConfig
 from sim.autopilot.endpoint import Endpoint, Transport
-from sim.autopilot.events import Connected, Disconnected, Event, Received, Tick
-from sim.autopilot.vehicle import COMPONENT_ID, Vehicle
+from sim.autopilot.events import Connected, Disconnected, Event, Received, Send, Tick
+from sim.autopilot.vehicle import COMPONENT_ID
 from swarm.clock import Clock
 
-__all__ = ["VehicleServer"]
+__all__ = ["Machine", "VehicleServer"]
 
 _Address = tuple[Any, ...]
 
@@ -31,6 +32,23 @@ _MAX_UNSENT_BYTES = 1 << 20
 _LEAST_SLEEP_WALL_S = 0.001
 
 
+class Machine(Protocol):
+    """A vehicle, whether faults happen to it or not."""
+
+    @property
+    def config(self) -> VehicleConfig:
+        """What it is."""
+        ...
+
+    def step(self, event: Event, now_s: float) -> list[Send]:
+        """Take an event; what is to be sent, in order."""
+        ...
+
+    def next_deadline_s(self) -> float:
+        """When `step` should be called at the latest [s]."""
+        ...
+
+
 class VehicleServer:
     """One vehicle and its ground stations.
 
@@ -40,7 +58,7 @@ class VehicleServer:
         clock: the vehicle's time.
     """
 
-    def __init__(self, vehicle: Vehicle, endpoint: Endpoint, clock: Clock) -> None:
+    def __init__(self, vehicle: Machine, endpoint: Endpoint, clock: Clock) -> None:
         self.vehicle = vehicle
         self._endpoint = endpoint
         self._clock = clock
@@ -127,7 +145,9 @@ class VehicleServer:
             to = self._channels if send.channel is None else (send.channel,)
             for number in to:
                 if (channel := self._channels.get(number)) is not None:
-                    frames.setdefault(number, []).append(channel.codec.encode(send.message))
+                    frames.setdefault(number, []).append(
+                        channel.codec.encode(send.message, send.system_id)
+                    )
         for number, batch in frames.items():
             if (channel := self._channels.get(number)) is not None:
                 channel.send(batch)
