@@ -10,6 +10,7 @@ import asyncio
 import math
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from contextlib import aclosing, asynccontextmanager
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -62,13 +63,9 @@ class Pilot:
         await until(self.telemetry.subscribe_flight_mode(), lambda now: now == mode)
 
 
-async def until(
-    stream: AsyncGenerator[Any, None],
-    wanted: Callable[[Any], bool],
-    deadline_s: float = DEADLINE_S,
-) -> Any:
+async def until(stream: AsyncGenerator[Any, None], wanted: Callable[[Any], bool]) -> Any:
     """The first of a stream that is as wanted."""
-    async with asyncio.timeout(deadline_s), aclosing(stream):
+    async with asyncio.timeout(DEADLINE_S), aclosing(stream):
         async for state in stream:
             if wanted(state):
                 return state
@@ -76,17 +73,27 @@ async def until(
 
 
 @asynccontextmanager
+async def seeing(
+    stream: AsyncGenerator[Any, None], wanted: Callable[[Any], bool]
+) -> AsyncIterator[asyncio.Task[Any]]:
+    """Listen from the beginning of the block, and stay in it until a state is as wanted.
+
+    States that last shorter than this machine may be busy elsewhere are not missed so.
+    """
+    watch = asyncio.create_task(until(stream, wanted))
+    await asyncio.sleep(0)  # lets it subscribe
+    try:
+        yield watch
+        await watch
+    finally:
+        watch.cancel()
+
+
+@asynccontextmanager
 async def connected(flavour: FlavourName, delays: Delays) -> AsyncIterator[Pilot]:
     """A vehicle that has just been powered up, and MAVSDK connected to it."""
     clock = ScaledClock(SPEEDUP)
-    config = VehicleConfig(
-        CONFIG.system_id,
-        cruise_m_s=CONFIG.cruise_m_s,
-        climb_m_s=CONFIG.climb_m_s,
-        land_m_s=CONFIG.land_m_s,
-        delays=delays,
-    )
-    vehicle = Vehicle(config, flavour_of(flavour), clock.now_s())
+    vehicle = Vehicle(replace(CONFIG, delays=delays), flavour_of(flavour), clock.now_s())
     server = VehicleServer(vehicle, parse_endpoint("tcp:127.0.0.1:0"), clock)
     await server.start()
     settings = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
@@ -129,15 +136,11 @@ def items() -> list[MissionItem]:
 
 async def start_mission(pilot: Pilot) -> None:
     """Start until the mode is seen: PX4 acknowledges before it has checked the mission."""
-    async with asyncio.timeout(DEADLINE_S):
-        while True:
+    modes = pilot.telemetry.subscribe_flight_mode()
+    async with seeing(modes, lambda mode: mode == FlightMode.MISSION) as seen:
+        while not seen.done():
             await pilot.mission.start_mission()
-            try:
-                modes = pilot.telemetry.subscribe_flight_mode()
-                await until(modes, lambda mode: mode == FlightMode.MISSION, deadline_s=1.0)
-            except TimeoutError:
-                continue
-            return
+            await asyncio.wait([seen], timeout=1.0)
 
 
 async def fly(pilot: Pilot, flavour: FlavourName) -> list[int]:
@@ -171,15 +174,12 @@ async def fly(pilot: Pilot, flavour: FlavourName) -> list[int]:
         seen.append(progress.current)
         return bool(progress.current == progress.total == len(sent))
 
-    following = asyncio.create_task(until(mission.subscribe_mission_progress(), finished))
-    try:
+    async with seeing(mission.subscribe_mission_progress(), finished):
         await start_mission(pilot)
-        await following
-    finally:
-        following.cancel()
 
-    await action.return_to_launch()
-    await pilot.in_mode(FlightMode.RETURN_TO_LAUNCH)
+    modes = telemetry.subscribe_flight_mode()
+    async with seeing(modes, lambda mode: mode == FlightMode.RETURN_TO_LAUNCH):
+        await action.return_to_launch()
     home = await telemetry.home()
     await until(
         telemetry.subscribe_position(),
