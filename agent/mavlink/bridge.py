@@ -6,8 +6,9 @@ sees over what was acknowledged. Leaves out: transports (agent.mavlink.link), wa
 (agent.mavlink.vehicle) and what to fly to (agent.core).
 
 The vehicle is *handed over* when a pilot or a failsafe changes its mode, when it
-disarms or reboots in flight, or when it falls silent. From then on nothing is commanded
-until a new `Prepare`, or a `Return` that finds it still in the guided mode.
+disarms, reboots, ends its flight or loses its position, or when it falls silent. From
+then on nothing is commanded until a new `Prepare`, or a `Return` that finds it still in
+the mode that takes our targets. One that obeys and is in trouble is *advised to return*.
 """
 
 from __future__ import annotations
