@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from agent.mavlink.config import CommandStyle
 from swarm.config import Link
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
@@ -67,6 +68,14 @@ def agent(
             help="Within this distance of a task, and stopped, the UAV has arrived.",
         ),
     ] = 1.0,
+    command: Annotated[
+        CommandStyle,
+        typer.Option(
+            "--command",
+            help="How targets are told: each at once, or each as a mission that ends in a "
+            "return home, so that the vehicle comes back if its companion dies.",
+        ),
+    ] = CommandStyle.REPOSITION,
     battery_reserve: Annotated[
         float,
         typer.Option(
@@ -161,6 +170,7 @@ def agent(
             settings = BridgeConfig(
                 system_id=system_id,
                 origin=origin,
+                command=command,
                 acceptance_radius_m=acceptance_radius_m,
                 position_rate_hz=position_rate_hz,
                 battery_reserve_frac=battery_reserve or None,

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from swarm.model.frames import Origin, enu_from_wgs84, wgs84_from_enu
+from tests.fake_missions import CopterMissions
 
 Point = tuple[float, float, float]
 
@@ -33,7 +34,8 @@ class FakeCopter:
     mav_type, autopilot = 2, 3
     boot_mode, own_mode, pilot_mode = STABILIZE, GUIDED, LOITER
     """What it boots into, what takes targets, and what a pilot flies in."""
-    return_mode, land_mode = RTL, LAND
+    return_mode, land_mode, mission_mode = RTL, LAND, AUTO
+    missions: type[CopterMissions] = CopterMissions
     mode_names: ClassVar = {GUIDED: "GUIDED", LOITER: "LOITER", RTL: "RTL", LAND: "LAND"}
     takeoff_mode = GUIDED
     """The mode it takes off in."""
@@ -76,6 +78,7 @@ class FakeCopter:
         self.ground_m = ground_m
         self.home_m: Point = (0.0, 0.0, ground_m)
         self.position_m: Point = self.home_m
+        self.mission = self.missions(self)
         self._buffer: list[bytes] = []
         self._parser = mavlink.MAVLink(None)
         self._parser.robust_parsing = True
@@ -85,6 +88,12 @@ class FakeCopter:
             "COMMAND_INT": self._on_command,
             "PARAM_REQUEST_READ": self._on_param_read,
             "PARAM_SET": self._on_param_set,
+            "MISSION_COUNT": self.mission.on_count,
+            "MISSION_ITEM_INT": self.mission.on_item,
+            "MISSION_REQUEST_LIST": self.mission.on_request_list,
+            "MISSION_REQUEST_INT": self.mission.on_request,
+            "MISSION_SET_CURRENT": self.mission.on_set_current,
+            "MISSION_ACK": self.mission.on_ack,
         }
         self.now_s = 0.0
         self.power_on(0.0)
@@ -169,7 +178,7 @@ class FakeCopter:
                 landed = 1 if not self.airborne else 3 if self.in_takeoff else 2
                 self.say(mavlink.MAVLink_extended_sys_state_message(3, landed))
             case 42:
-                self.say(mavlink.MAVLink_mission_current_message(0))
+                self.mission.say_current()
             case _:
                 pass
 
@@ -208,9 +217,11 @@ class FakeCopter:
                 self._intervals_s[int(m.param1)] = m.param2 / 1e6
                 self._due_s[int(m.param1)] = self.now_s
             case 176:
-                self.set_mode(int(m.param2))
+                return self._obey_mode(int(m.param2))
             case 400 if m.param1 == 1.0:
                 return self._arm()
+            case 400 if self.airborne:
+                return FAILED
             case 400:
                 self.armed = False
             case 22:
@@ -245,14 +256,31 @@ class FakeCopter:
             self.target_m = enu_from_wgs84(self.origin, m.x / 1e7, m.y / 1e7, m.z)
         return ACCEPTED
 
+    def _obey_mode(self, mode: int) -> int:
+        if mode == self.mode:
+            return ACCEPTED
+        if mode == self.mission_mode and (why := self.mission.refusal()):
+            self.text(2, why)
+            return FAILED
+        self.set_mode(mode)
+        return ACCEPTED
+
     def set_mode(self, mode: int) -> None:
         """By command, by the pilot's switch or by a failsafe."""
         self.mode = mode
         self.target_m = None
+        self.in_takeoff = False
+        self.mission.leave()
         if mode == self.return_mode:
-            east, north, _ = self.position_m
-            self.target_m = (east, north, max(self.position_m[2], self.home_m[2] + _RTL_ALT_M))
+            self.begin_return()
+        elif mode == self.mission_mode:
+            self.mission.enter()
         self._tell_change()
+
+    def begin_return(self) -> None:
+        """Climb, before it flies home."""
+        east, north, _ = self.position_m
+        self.target_m = (east, north, max(self.position_m[2], self.home_m[2] + _RTL_ALT_M))
 
     def _tell_change(self) -> None:
         self.heartbeat()
@@ -275,6 +303,7 @@ class FakeCopter:
     def advance(self, now_s: float) -> list[bytes]:
         duration_s, self.now_s = now_s - self.now_s, now_s
         self._move(duration_s)
+        self.mission.advance()
         if self.armed and not self.airborne and now_s - self.armed_at_s > _AUTO_DISARM_S:
             self.armed = False
         if now_s >= self._heartbeat_due_s:
@@ -300,7 +329,7 @@ class FakeCopter:
         moved = [(b - a) / duration_s for a, b in zip(before, self.position_m, strict=True)]
         still = share >= 1.0
         self.velocity_m_s = (0.0, 0.0, 0.0) if still else (moved[0], moved[1], moved[2])
-        if still and self.mode == self.return_mode:
+        if still and (self.mode == self.return_mode or self.mission.going_home):
             self._next_of_return()
 
     def _next_of_return(self) -> None:
@@ -313,6 +342,7 @@ class FakeCopter:
             self.target_m = (east, north, self.position_m[2])
 
     def _land(self) -> None:
+        self.mission.going_home = False
         self.airborne = self.armed = False
         self.target_m = None
 

@@ -13,8 +13,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from swarm.model.frames import enu_from_wgs84
 from tests.fake_copter import ACCEPTED, DENIED, FAILED, SET_MODE, UNSUPPORTED, FakeCopter
+from tests.fake_missions import Px4Missions
 
-AUTO_TAKEOFF, AUTO_LOITER, AUTO_RTL, AUTO_LAND = (4 << 16 | sub << 24 for sub in (2, 3, 5, 6))
+AUTO_TAKEOFF, AUTO_LOITER, AUTO_MISSION, AUTO_RTL, AUTO_LAND = (
+    4 << 16 | sub << 24 for sub in (2, 3, 4, 5, 6)
+)
 POSCTL = 3 << 16
 
 _PREARM = 0x10000000
@@ -30,10 +33,12 @@ class FakePx4(FakeCopter):
 
     mav_type, autopilot = 2, 12
     boot_mode, own_mode, pilot_mode = AUTO_LOITER, AUTO_LOITER, POSCTL
-    return_mode, land_mode = AUTO_RTL, AUTO_LAND
+    return_mode, land_mode, mission_mode = AUTO_RTL, AUTO_LAND, AUTO_MISSION
+    missions = Px4Missions
     mode_names: ClassVar = {
         AUTO_TAKEOFF: "AUTO.TAKEOFF",
         AUTO_LOITER: "AUTO.LOITER",
+        AUTO_MISSION: "AUTO.MISSION",
         POSCTL: "POSCTL",
         AUTO_RTL: "AUTO.RTL",
         AUTO_LAND: "AUTO.LAND",
@@ -99,8 +104,8 @@ class FakePx4(FakeCopter):
                 return FAILED
             case 176:
                 assert m.param1 == 1.0
-                self.set_mode(int(m.param2) << 16 | int(m.param3) << 24)
-                return ACCEPTED
+                self._obey_mode(int(m.param2) << 16 | int(m.param3) << 24)
+                return ACCEPTED  # whatever becomes of it
             case 22:
                 return self._take_off(m)
             case 400 if m.param1 == 0.0 and self.airborne:

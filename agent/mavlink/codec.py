@@ -49,9 +49,10 @@ from agent.mavlink.texts import TextJoiner
 __all__ = ["MavlinkCodec"]
 
 _AUTOPILOT_COMPONENT = 1
-_INT_FRAME = {AltitudeFrame.MEAN_SEA_LEVEL: 5, AltitudeFrame.HOME: 6}
+_INT_FRAME = {AltitudeFrame.MEAN_SEA_LEVEL: 5, AltitudeFrame.HOME: 6, AltitudeFrame.NONE: 2}
 _FRAME_BY_WIRE = {
     0: AltitudeFrame.MEAN_SEA_LEVEL,
+    2: AltitudeFrame.NONE,
     5: AltitudeFrame.MEAN_SEA_LEVEL,
     3: AltitudeFrame.HOME,
     6: AltitudeFrame.HOME,

@@ -75,6 +75,13 @@ class BridgeConfig:
     mission_patience_s: float = 60.0
     """Commanded by missions: how long the vehicle waits at its target, beyond its stay there,
     for the next one before it returns home by itself."""
+    mission_reply_timeout_s: float = 1.5
+    """Wait for the vehicle's next message of a mission transfer before repeating one's own."""
+    mission_tries: int = 6
+    """Transmissions of one message of a transfer without progress before giving up."""
+    reached_radius_m: float = 5.0
+    """Where the vehicle says itself that it reached its target, it must be at least that near,
+    or within the acceptance radius if that is wider."""
     battery_reserve_frac: float | None = 0.2
     """Charge below which the vehicle should go home, 0..1; None leaves that to the autopilot."""
     position_timeout_s: float = 5.0
@@ -107,6 +114,9 @@ class BridgeConfig:
             "stall_timeout_s",
             "stall_tries",
             "mission_patience_s",
+            "mission_reply_timeout_s",
+            "mission_tries",
+            "reached_radius_m",
             "position_timeout_s",
             "fence_radius_m",
             "fence_height_m",
@@ -150,6 +160,9 @@ class BridgeConfig:
             climb_timeout_s=max(self.climb_timeout_s, 2.0 * answer_s),
             stall_timeout_s=max(self.stall_timeout_s, answer_s),
             position_timeout_s=max(self.position_timeout_s, 3.0 * speedup),
+            mission_reply_timeout_s=max(self.mission_reply_timeout_s, answer_s),
+            # Renewing the wait takes a transfer, and half the patience is left for it.
+            mission_patience_s=max(self.mission_patience_s, 20.0 * answer_s),
             commands=replace(
                 self.commands,
                 ack_timeout_s=max(self.commands.ack_timeout_s, answer_s),

@@ -55,6 +55,8 @@ class AltitudeFrame(IntEnum):
     """Zero of an altitude; the value is the MAV_FRAME without its ``_INT`` twin."""
 
     MEAN_SEA_LEVEL = 0
+    NONE = 2
+    """MAV_FRAME_MISSION: a mission item without a place."""
     HOME = 3
 
 

@@ -4,8 +4,9 @@ The read-back decides: an upload whose acknowledgement got lost is still good if
 vehicle tells the same items, and one that was acknowledged is not if it tells others.
 After any failure the last verified mission stays the one in force; where the vehicle
 may hold part of the new one, the old one is uploaded again before the failure is
-reported. Leaves out: flying the mission and the flavour's item 0 (the comparison gets
-the number of leading items that the vehicle owns).
+reported. A vehicle may also be asked what stands on it. Leaves out: flying the mission
+and the flavour's item 0 (the comparison gets the number of leading items that the vehicle
+owns).
 
 Protocol: https://mavlink.io/en/services/mission.html
 """
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from agent.mavlink.messages import (
+    AltitudeFrame,
     Inbound,
     MissionAck,
     MissionCount,
@@ -27,13 +29,18 @@ from agent.mavlink.messages import (
     Outbound,
 )
 
-__all__ = ["MissionFailed", "MissionInForce", "MissionPolicy", "MissionTransfer"]
+__all__ = ["MissionFailed", "MissionInForce", "MissionPolicy", "MissionRead", "MissionTransfer"]
 
 _ACCEPTED = 0
+_ERROR = 1
+_INVALID_SEQUENCE = 13
 _OPERATION_CANCELLED = 15
 """MAV_MISSION_RESULT values."""
+_PATIENT_TRIES = 3
+"""A reading that makes no progress for that many transmissions is begun anew, once."""
 _PLACE_TOLERANCE_DEG = 2e-7
-_ALT_TOLERANCE_M = 0.01
+_ALT_TOLERANCE_M = 0.02
+"""ArduPilot cuts heights to whole centimetres."""
 _PARAM_TOLERANCE = 1e-3
 
 
@@ -73,6 +80,16 @@ class MissionFailed:
     """The vehicle was seen to hold the old mission; if not, do not start a mission."""
 
 
+@dataclass(frozen=True, slots=True)
+class MissionRead:
+    """What stands on the vehicle, as far as it was asked for."""
+
+    count: int
+    """Items it holds."""
+    items: tuple[MissionItem, ...]
+    """All of them if there are as many as expected, else none."""
+
+
 class _Phase(Enum):
     IDLE = "idle"
     ANNOUNCING = "announcing"
@@ -94,12 +111,16 @@ class MissionTransfer:
         self._last: list[Outbound] = []
         self._furthest_seq = -1
         self._touched = False
+        """The vehicle may hold part of a mission that was never verified."""
         self._second_reading = False
+        self._began_reading_anew = False
+        self._reading_count: int | None = None
+        """Items wanted of a vehicle that is only asked; None while something is uploaded."""
         self._failure: str | None = None
         self.in_force: tuple[MissionItem, ...] | None = None
         """Items last verified on the vehicle; None if none ever were."""
-        self.result: MissionInForce | MissionFailed | None = None
-        """Outcome of the last upload; None while it runs."""
+        self.result: MissionInForce | MissionFailed | MissionRead | None = None
+        """Outcome of the last upload or reading; None while it runs."""
 
     @property
     def busy(self) -> bool:
@@ -117,10 +138,21 @@ class MissionTransfer:
             raise ValueError("a mission transfer is under way already")
         if not items or [item.seq for item in items] != list(range(len(items))):
             raise ValueError("mission items must be numbered 0, 1, 2, … without a gap")
-        self._failure = None
-        self._touched = False
+        self._failure = self._reading_count = None
         self.result = None
         return self._announce(tuple(items), now_s)
+
+    def read(self, count: int, now_s: float) -> list[Outbound]:
+        """Begin to ask what stands on the vehicle; only ``count`` items are read, no others.
+
+        Raises:
+            ValueError: a transfer is under way.
+        """
+        if self.busy:
+            raise ValueError("a mission transfer is under way already")
+        self._failure, self._reading_count = None, count
+        self.result = None
+        return self._ask_count(now_s)
 
     def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
         """Go on with the transfer; messages that do not belong to it change nothing."""
@@ -130,6 +162,8 @@ class MissionTransfer:
             case MissionAck(result) if self._phase is _Phase.SENDING:
                 return self._on_upload_ack(result, now_s)
             case MissionAck(result) if self._phase is _Phase.ANNOUNCING and result != _ACCEPTED:
+                if result == _ERROR:
+                    return []  # PX4 is busy with an older transfer until that times out
                 return self._fail(f"the vehicle refused the mission (result {result})", now_s)
             case MissionCount(count) if self._phase is _Phase.ASKING_COUNT:
                 return self._on_count(count, now_s)
@@ -142,6 +176,11 @@ class MissionTransfer:
         """Repeat what was not answered in time, or give up."""
         if not self.busy or now_s < self._deadline_s:
             return []
+        stuck = self._phase is _Phase.ASKING_ITEMS and self._tries >= _PATIENT_TRIES
+        if stuck and not self._began_reading_anew:
+            # PX4 ends a reading that makes no progress, and says nothing then.
+            self._began_reading_anew = True
+            return self._ask_count(now_s)
         if self._tries < self._policy.tries:
             return self._say(self._last, now_s, again=True)
         if self._phase is _Phase.SENDING and self._furthest_seq == len(self._items) - 1:
@@ -163,12 +202,19 @@ class MissionTransfer:
         self._items = items
         self._phase = _Phase.ANNOUNCING
         self._furthest_seq = -1
-        self._second_reading = False
+        self._second_reading = self._began_reading_anew = False
         return self._say([MissionCount(len(items))], now_s)
 
     def _on_request(self, seq: int, now_s: float) -> list[Outbound]:
         if seq >= len(self._items):
             return []
+        if self._phase is _Phase.ANNOUNCING and seq > 0:
+            # PX4 goes on with an older transfer until it hears that this one was given up.
+            if self._tries >= self._policy.tries:
+                return self._fail("the vehicle is busy with another transfer", now_s)
+            out: list[Outbound] = [MissionAck(_OPERATION_CANCELLED), *self._last]
+            self._say(self._last, now_s, again=True)
+            return out
         self._touched = True
         self._phase = _Phase.SENDING
         # The vehicle asks again for what it did not get: only a higher number is progress.
@@ -179,6 +225,8 @@ class MissionTransfer:
         return self._say([self._items[seq]], now_s, again=again)
 
     def _on_upload_ack(self, result: int, now_s: float) -> list[Outbound]:
+        if result in (_INVALID_SEQUENCE, _ERROR):
+            return []  # an answer to what came twice; a transfer that ended asks no more
         if result != _ACCEPTED:
             return self._fail(f"the vehicle refused the mission (result {result})", now_s)
         if self._furthest_seq != len(self._items) - 1:
@@ -191,7 +239,11 @@ class MissionTransfer:
         return self._say([MissionRequestList()], now_s)
 
     def _on_count(self, count: int, now_s: float) -> list[Outbound]:
-        if count != len(self._items):
+        if self._reading_count is not None and count != self._reading_count:
+            self._phase = _Phase.IDLE
+            self.result = MissionRead(count, ())
+            return [MissionAck(_ACCEPTED)]
+        if self._reading_count is None and count != len(self._items):
             return self._differs(f"it holds {count} items, not {len(self._items)}", now_s)
         self._phase = _Phase.ASKING_ITEMS
         return self._say([MissionRequest(0)], now_s)
@@ -200,10 +252,12 @@ class MissionTransfer:
         wanted = len(self._read_back)
         if item.seq != wanted:
             return []  # doubled or late
-        if item.seq >= self._policy.vehicle_items and not _same(item, self._items[wanted]):
+        reading = self._reading_count is not None
+        ours = reading or wanted < self._policy.vehicle_items or _same(item, self._items[wanted])
+        if not ours:
             return self._differs(f"item {wanted} differs", now_s)
         self._read_back.append(item)
-        if len(self._read_back) < len(self._items):
+        if len(self._read_back) < (self._reading_count or len(self._items)):
             return self._say([MissionRequest(wanted + 1)], now_s)
         return self._verified()
 
@@ -216,6 +270,10 @@ class MissionTransfer:
 
     def _verified(self) -> list[Outbound]:
         self._phase = _Phase.IDLE
+        if self._reading_count is not None:
+            self.result = MissionRead(self._reading_count, tuple(self._read_back))
+            return [MissionAck(_ACCEPTED)]
+        self._touched = False
         if self._failure is None:
             self.in_force = self._items
             self.result = MissionInForce(self._items)
@@ -225,10 +283,9 @@ class MissionTransfer:
 
     def _fail(self, reason: str, now_s: float) -> list[Outbound]:
         out: list[Outbound] = [MissionAck(_OPERATION_CANCELLED)]
-        restoring = self._failure is not None
-        if not restoring:
+        if self._failure is None:
             self._failure = reason
-            if self._touched and self.in_force is not None:
+            if self._touched and self._reading_count is None and self.in_force is not None:
                 return out + self._announce(self.in_force, now_s)
         self._phase = _Phase.IDLE
         self.result = MissionFailed(self._failure or reason, not self._touched)
@@ -244,16 +301,26 @@ class MissionTransfer:
 
 
 def _same(told: MissionItem, meant: MissionItem) -> bool:
-    """Whether the vehicle's item is the one meant, but for the wire's rounding."""
+    """Whether the vehicle's item is the one meant, but for the wire's rounding.
+
+    Of an item without a place, ArduPilot tells another frame than it was told.
+    """
     return (
         told.command == meant.command
-        and told.frame == meant.frame
+        and (meant.frame is AltitudeFrame.NONE or _same_place(told, meant))
+        and told.autocontinue == meant.autocontinue
+        and all(
+            # NaN is "as you like", which some firmwares remember as 0.
+            (math.isnan(b) and (math.isnan(a) or a == 0.0)) or abs(a - b) <= _PARAM_TOLERANCE
+            for a, b in zip(told.params, meant.params, strict=True)
+        )
+    )
+
+
+def _same_place(told: MissionItem, meant: MissionItem) -> bool:
+    return (
+        told.frame == meant.frame
         and abs(told.lat_deg - meant.lat_deg) <= _PLACE_TOLERANCE_DEG
         and abs(told.lon_deg - meant.lon_deg) <= _PLACE_TOLERANCE_DEG
         and abs(told.alt_m - meant.alt_m) <= _ALT_TOLERANCE_M
-        and told.autocontinue == meant.autocontinue
-        and all(
-            (math.isnan(a) and math.isnan(b)) or abs(a - b) <= _PARAM_TOLERANCE
-            for a, b in zip(told.params, meant.params, strict=True)
-        )
     )

@@ -3,8 +3,9 @@
 No script: every time something is heard, the next step follows from the state *seen*,
 so an overwritten mode, an automatic disarming on the ground or a vehicle that flies
 already need no cases of their own. Every step has a limit. A vehicle that is resumed in
-the air keeps its old target meanwhile: only its speed is set. Leaves out: who may give
-the vehicle orders (agent.mavlink.bridge).
+the air keeps its old target meanwhile: only its speed is set, and not even that if it
+flies a mission of ours. Leaves out: who may give the vehicle orders
+(agent.mavlink.bridge).
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, resu
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.guards import Guards
-from agent.mavlink.leg import Leg
+from agent.mavlink.leg import RepositionLeg
 from agent.mavlink.messages import Heartbeat, Inbound, Landed, Outbound, Position
 from agent.mavlink.speed import SpeedSetting
+from agent.mavlink.standing_mission import StandingMission
 from agent.mavlink.state import VehicleState
 from agent.vehicle import Prepare
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
@@ -50,7 +52,16 @@ class _Step:
 
 
 class Preparation:
-    """Carries out one `Prepare`."""
+    """Carries out one `Prepare`.
+
+    Args:
+        order: the order.
+        config: patience.
+        commands: carries what is told.
+        flavour: the firmware.
+        mission: what an earlier life may have left on the vehicle; None if missions are
+            not our way to command it.
+    """
 
     def __init__(
         self,
@@ -59,8 +70,10 @@ class Preparation:
         commands: Commands,
         flavour: Flavour,
         guards: Guards,
+        mission: StandingMission | None = None,
     ) -> None:
         self._order = order
+        self._mission = mission
         self._config = config
         self._commands = commands
         self._flavour = flavour
@@ -79,7 +92,7 @@ class Preparation:
         self._saw_takeoff = False
         self._flew = False
         self._flown_by_pilot = False
-        self._leg: Leg | None = None
+        self._leg: RepositionLeg | None = None
         self._speed = SpeedSetting(order.speed_m_s, flavour, config)
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
@@ -124,8 +137,7 @@ class Preparation:
         place_enu_m = enu_from_wgs84(
             self._config.origin, position.lat_deg, position.lon_deg, position.alt_m
         )
-        told = self._leg.on_position(place_enu_m, position.velocity_enu_m_s, self._commands, now_s)
-        return [*told]
+        return [*self._leg.on_position(place_enu_m, position.velocity_enu_m_s, now_s)]
 
     def advance(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
         """Do what the state seen asks for next."""
@@ -137,6 +149,8 @@ class Preparation:
         if heartbeat.armed and flavour.is_taking_off(heartbeat.custom_mode):
             return self._follow_takeoff(now_s)
         if not flavour.is_commanded(heartbeat.custom_mode):
+            if self._may_fly_our_mission(vehicle, heartbeat):
+                return self._take_on_mission(now_s)
             if heartbeat.armed:
                 self._flown_by_pilot = True
                 mode = flavour.mode_name(heartbeat.custom_mode)
@@ -223,6 +237,27 @@ class Preparation:
             return self._fail(_CLIMB_STOPPED)
         return self._wait("climbing")
 
+    def _may_fly_our_mission(self, vehicle: VehicleState, heartbeat: Heartbeat) -> bool:
+        return (
+            self._mission is not None
+            and self._mission.is_ours is not False
+            and self._order.resume
+            and not self._flown_by_pilot
+            and heartbeat.armed
+            and self._flavour.is_mission(heartbeat.custom_mode)
+            and self._flavour.airborne(vehicle) is not False
+        )
+
+    def _take_on_mission(self, now_s: float) -> list[Outbound]:
+        """Find out whether the mission flown is one of ours; the vehicle flies on meanwhile."""
+        if self._mission is None:
+            return []
+        if self._mission.is_ours:
+            self._flew = self.done = True
+            return []
+        self._wait("reading the mission that the vehicle flies")
+        return self._mission.look(now_s)
+
     def _high_enough(self, position: Position, now_s: float) -> bool:
         height_m = self._start_alt_m - _home_alt_m(position)
         tolerance_m = max(
@@ -242,8 +277,10 @@ class Preparation:
         if self._leg is None and not self._resumes(vehicle):
             place = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
             message = self._flavour.reposition(*place, self._order.speed_m_s)
-            self._leg = Leg(self._order.position_enu_m, message, self._config)
-            out += self._leg.start(self._commands, now_s)
+            self._leg = RepositionLeg(
+                self._order.position_enu_m, message, self._config, self._commands
+            )
+            out += self._leg.start(now_s)
         leg = self._leg
         # ArduPilot forgets a speed set before the first target after takeoff.
         if (leg is None or leg.accepted) and not self._speed.begun:

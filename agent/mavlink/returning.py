@@ -21,12 +21,27 @@ _DISARMED_LONG_S = 5.0
 
 
 class Returning:
-    """Carries out one `Return`."""
+    """Carries out one `Return`.
+
+    Args:
+        order: the order.
+        config: patience.
+        commands: carries the mode.
+        flavour: the firmware.
+        from_mission: the vehicle may fly a mission of ours.
+    """
 
     def __init__(
-        self, order: Return, config: BridgeConfig, commands: Commands, flavour: Flavour
+        self,
+        order: Return,
+        config: BridgeConfig,
+        commands: Commands,
+        flavour: Flavour,
+        *,
+        from_mission: bool = False,
     ) -> None:
         self.order = order
+        self._from_mission = from_mission
         self._config = config
         self._commands = commands
         self._flavour = flavour
@@ -74,7 +89,11 @@ class Returning:
     def _obeys(self, custom_mode: int) -> bool:
         """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
         flavour = self._flavour
-        return flavour.is_commanded(custom_mode) or flavour.is_taking_off(custom_mode)
+        return (
+            flavour.is_commanded(custom_mode)
+            or flavour.is_taking_off(custom_mode)
+            or (self._from_mission and flavour.is_mission(custom_mode))
+        )
 
     def disarmed_long(self, now_s: float) -> bool:
         """Whether the motors have stood still for a while."""

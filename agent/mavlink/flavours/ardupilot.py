@@ -103,6 +103,11 @@ class ArduCopter:
         )
 
     @property
+    def mission_vehicle_items(self) -> int:
+        """Item 0 is home, whatever is sent as such."""
+        return 1
+
+    @property
     def acknowledged_twice(self) -> frozenset[int]:
         """None."""
         return frozenset()
@@ -221,6 +226,10 @@ class ArduCopter:
             lon_deg,
             alt_m,
         )
+
+    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
+        """Copters keep the hold time only; their radius is WPNAV_RADIUS."""
+        return (hold_s, 0.0, 0.0, 0.0)
 
     def change_speed(self, speed_m_s: float) -> CommandLong:
         """Ground speed; forgotten when GUIDED is entered or takeoff ends, so set it after."""

@@ -37,6 +37,11 @@ class Flavour(Protocol):
         ...
 
     @property
+    def mission_vehicle_items(self) -> int:
+        """Leading items of a mission that belong to the vehicle and cannot be chosen."""
+        ...
+
+    @property
     def acknowledged_twice(self) -> frozenset[int]:
         """Numbers of the commands that the firmware acknowledges twice."""
         ...
@@ -125,6 +130,10 @@ class Flavour(Protocol):
             alt_m: height above mean sea level.
             speed_m_s: cruise ground speed, for firmwares that take it with every target.
         """
+        ...
+
+    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
+        """Parameters of a mission's waypoint at which to wait so long, heading as it comes."""
         ...
 
     def change_speed(self, speed_m_s: float) -> CommandLong:

@@ -69,6 +69,8 @@ _GROUND_SPEED = 1.0
 _UNCHANGED = -1.0
 _CHANGE_MODE = 1.0
 """MAV_DO_REPOSITION_FLAGS_CHANGE_MODE."""
+_WAYPOINT_RADIUS_M = 2.0
+"""As ArduCopter's, within which a vehicle is as good as at its waypoint."""
 
 
 class Px4Copter:
@@ -87,6 +89,11 @@ class Px4Copter:
         either, PX4 answers "failed".
         """
         return ((1, SystemStatus), (245, ExtendedState))
+
+    @property
+    def mission_vehicle_items(self) -> int:
+        """None: item 0 is flown like any other."""
+        return 0
 
     @property
     def acknowledged_twice(self) -> frozenset[int]:
@@ -204,6 +211,10 @@ class Px4Copter:
             lon_deg,
             alt_m,
         )
+
+    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
+        """The hold begins within a radius of 10 m (NAV_ACC_RAD) unless told another."""
+        return (hold_s, _WAYPOINT_RADIUS_M, 0.0, math.nan)
 
     def change_speed(self, speed_m_s: float) -> CommandLong:
         """Cruise speed of what is flown now; targets bring their own."""

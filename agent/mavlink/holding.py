@@ -1,0 +1,131 @@
+"""A vehicle is stopped where it is: in the air it hovers, on the ground it is disarmed.
+
+Out of a mission, a return or a takeoff in a mode of its own, the guided mode stops the
+vehicle; in the guided mode, a target at the place where it is. Both are told again until
+the effect is seen. Leaves out: what was under way before, and who may order it
+(agent.mavlink.bridge).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, result_text
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.flavours import Flavour
+from agent.mavlink.leg import TARGET_TAG
+from agent.mavlink.messages import Heartbeat, Landed, Outbound, Position
+from agent.mavlink.state import VehicleState
+from agent.vehicle import Hold
+
+__all__ = ["Holding"]
+
+_MODE_TAG = "hold mode"
+_DISARM_TAG = "disarm"
+
+
+class Holding:
+    """Carries out one `Hold`.
+
+    Args:
+        order: the order.
+        config: patience.
+        commands: carries what is told.
+        flavour: the firmware.
+        speed_m_s: cruise speed, for firmwares that take it with every target.
+        leaves: whether a mode is one that the vehicle flies on our orders, and may be
+            taken out of.
+        motors_asked: the vehicle may be about to arm.
+    """
+
+    def __init__(
+        self,
+        order: Hold,
+        config: BridgeConfig,
+        commands: Commands,
+        flavour: Flavour,
+        speed_m_s: float,
+        leaves: Callable[[int], bool],
+        *,
+        motors_asked: bool = False,
+    ) -> None:
+        self.order = order
+        self._config = config
+        self._commands = commands
+        self._flavour = flavour
+        self._speed_m_s = speed_m_s
+        self._leaves = leaves
+        self._motors_asked = motors_asked
+        self._tries: dict[str, int] = {}
+        self._next_s: dict[str, float] = {}
+        self._refusal = ""
+        self._place: tuple[float, float, float] | None = None
+        self._told = False
+        """The vehicle has taken the place to hover at, or was taken out of another mode."""
+        self._guided_seen = False
+        self.done = False
+        self.aloft = False
+        """The vehicle is in the air, as far as it said."""
+        self.failure: str | None = None
+        """Why it does not stop; None while it may."""
+
+    def expects(self, custom_mode: int) -> bool:
+        """Whether that mode fits; anything else is somebody else's doing."""
+        if self._flavour.is_commanded(custom_mode):
+            self._guided_seen = True
+            return True
+        return not self._guided_seen and self._leaves(custom_mode)
+
+    def on_ended(self, ended: CommandEnded, now_s: float) -> None:
+        """Take a command's outcome."""
+        if ended.tag not in self._tries:
+            return
+        accepted = ended.ending is Ending.ACCEPTED
+        self._refusal = "" if accepted else result_text(ended.result)
+        wait_s = self._config.effect_timeout_s if accepted else self._config.retry_delay_s
+        self._next_s[ended.tag] = now_s + wait_s
+        if accepted and ended.tag == TARGET_TAG:
+            self._told = True
+        elif accepted and ended.tag == _DISARM_TAG:
+            self._motors_asked = False
+
+    def on_position(self, position: Position) -> None:
+        """See whether it has stopped."""
+        slow = math.hypot(*position.velocity_enu_m_s) <= self._config.arrival_speed_m_s
+        if self._told and self._guided_seen and slow:
+            self.done = True
+
+    def advance(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
+        """Tell the vehicle what is still to be told."""
+        if self.done or self.failure is not None:
+            return []
+        self.aloft = heartbeat.armed and vehicle.landed is not Landed.ON_GROUND
+        if not heartbeat.armed and not self._motors_asked:
+            self.done = True
+            return []
+        if not self.aloft:
+            return self._ask(_DISARM_TAG, self._flavour.disarm(), now_s)
+        if not self._flavour.is_commanded(heartbeat.custom_mode):
+            # The guided mode begins with a stop, which is given the time to be seen.
+            self._told = True
+            self._next_s[TARGET_TAG] = now_s + self._config.effect_timeout_s
+            return self._ask(_MODE_TAG, self._flavour.set_commanded_mode(), now_s)
+        self._guided_seen = True
+        position = vehicle.position
+        if position is None:
+            return []
+        if self._place is None:
+            self._place = (position.lat_deg, position.lon_deg, position.alt_m)
+        return self._ask(TARGET_TAG, self._flavour.reposition(*self._place, self._speed_m_s), now_s)
+
+    def _ask(self, tag: str, command: Command, now_s: float) -> list[Outbound]:
+        if self._commands.pending(tag) or now_s < self._next_s.get(tag, -math.inf):
+            return []
+        tries = self._tries.get(tag, 0)
+        if tries >= self._config.mode_tries:
+            why = f": {self._refusal}" if self._refusal else ""
+            self.failure = f"the vehicle was told to stop {tries} times and goes on{why}"
+            return []
+        self._tries[tag] = tries + 1
+        return [*self._commands.send(tag, command, now_s)]
