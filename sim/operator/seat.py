@@ -14,7 +14,7 @@ from enum import Enum
 
 from sim.status.onlooker import Onlooker
 from swarm.config import Timing
-from swarm.events import BusFact, Finish, Learned, Publish, Wish
+from swarm.events import Ask, BusFact, Finish, Learned, Publish, Wish
 from swarm.model.ids import FLEET, OPERATOR
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
@@ -83,16 +83,18 @@ class OperatorSeat:
         self._reason = reason
         self._voice = Voice(mission, OPERATOR, incarnation)
         self._announce_s = timing.announce_s
+        self._ask_s = timing.ask_s
         self._patience_s = patience_s
         self._leave_at_s = math.inf
         self._again_at_s = math.inf
+        """When to ask again; once the command is given, when to repeat it."""
         self._said: Message | None = None
         self._before: dict[str, Status] = {}
         """Newest status of each UAV when the command was given."""
 
     def start(self, now_s: float) -> list[Wish]:
         """Ask what there is to know."""
-        self._leave_at_s = now_s + self._patience_s
+        self._leave_at_s, self._again_at_s = now_s + self._patience_s, now_s + self._ask_s
         return self._onlooker.start(now_s)
 
     def step(self, fact: BusFact, now_s: float) -> list[Wish]:
@@ -100,12 +102,11 @@ class OperatorSeat:
         if self.verdict is not None:
             return []
         wishes = self._onlooker.step(fact, now_s)
-        brief = self._observer.replica.brief
-        if self._said is None and brief is not None and isinstance(fact, Learned):
+        brief, answered = self._observer.replica.brief, isinstance(fact, Learned) and fact.snapshots
+        if self._said is None and brief is not None and answered:
             self._speak(brief, now_s)
-        if self._said is not None and self._again_at_s <= now_s:
-            self._again_at_s = now_s + self._announce_s
-            wishes.append(Publish(self._said))
+        if self._again_at_s <= now_s:
+            wishes.append(self._repeat(now_s))
         if self.verdict is None:
             self.verdict = self._judge(late=self._leave_at_s <= now_s)
         if self.verdict is not None:
@@ -134,6 +135,14 @@ class OperatorSeat:
         brief = self._observer.replica.brief
         fleet = [] if brief is None else [str(uav.id) for uav in brief.uavs]
         return fleet if self._target == FLEET else [uav for uav in fleet if uav == self._target]
+
+    def _repeat(self, now_s: float) -> Wish:
+        """The command; before it is given, the question what is known, commands among it."""
+        if self._said is None:
+            self._again_at_s = now_s + self._ask_s
+            return Ask()
+        self._again_at_s = now_s + self._announce_s
+        return Publish(self._said)
 
     def _speak(self, brief: Brief, now_s: float) -> None:
         if self._target != FLEET and not self._concerned:
