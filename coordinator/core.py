@@ -281,6 +281,8 @@ class CoordinatorCore:
         self._in_charge = True
         self._answers, self._overheard, self._memory = [], [], None
         self._adopt(heritage, now_s)
+        if (abort := aborted(self.replica)) is not None:
+            self._actions.append(Note("this flight was aborted", {"reason": abort.reason}))
         if self.replica.brief is None:
             self._say(brief_of(self._mission, self._layers, self._speech.incarnation))
         self._post(now_s)

@@ -220,7 +220,10 @@ class OperatorSeat:
         """Why nothing was seen to come of it."""
         status, waited = self._observer.statuses.get(uav), f"within {self._patience_s:g} s"
         if uav not in self._observer.present:
-            return f"nobody flies {uav}, or it is cut off; whoever does will learn of it"
+            return (
+                f"nobody flies {uav}, or it is cut off; back again, it learns of it from those "
+                "who know"
+            )
         if status is None or status is self._before.get(uav):
             return f"{uav} has not been heard of {waited}"
         return f"{_told(uav, status)} still, {self._kind} was not obeyed {waited}"
