@@ -18,10 +18,10 @@ pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
 UAVS = ["uav1", "uav2", "uav3"]
 MISSION = Mission(
     "commanded",
-    2000.0,
+    9000.0,
     tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 5.0) for n, u in enumerate(UAVS)),
     tuple(
-        Task(TaskId(f"t{n}"), (20.0 * n, 60.0, 0.0), 1.0, service_s=120.0)
+        Task(TaskId(f"t{n}"), (20.0 * n, 60.0, 0.0), 1.0, service_s=900.0)
         for n in range(2 * len(UAVS))
     ),
     origin=Origin(46.8, 9.7, 1100.0),
@@ -50,7 +50,7 @@ def test_an_operator_commands_a_fleet_without_a_coordinator(tmp_path: Path) -> N
         by_hand = ByHand(tmp_path, stack, MISSION)
         coordinator = by_hand.coordinator("coordinator")
         for uav in UAVS:
-            by_hand.wait_for(uav, 'event="decided"')
+            by_hand.wait_for(uav, "event=decided")
         coordinator.kill()
         coordinator.wait()
 
@@ -62,7 +62,7 @@ def test_an_operator_commands_a_fleet_without_a_coordinator(tmp_path: Path) -> N
 
         resumed = swarm(by_hand, "resume", "uav1")
         assert (resumed.returncode, resumed.stderr) == (0, "")
-        by_hand.wait_for("uav1", 'command="resume"')
+        by_hand.wait_for("uav1", "command=resume")
 
         sent_home = swarm(by_hand, "return", "uav2")
         assert (sent_home.returncode, sent_home.stderr) == (0, "")
