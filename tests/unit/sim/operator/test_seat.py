@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from sim.operator.seat import OperatorSeat, Result
+from swarm.config import Timing
 from swarm.events import (
     Ask,
     BusFact,
@@ -29,11 +30,13 @@ from swarm.wire.messages import (
     Stamp,
     StatusPhase,
 )
-from tests.builders import IDLE, MISSION, OUT, TIMING, brief, message, status, uav
+from tests.builders import IDLE, MISSION, OUT, brief, message, status, uav
 
 HOLD, RESUME, RETURN, ABORT = CommandKind
 BRIEF = message(COORDINATOR, brief(uav("u0"), uav("u1")))
 PATIENCE_S = 10.0
+TIMING = Timing(silence_s=100.0)
+"""Nobody is given up for silence alone."""
 
 
 class Seat:
@@ -189,7 +192,8 @@ def test_when_nothing_comes_of_it_it_says_why(*, gone: bool, text: str) -> None:
         seat.happen(PeerGone("u0"))
     seat.wait(PATIENCE_S)
 
-    assert (seat.result, seat.text) == (Result.NOT_OBEYED, text)
+    assert seat.result is Result.NOT_OBEYED
+    assert seat.text.startswith(text)
 
 
 def test_who_goes_on_all_the_same_is_told() -> None:
