@@ -382,8 +382,7 @@ class AgentCore:
     @property
     def _minds_solitude(self) -> bool:
         """Whether there is a flight to break off for want of a bus."""
-        busy = self._stage in (StatusPhase.PREPARING, StatusPhase.HOLDING)
-        return busy and not self._finished
+        return self._stage in (StatusPhase.PREPARING, StatusPhase.HOLDING)
 
     # -- what the operator says -------------------------------------------------------
 
