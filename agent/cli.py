@@ -129,6 +129,18 @@ def agent(
             help="The same for the height above the origin, or below it.",
         ),
     ] = 1_000.0,
+    without_bus_s: Annotated[
+        float | None,
+        typer.Option(
+            "--without-bus-s",
+            min=0.1,
+            max=86400.0,
+            metavar="S",
+            help="Go home when the own link to the bus has been down for that long, in wall "
+            "seconds. Default: fly on with what is known.",
+            show_default=False,
+        ),
+    ] = None,
     state: StateOption = None,
     rejoin: Annotated[
         bool,
@@ -222,6 +234,7 @@ def agent(
                 None if memory is None else memory.snapshot,
                 0.0 if memory is None else memory.age_s,
                 rejoin=rejoin,
+                without_bus_s=None if without_bus_s is None else without_bus_s * speedup,
             )
             save = None if store is None else store.save
             try:
@@ -248,14 +261,15 @@ def agent(
 
 def _check_ids(mission: str, uav: str) -> None:
     from swarm.errors import Fault, InputError
-    from swarm.model.ids import COORDINATOR, ID_RULE, valid_id
+    from swarm.model.ids import ID_RULE, RESERVED, valid_id
 
     faults = [
         Fault(option, "", f"{text!r} is no id", f"give {ID_RULE}")
         for option, text in (("--mission", mission), ("--uav", uav))
         if not valid_id(text)
     ]
-    if uav == COORDINATOR:
-        faults.append(Fault("--uav", "", f"{uav!r} is the coordinator's name", "give a UAV's id"))
+    if uav in RESERVED:
+        problem = f"{uav!r} is the name of {RESERVED[uav]}"
+        faults.append(Fault("--uav", "", problem, "give a UAV's id"))
     if faults:
         raise InputError(*faults)

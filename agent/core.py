@@ -2,11 +2,12 @@
 
 The core owns one replica of the shared registers. It learns before it prepares its
 vehicle, or goes on where an earlier life stopped; it takes tasks while the vehicle is
-airborne in a running mission, and goes home when the mission has ended. Leaves out:
-tasks and claims (agent.tasking), when the mission is over (agent.ending), the mission
-as such (agent.picture), what it makes of the others (agent.peers), when it asks them
-(agent.learning) and repeats itself (agent.speech), what counts of an earlier life's
-memory (agent.recall), flying (agent.vehicle) and transport (agent.runner).
+airborne in a running mission, holds it when the operator says so, and goes home when the
+mission has ended. Leaves out: tasks and claims (agent.tasking), when the mission is over
+(agent.ending), the mission as such (agent.picture), what it makes of the others
+(agent.peers), when it asks them (agent.learning) and repeats itself (agent.speech), what
+counts of an earlier life's memory (agent.recall), which of the operator's commands are news
+(agent.obedience), flying (agent.vehicle) and transport (agent.runner).
 """
 
 from __future__ import annotations
@@ -16,15 +17,18 @@ from collections.abc import Iterable, Mapping
 from agent.ending import Ending
 from agent.events import Action, Event, Order
 from agent.hearing import Hearing
+from agent.obedience import Obedience
 from agent.peers import Peers
 from agent.picture import Picture
 from agent.recall import Recall
+from agent.solitude import Solitude
 from agent.speech import Speech
 from agent.tasking import Tasking
 from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    Hold,
     Home,
     NotReady,
     Prepare,
@@ -49,12 +53,16 @@ from swarm.events import (
     Tick,
 )
 from swarm.pulse import Pulse
+from swarm.state.commands import words
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
     Claim,
     ClaimPhase,
+    Command,
+    CommandKind,
     EpochPhase,
+    Fleet,
     Message,
     Snapshot,
     Status,
@@ -76,6 +84,8 @@ class AgentCore:
             is nothing.
         memory_age_s: how long ago that was kept.
         rejoin: take part again, although an earlier life left this flight of the mission.
+        without_bus_s: go home when the own link to the bus has been down for that long; None
+            to fly on.
     """
 
     def __init__(
@@ -88,6 +98,7 @@ class AgentCore:
         memory_age_s: float = 0.0,
         *,
         rejoin: bool = False,
+        without_bus_s: float | None = None,
     ) -> None:
         self.uav = uav
         self.replica = Replica()
@@ -107,10 +118,15 @@ class AgentCore:
         )
         self._learning = self._hearing.learning
         self._recall = Recall(uav, memory, memory_age_s, timing)
+        self._obedience = Obedience(uav, self.replica, rejoin=rejoin)
+        self._solitude = Solitude(without_bus_s)
         self._pulse = Pulse(timing.pause_s)
         self._actions: list[Action] = []
         self._stage = StatusPhase.LEARNING
         self._flew_before = False
+        """Whether the vehicle may be in the air though this life has not brought it there."""
+        self._homebound = False
+        """Whether it takes no further part, so that home is all that is left to fly to."""
         self._exit_status = 0
         self._finished = False
         self._kept: object = None
@@ -154,6 +170,7 @@ class AgentCore:
             self._ending.next_deadline_s() if self._knows_enough else None,
             self._learning.next_deadline_s(),
             self._recall.next_deadline_s() if self._is_beginning else None,
+            self._solitude.next_deadline_s() if self._minds_solitude else None,
         )
         return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
@@ -199,6 +216,7 @@ class AgentCore:
             case PeerGone(writer):
                 self._hearing.miss(writer, now_s)
             case LinkChanged(up):
+                self._solitude.link(up, now_s)
                 self._actions += self._hearing.link(up, now_s)
             case Stop(reason):
                 if self._stage is StatusPhase.LEARNING:
@@ -209,7 +227,8 @@ class AgentCore:
             case VehicleReady():
                 self._become_airborne(now_s)
             case NotReady(reason):
-                self._speech.note = reason
+                if self._stage is not StatusPhase.HOLDING:  # why it holds is worth more
+                    self._speech.note = reason
                 self._actions.append(Note("vehicle not ready", {"reason": reason}))
             case Arrived(leg):
                 self._tasking.arrive(leg, now_s)
@@ -249,6 +268,8 @@ class AgentCore:
             self._actions += self._tasking.refuse(order.leg, reason, now_s)
         elif isinstance(order, Prepare) and self._flew_before:
             self._go_home(reason, now_s, status=1)  # it may be in the air
+        elif isinstance(order, Hold) and self._stage is StatusPhase.HOLDING:
+            self._speech.note = f"cannot hold: {reason}"[:200]
         elif isinstance(order, Prepare | Return):
             self._leave_vehicle(reason, now_s, handed_over=False)
 
@@ -277,7 +298,10 @@ class AgentCore:
         if self._is_beginning:
             self._recollect(now_s)
         if self._knows_enough:
+            self._obey(now_s)
             self._go_home_if_over(now_s)
+        if self._minds_solitude and self._solitude.too_long(now_s):
+            self._go_home(f"without the bus for {self._solitude.patience_s:g} s", now_s)
         if self._is_beginning:
             self._begin(now_s)
         if self._tasking.phase is not None and self._picture.running:
@@ -330,12 +354,15 @@ class AgentCore:
                 self._speech.note = waits
                 self._actions.append(Note(waits, {"uav": self.uav}))
             return
-        self._enter(StatusPhase.PREPARING, "")
-        place_enu_m = self._picture.in_layer(me.position_enu_m)
-        self._actions.append(Order(Prepare(place_enu_m, me.speed_m_s, self._mission_runs)))
+        self._prepare(me)
         claim = self.replica.claims.get(self.uav)
         if claim is not None and self._picture.running:
             self._actions += self._tasking.resume(claim, now_s)
+
+    def _prepare(self, me: Fleet) -> None:
+        self._enter(StatusPhase.PREPARING, "")
+        place_enu_m = self._picture.in_layer(me.position_enu_m)
+        self._actions.append(Order(Prepare(place_enu_m, me.speed_m_s, self._mission_runs)))
 
     @property
     def _mission_runs(self) -> bool:
@@ -344,11 +371,61 @@ class AgentCore:
         return epoch is not None and epoch.phase is EpochPhase.RUNNING
 
     def _go_home_if_over(self, now_s: float) -> None:
-        if self.phase is StatusPhase.RETURNING:
+        waits = self._stage is StatusPhase.HOLDING and self._homebound
+        if waits or self._stage is StatusPhase.RETURNING:
             return
         reason = self._ending.reason(self.phase, now_s, undecided=self._tasking.undecided)
-        if reason is not None:
+        if reason is not None and self._stage is StatusPhase.HOLDING:
+            self._take_no_further_part(now_s)  # and stays where the operator wants it
+        elif reason is not None:
             self._go_home(reason, now_s)
+
+    @property
+    def _minds_solitude(self) -> bool:
+        """Whether there is a flight to break off for want of a bus."""
+        return self._stage in (StatusPhase.PREPARING, StatusPhase.HOLDING)
+
+    # -- what the operator says -------------------------------------------------------
+
+    def _obey(self, now_s: float) -> None:
+        """Do what the operator has said since; an abort ends the mission besides.
+
+        A vehicle that has been given up is another's to command.
+        """
+        command = self._obedience.news(begins=self._stage is StatusPhase.LEARNING)
+        if command is None:
+            return
+        fields: dict[str, object] = {"command": command.kind.value, "reason": command.reason}
+        self._actions.append(Note("told by the operator", fields))
+        if self._stage is StatusPhase.OUT:
+            return
+        match command.kind:
+            case CommandKind.HOLD:
+                self._hold(command, now_s)
+            case CommandKind.RESUME if self._stage is StatusPhase.HOLDING:
+                self._resume(command, now_s)
+            case CommandKind.RETURN | CommandKind.ABORT:
+                self._go_home(words(command), now_s)
+            case _:
+                pass
+
+    def _hold(self, command: Command, now_s: float) -> None:
+        """Stop the vehicle, or leave it on the ground where nobody has begun to prepare it."""
+        self._flew_before |= self._tasking.airborne
+        untouched = self._stage is StatusPhase.LEARNING and not self._flew_before
+        if not self._homebound:
+            self._actions += self._tasking.pause(now_s)
+        self._enter(StatusPhase.HOLDING, words(command))
+        if not untouched:
+            self._actions.append(Order(Hold(words(command))))
+
+    def _resume(self, command: Command, now_s: float) -> None:
+        """Take part again, as far as there is anything to take part in."""
+        me = self._picture.me
+        if self._homebound or me is None:
+            self._go_home(words(command), now_s)
+        else:
+            self._prepare(me)
 
     # -- pieces ---------------------------------------------------------------------
 
@@ -362,12 +439,17 @@ class AgentCore:
             # The vehicle is not ours to command any more.
             self._finish(0, now_s)
         elif self.phase is not StatusPhase.RETURNING:
-            self._actions += self._tasking.end(now_s, handed_over=False)
-            self._ending.settle()
-            self._exit_status = status
+            self._take_no_further_part(now_s)
+            self._exit_status = max(self._exit_status, status)
             self._enter(StatusPhase.RETURNING, reason)
             order = Return(reason, resume=self._flew_before)
             self._actions += [Note("returning", {"reason": reason}), Order(order)]
+
+    def _take_no_further_part(self, now_s: float) -> None:
+        if not self._homebound:
+            self._homebound = True
+            self._actions += self._tasking.end(now_s, handed_over=False)
+            self._ending.settle()
 
     def _finish(self, status: int, now_s: float) -> None:
         self._actions += [self._speech.say(self._status(now_s)), Finish(status)]
@@ -396,9 +478,10 @@ class AgentCore:
         return actions
 
     def _worth_keeping(self, actions: list[Action]) -> bool:
-        """Whether this agent has spoken, or the coordinator has said something new."""
+        """Whether this agent has spoken, or coordinator or operator has said something new."""
         epoch = self.replica.epoch
         plan = None if epoch is None else (epoch.number, epoch.phase)
-        before, self._kept = self._kept, (plan, self.replica.board_version)
+        commands = tuple(self.replica.commands.values())
+        before, self._kept = self._kept, (plan, self.replica.board_version, commands)
         said = [action.message.body for action in actions if isinstance(action, Publish)]
         return before != self._kept or not all(isinstance(body, Status) for body in said)

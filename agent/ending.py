@@ -1,4 +1,4 @@
-"""When the mission is over for one UAV: by the coordinator's word, or without one.
+"""When the mission is over for one UAV: by the operator's or coordinator's word, or without one.
 
 An agent that the coordinator left flies on while there is anything to do, then goes
 home by itself. Leaves out: how it goes home (agent.core).
@@ -10,6 +10,7 @@ from agent.peers import Peers
 from agent.picture import Picture
 from swarm.config import Timing
 from swarm.model.ids import COORDINATOR
+from swarm.state.commands import aborted, words
 from swarm.state.registers import Replica
 from swarm.wire.messages import EpochPhase, StatusPhase
 
@@ -41,6 +42,8 @@ class Ending:
             now_s: now.
             undecided: whether, being idle, it may yet find a task.
         """
+        if (abort := aborted(self._replica)) is not None:
+            return words(abort)
         epoch = self._replica.epoch
         if epoch is not None and epoch.phase is EpochPhase.ENDED:
             return epoch.reason

@@ -2,8 +2,8 @@
 
 Publishes ``uav/<id>/claim``, ``…/outcome/<task>`` and ``…/status``, holds
 ``alive/<id>`` and answers on ``state/<id>``; subscribes to ``brief``, ``plan``,
-``board/*``, ``uav/*/claim`` and ``uav/*/outcome/*`` and watches ``alive/*``. Leaves
-out: every decision (agent.core) and flying (agent.mavlink).
+``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and ``operator/*`` and watches
+``alive/*``. Leaves out: every decision (agent.core) and flying (agent.mavlink).
 """
 
 from __future__ import annotations

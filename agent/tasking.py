@@ -115,11 +115,15 @@ class Tasking:
             now_s: now.
             handed_over: because somebody else has its vehicle.
         """
-        mission_s = self._picture.mission_s(now_s)
-        self._become_free(mission_s)
-        self.phase, self.airborne = None, False
-        out = Claim(ClaimPhase.OUT, None, mission_s, 0, mission_s, handed_over)
-        return [self._speech.say(out)]
+        return [self._withdraw(ClaimPhase.OUT, now_s, handed_over=handed_over)]
+
+    def pause(self, now_s: float) -> list[Action]:
+        """The UAV gives its task up, and takes none before it `begin`s anew."""
+        task = self._task()
+        said = self._withdraw(ClaimPhase.PAUSED, now_s, handed_over=False)
+        if task is None:
+            return [said]
+        return [said, Note("released", {"task": task.task, "reason": "the operator holds the UAV"})]
 
     def wake(self, now_s: float) -> None:
         """Decide anew when free; who found nothing before takes no precedence from that."""
@@ -306,6 +310,12 @@ class Tasking:
         return [] if claim is None or claim.phase is ClaimPhase.IDLE else [self._say_idle()]
 
     # -- pieces ---------------------------------------------------------------------
+
+    def _withdraw(self, phase: ClaimPhase, now_s: float, *, handed_over: bool) -> Action:
+        mission_s = self._picture.mission_s(now_s)
+        self._become_free(mission_s)
+        self.phase, self.airborne = None, False
+        return self._speech.say(Claim(phase, None, mission_s, 0, mission_s, handed_over))
 
     def _task(self) -> Board | None:
         claim = self.claim

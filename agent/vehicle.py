@@ -122,7 +122,11 @@ class HandedOver:
 
 @dataclass(frozen=True, slots=True)
 class ReturnAdvised:
-    """The vehicle obeys, but should go home now: its battery is low, or it left its fence."""
+    """The vehicle is in the air and obeys, but should go home now.
+
+    Its battery is low, it left its fence, its autopilot is alarmed, or it could not be
+    prepared to the end.
+    """
 
     reason: str
 

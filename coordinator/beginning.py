@@ -23,7 +23,7 @@ class Verdict(Enum):
     """Whether a mission may begin."""
 
     WAIT = "the plan is not made, or somebody may yet get airborne"
-    START = "everybody is airborne or given up, and planned for"
+    START = "everybody is airborne, held by the operator or given up, and planned for"
     NOBODY = "everybody is given up"
 
 
@@ -91,10 +91,12 @@ class Beginning:
         phases = {uav: self._phase_of(uav) for uav in uavs}
         ready = tuple(uav for uav in uavs if phases[uav] is ClaimPhase.IDLE)
         out = [uav for uav in uavs if phases[uav] is ClaimPhase.OUT]
-        if len(ready) + len(out) < len(uavs) and self._start_by_s is not None:
+        paused = [uav for uav in uavs if phases[uav] is ClaimPhase.PAUSED]
+        settled = len(ready) + len(out) + len(paused)
+        if settled < len(uavs) and self._start_by_s is not None:
             return Verdict.WAIT, []
-        if not ready:
-            return Verdict.NOBODY, []
+        if not ready:  # whom the operator has stopped may yet be told to go on
+            return Verdict.WAIT if paused else Verdict.NOBODY, []
         if self._planned_for != ready:
             # Somebody is missing: the sequence must be one of those who fly.
             missing = sorted(set(uavs) - set(ready))

@@ -3,8 +3,8 @@
 It learns before it says anything. Where a mission runs it takes charge of that; else it
 briefs the fleet, plans while the vehicles get ready, and starts the mission when all are
 airborne (or given up). It posts pop-ups when their time comes, and ends the mission when
-nothing is left that anybody could do; where that is worth more it publishes another epoch
-meanwhile. The fleet needs it for none of its own decisions.
+nothing is left that anybody could do, or the operator aborts it; where that is worth more
+it publishes another epoch meanwhile. The fleet needs it for none of its own decisions.
 Leaves out: what it finds of a mission (coordinator.heritage), who keeps the seat when two
 sit on it (coordinator.seat), how a mission begins (coordinator.beginning) and when it is
 over (coordinator.ending), the board (coordinator.postings), when it plans anew
@@ -45,6 +45,7 @@ from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
 from swarm.pulse import Pulse
 from swarm.state.board import TaskBoard
+from swarm.state.commands import aborted, words
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
@@ -280,6 +281,8 @@ class CoordinatorCore:
         self._in_charge = True
         self._answers, self._overheard, self._memory = [], [], None
         self._adopt(heritage, now_s)
+        if (abort := aborted(self.replica)) is not None:
+            self._actions.append(Note("this flight was aborted", {"reason": abort.reason}))
         if self.replica.brief is None:
             self._say(brief_of(self._mission, self._layers, self._speech.incarnation))
         self._post(now_s)
@@ -371,6 +374,9 @@ class CoordinatorCore:
             self._inquiry.want(now_s)  # others may have heard its last words
         if self._inquiry.unsure or not self._in_charge:
             return
+        abort = aborted(self.replica)
+        if abort is not None and not self._ended:
+            self._end(words(abort), now_s)
         if self._ended:
             self._leave_when_empty(now_s)
         else:
@@ -468,7 +474,8 @@ class CoordinatorCore:
         if not self._finished and self._inquiry.due(now_s):
             self._actions.append(Ask())
         epoch = self.replica.epoch
-        state = self.replica.task_version, epoch and (epoch.number, epoch.phase)
+        commands = tuple(self.replica.commands.values())
+        state = self.replica.task_version, epoch and (epoch.number, epoch.phase), commands
         if self._in_charge and state != self._saved:
             self._saved = state
             self._actions.append(Save())

@@ -2,8 +2,9 @@
 
 Publishes ``brief``, ``plan`` and ``board/<task>``, holds ``alive/coordinator`` and
 answers on ``state/coordinator``; while it stands by, none of that. Subscribes to
-``brief``, ``plan``, ``board/*``, ``uav/*/claim`` and ``uav/*/outcome/*`` and watches
-``alive/*``. Leaves out: every decision (coordinator.core, coordinator.standby).
+``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and
+``operator/*`` and watches ``alive/*``. Leaves out: every decision (coordinator.core,
+coordinator.standby).
 """
 
 from __future__ import annotations

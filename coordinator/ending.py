@@ -72,7 +72,10 @@ class Ending:
         taking_part = {u for u in fleet if u in claims and claims[u].phase is not ClaimPhase.OUT}
         here = taking_part & self._membership.present
         if doable(self._board, here) or (more_to_come and here):
-            idle = all(claims[uav].phase is ClaimPhase.IDLE for uav in here)
+            paused = {uav for uav in here if claims[uav].phase is ClaimPhase.PAUSED}
+            if doable(self._board, paused) or (more_to_come and paused):
+                return None, 0.0  # the operator has stopped whom it may take: it is for them to say
+            idle = all(claims[uav].phase is ClaimPhase.IDLE for uav in here - paused)
             # Every UAV may refuse a task for reasons of its own, such as a geofence.
             return (NOBODY_WILL if idle and not more_to_come else None), self._timing.stalemate_s
         if TaskState.OPEN not in self._board.states.values() and not more_to_come:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from statistics import median_high
 
 from swarm.model.ids import COORDINATOR
+from swarm.state.commands import aborted
 from swarm.state.registers import Replica
 from swarm.wire.messages import EpochPhase, Message, Snapshot
 
@@ -42,7 +43,8 @@ def inherit(
 
     The living go first. The own memory adds to what they know of the same flight; where
     they know of none it counts only while it is young, and if it is of a mission that
-    had ended only while somebody still takes part.
+    had ended of itself only while somebody still takes part. One that was aborted is not
+    begun anew by a process that merely starts again.
 
     Args:
         snapshots: what the others answered.
@@ -75,6 +77,7 @@ def _counts(
     remembered.join_all(memory.messages)
     if living.brief is not None:
         return remembered.brief is not None and remembered.brief.run == living.brief.run
-    ended = remembered.epoch is not None and remembered.epoch.phase is EpochPhase.ENDED
+    over = remembered.epoch is not None and remembered.epoch.phase is EpochPhase.ENDED
+    ended = over and aborted(remembered) is None
     somebody_flies = any(snapshot.writer in living.claims for snapshot in snapshots)
     return living.epoch is None and is_young and (somebody_flies or not ended)

@@ -21,12 +21,15 @@ from swarm.model.ids import COORDINATOR
 from swarm.pulse import Pulse
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.claims import holders
+from swarm.state.commands import in_force
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.wire.messages import (
     Board,
     Claim,
     ClaimPhase,
+    Command,
+    CommandKind,
     Epoch,
     EpochPhase,
     Message,
@@ -37,6 +40,13 @@ from swarm.wire.messages import (
 )
 
 __all__ = ["Happening", "MissionResult", "Observer"]
+
+_COMMANDED = {
+    CommandKind.HOLD: "operator holds {}",
+    CommandKind.RESUME: "operator lets {} go on",
+    CommandKind.RETURN: "operator sends {} home",
+    CommandKind.ABORT: "operator aborts the mission",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +279,8 @@ class Observer:
                 self._hear_claim(message.writer, claim, before, now_s)
             case Outcome() as outcome:
                 self._hear_outcome(message.writer, outcome, earlier, now_s)
+            case Command() as command:
+                self._hear_command(command, now_s)
             case _:
                 pass
 
@@ -348,6 +360,12 @@ class Observer:
         former = self._orphans.pop(claim.task, uav)
         if former != uav:
             self._tell(f"{uav} took over {claim.task} from {former}", now_s)
+
+    def _hear_command(self, command: Command, now_s: float) -> None:
+        if in_force(self.replica).get(command.target) != command:
+            return  # of an earlier flight
+        why = f": {command.reason}" if command.reason else ""
+        self._tell(_COMMANDED[command.kind].format(command.target) + why, now_s)
 
     def _lose(self, writer: str, now_s: float) -> bool:
         """Tell of a loss; whether others may have heard last words."""

@@ -1,8 +1,9 @@
 """How simulated vehicles move: straight legs at constant speed, in closed form.
 
 Positions are functions of time, not sums of steps, so they carry no integration
-error and may be asked for in any order. Leaves out: acceleration limits, wind and
-attitude; a model that has them takes `IdealMotion`'s place behind `Motion`.
+error and may be asked for in any order. Leaves out: acceleration limits
+(`sim.smooth_motion`) and wind (`sim.wind`), which stand behind `Motion` in `IdealMotion`'s
+place, and attitude.
 """
 
 from __future__ import annotations

@@ -28,13 +28,14 @@ from coordinator.planner.live import NewPlan, replan
 from coordinator.standby import StandbyCore
 from sim.event_queue import EventQueue
 from sim.network import IdealNetwork, Network
+from sim.operator.seat import OperatorSeat
 from sim.processes import LocalClock, Process
 from sim.virtual_vehicle import VirtualVehicle
 from swarm.config import Timing
 from swarm.events import Ask, Finish, Note, Publish, Save, Tick
 from swarm.model import Mission, Plan, UavId
-from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
+from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
+from swarm.wire.messages import CommandKind, Epoch, EpochPhase, Message, Snapshot
 
 __all__ = [
     "ONLOOKER",
@@ -55,6 +56,8 @@ ONLOOKER = "onlooker"
 """Name of the process that only watches."""
 STANDBY = "standby"
 """Name of the process that takes the coordinator's place when it is lost."""
+OPERATOR_PATIENCE_S = 60.0
+"""How long an operator repeats a command that is not seen to take effect."""
 WRITE_S = 0.02
 """Until what a process wants kept is on its disk."""
 
@@ -144,6 +147,8 @@ class Setting:
     """How long planning takes [s]."""
     telemetry_gap_s: float = 0.0
     """Shortest interval at which vehicles tell where they are [s]."""
+    without_bus_s: float | None = None
+    """Agents without their link for that long go home [s]; None: they fly on."""
 
 
 class World:
@@ -200,6 +205,8 @@ class World:
         self._clocks = {name: self._setting.clocks.get(name, LocalClock()) for name in names}
         self.processes = {name: self._process(name, 1_000_000) for name in names}
         """The latest life of every process, by name."""
+        self.operators: list[OperatorSeat] = []
+        """Every command given so far, and what has come of it."""
         self._vehicles = {str(uav.id): self._vehicle(uav.id) for uav in mission.uavs}
         self._commanders: dict[str, Process] = {}
 
@@ -264,6 +271,28 @@ class World:
                     core._say(replace(entry, withdrawn=True))  # noqa: SLF001
                     process.step(Tick())
 
+    def command(self, kind: CommandKind, uav: str = FLEET, reason: str = "") -> OperatorSeat:
+        """Let an operator take a seat and give a command; gives that seat.
+
+        They leave it once the command has been seen to take effect, or `OPERATOR_PATIENCE_S`
+        after they gave it.
+        """
+        seat = OperatorSeat(
+            self.mission.name,
+            uav,
+            kind,
+            reason,
+            incarnation=1_000_000 + round(1e3 * self.queue.now_s()),
+            timing=self._timing,
+            patience_s=OPERATOR_PATIENCE_S,
+        )
+        self.operators.append(seat)
+        name = f"{OPERATOR}-{len(self.operators)}"
+        process = Process(name, None, seat, self.queue, self, clock=LocalClock())
+        self.network.join(process)
+        process.start()
+        return seat
+
     def skew(self, name: str, by_s: float) -> None:
         """Let the clock of a process jump forward."""
         self._clocks[name].offset_s += by_s
@@ -298,7 +327,7 @@ class World:
                 self._end(process)
                 if process.name == STANDBY and process.core.stood_down is not None:  # type: ignore[attr-defined]  # a StandbyCore
                     self._stand_by_again(process)
-                else:
+                elif process.name in self.processes:
                     self.finished[process.name] = status
             case Note() if self._watch is not None:
                 self._watch.noted(process, action)
@@ -395,6 +424,7 @@ class World:
             self._timing,
             memory=known,
             memory_age_s=age_s,
+            without_bus_s=self._setting.without_bus_s,
         )
         return new(
             name,

@@ -9,7 +9,8 @@ Names: `ScenarioArgument` (a `pathlib.Path`; give it to
 `swarm.scenario.load_scenario`), `JsonOption` (bool), `SeedOption` (int),
 `TimeLimitOption` (float or None), `LogLevelOption` and `LogFormatOption` (for
 `swarm.log.configure_logging`; defaults `LogLevel.INFO`, `LogFormat.AUTO`), the
-hidden `LifelineOption` (bool), `SpeedupOption` and `MissionOption`; `BusOption`,
+hidden `LifelineOption` (bool), `SpeedupOption`, `MissionOption` and, for those that can find
+the mission, `SomeMissionOption` (str or None); `BusOption`,
 `ListenOption` and `ConnectOption` (for `swarm.bus.config.bus_config`); `LinkOption` and
 `LeaseOption` (for `swarm.config.preset`; defaults `Link.NORMAL` and None); `StateOption`
 (a folder or None, for `swarm.store.Store`).
@@ -40,6 +41,7 @@ __all__ = [
     "MissionOption",
     "ScenarioArgument",
     "SeedOption",
+    "SomeMissionOption",
     "SpeedupOption",
     "StateOption",
     "TimeLimitOption",
@@ -125,6 +127,16 @@ SpeedupOption = Annotated[
 MissionOption = Annotated[
     str,
     typer.Option("--mission", metavar="NAME", help="Name of the mission: its scenario's name."),
+]
+
+SomeMissionOption = Annotated[
+    str | None,
+    typer.Option(
+        "--mission",
+        metavar="NAME",
+        help="Name of the mission. Default: the only one on the bus.",
+        show_default=False,
+    ),
 ]
 
 BusOption = Annotated[

@@ -287,8 +287,8 @@ def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:
 def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None:
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
-    Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim`` and
-    ``uav/*/outcome/*``, watches ``alive/*``.
+    Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``
+    and ``operator/*``, watches ``alive/*``.
 
     Args:
         bus: an open bus.
@@ -304,6 +304,7 @@ def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None
         keys.board("*"),
         keys.claim("*"),
         keys.outcome("*", "*"),
+        keys.operator("*"),
     ):
         bus.subscribe(key_expr)
     if status:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from agent.mavlink.bridge import Bridge
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import Event, LinkUp, Received, Send, Tick
@@ -23,6 +25,20 @@ Spoil = Callable[[bytes], list[bytes]]
 
 def untouched(data: bytes) -> list[bytes]:
     return [data]
+
+
+def rough_link(seed: int) -> Spoil:
+    """Loses a fifth of all messages and doubles a tenth, but for heartbeats.
+
+    Five heartbeats lost in a row would be silence, which is another test's affair.
+    """
+    chance = np.random.default_rng(seed)
+
+    def spoil(data: bytes) -> list[bytes]:
+        heartbeat = data[7:10] == bytes(3)
+        return [data] * (1 if heartbeat else int(chance.choice([0, 1, 2], p=[0.2, 0.7, 0.1])))
+
+    return spoil
 
 
 class BridgeFlight:

@@ -146,7 +146,7 @@ class BridgeWatch:
         if isinstance(event, Prepare | GoTo | Hold | Return):
             self._note(event)
         actions = self.bridge.step(event, now_s)
-        self.fake = _FAKES.get(type(self.bridge._flavour), self.fake)
+        self.fake = _FAKES.get(type(self.bridge._seat.flavour), self.fake)
         after = self.bridge.phase
         for action in actions:
             if isinstance(action, Send):

@@ -123,6 +123,7 @@ def held(name: str, decided_s: float, rank: int = 0, completion_s: float = 1000.
 
 IDLE = Claim(ClaimPhase.IDLE, None, 0.0, 0, 0.0)
 OUT = Claim(ClaimPhase.OUT, None, 0.0, 0, 0.0)
+PAUSED = Claim(ClaimPhase.PAUSED, None, 0.0, 0, 0.0)
 
 
 def done(name: str, completed_s: float = 1.0, attempt: int = 1) -> Outcome:

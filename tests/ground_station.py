@@ -9,7 +9,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import Connected, Event, Received, Tick
+from sim.autopilot.faults import VehicleFault
+from sim.autopilot.faulty_vehicle import FaultyVehicle
 from sim.autopilot.flavours.ardupilot import ArduCopter
+from sim.autopilot.flavours.base import Flavour
 from sim.autopilot.vehicle import Vehicle
 from swarm.model.frames import wgs84_from_enu
 
@@ -20,8 +23,15 @@ ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 class GroundStation:
     """Speaks to a vehicle in frames, as a link would carry them, and keeps what it says."""
 
-    def __init__(self, vehicle: Vehicle, channel: int = 0, now_s: float = 0.0) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        channel: int = 0,
+        now_s: float = 0.0,
+        faults: tuple[VehicleFault, ...] = (),
+    ) -> None:
         self.vehicle = vehicle
+        self._machine = FaultyVehicle(vehicle, faults, now_s) if faults else vehicle
         self.now_s = now_s
         self.heard: list[Any] = []
         """Messages of the vehicle on this channel, oldest first."""
@@ -36,9 +46,9 @@ class GroundStation:
     def step(self, event: Event) -> list[Any]:
         """Let the vehicle take a step now; what it says on this channel."""
         said: list[Any] = []
-        for send in self.vehicle.step(event, self.now_s):
+        for send in self._machine.step(event, self.now_s):
             if send.channel in (None, self._channel):
-                frame = self._to_vehicle.encode(send.message)
+                frame = self._to_vehicle.encode(send.message, send.system_id)
                 said += self._to_ground.decode(frame)
         self.heard += said
         self.heard_s += [self.now_s] * len(said)
@@ -53,7 +63,7 @@ class GroundStation:
         """Let time pass, calling the vehicle when it asks for it."""
         end_s = self.now_s + duration_s
         said: list[Any] = []
-        while (deadline_s := self.vehicle.next_deadline_s()) <= end_s:
+        while (deadline_s := self._machine.next_deadline_s()) <= end_s:
             self.now_s = max(self.now_s, deadline_s)
             said += self.step(Tick())
         self.now_s = end_s
@@ -63,7 +73,7 @@ class GroundStation:
         """Send a COMMAND_LONG; the result in its acknowledgement."""
         filled = [*params, *[0.0] * (7 - len(params))]
         answer = self.send(mavlink.MAVLink_command_long_message(1, 1, command, 0, *filled))
-        return the(answer, "COMMAND_ACK").result  # type: ignore[no-any-return]  # generated code
+        return the_result(answer)
 
     def command_int(
         self, command: int, frame: int, x: int, y: int, z: float, *params: float
@@ -73,11 +83,11 @@ class GroundStation:
         answer = self.send(
             mavlink.MAVLink_command_int_message(1, 1, frame, command, 0, 0, *filled, x, y, z)
         )
-        return the(answer, "COMMAND_ACK").result  # type: ignore[no-any-return]  # generated code
+        return the_result(answer)
 
-    def set_mode(self, custom_mode: int) -> int:
+    def set_mode(self, custom_mode: int, sub_mode: int = 0) -> int:
         """Ask for a mode."""
-        return self.command(mavlink.MAV_CMD_DO_SET_MODE, 1, custom_mode)
+        return self.command(mavlink.MAV_CMD_DO_SET_MODE, 1, custom_mode, sub_mode)
 
     def arm(self) -> int:
         """Ask for the motors."""
@@ -116,7 +126,8 @@ class GroundStation:
         """Upload a mission the vehicle asks for item by item; the type of its MISSION_ACK."""
         answer = self.send(mavlink.MAVLink_mission_count_message(1, 1, len(items)))
         while not (acks := only(answer, "MISSION_ACK")):
-            answer = self.send(items[the(answer, "MISSION_REQUEST").seq])
+            [request] = only(answer, "MISSION_REQUEST") + only(answer, "MISSION_REQUEST_INT")
+            answer = self.send(items[request.seq])
         return acks[0].type  # type: ignore[no-any-return]  # generated code
 
     def item(
@@ -146,12 +157,10 @@ class GroundStation:
         return [message.text for message in only(self.heard, "STATUSTEXT")]
 
 
-def ground_station(**config: Any) -> GroundStation:
-    """A ground station connected to a vehicle that has just been powered up."""
-    vehicle = Vehicle(
-        VehicleConfig(**{"system_id": 1, "spool_up_s": 0.0, **config}), ArduCopter(), 0.0
-    )
-    return GroundStation(vehicle)
+def ground_station(flavour: Flavour | None = None, **config: Any) -> GroundStation:
+    """A ground station connected to a vehicle (ArduCopter) that has just been powered up."""
+    settings = VehicleConfig(**{"system_id": 1, "spool_up_s": 0.0, **config})
+    return GroundStation(Vehicle(settings, flavour or ArduCopter(), 0.0))
 
 
 def only(messages: list[Any], name: str) -> list[Any]:
@@ -163,3 +172,9 @@ def the(messages: list[Any], name: str) -> Any:
     """The one message of that name."""
     [message] = only(messages, name)
     return message
+
+
+def the_result(messages: list[Any]) -> int:
+    """The result in the acknowledgement, which may come more than once."""
+    [result] = {message.result for message in only(messages, "COMMAND_ACK")}
+    return int(result)

@@ -50,11 +50,19 @@ class LoneAgent:
         memory: Snapshot | None = None,
         memory_age_s: float = 0.0,
         rejoin: bool = False,
+        without_bus_s: float | None = None,
     ) -> None:
         self.uavs = uavs
         self.me = uavs[0].id
         self.core = AgentCore(
-            MISSION, self.me, incarnation, timing, memory, memory_age_s, rejoin=rejoin
+            MISSION,
+            self.me,
+            incarnation,
+            timing,
+            memory,
+            memory_age_s,
+            rejoin=rejoin,
+            without_bus_s=without_bus_s,
         )
         self.timing = timing
         self.now_s = now_s

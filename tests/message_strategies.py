@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.wire.messages import (
     MAX_COUNT,
     Board,
     Brief,
     Claim,
     ClaimPhase,
+    Command,
+    CommandKind,
     Epoch,
     EpochPhase,
     Fleet,
@@ -79,7 +81,7 @@ claims = st.one_of(
     ),
     st.builds(
         Claim,
-        st.sampled_from([ClaimPhase.IDLE, ClaimPhase.OUT]),
+        st.sampled_from([ClaimPhase.IDLE, ClaimPhase.PAUSED, ClaimPhase.OUT]),
         st.none(),
         numbers,
         counts,
@@ -98,6 +100,16 @@ statuses = st.builds(
     st.dictionaries(st.sampled_from(["malformed", "stale", "too many"]), counts),
     notes,
 )
+commands = st.one_of(
+    st.builds(
+        Command,
+        uav_ids,
+        st.sampled_from([CommandKind.HOLD, CommandKind.RESUME, CommandKind.RETURN]),
+        counts,
+        notes,
+    ),
+    st.builds(Command, st.just(FLEET), st.just(CommandKind.ABORT), counts, notes),
+)
 by_coordinator = briefs | epochs | boards
 by_uav = claims | outcomes | statuses
 
@@ -110,4 +122,5 @@ def messages(
     return st.one_of(
         st.builds(Message, st.just(MISSION), st.just(COORDINATOR), stamped, by_coordinator),
         st.builds(Message, st.just(MISSION), uav_ids, stamped, said),
+        st.builds(Message, st.just(MISSION), st.just(OPERATOR), stamped, commands),
     )

@@ -5,83 +5,40 @@ brings it home. It commands no other vehicle, does not fight a pilot and trusts 
 sees over what was acknowledged. Leaves out: transports (agent.mavlink.link), waiting
 (agent.mavlink.vehicle) and what to fly to (agent.core).
 
-Targets are told one by one or stand on the vehicle as missions (`CommandStyle`); the way
-of telling is the leg's, and what the vehicle may do by itself meanwhile is asked of
-`StandingMission`.
-
 The vehicle is *handed over* when a pilot or a failsafe changes its mode, when it
-disarms or reboots in flight, or when it falls silent. From then on nothing is commanded
-until a new `Prepare`, or a `Return` that finds it still in the guided mode.
+disarms, reboots, ends its flight or loses its position, or when it falls silent. From
+then on nothing is commanded until a new `Prepare`, or a `Return` that finds it still in
+the mode that takes our targets. One that obeys and is in trouble is *advised to return*.
 """
 
 from __future__ import annotations
 
 import math
-from enum import Enum
 
 from agent.mavlink.authority import intervention
 from agent.mavlink.codec import MavlinkCodec
-from agent.mavlink.commands import CommandEnded, Commands
-from agent.mavlink.config import BridgeConfig, CommandStyle
+from agent.mavlink.commands import CommandEnded
+from agent.mavlink.config import BridgeConfig
 from agent.mavlink.contact import Contact
-from agent.mavlink.events import Action, Event, LinkDown, LinkUp, Received, Send, Tick
-from agent.mavlink.flavours import Flavour, flavour_of
-from agent.mavlink.guards import Guards
-from agent.mavlink.holding import Holding
-from agent.mavlink.leg import Leg, RepositionLeg
+from agent.mavlink.duty import Duty, Phase
+from agent.mavlink.events import Action, Event, LinkDown, LinkUp, Received, Tick
+from agent.mavlink.flavours import flavour_of
 from agent.mavlink.messages import (
     CommandAck,
     GroundHeartbeat,
     Heard,
     Heartbeat,
-    Inbound,
-    Landed,
-    Outbound,
     Position,
 )
-from agent.mavlink.mission_leg import MissionLeg
-from agent.mavlink.preparation import Preparation
-from agent.mavlink.returning import Returning
+from agent.mavlink.seat import Seat
 from agent.mavlink.signing import Signing
-from agent.mavlink.standing_mission import StandingMission
-from agent.mavlink.state import PositionNews, VehicleState
+from agent.mavlink.state import PositionNews
 from agent.mavlink.streams import Streams
-from agent.vehicle import (
-    Arrived,
-    GoTo,
-    HandedOver,
-    Hold,
-    Home,
-    NotReady,
-    Orders,
-    Prepare,
-    Refused,
-    Return,
-    ReturnAdvised,
-    Telemetry,
-    VehicleReady,
-)
-from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
+from agent.vehicle import GoTo, Hold, Prepare, Return, ReturnAdvised, Telemetry
+from swarm.model.frames import enu_from_wgs84
 from swarm.pulse import Pulse
 
 __all__ = ["Bridge", "Phase"]
-
-_POLL_S = 0.25
-"""While something is waited for, look that often even if nothing is heard."""
-_UNHEARD_TIMEOUTS = 3.0
-"""A vehicle that may be in the air has that many silence timeouts to be heard at all."""
-
-
-class Phase(Enum):
-    """What the bridge is doing."""
-
-    IDLE = "idle"
-    PREPARING = "preparing"
-    HOVERING = "hovering"
-    FLYING = "flying"
-    HOLDING = "being stopped"
-    RETURNING = "returning"
-    HANDED_OVER = "handed over"
 
 
 class Bridge:
@@ -89,180 +46,143 @@ class Bridge:
 
     def __init__(self, config: BridgeConfig, signing: Signing | None = None) -> None:
         self.config = config
-        self.phase = Phase.IDLE
-        self.contact = Contact(config.system_id)
         self.stale_positions = 0
         """Positions dropped because they were late or doubled."""
         self.strange_heartbeats = 0
         """Heartbeats dropped in flight: another kind of vehicle, under the same ids."""
-        self.codec = MavlinkCodec(
-            config.system_id,
-            source_system_id=config.ground_system_id,
-            source_component_id=config.ground_component_id,
-            signing=signing,
-        )
-        self._commands = Commands(config.commands)
-        self._vehicle = VehicleState()
-        self._guards = Guards(config)
-        self._flavour: Flavour | None = None
+        self._seat = Seat(config, signing)
+        self._duty = Duty(self._seat)
         self._streams: Streams | None = None
-        self._prepare: Prepare | None = None
-        self._preparation: Preparation | None = None
-        self._returning: Returning | None = None
-        self._holding: Holding | None = None
-        self._mission: StandingMission | None = None
-        """What stands on the vehicle; None if missions are not our way to command it."""
-        self._awaited: Return | Hold | None = None
-        """Ordered before it was known what the vehicle does, which may be in the air."""
-        self._awaited_until_s = 0.0
-        self._prepare_next: Prepare | None = None
-        """Ordered of a vehicle that has to be stopped first."""
-        self._speed_m_s = 0.0
-        """Cruise speed of the last preparation [m/s]."""
-        self._order: GoTo | None = None
-        self._leg: Leg | None = None
-        self._told_not_ready: str | None = None
         self._heartbeat_at_s = -math.inf
         self._pulse = Pulse(config.silence_timeout_s / 2.0)
-        self._now_s = 0.0
-        self._actions: list[Action] = []
+
+    @property
+    def phase(self) -> Phase:
+        """What it is doing."""
+        return self._duty.phase
+
+    @property
+    def codec(self) -> MavlinkCodec:
+        """Its side of the conversation; counts what it drops."""
+        return self._seat.codec
+
+    @property
+    def contact(self) -> Contact:
+        """Who is heard."""
+        return self._seat.contact
 
     def step(self, event: Event, now_s: float) -> list[Action]:
         """What to do about ``event``, in order; never raises on anything received."""
-        self._now_s = now_s
+        seat = self._seat
+        seat.now_s = now_s
         if self._pulse.late(now_s):
-            self._vehicle.excuse_silence(now_s)
-            self._guards.excuse_silence(now_s)
+            seat.vehicle.excuse_silence(now_s)
+            seat.guards.excuse_silence(now_s)
         match event:
             case Received(data):
-                for heard in self.codec.decode(data):
+                for heard in seat.codec.decode(data):
                     self._hear(heard)
             case Prepare() | GoTo() | Hold() | Return():
-                self._obey(event)
+                self._duty.obey(event)
             case LinkUp():
-                self.contact.link_up = True
-                self.codec.reset_link()
+                seat.contact.link_up = True
+                seat.codec.reset_link()
                 if self._streams is not None:
                     self._streams.ask_anew()
             case LinkDown():
-                self.contact.link_up = False
+                seat.contact.link_up = False
             case Tick():
                 pass
         self._advance()
         self._pulse.promise(self.next_deadline_s())
-        actions, self._actions = self._actions, []
-        return actions
+        return seat.take_actions()
 
     def next_deadline_s(self) -> float:
         """When to step with `Tick` if nothing else happens before."""
-        deadlines_s = [self._heartbeat_at_s]
-        if (commands_s := self._commands.next_deadline_s()) is not None:
+        seat = self._seat
+        deadlines_s = [self._heartbeat_at_s, self._duty.next_deadline_s()]
+        if (commands_s := seat.commands.next_deadline_s()) is not None:
             deadlines_s.append(commands_s)
-        busy = (Phase.PREPARING, Phase.HOLDING, Phase.RETURNING)
-        starting = self._mission is not None and self._mission.is_starting
-        if self.phase in busy or self._awaited is not None or starting:
-            deadlines_s.append(self._now_s + _POLL_S)
-        if self._mission is not None and (at_s := self._mission.next_deadline_s()) is not None:
-            deadlines_s.append(max(at_s, self._now_s))
-        heard_s = self._vehicle.heartbeat_at_s
-        if heard_s is not None and self._in_our_hands() and not self._silent():
+        heard_s = seat.vehicle.heartbeat_at_s
+        if heard_s is not None and self._duty.in_our_hands() and not seat.silent:
             deadlines_s.append(heard_s + self.config.silence_timeout_s)
         return min(deadlines_s)
 
     # What is heard.
 
     def _hear(self, heard: Heard) -> None:
-        if not self.contact.is_from_vehicle(heard):
+        seat, message = self._seat, heard.message
+        if not seat.contact.is_from_vehicle(heard):
             return
-        message = heard.message
-        self._guards.on_message(message, self._now_s)
+        seat.guards.on_message(message, seat.now_s)
         if self._streams is not None:
-            self._streams.on_message(message, self._now_s)
+            self._streams.on_message(message, seat.now_s)
         match message:
             case Heartbeat():
                 self._on_heartbeat(message)
             case Position():
                 self._on_position(message)
             case CommandAck():
-                out, ended = self._commands.on_ack(message, self._now_s)
-                self._say(*out)
+                out, ended = seat.commands.on_ack(message, seat.now_s)
+                seat.say(*out)
                 self._on_ended(ended)
             case _:
-                self._vehicle.on_message(message, self._now_s)
-                self._pass_on(message)
-
-    def _pass_on(self, message: Inbound) -> None:
-        if self._preparation is not None:
-            self._say(*self._preparation.on_message(message, self._now_s))
-        if self._mission is not None:
-            self._say(*self._mission.on_message(message, self._now_s))
+                seat.vehicle.on_message(message, seat.now_s)
+                self._duty.on_message(message)
 
     def _on_heartbeat(self, heartbeat: Heartbeat) -> None:
-        vehicle, before = self._vehicle, self._vehicle.heartbeat
-        if self._in_our_hands() and self._flavour and not self._flavour.flies(heartbeat):
+        seat, before = self._seat, self._seat.vehicle.heartbeat
+        if self._duty.in_our_hands() and seat.flavour and not seat.flavour.flies(heartbeat):
             self.strange_heartbeats += 1
             return
         if (
             before is not None
-            and self._flavour is not None
-            and self._flavour.has_booted(before)
-            and not self._flavour.has_booted(heartbeat)
+            and seat.flavour is not None
+            and seat.flavour.has_booted(before)
+            and not seat.flavour.has_booted(heartbeat)
         ):
             self._on_reboot()
-            vehicle = self._vehicle
-        vehicle.on_message(heartbeat, self._now_s)
-        if self._flavour is None or not self._flavour.flies(heartbeat):
-            self._flavour = flavour_of(heartbeat)
-            self._streams = Streams(self.config, self._flavour) if self._flavour else None
-            if self._flavour is not None:
-                self._commands.acknowledged_twice = self._flavour.acknowledged_twice
-            self._forget_mission()
+        seat.vehicle.on_message(heartbeat, seat.now_s)
+        if seat.flavour is None or not seat.flavour.flies(heartbeat):
+            flavour = seat.flavour = flavour_of(heartbeat)
+            self._streams = Streams(self.config, flavour) if flavour else None
+            if flavour is not None:
+                seat.commands.acknowledged_twice = flavour.acknowledged_twice
+            self._duty.forget_mission()
         self._check_authority(heartbeat)
         self._check_guards()
 
     def _check_authority(self, heartbeat: Heartbeat) -> None:
         """Hand over a vehicle that somebody else flies now."""
-        flavour = self._flavour
-        if flavour is None or not self._in_our_hands():
+        seat, duty = self._seat, self._duty
+        if seat.flavour is None or not duty.in_our_hands():
             return
-        mode = heartbeat.custom_mode
-        ours = self._obeys(mode)
-        if self._holding is not None:
-            ours = not heartbeat.armed or self._holding.expects(mode)
-        elif self._returning is not None:
-            ours = not heartbeat.armed or self._returning.expects(mode)
         reason = intervention(
-            self._vehicle,
+            seat.vehicle,
             heartbeat,
-            flavour,
-            self._now_s,
-            expected=ours,
-            may_disarm=self.phase in (Phase.PREPARING, Phase.RETURNING)
-            or (self._holding is not None and not self._holding.aloft),
+            seat.flavour,
+            seat.now_s,
+            expected=duty.expects(heartbeat),
+            may_disarm=duty.may_disarm,
         )
         if reason is not None:
-            self._hand_over(reason)
+            duty.hand_over(reason)
 
     def _check_guards(self) -> None:
         """Let go of a vehicle that has lost its way, and advise one in trouble to go home."""
-        flavour = self._flavour
-        if flavour is None or not self._in_our_hands() or self._returning is not None:
+        seat, duty = self._seat, self._duty
+        flavour, now_s = seat.flavour, seat.now_s
+        if flavour is None or not duty.in_our_hands() or duty.phase is Phase.RETURNING:
             return
-        if not flavour.airborne(self._vehicle):
+        if not flavour.airborne(seat.vehicle):
             return
-        if (lost := self._guards.position_lost(self._now_s)) is not None:
-            self._hand_over(lost)
-        elif (advice := self._guards.advice(self._vehicle, flavour, self._now_s)) is not None:
-            self._actions.append(ReturnAdvised(advice))
-
-    def _flies_for_us(self, custom_mode: int) -> bool:
-        """Whether that mode is our doing, as far as targets go."""
-        if self._mission is not None:
-            return self._mission.expects(custom_mode, self._now_s)
-        return self._flavour is not None and self._flavour.is_commanded(custom_mode)
+        if (lost := seat.guards.position_lost(now_s)) is not None:
+            duty.hand_over(lost)
+        elif (advice := seat.guards.advice(seat.vehicle, flavour, now_s)) is not None:
+            seat.report(ReturnAdvised(advice))
 
     def _on_position(self, position: Position) -> None:
-        match self._vehicle.on_position(position):
+        match self._seat.vehicle.on_position(position):
             case PositionNews.STALE:
                 self.stale_positions += 1
             case PositionNews.REBOOTED:
@@ -273,476 +193,40 @@ class Bridge:
                 pass
 
     def _on_fresh_position(self, position: Position) -> None:
+        seat = self._seat
         place_enu_m = enu_from_wgs84(
             self.config.origin, position.lat_deg, position.lon_deg, position.alt_m
         )
-        velocity = position.velocity_enu_m_s
-        fault = self._flavour.position_fault(self._vehicle) if self._flavour else None
-        self._guards.on_position(place_enu_m, fault, self._now_s)
-        self._actions.append(Telemetry(place_enu_m, velocity, self._vehicle.battery_frac))
-        if self._preparation is not None:
-            self._say(*self._preparation.on_position(position, self._now_s))
-        if self._holding is not None:
-            self._holding.on_position(position)
-        if self._mission is not None:
-            self._mission.on_position(place_enu_m, self._now_s)
-        if self._leg is not None:
-            self._say(*self._leg.on_position(place_enu_m, velocity, self._now_s))
-            self._judge_leg()
-
-    def _judge_leg(self) -> None:
-        leg, order = self._leg, self._order
-        if leg is None or order is None:
-            return
-        if leg.arrived:
-            self._end_leg()
-            self._actions.append(Arrived(order.leg))
-        elif leg.failure is not None:
-            self._end_leg()
-            text = self._vehicle.recent_warning(self._now_s)
-            reason = f"{leg.failure}: {text}" if text else leg.failure
-            self._actions.append(Refused(order, reason))
+        fault = seat.flavour.position_fault(seat.vehicle) if seat.flavour else None
+        seat.guards.on_position(place_enu_m, fault, seat.now_s)
+        velocity, battery_frac = position.velocity_enu_m_s, seat.vehicle.battery_frac
+        seat.report(Telemetry(place_enu_m, velocity, battery_frac))
+        self._duty.on_position(position, place_enu_m)
 
     def _on_reboot(self) -> None:
         """Forget what is no longer true of an autopilot that began anew."""
-        if self._in_our_hands():
-            self._hand_over("the autopilot rebooted")
-        self._vehicle = VehicleState()
-        self._guards = Guards(self.config)
-        self._flavour = None
+        self._duty.on_reboot()
+        self._seat.forget_vehicle()
         self._streams = None
-        self._preparation = None
-        self._mission = None
-        self._commands.cancel_all()
 
     def _on_ended(self, ended: list[CommandEnded]) -> None:
-        for one in ended:
-            if self._streams is not None:
-                self._streams.on_ended(one, self._now_s)
-            if self._preparation is not None:
-                self._say(*self._preparation.on_ended(one, self._now_s))
-            if self._returning is not None:
-                self._returning.on_ended(one, self._now_s)
-            if self._holding is not None:
-                self._holding.on_ended(one, self._now_s)
-            if self._mission is not None:
-                self._mission.on_ended(one, self._now_s)
-            if self._leg is not None:
-                self._leg.on_ended(one)
-                self._judge_leg()
-
-    # What is ordered.
-
-    def _obey(self, order: Orders) -> None:
-        match order:
-            case Prepare():
-                self._begin_preparation(order)
-            case GoTo():
-                self._go_to(order)
-            case Hold():
-                self._hold(order)
-            case Return():
-                self._return(order)
-
-    def _begin_preparation(self, order: Prepare) -> None:
-        if fault := self.config.out_of_bounds(order.position_enu_m):
-            self._actions.append(Refused(order, fault))
-            return
-        if not (math.isfinite(order.speed_m_s) and order.speed_m_s > 0.0):
-            self._actions.append(Refused(order, f"speed {order.speed_m_s} m/s is not > 0"))
-            return
-        if self._must_stop_first() and not self._silent():
-            self._hold(Hold("to be prepared anew"))
-            self._prepare_next = order
-            return
-        self._drop_work()
-        self._forget_mission()
-        self._guards.begin()
-        self.phase = Phase.PREPARING
-        self._prepare = order
-        self._speed_m_s = order.speed_m_s
-        self._told_not_ready = None
-
-    def _must_stop_first(self) -> bool:
-        """Whether the vehicle flies on our orders, but takes no targets."""
-        flavour, heartbeat = self._flavour, self._vehicle.heartbeat
-        return (
-            self.phase in (Phase.RETURNING, Phase.HOLDING)
-            and flavour is not None
-            and heartbeat is not None
-            and heartbeat.armed
-            and not flavour.is_commanded(heartbeat.custom_mode)
-            and self._vehicle.landed is not Landed.ON_GROUND
-        )
-
-    def _go_to(self, order: GoTo) -> None:
-        by_mission = self._mission is not None and self._returning is None
-        takes_targets = self.phase in (Phase.HOVERING, Phase.FLYING) or (
-            self.phase is Phase.HOLDING and (by_mission or not self._must_stop_first())
-        )
-        if not takes_targets or self._flavour is None:
-            self._actions.append(Refused(order, f"the vehicle is {self.phase.value}"))
-            return
-        if fault := self.config.out_of_bounds(order.position_enu_m):
-            self._actions.append(Refused(order, fault))
-            return
-        if not (math.isfinite(order.stay_s) and order.stay_s >= 0.0):
-            self._actions.append(Refused(order, f"a stay of {order.stay_s} s is not >= 0"))
-            return
-        if self._holding is not None:
-            self._drop_work()
-        self._order, self._leg = order, self._leg_to(order, self._flavour)
-        self.phase = Phase.FLYING
-        self._say(*self._leg.start(self._now_s))
-
-    def _leg_to(self, order: GoTo, flavour: Flavour) -> Leg:
-        target_enu_m, config = order.position_enu_m, self.config
-        if self._mission is not None:
-            return MissionLeg(target_enu_m, order.stay_s, self._speed_m_s, config, self._mission)
-        place = wgs84_from_enu(config.origin, target_enu_m)
-        message = flavour.reposition(*place, self._speed_m_s)
-        return RepositionLeg(target_enu_m, message, config, self._commands)
-
-    def _hold(self, order: Hold) -> None:
-        if self.phase is Phase.HANDED_OVER:
-            self._actions.append(Refused(order, f"the vehicle is {self.phase.value}"))
-        elif not self._in_our_hands():
-            # It may fly on the orders of an earlier life, or be somebody else's.
-            self._drop_work()
-            self.phase = Phase.IDLE
-            self._await(order)
-        elif self._silent():
-            self._actions.append(Refused(order, "the autopilot is silent"))
-        elif self._returning is None or self._vehicle.armed:
-            self._begin_holding(order)
-
-    def _begin_holding(self, order: Hold) -> None:
-        """Stop a vehicle that flies on our orders, or is about to."""
-        flavour, heartbeat = self._flavour, self._vehicle.heartbeat
-        if flavour is None or heartbeat is None:
-            return
-        took_off, returning = self._took_off(), self._returning
-        on_missions = self._mission is not None and self.phase is not Phase.PREPARING
-        motors_asked = self._preparation is not None and self._preparation.engaged
-
-        def leaves(mode: int) -> bool:
-            return (
-                mode == heartbeat.custom_mode
-                or (took_off and flavour.is_taking_off(mode))
-                or (on_missions and flavour.is_mission(mode))
-                or (returning is not None and flavour.is_returning(mode))
-            )
-
-        self._drop_work()
-        self._returning = returning  # goes on if the vehicle cannot be stopped
-        if self._mission is not None:
-            self._mission.suspend()
-        self._holding = Holding(
-            order,
-            self.config,
-            self._commands,
-            flavour,
-            self._speed_m_s,
-            leaves,
-            motors_asked=motors_asked,
-        )
-        self.phase = Phase.HOLDING
-
-    def _return(self, order: Return) -> None:
-        if self.phase is Phase.RETURNING:
-            return
-        in_air = (Phase.HOVERING, Phase.FLYING, Phase.HOLDING)
-        took_off = self.phase in in_air or self._took_off()
-        motors_asked_for = self._preparation is not None and self._preparation.engaged
-        flavour, heartbeat, holding = self._flavour, self._vehicle.heartbeat, self._holding
-        self._drop_work()
-        self.phase = Phase.IDLE
-        if flavour is None or heartbeat is None:
-            if order.resume:
-                self._await(order)
-            else:
-                self._actions.append(Home())
-            return
-        mode = heartbeat.custom_mode
-        if self._reads_mission(heartbeat):
-            self._await(order)
-            return
-        taking_off = flavour.is_taking_off(mode) and (took_off or order.resume)
-        on_mission = self._mission is not None and (
-            self._flies_for_us(mode) or (holding is not None and holding.expects(mode))
-        )
-        commanded = flavour.is_commanded(mode) or taking_off or on_mission
-        if self._mission is not None:
-            self._mission.stand_down()
-        aloft = heartbeat.armed and (took_off or flavour.airborne(self._vehicle) is not False)
-        if not aloft:
-            # That it was armed may not have been heard yet.
-            if commanded and (heartbeat.armed or motors_asked_for):
-                self._say(*self._commands.send("disarm", flavour.disarm(), self._now_s))
-            self._actions.append(Home())
-            return
-        if self._silent():
-            self._refuse_return(order, "the autopilot is silent")
-        elif not (commanded or flavour.is_returning(mode)):
-            self._hand_over(f"its pilot flies it in {flavour.mode_name(mode)}")
-        else:
-            self._come_home(order, flavour)
-
-    def _come_home(self, order: Return, flavour: Flavour) -> None:
-        self._returning = Returning(
-            order,
-            self.config,
-            self._commands,
-            flavour,
-            from_mission=self._mission is not None,
-        )
-        self.phase = Phase.RETURNING
-
-    def _refuse_return(self, order: Return, reason: str) -> None:
-        self.phase = Phase.HANDED_OVER
-        self._actions.append(Refused(order, reason))
+        if self._streams is not None:
+            for one in ended:
+                self._streams.on_ended(one, self._seat.now_s)
+        self._duty.on_ended(ended)
 
     # What time brings.
 
     def _advance(self) -> None:
-        now_s = self._now_s
+        seat, now_s = self._seat, self._seat.now_s
         if now_s >= self._heartbeat_at_s:
             self._heartbeat_at_s = now_s + self.config.heartbeat_interval_s
-            self._say(GroundHeartbeat())
-        out, ended = self._commands.on_time(now_s)
-        self._say(*out)
+            seat.say(GroundHeartbeat())
+        out, ended = seat.commands.on_time(now_s)
+        seat.say(*out)
         self._on_ended(ended)
-        silent = self._silent()
-        if silent and self._in_our_hands():
-            self._hand_over(f"no heartbeat for {self.config.silence_timeout_s:g} s")
-        if self._streams is not None and not silent:
-            self._say(*self._streams.advance(self._commands, now_s))
-        if not silent:
-            self._advance_mission()
-        if self.phase is Phase.PREPARING:
-            self._advance_preparation()
-        elif self.phase is Phase.HOLDING:
-            self._advance_holding()
-        elif self.phase is Phase.RETURNING:
-            self._advance_return()
-        elif self._awaited is not None:
-            self._look_for_vehicle(self._awaited)
-
-    def _advance_preparation(self) -> None:
-        heartbeat, order = self._vehicle.heartbeat, self._prepare
-        if order is None:
-            return
-        if (reason := self._unheard()) is not None:
-            self._tell_not_ready(reason)
-            return
-        if heartbeat is None or self._flavour is None:
-            return
-        if self._preparation is None:
-            self._preparation = Preparation(
-                order, self.config, self._commands, self._flavour, self._guards, self._mission
-            )
-        preparation = self._preparation
-        self._say(*preparation.advance(self._vehicle, heartbeat, self._now_s))
-        if preparation.failure is not None:
-            aloft = heartbeat.armed and self._flavour.airborne(self._vehicle)
-            obeys = self._obeys(heartbeat.custom_mode)
-            self._drop_work()
-            if aloft and obeys:
-                self.phase = Phase.HOVERING  # nobody else would bring it down
-                self._actions.append(ReturnAdvised(preparation.failure))
-            else:
-                self.phase = Phase.IDLE
-                self._actions.append(Refused(order, preparation.failure))
-        elif preparation.done:
-            self._drop_work()
-            self.phase = Phase.HOVERING
-            self._actions.append(VehicleReady())
-        else:
-            self._tell_not_ready(preparation.waiting_for)
-
-    def _unheard(self) -> str | None:
-        """Why there is no vehicle to prepare yet; None if there is one."""
-        return self.contact.missing(
-            self._vehicle.heartbeat,
-            self._flavour,
-            silent=self._silent(),
-            distrusted=self.codec.distrusted,
-        )
-
-    def _tell_not_ready(self, reason: str) -> None:
-        if reason != self._told_not_ready:
-            self._told_not_ready = reason
-            self._actions.append(NotReady(reason))
-
-    def _await(self, order: Return | Hold) -> None:
-        """Carry the order out once it is known what the vehicle does."""
-        patience_s = _UNHEARD_TIMEOUTS * self.config.silence_timeout_s
-        self._awaited, self._awaited_until_s = order, self._now_s + patience_s
-        self._told_not_ready = None
-
-    def _look_for_vehicle(self, order: Return | Hold) -> None:
-        """Return or stop the vehicle once it is heard; it has this long to be."""
-        reason = self._unheard() or self._unclear(order)
-        if reason is None:
-            self._awaited = None
-            if isinstance(order, Return):
-                self._return(order)
-            else:
-                self._hold_found(order)
-        elif self._now_s < self._awaited_until_s:
-            self._tell_not_ready(reason)
-        else:
-            self._drop_work()
-            if isinstance(order, Return):
-                self._refuse_return(order, reason)
-            else:
-                self._actions.append(Refused(order, reason))
-
-    def _unclear(self, order: Return | Hold) -> str | None:
-        """What is still to be learned of a vehicle that is heard; None if it is enough."""
-        flavour, heartbeat, mission = self._flavour, self._vehicle.heartbeat, self._mission
-        if flavour is None or heartbeat is None or not heartbeat.armed:
-            return None
-        if isinstance(order, Hold) and self._vehicle.landed is Landed.UNDEFINED:
-            return "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
-        if mission is not None and self._reads_mission(heartbeat):
-            self._say(*mission.look(self._now_s))
-            return "reading the mission that the vehicle flies"
-        return None
-
-    def _reads_mission(self, heartbeat: Heartbeat) -> bool:
-        """Whether the vehicle flies a mission of which it is not known whose it is."""
-        return (
-            self._flavour is not None
-            and self._mission is not None
-            and heartbeat.armed
-            and self._flavour.is_mission(heartbeat.custom_mode)
-            and self._mission.is_ours is None
-            and not self._flies_for_us(heartbeat.custom_mode)
-        )
-
-    def _hold_found(self, order: Hold) -> None:
-        """Stop a vehicle that an earlier life left in the air."""
-        flavour, heartbeat = self._flavour, self._vehicle.heartbeat
-        aloft = self._vehicle.landed is not Landed.ON_GROUND
-        if flavour is None or heartbeat is None or not (heartbeat.armed and aloft):
-            return
-        mode = heartbeat.custom_mode
-        if self._flies_for_us(mode) or flavour.is_taking_off(mode):
-            self._begin_holding(order)
-        else:
-            name = flavour.mode_name(mode)
-            self._actions.append(Refused(order, f"its pilot flies it in {name}"))
-
-    def _advance_mission(self) -> None:
-        mission, flavour = self._mission, self._flavour
-        heartbeat, heard_s = self._vehicle.heartbeat, self._vehicle.heartbeat_at_s
-        if mission is None or flavour is None or heartbeat is None or heard_s is None:
-            return
-        self._say(*mission.advance(heartbeat, heard_s, self._now_s))
-        self._judge_leg()
-        if self.phase not in (Phase.HOVERING, Phase.FLYING):
-            return
-        if mission.coming_home:
-            reason = "nothing followed its last target in time, so it comes home by itself"
-            self._drop_work()
-            mission.stand_down()
-            self._actions.append(ReturnAdvised(reason))
-            self._come_home(Return(reason), flavour)
-        elif mission.unverified:
-            self._begin_holding(Hold("which mission it flies is not known"))
-
-    def _advance_holding(self) -> None:
-        holding, heartbeat = self._holding, self._vehicle.heartbeat
-        if holding is None or heartbeat is None:
-            return
-        self._say(*holding.advance(self._vehicle, heartbeat, self._now_s))
-        if not holding.done and holding.failure is None:
-            return
-        prepare, returning, mission = self._prepare_next, self._returning, self._mission
-        self._drop_work()
-        self.phase = Phase.HOVERING if holding.aloft else Phase.IDLE
-        if holding.failure is None and mission is not None:
-            mission.stand_down()
-        elif mission is not None and returning is None:
-            mission.carry_on()
-        if holding.failure is not None:
-            self._actions.append(Refused(holding.order, holding.failure))
-            if prepare is not None:
-                self._actions.append(Refused(prepare, holding.failure))
-            if returning is not None:
-                self._returning, self.phase = returning, Phase.RETURNING
-        elif prepare is not None:
-            self._begin_preparation(prepare)
-
-    def _advance_return(self) -> None:
-        returning, heartbeat = self._returning, self._vehicle.heartbeat
-        if returning is None or heartbeat is None:
-            return
-        self._say(*returning.advance(heartbeat, self._now_s))
-        on_ground = self._vehicle.landed in (Landed.ON_GROUND, Landed.UNDEFINED)
-        if not heartbeat.armed and (on_ground or returning.disarmed_long(self._now_s)):
-            self._drop_work()
-            self.phase = Phase.IDLE
-            self._actions.append(Home())
-        elif returning.failure is not None:
-            self._drop_work()
-            self.phase = Phase.HOVERING
-            self._actions.append(Refused(returning.order, returning.failure))
-
-    # Keeping the books.
-
-    def _in_our_hands(self) -> bool:
-        """Whether the vehicle is, or may be, in the air on our orders."""
-        if self.phase is Phase.PREPARING:
-            return self._preparation is not None and self._preparation.engaged
-        return self.phase in (Phase.HOVERING, Phase.FLYING, Phase.HOLDING, Phase.RETURNING)
-
-    def _obeys(self, custom_mode: int) -> bool:
-        """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
-        flavour = self._flavour
-        return flavour is not None and (
-            self._flies_for_us(custom_mode)
-            or (flavour.is_taking_off(custom_mode) and self._took_off())
-        )
-
-    def _took_off(self) -> bool:
-        """Whether the preparation under way has asked for takeoff."""
-        return self._preparation is not None and self._preparation.took_off
-
-    def _silent(self) -> bool:
-        heard_s = self._vehicle.heartbeat_at_s
-        return heard_s is not None and self._now_s - heard_s >= self.config.silence_timeout_s
-
-    def _hand_over(self, reason: str) -> None:
-        self._drop_work()
-        if self._mission is not None:
-            self._mission.abort(reason)
-        self.phase = Phase.HANDED_OVER
-        self._actions.append(HandedOver(reason))
-
-    def _end_leg(self) -> None:
-        self._leg = self._order = None
-        self.phase = Phase.HOVERING
-        if self._mission is not None:
-            self._mission.wait_there()
-
-    def _forget_mission(self) -> None:
-        """Know nothing of what stands on the vehicle."""
-        missions = self.config.command is CommandStyle.MISSION
-        flavour = self._flavour
-        self._mission = (
-            StandingMission(self.config, self._commands, flavour)
-            if missions and flavour is not None
-            else None
-        )
-
-    def _drop_work(self) -> None:
-        """Give up whatever is under way; nothing is sent about it any more."""
-        self._leg = self._order = None
-        self._prepare = self._preparation = self._prepare_next = None
-        self._returning = self._holding = self._awaited = None
-        self._commands.cancel_all()
-
-    def _say(self, *messages: Outbound) -> None:
-        self._actions += [Send(self.codec.encode(message)) for message in messages]
+        if seat.silent and self._duty.in_our_hands():
+            self._duty.hand_over(f"no heartbeat for {self.config.silence_timeout_s:g} s")
+        if self._streams is not None and not seat.silent:
+            seat.say(*self._streams.advance(seat.commands, now_s))
+        self._duty.advance()

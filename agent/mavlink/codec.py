@@ -162,9 +162,9 @@ class MavlinkCodec:
     def _texts_of(self, raw: Any) -> list[Heard]:
         """Texts of the autopilot that are complete by this chunk; nobody else's are joined."""
         sender = (raw.get_srcSystem(), raw.get_srcComponent())
-        if sender != (self._target, _AUTOPILOT_COMPONENT):
-            return []
-        texts = self._texts.add(raw.severity, str(raw.text), raw.id, raw.chunk_seq)
+        ours = sender == (self._target, _AUTOPILOT_COMPONENT)
+        joiner = self._texts if ours else TextJoiner()
+        texts = joiner.add(raw.severity, str(raw.text), raw.id, raw.chunk_seq)
         return [Heard(*sender, text) for text in texts]
 
     def _addressed_to_us(self, raw: Any) -> bool:

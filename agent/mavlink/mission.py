@@ -36,6 +36,8 @@ _ERROR = 1
 _INVALID_SEQUENCE = 13
 _OPERATION_CANCELLED = 15
 """MAV_MISSION_RESULT values."""
+_PATIENT_TRIES = 3
+"""A reading that makes no progress for that many transmissions is begun anew, once."""
 _PLACE_TOLERANCE_DEG = 2e-7
 _ALT_TOLERANCE_M = 0.02
 """ArduPilot cuts heights to whole centimetres."""
@@ -111,6 +113,7 @@ class MissionTransfer:
         self._touched = False
         """The vehicle may hold part of a mission that was never verified."""
         self._second_reading = False
+        self._began_reading_anew = False
         self._reading_count: int | None = None
         """Items wanted of a vehicle that is only asked; None while something is uploaded."""
         self._failure: str | None = None
@@ -173,6 +176,11 @@ class MissionTransfer:
         """Repeat what was not answered in time, or give up."""
         if not self.busy or now_s < self._deadline_s:
             return []
+        stuck = self._phase is _Phase.ASKING_ITEMS and self._tries >= _PATIENT_TRIES
+        if stuck and not self._began_reading_anew:
+            # PX4 ends a reading that makes no progress, and says nothing then.
+            self._began_reading_anew = True
+            return self._ask_count(now_s)
         if self._tries < self._policy.tries:
             return self._say(self._last, now_s, again=True)
         if self._phase is _Phase.SENDING and self._furthest_seq == len(self._items) - 1:
@@ -194,7 +202,7 @@ class MissionTransfer:
         self._items = items
         self._phase = _Phase.ANNOUNCING
         self._furthest_seq = -1
-        self._second_reading = False
+        self._second_reading = self._began_reading_anew = False
         return self._say([MissionCount(len(items))], now_s)
 
     def _on_request(self, seq: int, now_s: float) -> list[Outbound]:
@@ -217,8 +225,8 @@ class MissionTransfer:
         return self._say([self._items[seq]], now_s, again=again)
 
     def _on_upload_ack(self, result: int, now_s: float) -> list[Outbound]:
-        if result == _INVALID_SEQUENCE:
-            return []  # ArduPilot's answer to an item that came twice
+        if result in (_INVALID_SEQUENCE, _ERROR):
+            return []  # an answer to what came twice; a transfer that ended asks no more
         if result != _ACCEPTED:
             return self._fail(f"the vehicle refused the mission (result {result})", now_s)
         if self._furthest_seq != len(self._items) - 1:

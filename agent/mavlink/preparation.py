@@ -234,7 +234,9 @@ class Preparation:
             # An earlier life's, or a pilot's.
             self._flown_by_pilot = not self._order.resume
             return self._wait("waiting for the takeoff under way to end")
-        if now_s - self._climbed_at_s > self._config.climb_timeout_s:
+        # The heartbeat that tells its end may come as late as any other.
+        patience_s = self._config.climb_timeout_s + self._config.silence_timeout_s
+        if now_s - self._climbed_at_s > patience_s:
             return self._fail(_CLIMB_STOPPED)
         return self._wait("climbing")
 

@@ -37,8 +37,8 @@ Point = tuple[float, float, float]
 
 _RENEWAL_FRAC = 0.5
 """The wait is renewed when that share of the patience is left."""
-_HOLD_SLACK_S = 1.0
-"""A hold may end that much earlier than told: firmwares count it on clocks of their own."""
+_HOLD_SLACK_S = 2.0
+"""A hold may end that much earlier than it seems: it begins before the mission is read back."""
 
 
 class _Stage(Enum):
@@ -81,7 +81,7 @@ class StandingMission:
         """The vehicle may take up the mission mode because of us."""
         self._renew_at_s = -math.inf
         self._look_at_s = -math.inf
-        self._flown_since_s = 0.0
+        self._begun_s = 0.0
         self._near_since_s: float | None = None
         """When the hold may have begun."""
         self.reached = False
@@ -190,7 +190,8 @@ class StandingMission:
     def on_position(self, position_enu_m: Point, now_s: float) -> None:
         """Note how near the vehicle is."""
         self._place_enu_m = position_enu_m
-        if self._stage is _Stage.FLOWN and self._near_since_s is None and self._is_near():
+        flown = self._stage in (_Stage.STARTING, _Stage.FLOWN)
+        if flown and self._near_since_s is None and self._is_near():
             # Of a mission that an earlier life left, the hold may have begun long ago.
             self._near_since_s = -math.inf if self._inherited else now_s
 
@@ -202,7 +203,7 @@ class StandingMission:
             out += start.advance(heartbeat, heard_at_s, now_s)
             self._mode_asked |= start.mode_asked
             if start.done:
-                self._become_flown(now_s)
+                self._become_flown()
             elif start.failure is not None:
                 in_mission = self._flavour.is_mission(heartbeat.custom_mode)
                 self._give_up(start.failure, now_s, astray=in_mission)
@@ -262,13 +263,12 @@ class StandingMission:
 
     def _begin(self, now_s: float, *, again: bool = False) -> None:
         self._stage = _Stage.STARTING
-        self._near_since_s = None
+        self._begun_s, self._near_since_s = now_s, None
         self._start = MissionStart(self._config, self._commands, self._flavour, now_s, again=again)
 
-    def _become_flown(self, now_s: float) -> None:
+    def _become_flown(self) -> None:
         self._stage, self._start = _Stage.FLOWN, None
         self._mode_seen, self._renewing, self._inherited = True, False, False
-        self._flown_since_s = now_s
 
     def _give_up(self, reason: str, now_s: float, *, astray: bool) -> None:
         """The wanted mission is not flown: go on with the one that stands, if it may.
@@ -306,12 +306,12 @@ class StandingMission:
         self._wanted = self._standing = plan
         self._stage, self._mode_seen = _Stage.FLOWN, True
         self._inherited = True
-        self._flown_since_s, self._near_since_s = now_s, None
+        self._begun_s, self._near_since_s = now_s, None
 
     def _on_reached(self, now_s: float) -> None:
         """The item is done, which it cannot be before its hold time: else it is an echo."""
         standing = self._standing
-        if standing is None or now_s < self._flown_since_s + standing.hold_s - _HOLD_SLACK_S:
+        if standing is None or now_s < self._begun_s + standing.hold_s - _HOLD_SLACK_S:
             return
         self.reached = self._awaited and self._is_near()
         self.coming_home = True
@@ -329,8 +329,7 @@ class StandingMission:
         near_s, standing = self._near_since_s, self._standing
         if near_s is None or standing is None:
             return False
-        # It may have begun up to a position's interval before it was seen.
-        return now_s >= near_s + standing.hold_s - 2.0 * _HOLD_SLACK_S
+        return now_s >= near_s + standing.hold_s - _HOLD_SLACK_S
 
     def _runs_out_s(self) -> float | None:
         """When the wait is to be renewed; None while there is nothing to renew."""

@@ -81,7 +81,8 @@ class Situation:
         for uav, task in under_way.items():
             finish_claim(problem, state, rows[uav], columns[task], claims[uav])
         state.active[:] = [
-            uav in claims and claims[uav].phase is not ClaimPhase.OUT for uav in problem.uav_ids
+            uav in claims and claims[uav].phase not in (ClaimPhase.OUT, ClaimPhase.PAUSED)
+            for uav in problem.uav_ids
         ]
         # Who is late may be there any moment, and who waits may decide at once.
         np.maximum(state.free_s, mission_s, out=state.free_s)

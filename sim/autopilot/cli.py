@@ -10,14 +10,27 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.options import JsonOption, LifelineOption, ScenarioArgument, SpeedupOption
+from sim.autopilot.flavours import FlavourName
+from swarm.options import (
+    JsonOption,
+    LifelineOption,
+    ScenarioArgument,
+    SeedOption,
+    SpeedupOption,
+)
 
 if TYPE_CHECKING:
     from agent.mavlink.signing import SigningKey
     from sim.autopilot.endpoint import Endpoint
+    from sim.autopilot.faults import VehicleFault
     from sim.autopilot.fleet import FleetMember
 
 __all__ = ["autopilot"]
+
+_FAULT_HELP = """Let something happen to a UAV: UAV:KIND@T or UAV:KIND@T+DURATION, in vehicle
+seconds; T 0 is power-up, any other counts from the first arming. KIND: reboot, gps-lost,
+battery-low (battery-low=0.2 says how low), silent, stuck, pilot, failsafe-rtl, refuse-arming,
+reject-mission, wrong-id. May be repeated."""
 
 
 def autopilot(
@@ -40,6 +53,9 @@ def autopilot(
             "udpout:HOST:PORT; the next ones take the ports that follow. Port 0 takes free ones.",
         ),
     ] = "tcp:127.0.0.1:0",
+    flavour: Annotated[
+        FlavourName, typer.Option("--flavour", help="Whose firmware the vehicles behave like.")
+    ] = FlavourName.ARDUPILOT,
     speedup: SpeedupOption = 1.0,
     system_id: Annotated[
         int | None,
@@ -62,10 +78,66 @@ def autopilot(
             show_default=False,
         ),
     ] = None,
+    acceleration_m_s2: Annotated[
+        float | None,
+        typer.Option(
+            "--acceleration-m-s2",
+            min=0.01,
+            metavar="A",
+            help="Greatest acceleration [m/s²]; default: speeds change in no time.",
+            show_default=False,
+        ),
+    ] = None,
+    wind_m_s: Annotated[
+        str | None,
+        typer.Option(
+            "--wind-m-s",
+            metavar="EAST,NORTH",
+            help="Steady wind, by where it blows to [m/s]; default: none.",
+            show_default=False,
+        ),
+    ] = None,
+    gust_m_s: Annotated[
+        float,
+        typer.Option("--gust-m-s", min=0.0, metavar="G", help="Speed of gusts [m/s]."),
+    ] = 0.0,
+    seed: SeedOption = 0,
+    endurance_s: Annotated[
+        float | None,
+        typer.Option(
+            "--endurance-s",
+            min=1.0,
+            metavar="S",
+            help="Armed time that empties a battery [s]; default: it stays full.",
+            show_default=False,
+        ),
+    ] = None,
+    battery_failsafe: Annotated[
+        bool,
+        typer.Option(
+            "--battery-failsafe", help="The firmware returns at 20 % of charge, and lands at 10 %."
+        ),
+    ] = False,
+    position_failsafe_s: Annotated[
+        float | None,
+        typer.Option(
+            "--position-failsafe-s",
+            min=0.01,
+            metavar="S",
+            help="Without GPS for so long, the firmware lands [s]; default: it hovers.",
+            show_default=False,
+        ),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault", metavar="UAV:KIND@T[+DURATION]", help=_FAULT_HELP, show_default=False
+        ),
+    ] = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
 ) -> int:
-    """Simulate the autopilots of a scenario's UAVs, speaking MAVLink 2 like ArduCopter.
+    """Simulate the autopilots of a scenario's UAVs, speaking MAVLink 2 like ArduCopter or PX4.
 
     Prints one JSON object per vehicle with the address to connect to, then runs
     until interrupted. With --json nothing else is printed.
@@ -73,12 +145,17 @@ def autopilot(
     Examples:
         swarm autopilot table-1
         swarm autopilot table-1 --uav uav1 --listen udpin:127.0.0.1:14550 --speedup 5
+        swarm autopilot table-1 --flavour px4
+        swarm autopilot table-1 --acceleration-m-s2 2.5 --fault uav2:gps-lost@30+10
     """
     import asyncio
+    import math
 
     from agent.mavlink.signing_key import load_signing_key
+    from sim.autopilot.config import BatteryFailsafe
     from sim.autopilot.endpoint import ENDPOINT_RULE, parse_endpoint
-    from sim.autopilot.fleet import fleet_of
+    from sim.autopilot.fleet import Physics, fleet_of
+    from sim.autopilot.options import check_wind, faults_by_uav, parse_wind, require_finite
     from swarm.errors import Fault, InputError
     from swarm.model import UavId
     from swarm.process import run_until_stopped
@@ -97,16 +174,37 @@ def autopilot(
             error
         )
     wanted = [UavId(name) for name in dict.fromkeys(uav)] if uav else None
-    fleet = fleet_of(mission, wanted, system_id)
     key = None if signing_key is None else load_signing_key(signing_key)
+    require_finite(
+        acceleration_m_s2=acceleration_m_s2,
+        gust_m_s=gust_m_s,
+        endurance_s=endurance_s,
+        position_failsafe_s=position_failsafe_s,
+    )
+    physics = Physics(
+        acceleration_m_s2=acceleration_m_s2,
+        wind_enu_m_s=parse_wind(wind_m_s),
+        gust_m_s=gust_m_s,
+        seed=seed,
+        endurance_s=endurance_s,
+        battery_failsafe=BatteryFailsafe() if battery_failsafe else None,
+        position_failsafe_s=position_failsafe_s,
+    )
+    check_wind(math.hypot(*physics.wind_enu_m_s), fleet_of(mission, wanted, system_id))
+    faults = faults_by_uav(fault or (), known)
+    fleet = fleet_of(mission, wanted, system_id, physics)
     return asyncio.run(
-        run_until_stopped(_serve(fleet, endpoint, speedup, key, quiet=json), lifeline=lifeline)
+        run_until_stopped(
+            _serve(fleet, faults, endpoint, flavour, speedup, key, quiet=json), lifeline=lifeline
+        )
     )
 
 
 async def _serve(
     fleet: tuple[FleetMember, ...],
+    faults: dict[str, tuple[VehicleFault, ...]],
     endpoint: Endpoint,
+    flavour: FlavourName,
     speedup: float,
     key: SigningKey | None,
     *,
@@ -117,8 +215,9 @@ async def _serve(
     import json
     import sys
 
-    from sim.autopilot.flavours.ardupilot import ArduCopter
-    from sim.autopilot.server import VehicleServer
+    from sim.autopilot.faulty_vehicle import FaultyVehicle
+    from sim.autopilot.flavours import flavour_of
+    from sim.autopilot.server import Machine, VehicleServer
     from sim.autopilot.vehicle import Vehicle
     from swarm.clock import ScaledClock
     from swarm.errors import Fault, InputError
@@ -128,7 +227,10 @@ async def _serve(
     servers: list[VehicleServer] = []
     try:
         for place, member in enumerate(fleet):
-            vehicle = Vehicle(member.config, ArduCopter(), clock.now_s())
+            start_s = clock.now_s()
+            sound = Vehicle(member.config, flavour_of(flavour), start_s)
+            own_faults = faults.get(member.uav)
+            vehicle: Machine = FaultyVehicle(sound, own_faults, start_s) if own_faults else sound
             own = endpoint.shifted(place)
             server = VehicleServer(vehicle, own, clock, signing_secret=secret)
             servers.append(server)

@@ -71,9 +71,18 @@ class ChannelCodec:
             self._forget_rest()
         return messages
 
-    def encode(self, message: mavlink.MAVLink_message) -> bytes:
-        """The frame of ``message``, with this channel's next sequence number."""
+    def encode(self, message: mavlink.MAVLink_message, system_id: int | None = None) -> bytes:
+        """The frame of ``message``, with this channel's next sequence number.
+
+        Args:
+            message: what is said.
+            system_id: whom it is said to come from, where that is not this end.
+        """
+        own_id = self._mav.srcSystem
+        if system_id is not None:
+            self._mav.srcSystem = system_id
         frame: bytes = message.pack(self._mav)
+        self._mav.srcSystem = own_id
         self._mav.seq = (self._mav.seq + 1) % 256
         return frame
 

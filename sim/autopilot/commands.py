@@ -1,8 +1,8 @@
 """Carries out MAV_CMD commands and answers each with a MAV_RESULT.
 
 A COMMAND_LONG is read as the COMMAND_INT it stands for. Sources:
-https://mavlink.io/en/services/command.html; which result a refusal gets is
-ArduCopter's. Leaves out: commands for payloads, calibration, parameters.
+https://mavlink.io/en/services/command.html; which result a refusal gets differs
+between firmwares. Leaves out: commands for payloads, calibration, parameters.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim.autopilot.events import Outbox, Sender
 from sim.autopilot.geo import ABOVE_HOME_FRAMES, place_enu_m
 from sim.autopilot.modes import Mode
+from sim.autopilot.occasions import Occasion
 from sim.autopilot.pilot import Pilot
 from sim.autopilot.streams import Streams
 from sim.autopilot.telemetry import Telemetry
@@ -103,39 +104,45 @@ class Commands:
     def handle(self, command: Command, sender: Sender, now_s: float) -> None:
         """Carry ``command`` out and acknowledge it."""
         handler = self._handlers.get(command.id)
+        times = 1
+        if command.id == mavlink.MAV_CMD_DO_SET_MODE:
+            times = self._pilot.flavour.modes.acknowledgements
         if handler is None:
             self._answer(command.id, lambda: _UNSUPPORTED, sender)
         else:
-            self._answer(command.id, lambda: handler(command, sender, now_s), sender)
+            self._answer(command.id, lambda: handler(command, sender, now_s), sender, times)
 
     def handle_set_mode(self, base_mode: int, mode: int, sender: Sender, now_s: float) -> None:
-        """Obey the older message SET_MODE; acknowledged like a command of its message id."""
+        """Obey the older message SET_MODE; acknowledged like a command."""
         custom = base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         self._answer(
-            mavlink.MAVLINK_MSG_ID_SET_MODE,
+            self._pilot.flavour.modes.set_mode_acknowledged_as,
             lambda: self._set_custom_mode(mode, now_s) if custom else _DENIED,
             sender,
         )
 
-    def _answer(self, command_id: int, act: Callable[[], int], to: Sender) -> None:
+    def _answer(self, command_id: int, act: Callable[[], int], to: Sender, times: int = 1) -> None:
         """Act, but let the acknowledgement go ahead of whatever that makes the vehicle say."""
         said_before = self._outbox.take()
         result = act()
         said_meanwhile = self._outbox.take()
         self._outbox.put(said_before)
-        self._outbox.reply(
-            to,
-            mavlink.MAVLink_command_ack_message(command_id, result, 0, 0, to.system, to.component),
-        )
+        ack = mavlink.MAVLink_command_ack_message(command_id, result, 0, 0, to.system, to.component)
+        for _ in range(times):
+            self._outbox.reply(to, ack)
         self._outbox.put(said_meanwhile)
 
     def _set_custom_mode(self, custom_mode: int | None, now_s: float) -> int:
         """Change to a mode by its number; the MAV_RESULT."""
         mode = None if custom_mode is None else self._pilot.flavour.mode_of(custom_mode)
         if mode is None:
-            self._outbox.text(mavlink.MAV_SEVERITY_WARNING, f"No such mode {custom_mode}")
-            return _FAILED
-        return _ACCEPTED if self._pilot.set_mode(mode, now_s) else _FAILED
+            self._pilot.narrator.tell(Occasion.NO_SUCH_MODE, number=custom_mode)
+            return self._pilot.flavour.refusals.no_such_mode
+        return self._result(self._pilot.set_mode(mode, now_s))
+
+    def _result(self, done: bool) -> int:
+        """MAV_RESULT of something the vehicle may be unable to do now."""
+        return _ACCEPTED if done else self._pilot.flavour.refusals.not_now
 
     def _set_mode(self, command: Command, sender: Sender, now_s: float) -> int:
         del sender
@@ -149,55 +156,62 @@ class Commands:
         del sender
         forced = command.params[1] == _FORCE_ARM
         if command.params[0] == 1.0:
-            return _ACCEPTED if self._pilot.arm(now_s, forced=forced) else _FAILED
+            return self._result(self._pilot.arm(now_s, forced=forced))
         if command.params[0] == 0.0:
-            return _ACCEPTED if self._pilot.disarm(now_s, forced=forced) else _FAILED
+            return self._result(self._pilot.disarm(now_s, forced=forced))
         return _UNSUPPORTED
 
     def _take_off(self, command: Command, sender: Sender, now_s: float) -> int:
         del sender
         pilot = self._pilot
-        if not math.isfinite(command.height_m):
-            return _DENIED
-        up_m = command.height_m - pilot.config.origin.alt_m
+        up_m: float | None = None
         if pilot.flavour.take_off_above_home:
-            if command.frame not in ABOVE_HOME_FRAMES:
+            if not math.isfinite(command.height_m) or command.frame not in ABOVE_HOME_FRAMES:
                 return _DENIED
             up_m = pilot.flight.home_enu_m[2] + command.height_m
-        return _ACCEPTED if pilot.take_off(up_m, now_s) else _FAILED
+        elif math.isfinite(command.height_m):
+            up_m = command.height_m - pilot.config.origin.alt_m
+        return self._result(pilot.take_off(up_m, now_s))
 
     def _land(self, command: Command, sender: Sender, now_s: float) -> int:
         del command, sender
-        return _ACCEPTED if self._pilot.set_mode(Mode.LAND, now_s) else _FAILED
+        return self._result(self._pilot.set_mode(Mode.LAND, now_s))
 
     def _return_to_launch(self, command: Command, sender: Sender, now_s: float) -> int:
         del command, sender
-        return _ACCEPTED if self._pilot.set_mode(Mode.RTL, now_s) else _FAILED
+        return self._result(self._pilot.set_mode(Mode.RTL, now_s))
 
     def _reposition(self, command: Command, sender: Sender, now_s: float) -> int:
         del sender
         pilot = self._pilot
-        flags = command.params[1]
+        speed_m_s, flags = command.params[:2]
+        habits = pilot.flavour.modes
         change_mode = math.isfinite(flags) and bool(
             int(flags) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         )
-        mode = pilot.flavour.reposition_mode
-        if pilot.mode is not mode and not change_mode:
-            return _DENIED
+        needs_flag = habits.reposition_needs_flag or pilot.mode is not habits.for_reposition
+        if needs_flag and not change_mode:
+            return pilot.flavour.refusals.reposition_without_flag
         target_enu_m = self._place(command)
         if target_enu_m is None:
             return _DENIED
-        if not pilot.set_mode(mode, now_s):
-            return _FAILED
-        pilot.fly_guided(target_enu_m, now_s)
+        if not pilot.set_mode(habits.for_reposition, now_s):
+            return pilot.flavour.refusals.not_now
+        if not pilot.within_fence(target_enu_m):
+            # Acknowledged all the same, and ignored.
+            pilot.narrator.tell(Occasion.TARGET_OUTSIDE_FENCE)
+            return _ACCEPTED
+        own_speed = pilot.flavour.obeys_leg_speed and 0.0 < speed_m_s < math.inf
+        pilot.fly_guided(target_enu_m, now_s, speed_m_s if own_speed else None)
         return _ACCEPTED
 
     def _place(self, command: Command) -> Point | None:
         if command.lat_e7 is None or command.lon_e7 is None:
             return None
+        frame = command.frame if self._pilot.flavour.reads_frames else mavlink.MAV_FRAME_GLOBAL
         return place_enu_m(
             self._pilot.config.origin,
-            command.frame,
+            frame,
             command.lat_e7,
             command.lon_e7,
             command.height_m,
@@ -211,13 +225,13 @@ class Commands:
             return _FAILED
         if not 0.0 < speed_m_s < math.inf:
             return _FAILED
-        return _ACCEPTED if self._pilot.change_speed(speed_m_s, now_s) else _FAILED
+        return self._result(self._pilot.change_speed(speed_m_s, now_s))
 
     def _mission_start(self, command: Command, sender: Sender, now_s: float) -> int:
         del sender
         if command.params[0] != 0.0 or command.params[1] != 0.0:
             return _DENIED  # flying a part of the mission is not supported
-        return _ACCEPTED if self._pilot.start_mission(now_s) else _FAILED
+        return self._result(self._pilot.start_mission(now_s))
 
     def _set_mission_current(self, command: Command, sender: Sender, now_s: float) -> int:
         seq = command.params[0]
@@ -264,14 +278,15 @@ class Commands:
     def _send(self, message_id: int, sender: Sender, now_s: float) -> int:
         message = self._telemetry.build(message_id, now_s)
         if message is None:
-            return _FAILED
+            return self._pilot.flavour.refusals.no_such_message
         self._outbox.reply(sender, message)
         return _ACCEPTED
 
     def _set_message_interval(self, command: Command, sender: Sender, now_s: float) -> int:
         message_id, interval_us = command.params[:2]
-        if not math.isfinite(message_id) or int(message_id) not in self._telemetry.known:
-            return _DENIED
+        changeable = self._telemetry.known - self._pilot.flavour.fixed_streams
+        if not math.isfinite(message_id) or int(message_id) not in changeable:
+            return self._pilot.flavour.refusals.no_such_stream
         if not math.isfinite(interval_us):
             return _DENIED
         interval_s: float | None = interval_us / 1e6
@@ -302,6 +317,6 @@ class Commands:
         if command.params[0] not in (1.0, 3.0):
             return _UNSUPPORTED
         if self._pilot.armed and command.raw[1] != _FORCE_REBOOT:
-            return _FAILED
+            return self._pilot.flavour.refusals.not_now
         self.reboot_asked = True
         return _ACCEPTED

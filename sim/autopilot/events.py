@@ -23,6 +23,10 @@ __all__ = [
 ]
 
 
+_TEXT = 50
+"""Characters in a STATUSTEXT."""
+
+
 @dataclass(frozen=True, slots=True)
 class Connected:
     """A ground station can be spoken to on that channel from now on."""
@@ -65,6 +69,8 @@ class Send:
     message: mavlink.MAVLink_message
     channel: int | None = None
     """None: every channel there is."""
+    system_id: int | None = None
+    """Whom it is said to come from; None: the vehicle's own id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +85,11 @@ class Sender:
 class Outbox:
     """Messages in the order in which they are to be sent."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, numbers_texts: bool = False) -> None:
         self._sends: list[Send] = []
+        self._numbers_texts = numbers_texts
+        """Texts end in a tab, are numbered, and are sent in pieces if they are long."""
+        self._text_number = 0
 
     def broadcast(self, message: mavlink.MAVLink_message) -> None:
         """Say something to every ground station."""
@@ -95,8 +104,17 @@ class Outbox:
         self._sends.append(Send(message, channel))
 
     def text(self, severity: int, text: str) -> None:
-        """Say a line of at most 50 characters to people (STATUSTEXT)."""
-        self.broadcast(mavlink.MAVLink_statustext_message(severity, text.encode()[:50]))
+        """Say a line to people (STATUSTEXT), cut at 50 characters unless texts are numbered."""
+        if not self._numbers_texts:
+            self.broadcast(mavlink.MAVLink_statustext_message(severity, text.encode()[:_TEXT]))
+            return
+        encoded = f"{text}\t".encode()
+        for place, start in enumerate(range(0, len(encoded), _TEXT)):
+            piece = encoded[start : start + _TEXT]
+            self.broadcast(
+                mavlink.MAVLink_statustext_message(severity, piece, self._text_number, place)
+            )
+        self._text_number = self._text_number % 0xFFFF + 1
 
     def put(self, sends: list[Send]) -> None:
         """Say what was taken before."""

@@ -60,6 +60,9 @@ class Flight:
         self._parameters = parameters
         self._cruise_override_m_s: float | None = None
         self._timer_s: float | None = None
+        self._order: tuple[Point, float] = (config.start_enu_m, _LEAST_SPEED_M_S)
+        """Place [m] and speed [m/s] of the last leg."""
+        self._hindered: frozenset[Activity] = frozenset()
 
     @property
     def on_ground(self) -> bool:
@@ -77,7 +80,18 @@ class Flight:
         """Fly on at another speed [m/s], until None gives the parameter its say again."""
         self._cruise_override_m_s = speed_m_s
         if speed_m_s is not None and self.activity in (Activity.NAVIGATING, Activity.RETURNING):
-            self.motion.fly_to(self.motion.target_enu_m, speed_m_s, now_s)
+            self._fly(self._order[0], speed_m_s, now_s)
+
+    def hinder(self, activities: frozenset[Activity], now_s: float) -> None:
+        """Keep the vehicle where it is during these activities, until told otherwise."""
+        was_hindered = self.activity in self._hindered
+        self._hindered = activities
+        if self._timer_s is not None or was_hindered is (self.activity in activities):
+            return
+        if was_hindered:
+            self._fly(*self._order, now_s)
+        else:
+            self.motion.stop(now_s)
 
     def take_off(self, up_m: float, now_s: float) -> None:
         """Rise straight to a height in the local frame [m], once the motors are up to it."""
@@ -88,9 +102,10 @@ class Flight:
         elif self.activity is not Activity.SPOOLING_UP:
             self._lift(now_s)
 
-    def navigate(self, target_enu_m: Point, now_s: float) -> None:
+    def navigate(self, target_enu_m: Point, now_s: float, speed_m_s: float | None = None) -> None:
         """Fly straight to a place, in place of whatever was being done."""
-        self._leave(Activity.NAVIGATING, target_enu_m, self.cruise_m_s, now_s)
+        speed_m_s = self.cruise_m_s if speed_m_s is None else speed_m_s
+        self._leave(Activity.NAVIGATING, target_enu_m, speed_m_s, now_s)
 
     def hold(self, now_s: float) -> None:
         """Stay in the air where the vehicle is; on the ground, stay there."""
@@ -121,7 +136,7 @@ class Flight:
             self.hold(now_s)
         if self.activity in (Activity.GROUNDED, Activity.TOUCHED_DOWN):
             return
-        east_m, north_m, up_m = self.motion.position_enu_m(now_s)
+        east_m, north_m, up_m = self._stopped_enu_m(now_s)
         return_up_m = self.home_enu_m[2] + self._parameters.value_si(Setting.RETURN_HEIGHT_M)
         target_enu_m = (east_m, north_m, max(up_m, return_up_m))
         self._leave(Activity.CLIMBING, target_enu_m, self._speed(Setting.CLIMB_M_S), now_s)
@@ -144,7 +159,7 @@ class Flight:
                 self.hold(at_s)
                 return Milestone.REACHED
             case Activity.CLIMBING:
-                _, _, up_m = self.motion.position_enu_m(at_s)
+                _, _, up_m = self.motion.target_enu_m
                 above_home_enu_m = (*self.home_enu_m[:2], up_m)
                 self._leave(Activity.RETURNING, above_home_enu_m, self.cruise_m_s, at_s)
             case Activity.RETURNING:
@@ -166,15 +181,15 @@ class Flight:
         return Milestone.UNDERWAY
 
     def _lift(self, now_s: float) -> None:
-        east_m, north_m, _ = self.motion.position_enu_m(now_s)
+        east_m, north_m, _ = self._stopped_enu_m(now_s)
         target_enu_m = (east_m, north_m, self._take_off_up_m)
-        self._leave(Activity.TAKING_OFF, target_enu_m, self._speed(Setting.CLIMB_M_S), now_s)
+        self._leave(Activity.TAKING_OFF, target_enu_m, self._speed(Setting.TAKE_OFF_M_S), now_s)
 
     def _speed(self, setting: Setting) -> float:
         return max(_LEAST_SPEED_M_S, self._parameters.value_si(setting))
 
     def _descend(self, activity: Activity, speed_m_s: float, now_s: float) -> None:
-        east_m, north_m, _ = self.motion.position_enu_m(now_s)
+        east_m, north_m, _ = self._stopped_enu_m(now_s)
         self._leave(activity, (east_m, north_m, self._ground_up_m), speed_m_s, now_s)
 
     def _leave(
@@ -182,4 +197,16 @@ class Flight:
     ) -> None:
         self.activity = activity
         self._timer_s = None
-        self.motion.fly_to(target_enu_m, speed_m_s, now_s)
+        self._fly(target_enu_m, speed_m_s, now_s)
+
+    def _fly(self, target_enu_m: Point, speed_m_s: float, now_s: float) -> None:
+        self._order = target_enu_m, speed_m_s
+        if self.activity in self._hindered:
+            self.motion.stop(now_s)
+        else:
+            self.motion.fly_to(target_enu_m, speed_m_s, now_s)
+
+    def _stopped_enu_m(self, now_s: float) -> Point:
+        """Where the vehicle comes to a stop if it brakes now [m]."""
+        self.motion.stop(now_s)
+        return self.motion.target_enu_m

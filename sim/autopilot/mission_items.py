@@ -13,9 +13,24 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.geo import ABOVE_HOME_FRAMES, ABOVE_SEA_FRAMES
+from sim.autopilot.geo import (
+    ABOVE_HOME_FRAMES,
+    ABOVE_SEA_FRAMES,
+    place_enu_m,
+    place_wgs84_e7,
+)
+from sim.kinematics import Point
+from swarm.model.frames import Origin
 
-__all__ = ["MAX_ITEMS", "MissionItem", "MissionStore", "item_from_message"]
+__all__ = [
+    "MAX_ITEMS",
+    "MissionItem",
+    "MissionStore",
+    "home_item",
+    "int_frame",
+    "item_from_message",
+    "item_place_enu_m",
+]
 
 MAX_ITEMS = 724
 """Room for items, home included."""
@@ -77,12 +92,21 @@ _FRAMES_KEPT = {
 }
 
 
+_INT_FRAMES: dict[int, int] = {kept: sent for sent, kept in _FRAMES_KEPT.items()}
+
+
+def int_frame(frame: int) -> int:
+    """The variant of a frame that says that places are whole numbers."""
+    return _INT_FRAMES.get(frame, frame)
+
+
 def item_from_message(message: mavlink.MAVLink_message) -> MissionItem | int:
     """The item in a MISSION_ITEM or MISSION_ITEM_INT, or the MAV_MISSION_RESULT of refusing it."""
     if message.command not in _NAMES:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
-    params = (message.param1, message.param2, message.param3, message.param4)
-    # Yaw is given as NaN where it doesn't matter.
+    # Yaw is given as NaN where it doesn't matter; one NaN, so that equal items are equal.
+    yaw_deg = math.nan if math.isnan(message.param4) else message.param4
+    params = (message.param1, message.param2, message.param3, yaw_deg)
     if not all(math.isfinite(value) for value in params[:3]) or not math.isfinite(message.z):
         return int(mavlink.MAV_MISSION_INVALID)
     scale = 1e7 if message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM else 1
@@ -105,6 +129,34 @@ def item_from_message(message: mavlink.MAVLink_message) -> MissionItem | int:
         if abs(item.lon_e7) > 1_800_000_000:
             return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
     return item
+
+
+def item_place_enu_m(
+    item: MissionItem, origin: Origin, here_enu_m: Point, home_up_m: float
+) -> Point:
+    """Place of an item [m]; zeros mean where the vehicle is."""
+    place = place_enu_m(origin, item.frame, item.lat_e7, item.lon_e7, item.height_m, home_up_m)
+    if place is None:
+        return here_enu_m
+    east_m, north_m, up_m = place
+    if item.lat_e7 == 0 and item.lon_e7 == 0:
+        east_m, north_m, _ = here_enu_m
+    if item.height_m == 0.0:
+        up_m = here_enu_m[2]
+    return east_m, north_m, up_m
+
+
+def home_item(origin: Origin, home_enu_m: Point) -> MissionItem:
+    """Home as an item of a mission."""
+    lat_e7, lon_e7, alt_mm = place_wgs84_e7(origin, home_enu_m)
+    return MissionItem(
+        frame=mavlink.MAV_FRAME_GLOBAL,
+        command=mavlink.MAV_CMD_NAV_WAYPOINT,
+        params=(0.0, 0.0, 0.0, 0.0),
+        lat_e7=lat_e7,
+        lon_e7=lon_e7,
+        height_m=alt_mm / 1e3,
+    )
 
 
 class MissionStore:

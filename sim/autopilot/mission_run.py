@@ -12,13 +12,16 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import Outbox
+from sim.autopilot.flavours.base import MissionHabits
 from sim.autopilot.flight import Milestone
 from sim.autopilot.mission_items import MissionItem, MissionStore
+from sim.autopilot.occasions import Narrator, Occasion
 
 __all__ = ["MissionPilot", "MissionRun", "RunState"]
 
 _ITEMS_COMPARED = 3
 """Navigation items, from the current one, whose change makes the autopilot start it anew."""
+_REPEAT_S = 1.0
 
 
 class RunState(Enum):
@@ -62,15 +65,27 @@ class MissionRun:
     """Where in the mission the vehicle is."""
 
     def __init__(
-        self, store: MissionStore, pilot: MissionPilot, outbox: Outbox, first_seq: int
+        self,
+        store: MissionStore,
+        pilot: MissionPilot,
+        outbox: Outbox,
+        narrator: Narrator,
+        habits: MissionHabits,
     ) -> None:
         self.state = RunState.NOT_STARTED
         self.current: int | None = None
         """Number of the item being flown, or to be flown on resuming."""
+        self.told = 0
+        """The number that is told as the current one."""
         self._store = store
         self._pilot = pilot
         self._outbox = outbox
-        self._first_seq = first_seq
+        self._narrator = narrator
+        self._habits = habits
+        self._first_seq = habits.first_item
+        self._repeat_s: float | None = None
+        self._repeats_left = 0
+        self._reached_seq = 0
         self._hold_until_s: float | None = None
         self._landing = False
         """A landing item has reached its place and is descending."""
@@ -101,19 +116,23 @@ class MissionRun:
         if self.state is RunState.RUNNING:
             self.state = RunState.STOPPED
         self._hold_until_s = None
+        self._repeat_s = None
 
     def reset(self) -> None:
         """Forget the place in the mission, as disarming does."""
         self.stop()
         self.current = None
+        if self.state is RunState.COMPLETE and not self._habits.restarts:
+            self.state = RunState.NOT_STARTED
+        if not self._habits.keeps_number:
+            self.told = 0
 
     def clear(self) -> bool:
         """Delete the mission; False while it is being flown."""
         if self.state is RunState.RUNNING:
             return False
         self._store.replace(())
-        self.state = RunState.NOT_STARTED
-        self.current = None
+        self._rewind()
         return True
 
     def set_current(self, seq: int, now_s: float) -> bool:
@@ -124,7 +143,7 @@ class MissionRun:
         if self.state is RunState.RUNNING:
             self._begin_from(max(seq, self._first_seq), now_s)
         else:
-            self.current = first
+            self._go_to(first)
             self.state = RunState.STOPPED
         return True
 
@@ -132,12 +151,18 @@ class MissionRun:
         """Take up a mission that replaced ``old`` while this one ran; True if it made a change.
 
         The current item is begun anew if it or one of the next two differs, as
-        ArduCopter does; otherwise the vehicle flies on.
+        ArduCopter does, or the whole mission if anything differs, where the firmware
+        goes back to the first item; otherwise the vehicle flies on.
         """
+        rewinds = self._habits.upload_rewinds and old != self._store.items
         if self.state is not RunState.RUNNING:
-            if not self._store.items:
-                self.state = RunState.NOT_STARTED
+            if not self._store.items or rewinds:
+                self._rewind()
             return False
+        if rewinds:
+            self._repeat_s = None
+            self._begin_from(self._first_seq, now_s)
+            return True
         if self.current is None or self._upcoming(old) == self._upcoming(self._store.items):
             return False
         self._begin_from(self.current, now_s)
@@ -151,6 +176,16 @@ class MissionRun:
         """End the time on the spot at its deadline ``at_s``."""
         self._hold_until_s = None
         self._complete_current(at_s)
+
+    def repeat_deadline_s(self) -> float | None:
+        """When the last item reached is told again [s]."""
+        return self._repeat_s
+
+    def repeat(self, at_s: float) -> None:
+        """Tell the last item reached again, at its deadline ``at_s``."""
+        self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(self._reached_seq))
+        self._repeats_left -= 1
+        self._repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
 
     def on_milestone(self, milestone: Milestone, at_s: float) -> None:
         """Hear what the flight came to while the mission runs."""
@@ -185,28 +220,57 @@ class MissionRun:
         self._hold_until_s = None
         self._landing = False
         while (item := self._store.item(seq)) is not None:
-            self._outbox.text(mavlink.MAV_SEVERITY_INFO, f"Mission: {seq} {item.name}")
+            self._narrator.tell(Occasion.ITEM_BEGUN, seq=seq, name=item.name)
             if item.is_navigation:
-                self.current = seq
+                self._go_to(seq)
                 self._begin(item, now_s)
                 return
             if item.params[1] > 0.0:
                 self._pilot.mission_change_speed(item.params[1], now_s)
-            self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
+            self._reached(seq, now_s)
             seq += 1
         self.state = RunState.COMPLETE
+        self._repeat_s = None
         self._pilot.mission_finished(now_s)
 
     def _begin(self, item: MissionItem, now_s: float) -> None:
         match item.command:
             case mavlink.MAV_CMD_NAV_TAKEOFF:
                 self._pilot.mission_take_off(item, now_s)
+            case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH if self._habits.forgets_mode:
+                self._leave_by_returning(now_s)
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
                 self._pilot.mission_return(now_s)
             case mavlink.MAV_CMD_NAV_LAND if item.lat_e7 == 0 and item.lon_e7 == 0:
                 self._land(now_s)
             case _:
                 self._pilot.mission_navigate(item, now_s)
+
+    def _leave_by_returning(self, now_s: float) -> None:
+        """Call the item done and leave the mission, for the mode that returns home."""
+        seq = self.current or 0
+        following = self._store.next_navigation(seq + 1)
+        if following is None:
+            self._complete_current(now_s)
+        else:
+            self._reached(seq, now_s)
+            self._go_to(following)
+        self._pilot.mission_return(now_s)
+
+    def _go_to(self, seq: int) -> None:
+        self.current = self.told = seq
+
+    def _rewind(self) -> None:
+        self.state = RunState.NOT_STARTED
+        self.current = None
+        self.told = 0
+        self._repeat_s = None
+
+    def _reached(self, seq: int, at_s: float) -> None:
+        self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
+        self._reached_seq = seq
+        self._repeats_left = self._habits.repeats_reached
+        self._repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
 
     def _land(self, now_s: float) -> None:
         self._landing = True
@@ -222,7 +286,7 @@ class MissionRun:
         if self.current is None or (item := self._store.item(self.current)) is None:
             return
         seq = self.current
-        self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
+        self._reached(seq, at_s)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
-            self._outbox.text(mavlink.MAV_SEVERITY_INFO, f"Reached command #{seq}")
+            self._narrator.tell(Occasion.WAYPOINT_REACHED, seq=seq)
         self._begin_from(seq + 1, at_s)

@@ -13,7 +13,14 @@ from dataclasses import dataclass, field
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import Outbox, Sender
-from sim.autopilot.mission_items import MAX_ITEMS, MissionItem, MissionStore, item_from_message
+from sim.autopilot.flavours.base import MissionHabits
+from sim.autopilot.mission_items import (
+    MAX_ITEMS,
+    MissionItem,
+    MissionStore,
+    int_frame,
+    item_from_message,
+)
 
 __all__ = ["MissionTransfer"]
 
@@ -40,14 +47,17 @@ class MissionTransfer:
         store: MissionStore,
         outbox: Outbox,
         *,
-        asks_for_int: bool,
+        habits: MissionHabits,
+        current: Callable[[], int],
         home_item: Callable[[], MissionItem] | None,
         uploaded: Callable[[tuple[MissionItem, ...], float], None],
         clear: Callable[[], bool],
     ) -> None:
         self._store = store
         self._outbox = outbox
-        self._asks_for_int = asks_for_int
+        self._habits = habits
+        self._current = current
+        """Gives the number of the current item."""
         self._home_item = home_item
         """Gives item 0, where that is home and not the first waypoint."""
         self._uploaded = uploaded
@@ -159,7 +169,7 @@ class MissionTransfer:
         upload.resend_s = now_s + _RESEND_S
         request = (
             mavlink.MAVLink_mission_request_int_message
-            if self._asks_for_int
+            if self._habits.asks_for_int
             else mavlink.MAVLink_mission_request_message
         )
         sender = upload.sender
@@ -196,9 +206,9 @@ class MissionTransfer:
                 sender.system,
                 sender.component,
                 seq,
-                item.frame,
+                int_frame(item.frame) if as_int and self._habits.int_frames else item.frame,
                 item.command,
-                0,
+                int(self._habits.marks_current and seq == self._current()),
                 item.autocontinue,
                 *item.params,
                 item.lat_e7 * scale,

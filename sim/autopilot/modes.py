@@ -12,14 +12,16 @@ __all__ = ["Mode"]
 
 
 class Mode(Enum):
-    """What the vehicle flies by; the value is the name people see."""
+    """What the vehicle flies by; the value is the name people see on ArduPilot."""
 
+    MANUAL = "MANUAL"
     STABILIZE = "STABILIZE"
     ALT_HOLD = "ALT_HOLD"
     LOITER = "LOITER"
     POSHOLD = "POSHOLD"
     BRAKE = "BRAKE"
     GUIDED = "GUIDED"
+    TAKEOFF = "TAKEOFF"
     AUTO = "AUTO"
     RTL = "RTL"
     LAND = "LAND"
@@ -27,9 +29,9 @@ class Mode(Enum):
     @property
     def needs_position(self) -> bool:
         """Whether it can be armed, or entered in flight, only with a position estimate."""
-        return self not in (Mode.STABILIZE, Mode.ALT_HOLD, Mode.LAND)
+        return self.controls_position and self is not Mode.LAND
 
     @property
     def controls_position(self) -> bool:
         """Whether the autopilot itself holds the horizontal position."""
-        return self not in (Mode.STABILIZE, Mode.ALT_HOLD)
+        return self not in (Mode.MANUAL, Mode.STABILIZE, Mode.ALT_HOLD)

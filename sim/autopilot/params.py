@@ -9,6 +9,7 @@ extended parameters.
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -17,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import Outbox, Sender
 
-__all__ = ["Parameter", "ParameterServer", "ParameterTable", "Setting"]
+__all__ = ["Parameter", "ParameterHabits", "ParameterServer", "ParameterTable", "Setting"]
 
 _NO_INDEX = 65535
 """Index in a PARAM_VALUE that answers a request by name, as the autopilots send it."""
@@ -28,10 +29,40 @@ class Setting(Enum):
 
     CRUISE_M_S = "cruise"
     CLIMB_M_S = "climb"
+    TAKE_OFF_M_S = "take-off"
     LAND_M_S = "land"
     RETURN_HEIGHT_M = "return height"
     RETURN_WAIT_S = "return wait"
     DISARM_DELAY_S = "disarm delay"
+    DISARM_LANDED_S = "disarm delay after landing"
+    TAKE_OFF_HEIGHT_M = "take-off height"
+    FENCE_RADIUS_M = "fence radius"
+
+
+_FOLLOWED = {Setting.TAKE_OFF_M_S: Setting.CLIMB_M_S}
+"""Settings that go by another one where the firmware has no parameter for them."""
+_DEFAULTS_SI = {
+    Setting.DISARM_LANDED_S: 0.0,
+    Setting.TAKE_OFF_HEIGHT_M: 0.0,
+    Setting.FENCE_RADIUS_M: 0.0,  # no fence
+}
+"""Values of settings where the firmware has no parameter for them."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterHabits:
+    """How a firmware speaks of its parameters."""
+
+    reports_errors: bool
+    """Whether an unknown parameter is answered by PARAM_ERROR; otherwise by nothing."""
+    integers_bytewise: bool
+    """Whether the bytes of an integer travel in the float field, instead of its value."""
+    index_by_name: bool
+    """Whether an answer to a request by name tells the index."""
+    unanswered: frozenset[str] = frozenset()
+    """Unknown parameters that are answered by nothing all the same."""
+    told_at_boot: tuple[str, ...] = ()
+    """Parameters that are told to everybody when the vehicle has booted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +109,18 @@ class ParameterTable:
         names = list(self._table)
         return self._table[names[index]] if 0 <= index < len(names) else None
 
+    def index(self, name: str) -> int:
+        """Place of a parameter in the list."""
+        return list(self._table).index(name)
+
     def value_si(self, setting: Setting) -> float:
         """What the vehicle goes by, in SI units."""
-        parameter = self._table[self._by_setting[setting]]
+        name = self._by_setting.get(setting) or self._by_setting.get(
+            _FOLLOWED.get(setting, setting)
+        )
+        if name is None:
+            return _DEFAULTS_SI[setting]
+        parameter = self._table[name]
         return parameter.value * parameter.unit_si
 
     def write(self, name: str, value: float) -> Parameter:
@@ -97,19 +137,22 @@ class ParameterServer:
         self,
         table: ParameterTable,
         outbox: Outbox,
-        *,
-        reports_errors: bool,
-        unanswered: frozenset[str],
+        habits: ParameterHabits,
     ) -> None:
         self._table = table
         self._outbox = outbox
-        self._reports_errors = reports_errors
-        """Whether the firmware knows PARAM_ERROR; otherwise it keeps silent."""
-        self._unanswered = unanswered
+        self._habits = habits
 
     def announce(self, name: str, value: float) -> None:
-        """Change a value from inside and tell everybody."""
-        self._outbox.broadcast(self._value(self._table.write(name, value), _NO_INDEX))
+        """Change a value from inside and tell everybody; nothing where there is no such name."""
+        if self._table.get(name) is not None:
+            self._tell(self._table.write(name, value))
+
+    def tell_at_boot(self) -> None:
+        """Tell everybody what this firmware tells when it has booted."""
+        for name in self._habits.told_at_boot:
+            if (parameter := self._table.get(name)) is not None:
+                self._tell(parameter)
 
     def read(self, message: mavlink.MAVLink_message, sender: Sender) -> None:
         """Answer PARAM_REQUEST_READ, by name or by index."""
@@ -118,7 +161,8 @@ class ParameterServer:
         if parameter is None:
             self._refuse(message, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST, sender)
             return
-        self._outbox.reply(sender, self._value(parameter, _NO_INDEX if index < 0 else index))
+        told = self._index_told(parameter) if index < 0 else index
+        self._outbox.reply(sender, self._value(parameter, told))
 
     def list_all(self, sender: Sender) -> None:
         """Answer PARAM_REQUEST_LIST."""
@@ -128,18 +172,24 @@ class ParameterServer:
     def write(self, message: mavlink.MAVLink_message, sender: Sender) -> None:
         """Obey PARAM_SET; a value out of range or of a read-only parameter is refused."""
         parameter = self._table.get(message.param_id)
-        value = message.param_value
         if parameter is None:
             self._refuse(message, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST, sender)
-        elif not math.isfinite(value) or value < parameter.least:
+            return
+        value = message.param_value
+        if self._habits.integers_bytewise:
+            if message.param_type != parameter.type:
+                self._refuse(message, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, sender)
+                return
+            value = _from_wire(value, parameter.type)
+        if not math.isfinite(value) or value < parameter.least:
             self._refuse(message, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, sender)
         elif parameter.read_only:
             self._refuse(message, mavlink.MAV_PARAM_ERROR_READ_ONLY, sender)
         else:
-            self.announce(parameter.name, value)
+            self._tell(self._table.write(parameter.name, value))
 
     def _refuse(self, message: mavlink.MAVLink_message, error: int, sender: Sender) -> None:
-        if self._reports_errors and message.param_id not in self._unanswered:
+        if self._habits.reports_errors and message.param_id not in self._habits.unanswered:
             self._outbox.reply(
                 sender,
                 mavlink.MAVLink_param_error_message(
@@ -151,7 +201,31 @@ class ParameterServer:
                 ),
             )
 
+    def _tell(self, parameter: Parameter) -> None:
+        self._outbox.broadcast(self._value(parameter, self._index_told(parameter)))
+
+    def _index_told(self, parameter: Parameter) -> int:
+        return self._table.index(parameter.name) if self._habits.index_by_name else _NO_INDEX
+
     def _value(self, parameter: Parameter, index: int) -> mavlink.MAVLink_message:
+        value = parameter.value
+        if self._habits.integers_bytewise:
+            value = _on_wire(value, parameter.type)
         return mavlink.MAVLink_param_value_message(
-            parameter.name.encode(), parameter.value, parameter.type, len(self._table), index
+            parameter.name.encode(), value, parameter.type, len(self._table), index
         )
+
+
+def _on_wire(value: float, kind: int) -> float:
+    """The float whose bytes are those of an integer; a REAL32 as it is."""
+    if kind == mavlink.MAV_PARAM_TYPE_REAL32:
+        return value
+    whole = max(-(2**31), min(2**31 - 1, round(value)))
+    return float(struct.unpack("<f", struct.pack("<i", whole))[0])
+
+
+def _from_wire(value: float, kind: int) -> float:
+    """The number in a float field; integers lie in its bytes."""
+    if kind == mavlink.MAV_PARAM_TYPE_REAL32:
+        return value
+    return float(struct.unpack("<i", struct.pack("<f", value))[0])

@@ -7,28 +7,31 @@ Leaves out: decoding of commands (sim.autopilot.commands) and telemetry.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import replace
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
+from sim.autopilot.battery import Battery
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import Outbox
+from sim.autopilot.failsafes import FailSafes
 from sim.autopilot.flavours.base import Flavour
-from sim.autopilot.flight import Flight, Milestone
-from sim.autopilot.geo import place_enu_m, place_wgs84_e7
+from sim.autopilot.flight import Activity, Flight, Milestone
 from sim.autopilot.messages import home_position, origin_position
-from sim.autopilot.mission_items import MissionItem, MissionStore
+from sim.autopilot.mission_flight import MissionFlight
+from sim.autopilot.mission_items import MissionItem, MissionStore, home_item
 from sim.autopilot.mission_run import MissionRun, RunState
 from sim.autopilot.modes import Mode
+from sim.autopilot.occasions import Narrator, Occasion
 from sim.autopilot.params import ParameterServer, ParameterTable, Setting
 from sim.autopilot.readiness import Readiness, Stage
-from sim.kinematics import IdealMotion, Point
+from sim.kinematics import Point
 
 __all__ = ["Pilot"]
 
 _PREARM_TEXT_S = 30.0
 """How often a vehicle that can't be armed says why [s]."""
+_TASKS = frozenset({Mode.TAKEOFF, Mode.AUTO, Mode.LAND})
+"""Modes that are entered for something that comes to an end."""
 
 
 class Pilot:
@@ -40,6 +43,7 @@ class Pilot:
         parameters: what the ground set; outlasts a reboot.
         store: the mission on the vehicle; outlasts a reboot.
         outbox: takes what it says.
+        battery: what it flies on; outlasts a reboot.
         boot_s: when it is powered up [s].
         mode_changed: called with the time [s] as soon as the mode is another one.
     """
@@ -51,6 +55,7 @@ class Pilot:
         parameters: ParameterTable,
         store: MissionStore,
         outbox: Outbox,
+        battery: Battery,
         boot_s: float,
         mode_changed: Callable[[float], None],
     ) -> None:
@@ -61,15 +66,18 @@ class Pilot:
         self.parameter_server = ParameterServer(
             self.parameters,
             outbox,
-            reports_errors=flavour.reports_parameter_errors,
-            unanswered=flavour.unanswered_parameters,
+            flavour.parameter_habits,
         )
+        self.narrator = Narrator(outbox, flavour.texts, flavour.own_commands, config.system_id)
         self.readiness = Readiness(config.delays, boot_s)
-        self.flight = Flight(config, self.parameters, IdealMotion(config.start_enu_m))
+        self.flight = Flight(config, self.parameters, config.motion())
         self.store = store
-        self.run = MissionRun(self.store, self, outbox, flavour.first_item)
-        self.mode = flavour.boot_mode
+        self._mission = MissionFlight(self, config, flavour, self.flight, self.parameters)
+        self.run = MissionRun(self.store, self._mission, outbox, self.narrator, flavour.missions)
+        self.mode = flavour.modes.at_boot
         self.armed = False
+        self.task_done = False
+        """What the last take-off, mission or landing was for is done."""
         self._mode_changed = mode_changed
         self._home_locked = False
         self._auto_armed = False
@@ -77,10 +85,14 @@ class Pilot:
         self._position_control = False
         """A place was flown to since GUIDED was entered or the vehicle took off."""
         self._disarm_s: float | None = None
+        self._disarm_occasion = Occasion.DISARMED_UNUSED
+        self._take_off_up_m: float | None = None
+        """Height that was asked for [m], until the take-off begins; None: the usual one."""
+        self._mission_checked_s = boot_s
+        """From when on the mission on the vehicle can be begun [s]."""
         self._prearm_text_s = boot_s + _PREARM_TEXT_S
-        self._armed_s = 0.0
-        """Armed time of finished flights [s]."""
-        self._armed_since_s: float | None = None
+        self.battery = battery
+        self.failsafes = FailSafes(self, battery)
 
     # --- Time -------------------------------------------------------------------
 
@@ -104,7 +116,9 @@ class Pilot:
             (self.readiness.deadline_s(), self._pass_stage),
             (self.flight.deadline_s(), self._advance_flight),
             (self.run.deadline_s(), self.run.advance),
-            (self._disarm_s, self._disarm),
+            (self.run.repeat_deadline_s(), self.run.repeat),
+            (self._disarm_s, self._disarm_by_itself),
+            (self.failsafes.deadline_s(), self.failsafes.advance),
         ):
             if deadline_s is not None:
                 due.append((deadline_s, happen))
@@ -115,32 +129,63 @@ class Pilot:
         match stage:
             case Stage.BOOTED:
                 # A mode that was set meanwhile was acknowledged, and is lost here.
-                self.mode = self.flavour.boot_mode
+                self.mode = self.flavour.modes.at_boot
                 self._mode_changed(at_s)
+                self.parameter_server.tell_at_boot()
             case Stage.ORIGIN:
                 self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(at_s)))
                 self.set_home(self.position_enu_m(at_s), at_s, lock=False)
                 self.parameter_server.announce("MIS_TOTAL", float(max(1, len(self.store.items))))
             case Stage.SENSORS | Stage.POSITION:
                 pass
-        if stage in self.flavour.stage_texts:
-            self.outbox.text(mavlink.MAV_SEVERITY_INFO, self.flavour.stage_texts[stage])
+        text = self.flavour.stage_texts.get(stage)
+        if text is not None:
+            self.outbox.text(text.severity, text.template)
 
     def _say_obstacle(self, at_s: float) -> None:
         self._prearm_text_s = at_s + _PREARM_TEXT_S
         obstacle = self.readiness.obstacle(self.mode)
         if obstacle is not None and not self.armed:
-            self.outbox.text(mavlink.MAV_SEVERITY_CRITICAL, self.flavour.not_ready(obstacle))
+            self.narrator.tell(Occasion.NOT_READY, obstacle=obstacle)
 
     def _advance_flight(self, at_s: float) -> None:
+        stood, landing = self.flight.on_ground, self.flight.activity is Activity.LANDING
         milestone = self.flight.advance(at_s)
+        if stood and not self.flight.on_ground:
+            self.narrator.tell(Occasion.LIFTED_OFF)
+        if self.mode is Mode.RTL and not landing and self.flight.activity is Activity.LANDING:
+            self.narrator.tell(Occasion.RETURN_LANDING)
         if milestone is Milestone.LANDED:
-            if self.mode in (Mode.RTL, Mode.LAND):
-                self._disarm(at_s)
-            elif self.armed:
-                self._arm_delay(at_s)
+            self._landed(at_s)
+        elif milestone is Milestone.TAKEN_OFF and self.mode is self.flavour.modes.for_take_off:
+            self._taken_off(at_s)
+        elif self.mode is Mode.AUTO and self._mission.continues(milestone, at_s):
+            return
         if self.mode is Mode.AUTO:
             self.run.on_milestone(milestone, at_s)
+
+    def finish_task(self, now_s: float, *, motors_stop: bool = False) -> None:
+        """Be done with what the mode was for."""
+        self.task_done = True
+        if motors_stop:
+            self._disarm(now_s, Occasion.DISARMED_LANDED)
+
+    def _landed(self, at_s: float) -> None:
+        self.narrator.tell(Occasion.LANDED)
+        if self.mode is Mode.RTL:
+            self.narrator.tell(Occasion.RETURN_LANDED)
+        if self.mode is not Mode.AUTO:
+            self.task_done = True
+        delay = self.flavour.disarm_delay(self.mode)
+        if delay is None:
+            self._disarm(at_s, Occasion.DISARMED_LANDED)
+        elif self.armed:
+            self._disarm_after(delay, at_s, Occasion.DISARMED_LANDED)
+
+    def _taken_off(self, at_s: float) -> None:
+        """Leave the mode that was entered for taking off."""
+        self.task_done = True
+        self.enter(self.flavour.modes.for_reposition, at_s)
 
     # --- What is asked for --------------------------------------------------------
 
@@ -148,27 +193,35 @@ class Pilot:
         """Where the vehicle is [m]."""
         return self.flight.motion.position_enu_m(now_s)
 
-    def battery_frac(self, now_s: float) -> float:
-        """Remaining charge, 0..1."""
-        if self.config.endurance_s is None:
-            return 1.0
-        armed_s = self._armed_s
-        if self._armed_since_s is not None:
-            armed_s += now_s - self._armed_since_s
-        return max(0.0, 1.0 - armed_s / self.config.endurance_s)
+    def told_enu_m(self, now_s: float) -> Point:
+        """Where the vehicle says it is [m]: without GPS, above or below the last fix."""
+        place_enu_m = self.position_enu_m(now_s)
+        last_fix_enu_m = self.readiness.last_fix_enu_m
+        return place_enu_m if last_fix_enu_m is None else (*last_fix_enu_m[:2], place_enu_m[2])
 
     def set_mode(self, mode: Mode, now_s: float) -> bool:
         """Change the mode; False, with a text, where the autopilot refuses."""
         if mode is self.mode:
             return True
+        if mode is Mode.AUTO and self._mission_unavailable(now_s):
+            on_ground = self.flight.on_ground
+            self.narrator.tell(
+                Occasion.MISSION_UNAVAILABLE_ON_GROUND
+                if on_ground
+                else Occasion.MISSION_UNAVAILABLE
+            )
+            return True  # acknowledged all the same
         refusal = self._mode_refusal(mode)
         if refusal is not None:
-            self.outbox.text(
-                mavlink.MAV_SEVERITY_WARNING, f"Mode change to {mode.value} failed: {refusal}"
-            )
+            name = self.flavour.mode_name(mode)
+            self.narrator.tell(Occasion.MODE_REFUSED, mode=name, reason=refusal)
             return False
-        self._enter(mode, now_s)
+        self.enter(mode, now_s)
         return True
+
+    def _mission_unavailable(self, now_s: float) -> bool:
+        over = self.run.state is RunState.COMPLETE and not self.flavour.missions.restarts
+        return self.run.present and (over or now_s < self._mission_checked_s)
 
     def _mode_refusal(self, mode: Mode) -> str | None:
         if not self.readiness.booted:
@@ -178,32 +231,57 @@ class Pilot:
         if mode is Mode.AUTO:
             if not self.run.present:
                 return "init failed"
-            if self.armed and self.flight.on_ground and not self.run.starts_with_take_off:
-                self.outbox.text(mavlink.MAV_SEVERITY_CRITICAL, "Auto: Missing Takeoff Cmd")
+            grounded = self.armed and self.flight.on_ground
+            rises = self.flavour.missions.climbs_first or self.run.starts_with_take_off
+            if grounded and not rises:
+                self.narrator.tell(Occasion.MISSION_WITHOUT_TAKE_OFF)
                 return "init failed"
         return None
 
-    def _enter(self, mode: Mode, now_s: float) -> None:
+    def enter(self, mode: Mode, now_s: float) -> None:
+        """Be in a mode from now on, and begin to do what it is for."""
         if self.mode is Mode.AUTO:
             self.run.stop()
         self.mode = mode
+        if mode in _TASKS:
+            self.task_done = False
+        if mode is not Mode.TAKEOFF:
+            self._take_off_up_m = None
         self._mode_changed(now_s)
         self._position_control = False
+        self._mission.begin()
         self.flight.override_cruise(None, now_s)
-        if not self.armed:
-            return
+        if self.armed:
+            self._fly(mode, now_s)
+
+    def _fly(self, mode: Mode, now_s: float) -> None:
+        """Begin to do what a mode is for."""
         if mode is Mode.AUTO:
-            if self._auto_armed or not self.flight.on_ground:
+            if self._auto_armed or not self.flight.on_ground or self._mission.climb_due:
+                self.narrator.tell(Occasion.MISSION_BEGUN)
                 self.run.start_or_resume(now_s)
+        elif mode is Mode.TAKEOFF:
+            self._rise(now_s)
+            return
         elif mode is Mode.RTL:
-            self.flight.return_home(now_s)
+            self._return(now_s)
         elif mode is Mode.LAND:
             self.flight.land(now_s)
         else:
             # In manual modes too: a pilot who takes over is taken to hold the place.
             self.flight.hold(now_s)
         if self.flight.on_ground and self.run.state is not RunState.RUNNING:
-            self._stay_on_ground(now_s)
+            self.stay_on_ground(now_s)
+
+    def _return(self, now_s: float) -> None:
+        self.flight.return_home(now_s)
+        if self.flight.activity is Activity.CLIMBING:
+            up_m = self.flight.motion.target_enu_m[2]
+            self.narrator.tell(
+                Occasion.RETURN_BEGUN,
+                altitude_m=math.ceil(self.config.origin.alt_m + up_m),
+                above_home_m=math.ceil(up_m - self.flight.home_enu_m[2]),
+            )
 
     def arm(self, now_s: float, *, forced: bool) -> bool:
         """Start the motors; False, with a text, while the vehicle isn't ready."""
@@ -211,24 +289,27 @@ class Pilot:
             return True
         obstacle = self._arming_obstacle(forced=forced)
         if obstacle is not None:
-            self.outbox.text(mavlink.MAV_SEVERITY_CRITICAL, self.flavour.cannot_arm(obstacle))
+            self.narrator.tell(Occasion.ARMING_REFUSED, obstacle=obstacle)
             return False
         self.armed = True
-        self._armed_since_s = now_s
-        self._arm_delay(now_s)
-        self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(now_s)))
+        self.battery.start(now_s)
+        self._disarm_unused(now_s)
+        if self.flavour.tells_origin_when_armed:
+            self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(now_s)))
         here_enu_m = self.position_enu_m(now_s)
         if not self._home_locked and self.flight.home_enu_m != here_enu_m:
             self.set_home(here_enu_m, now_s, lock=False)
-        self.outbox.text(mavlink.MAV_SEVERITY_INFO, "Arming motors")
+        self.narrator.tell(Occasion.ARMED)
+        if self.flavour.modes.flies_when_armed and self.mode in (Mode.TAKEOFF, Mode.AUTO):
+            self._fly(self.mode, now_s)
         return True
 
     def _arming_obstacle(self, *, forced: bool) -> str | None:
         if not self.flight.on_ground:
             return "Falling"
         obstacle = self.readiness.obstacle(self.mode)
-        if obstacle is None and self.mode in self.flavour.unarmable_modes:
-            obstacle = f"{self.mode.value} mode not armable"
+        if obstacle is None and self.mode in self.flavour.modes.unarmable:
+            obstacle = f"{self.flavour.mode_name(self.mode)} mode not armable"
         # Force overcomes checks, but starts no motors of a computer that is still booting.
         return None if forced and self.readiness.booted else obstacle
 
@@ -237,51 +318,93 @@ class Pilot:
         if not self.armed:
             return True
         if not forced and not self.flight.on_ground:
+            self.narrator.tell(Occasion.DISARMING_REFUSED)
             return False
-        self._disarm(now_s)
+        self._disarm(now_s, Occasion.DISARMED)
         return True
 
-    def _disarm(self, now_s: float) -> None:
+    def _disarm_by_itself(self, at_s: float) -> None:
+        self._disarm(at_s, self._disarm_occasion)
+
+    def _disarm(self, now_s: float, occasion: Occasion) -> None:
         self._disarm_s = None
         if not self.armed:
             return
         self.armed = False
-        if self._armed_since_s is not None:
-            self._armed_s += now_s - self._armed_since_s
-        self._armed_since_s = None
+        self.battery.stop(now_s)
         self._auto_armed = False
         self.run.reset()
         self.flight.fall(now_s)
-        self.outbox.text(mavlink.MAV_SEVERITY_INFO, "Disarming motors")
+        self.narrator.tell(occasion)
+        after = self.flavour.modes.after_flight
+        if after is not None and (self.mode in _TASKS or self.mode is Mode.RTL):
+            self.mode = after
+            self._mode_changed(now_s)
 
-    def _stay_on_ground(self, now_s: float) -> None:
+    def stay_on_ground(self, now_s: float) -> None:
         """Give up a take-off that has not begun to rise; the motors stop after the usual delay."""
         self.flight.hold(now_s)
         if self._disarm_s is None:
-            self._arm_delay(now_s)
+            self._disarm_unused(now_s)
 
-    def _arm_delay(self, now_s: float) -> None:
-        delay_s = self.parameters.value_si(Setting.DISARM_DELAY_S)
+    def _disarm_unused(self, now_s: float) -> None:
+        self._disarm_after(Setting.DISARM_DELAY_S, now_s, Occasion.DISARMED_UNUSED)
+
+    def _disarm_after(self, setting: Setting, now_s: float, occasion: Occasion) -> None:
+        """Stop the motors after some time on the ground; 0 or less leaves them on."""
+        delay_s = self.parameters.value_si(setting)
         self._disarm_s = now_s + delay_s if delay_s > 0.0 else None
+        self._disarm_occasion = occasion
 
-    def take_off(self, up_m: float, now_s: float) -> bool:
-        """Rise to a height in the local frame [m]; False unless armed, guided, on the ground."""
+    def take_off(self, up_m: float | None, now_s: float) -> bool:
+        """Rise to a height in the local frame [m], None for the usual one; False if refused."""
+        own_mode = self.flavour.modes.for_take_off
+        if own_mode is not None:
+            self._take_off_up_m = up_m
+            if self.mode is own_mode and self.armed:
+                self._fly(own_mode, now_s)
+                return True
+            accepted = self.set_mode(own_mode, now_s)
+            if not accepted:
+                self._take_off_up_m = None
+            return accepted
         ready = self.armed and self.mode is Mode.GUIDED and self.flight.on_ground
-        if not ready or not self.readiness.has_position:
+        if not ready or not self.readiness.has_position or up_m is None:
             return False
         if up_m <= self.position_enu_m(now_s)[2]:
             return False
-        self._lift(up_m, now_s)
+        self.lift(up_m, now_s)
         return True
 
-    def _lift(self, up_m: float, now_s: float) -> None:
+    def _rise(self, now_s: float) -> None:
+        """Take off in the mode for it, as high as was asked, but not lower than usual."""
+        home_up_m = self.flight.home_enu_m[2]
+        least_up_m = home_up_m + self.parameters.value_si(Setting.TAKE_OFF_HEIGHT_M)
+        up_m, self._take_off_up_m = self._take_off_up_m, None
+        if up_m is None or up_m < least_up_m:
+            if up_m is not None:
+                height_m = self.config.origin.alt_m + least_up_m
+                self.narrator.tell(Occasion.TAKE_OFF_RAISED, height_m=height_m)
+            up_m = least_up_m
+        if up_m > self.position_enu_m(now_s)[2]:
+            self.lift(up_m, now_s)
+        else:
+            self._taken_off(now_s)
+
+    def lift(self, up_m: float, now_s: float) -> None:
+        """Rise to a height in the local frame [m]."""
         self._disarm_s = None
         self._auto_armed = True
         self._position_control = False
         self.flight.take_off(up_m, now_s)
 
-    def fly_guided(self, target_enu_m: Point, now_s: float) -> None:
-        """Fly to a place at once, in GUIDED.
+    def within_fence(self, target_enu_m: Point) -> bool:
+        """Whether a target lies inside the vehicle's own fence around home."""
+        radius_m = self.parameters.value_si(Setting.FENCE_RADIUS_M)
+        return not 0.0 < radius_m < math.dist(target_enu_m[:2], self.flight.home_enu_m[:2])
+
+    def fly_guided(self, target_enu_m: Point, now_s: float, speed_m_s: float | None = None) -> None:
+        """Fly to a place at once, in the mode for it, at the usual speed or one of its own.
 
         On the ground the target is taken and not flown; worse, it takes the place
         of a take-off that has not left the ground yet, as on ArduCopter.
@@ -289,25 +412,27 @@ class Pilot:
         if not self.armed:
             return
         if self.flight.on_ground:
-            self._stay_on_ground(now_s)
+            self.stay_on_ground(now_s)
             return
         if not self._position_control:
             self._position_control = True
             if self.flavour.forgets_speed:
                 self.flight.override_cruise(None, now_s)
-        self.flight.navigate(target_enu_m, now_s)
+        self.flight.navigate(target_enu_m, now_s, speed_m_s)
 
     def change_speed(self, speed_m_s: float, now_s: float) -> bool:
         """Fly on at another speed [m/s]; False in modes that have none of their own."""
-        if self.mode not in (Mode.GUIDED, Mode.AUTO, Mode.RTL):
+        if self.mode not in self.flavour.modes.change_speed:
             return False
         self.flight.override_cruise(speed_m_s, now_s)
         return True
 
     def start_mission(self, now_s: float) -> bool:
         """Fly the mission, from the ground too; False where AUTO is refused."""
-        if not self.set_mode(Mode.AUTO, now_s):
+        if not self.set_mode(Mode.AUTO, now_s) or self.mode is not Mode.AUTO:
             return False
+        if self.flavour.modes.flies_when_armed:
+            return self.arm(now_s, forced=False)
         if self.armed:
             self._auto_armed = True
             if self.run.state is not RunState.RUNNING:
@@ -322,81 +447,18 @@ class Pilot:
 
     def mission_uploaded(self, old: tuple[MissionItem, ...], now_s: float) -> None:
         """Hear that another mission has taken the place of ``old``."""
-        self.outbox.text(mavlink.MAV_SEVERITY_INFO, "Flight plan received")
+        self.narrator.tell(Occasion.MISSION_RECEIVED)
+        self._mission_checked_s = now_s + self.flavour.missions.check_s
         self.parameter_server.announce("MIS_TOTAL", float(len(self.store.items)))
         if self.run.mission_changed(old, now_s):
             restarted = self.run.state is RunState.RUNNING
-            self.outbox.text(
-                mavlink.MAV_SEVERITY_CRITICAL,
-                "Auto mission changed, restarted command"
-                if restarted
-                else "Auto mission changed but failed to restart command",
+            self.narrator.tell(
+                Occasion.MISSION_REPLACED if restarted else Occasion.MISSION_REPLACED_IN_VAIN
             )
 
     def home_item(self) -> MissionItem:
         """Home as item 0 of a mission."""
-        lat_e7, lon_e7, alt_mm = place_wgs84_e7(self.config.origin, self.flight.home_enu_m)
-        return MissionItem(
-            frame=mavlink.MAV_FRAME_GLOBAL,
-            command=mavlink.MAV_CMD_NAV_WAYPOINT,
-            params=(0.0, 0.0, 0.0, 0.0),
-            lat_e7=lat_e7,
-            lon_e7=lon_e7,
-            height_m=alt_mm / 1e3,
-        )
-
-    # --- What a mission asks for (MissionPilot) -----------------------------------
-
-    def mission_take_off(self, item: MissionItem, now_s: float) -> None:
-        """Rise to the height of the item, at least to where the vehicle is."""
-        place = self._place(replace(item, lat_e7=0, lon_e7=0), now_s)
-        self._lift(max(place[2], self.position_enu_m(now_s)[2]), now_s)
-
-    def mission_navigate(self, item: MissionItem, now_s: float) -> None:
-        """Fly to the place of the item; not from the ground."""
-        if self.flight.on_ground:
-            self._stay_on_ground(now_s)
-        else:
-            self.flight.navigate(self._place(item, now_s), now_s)
-
-    def mission_land(self, now_s: float) -> None:
-        """Land where the vehicle is."""
-        self.flight.land(now_s)
-
-    def mission_return(self, now_s: float) -> None:
-        """Return home and land."""
-        self.flight.return_home(now_s)
-
-    def mission_change_speed(self, speed_m_s: float, now_s: float) -> None:
-        """Fly at another speed [m/s] until AUTO is left."""
-        self.flight.override_cruise(speed_m_s, now_s)
-
-    def mission_finished(self, now_s: float) -> None:
-        """Stay where the last item ended: in the air, or on the ground with motors stopped."""
-        if self.flight.on_ground:
-            self._disarm(now_s)
-        else:
-            self.flight.hold(now_s)
-
-    def _place(self, item: MissionItem, now_s: float) -> Point:
-        """Place of an item [m]; zeros mean where the vehicle is, as ArduPilot reads them."""
-        here_enu_m = self.position_enu_m(now_s)
-        place = place_enu_m(
-            self.config.origin,
-            item.frame,
-            item.lat_e7,
-            item.lon_e7,
-            item.height_m,
-            self.flight.home_enu_m[2],
-        )
-        if place is None:
-            return here_enu_m
-        east_m, north_m, up_m = place
-        if item.lat_e7 == 0 and item.lon_e7 == 0:
-            east_m, north_m, _ = here_enu_m
-        if item.height_m == 0.0:
-            up_m = here_enu_m[2]
-        return east_m, north_m, up_m
+        return home_item(self.config.origin, self.flight.home_enu_m)
 
     def _boot_us(self, now_s: float) -> int:
         return round((now_s - self.readiness.boot_s) * 1e6)

@@ -9,6 +9,7 @@ from enum import Enum
 
 from sim.autopilot.config import Delays
 from sim.autopilot.modes import Mode
+from sim.kinematics import Point
 
 __all__ = ["Readiness", "Stage"]
 
@@ -20,6 +21,9 @@ class Stage(Enum):
     SENSORS = "sensors"
     ORIGIN = "origin"
     POSITION = "position"
+
+
+_BY_GPS = frozenset({Stage.ORIGIN, Stage.POSITION})
 
 
 class Readiness:
@@ -39,6 +43,16 @@ class Readiness:
             (boot_s + delays.position_s, Stage.POSITION),
         ]
         self._passed: set[Stage] = set()
+        self.last_fix_enu_m: Point | None = None
+        """Where the receiver lost the satellites [m]; None while it sees them."""
+        self._gps_lost_s = boot_s
+        self.defect: str | None = None
+        """What a check found that keeps the vehicle from arming, if any."""
+
+    @property
+    def gps_lost(self) -> bool:
+        """Whether the receiver has lost the satellites."""
+        return self.last_fix_enu_m is not None
 
     @property
     def booted(self) -> bool:
@@ -53,11 +67,28 @@ class Readiness:
     @property
     def has_position(self) -> bool:
         """Whether the position estimate is good enough to navigate by."""
-        return Stage.POSITION in self._passed
+        return Stage.POSITION in self._passed and not self.gps_lost
+
+    def lose_gps(self, last_fix_enu_m: Point, now_s: float) -> None:
+        """See no satellites from now on; stages that need them wait."""
+        self.last_fix_enu_m = last_fix_enu_m
+        self._gps_lost_s = now_s
+
+    def regain_gps(self, now_s: float) -> None:
+        """See them again; stages that need them are as much later as that took."""
+        if self.last_fix_enu_m is not None:
+            self.last_fix_enu_m = None
+            lost_s = now_s - self._gps_lost_s
+            self._ahead = [
+                (due_s + lost_s if stage in _BY_GPS else due_s, stage)
+                for due_s, stage in self._ahead
+            ]
 
     def deadline_s(self) -> float | None:
-        """When the next stage is due [s]; None once all are passed."""
-        return self._ahead[0][0] if self._ahead else None
+        """When the next stage is due [s]; None once all are passed, or while GPS lacks."""
+        if not self._ahead or (self.gps_lost and self._ahead[0][1] in _BY_GPS):
+            return None
+        return self._ahead[0][0]
 
     def advance(self) -> Stage:
         """Pass the next stage.
@@ -79,4 +110,4 @@ class Readiness:
             return "Accels inconsistent"
         if mode.needs_position and not self.has_position:
             return "Need Position Estimate"
-        return None
+        return self.defect

@@ -11,15 +11,16 @@ import asyncio
 import contextlib
 import itertools
 import socket
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 from sim.autopilot.codec import ChannelCodec, ChannelSigning
+from sim.autopilot.config import VehicleConfig
 from sim.autopilot.endpoint import Endpoint, Transport
-from sim.autopilot.events import Connected, Disconnected, Event, Received, Tick
-from sim.autopilot.vehicle import COMPONENT_ID, Vehicle
+from sim.autopilot.events import Connected, Disconnected, Event, Received, Send, Tick
+from sim.autopilot.vehicle import COMPONENT_ID
 from swarm.clock import Clock, unix_s
 
-__all__ = ["VehicleServer"]
+__all__ = ["Machine", "VehicleServer"]
 
 _Address = tuple[Any, ...]
 
@@ -29,6 +30,23 @@ _PEER_SILENCE_WALL_S = 30.0
 _MAX_UNSENT_BYTES = 1 << 20
 """A TCP client that leaves more unread is hung up on."""
 _LEAST_SLEEP_WALL_S = 0.001
+
+
+class Machine(Protocol):
+    """A vehicle, whether faults happen to it or not."""
+
+    @property
+    def config(self) -> VehicleConfig:
+        """What it is."""
+        ...
+
+    def step(self, event: Event, now_s: float) -> list[Send]:
+        """Take an event; what is to be sent, in order."""
+        ...
+
+    def next_deadline_s(self) -> float:
+        """When `step` should be called at the latest [s]."""
+        ...
 
 
 class VehicleServer:
@@ -43,7 +61,7 @@ class VehicleServer:
 
     def __init__(
         self,
-        vehicle: Vehicle,
+        vehicle: Machine,
         endpoint: Endpoint,
         clock: Clock,
         *,
@@ -136,7 +154,9 @@ class VehicleServer:
             to = self._channels if send.channel is None else (send.channel,)
             for number in to:
                 if (channel := self._channels.get(number)) is not None:
-                    frames.setdefault(number, []).append(channel.codec.encode(send.message))
+                    frames.setdefault(number, []).append(
+                        channel.codec.encode(send.message, send.system_id)
+                    )
         for number, batch in frames.items():
             if (channel := self._channels.get(number)) is not None:
                 channel.send(batch)

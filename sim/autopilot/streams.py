@@ -1,7 +1,7 @@
 """Which messages each ground station gets how often.
 
-Intervals are kept on average; a vehicle that is called too late skips what was
-missed instead of sending it in a burst. Leaves out: what the messages say
+Messages are due on a grid of their own; a vehicle that is called too late skips what was
+missed instead of sending it in a burst, and keeps the grid. Leaves out: what the messages say
 (sim.autopilot.telemetry).
 """
 
@@ -75,7 +75,7 @@ class Streams:
             for message_id, entry in streams.items():
                 interval_s, due_s = entry
                 if due_s <= now_s:
-                    entry[1] = (
-                        due_s + interval_s if due_s + interval_s > now_s else (now_s + interval_s)
-                    )
+                    missed = (now_s - due_s) // interval_s
+                    next_s = due_s + (missed + 1.0) * interval_s
+                    entry[1] = next_s if next_s > now_s else next_s + interval_s
                     yield channel, message_id

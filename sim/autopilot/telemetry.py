@@ -1,8 +1,8 @@
 """What a vehicle reports about itself, message by message.
 
-Sources: https://mavlink.io/en/messages/common.html and the recordings of
-ArduCopter 4.8, from which the sensor bits are taken. Leaves out: attitude other
-than heading, raw sensors, RC channels.
+Source: https://mavlink.io/en/messages/common.html. Leaves out: what firmwares say
+differently (sim.autopilot.flavours), attitude other than heading, raw sensors,
+RC channels.
 """
 
 from __future__ import annotations
@@ -12,25 +12,14 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sim.autopilot.flavours.base import MissionView
 from sim.autopilot.flight import Activity
 from sim.autopilot.geo import place_wgs84_e7
 from sim.autopilot.messages import home_position, origin_position
 from sim.autopilot.mission_run import RunState
-from sim.autopilot.modes import Mode
 from sim.autopilot.pilot import Pilot
 
 __all__ = ["DATA_STREAMS", "Telemetry"]
-
-_PRESENT = 0x5371FC0F
-_ENABLED = 0x53419C0F
-_HEALTHY = 0x47519C0F
-_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
-_AHRS = mavlink.MAV_SYS_STATUS_AHRS
-_PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-_POSITION_CONTROL = (
-    mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
-    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
-)
 
 _EKF_ALIGNED = (
     mavlink.EKF_ATTITUDE
@@ -47,9 +36,7 @@ _EKF_WITH_POSITION = (
     | mavlink.EKF_PRED_POS_HORIZ_ABS
 )
 
-_BATTERY_MV = 12600
-_HOVER_CA = 3000
-"""Current drawn while armed [10 mA]."""
+_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
 _UTC_AT_BOOT_US = 1_735_689_600_000_000
 """Simulated GPS time at boot: 2025-01-01 UTC. The core knows no wall clock."""
 _INT16_MAX = 32767
@@ -82,7 +69,7 @@ class Telemetry:
     def __init__(self, pilot: Pilot) -> None:
         self._pilot = pilot
         self._heading_deg = 0.0
-        self._builders: dict[int, Callable[[float], mavlink.MAVLink_message]] = {
+        builders: dict[int, Callable[[float], mavlink.MAVLink_message]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
@@ -100,6 +87,8 @@ class Telemetry:
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._origin,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home,
         }
+        missing = pilot.flavour.missing_messages
+        self._builders = {key: build for key, build in builders.items() if key not in missing}
 
     @property
     def known(self) -> frozenset[int]:
@@ -128,10 +117,6 @@ class Telemetry:
         pilot = self._pilot
         on_ground = pilot.flight.on_ground
         booted = pilot.readiness.booted
-        if not booted:
-            status = mavlink.MAV_STATE_BOOT
-        else:
-            status = mavlink.MAV_STATE_STANDBY if on_ground else mavlink.MAV_STATE_ACTIVE
         return mavlink.MAVLink_heartbeat_message(
             mavlink.MAV_TYPE_QUADROTOR,
             pilot.flavour.autopilot,
@@ -139,44 +124,49 @@ class Telemetry:
                 pilot.mode, armed=pilot.armed, on_ground=on_ground, booted=booted
             ),
             pilot.flavour.custom_mode(pilot.mode),
-            status,
+            pilot.flavour.system_status(armed=pilot.armed, on_ground=on_ground, booted=booted),
             3,
         )
 
     def _sys_status(self, now_s: float) -> mavlink.MAVLink_message:
         pilot = self._pilot
-        seen = _GPS if pilot.readiness.has_origin else 0
-        running = _AHRS if pilot.readiness.has_origin else 0
-        if pilot.mode.controls_position:
-            running |= _POSITION_CONTROL
-        prearm = _PREARM if pilot.readiness.obstacle(pilot.mode) is None else 0
+        sensors = pilot.flavour.sensors(
+            pilot.mode,
+            has_origin=pilot.readiness.has_origin,
+            can_arm=pilot.readiness.obstacle(pilot.mode) is None,
+        )
+        lost = _GPS if pilot.readiness.gps_lost else 0
         return mavlink.MAVLink_sys_status_message(
-            _PRESENT | seen,
-            _ENABLED | seen | running,
-            _HEALTHY | seen | running | prearm,
+            sensors.present,
+            sensors.enabled,
+            sensors.health & ~lost,
             0,
-            _BATTERY_MV,
+            self._battery_mv(now_s),
             self._current_ca(),
             self._battery_percent(now_s),
             *(0, 0, 0, 0, 0, 0),
         )
 
     def _current_ca(self) -> int:
-        return _HOVER_CA if self._pilot.armed and not self._pilot.flight.on_ground else 0
+        return round(self._pilot.battery.current_a * 100.0)
+
+    def _battery_mv(self, now_s: float) -> int:
+        return round(self._pilot.battery.voltage_v(now_s) * 1e3)
 
     def _battery_percent(self, now_s: float) -> int:
-        return math.ceil(self._pilot.battery_frac(now_s) * 100.0)
+        return math.ceil(self._pilot.battery.remaining_frac(now_s) * 100.0)
 
     def _battery(self, now_s: float) -> mavlink.MAVLink_message:
         unknown_mv = [65535] * 9
+        consumed_mah = self._pilot.battery.consumed_mah(now_s)
         return mavlink.MAVLink_battery_status_message(
             0,
             mavlink.MAV_BATTERY_FUNCTION_ALL,
             mavlink.MAV_BATTERY_TYPE_LIPO,
             _INT16_MAX,
-            [_BATTERY_MV, *unknown_mv],
+            [self._battery_mv(now_s), *unknown_mv],
             self._current_ca(),
-            -1,
+            -1 if consumed_mah is None else round(consumed_mah),
             -1,
             self._battery_percent(now_s),
         )
@@ -188,7 +178,7 @@ class Telemetry:
         return mavlink.MAVLink_system_time_message(utc_us, self._boot_ms(now_s))
 
     def _gps_raw(self, now_s: float) -> mavlink.MAVLink_message:
-        fixed = self._pilot.readiness.has_origin
+        fixed = self._pilot.readiness.has_origin and not self._pilot.readiness.gps_lost
         lat_e7, lon_e7, alt_mm = self._place(now_s)
         return mavlink.MAVLink_gps_raw_int_message(
             int(self._boot_s(now_s) * 1e6),
@@ -203,10 +193,12 @@ class Telemetry:
     def _place(self, now_s: float) -> tuple[int, int, int]:
         if not self._pilot.readiness.has_origin:
             return 0, 0, 0
-        return place_wgs84_e7(self._pilot.config.origin, self._pilot.position_enu_m(now_s))
+        return place_wgs84_e7(self._pilot.config.origin, self._pilot.told_enu_m(now_s))
 
     def _velocity_ned_m_s(self, now_s: float) -> tuple[float, float, float]:
         east_m_s, north_m_s, up_m_s = self._pilot.flight.motion.velocity_enu_m_s(now_s)
+        if self._pilot.readiness.gps_lost:
+            east_m_s = north_m_s = 0.0
         return north_m_s, east_m_s, 0.0 - up_m_s
 
     def _ground_speed_m_s(self, now_s: float) -> float:
@@ -228,7 +220,7 @@ class Telemetry:
         )
 
     def _local_position(self, now_s: float) -> mavlink.MAVLink_message:
-        east_m, north_m, up_m = self._pilot.position_enu_m(now_s)
+        east_m, north_m, up_m = self._pilot.told_enu_m(now_s)
         return mavlink.MAVLink_local_position_ned_message(
             self._boot_ms(now_s), north_m, east_m, 0.0 - up_m, *self._velocity_ned_m_s(now_s)
         )
@@ -274,17 +266,21 @@ class Telemetry:
         del now_s
         pilot = self._pilot
         run = pilot.run
-        states = {
-            RunState.NOT_STARTED: mavlink.MISSION_STATE_NOT_STARTED,
-            RunState.RUNNING: mavlink.MISSION_STATE_ACTIVE,
-            RunState.STOPPED: mavlink.MISSION_STATE_PAUSED,
-            RunState.COMPLETE: mavlink.MISSION_STATE_COMPLETE,
-        }
+        view = MissionView(
+            mode=pilot.mode,
+            current=run.current,
+            items=max(0, len(pilot.store.items) - pilot.flavour.missions.first_item),
+            present=run.present,
+            running=run.state is RunState.RUNNING,
+            stopped=run.state is RunState.STOPPED,
+            over=run.state is RunState.COMPLETE,
+            task_done=pilot.task_done,
+        )
         return mavlink.MAVLink_mission_current_message(
-            run.current or 0,
-            max(0, len(pilot.store.items) - pilot.flavour.first_item),
-            states[run.state] if run.present else mavlink.MISSION_STATE_NO_MISSION,
-            1 if pilot.mode is Mode.AUTO else 0,
+            run.told,
+            pilot.flavour.mission_total(view),
+            pilot.flavour.mission_state(view),
+            pilot.flavour.mission_mode(view),
         )
 
     def _version(self, now_s: float) -> mavlink.MAVLink_message:
@@ -317,7 +313,7 @@ class Telemetry:
             Activity.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
         }
         return mavlink.MAVLink_extended_sys_state_message(
-            mavlink.MAV_VTOL_STATE_MC,
+            self._pilot.flavour.vtol_state,
             landed.get(self._pilot.flight.activity, mavlink.MAV_LANDED_STATE_IN_AIR),
         )
 

@@ -15,6 +15,7 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sim.autopilot.battery import Battery
 from sim.autopilot.commands import Commands, command_from_message
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import (
@@ -65,10 +66,11 @@ class Vehicle:
         self.unknown = 0
         """Messages dropped because this vehicle doesn't know them."""
         self._flavour = flavour
-        self._outbox = Outbox()
+        self._outbox = Outbox(numbers_texts=flavour.numbers_texts)
         self._streams = Streams()
         self._parameters = ParameterTable(flavour.parameters(config))
         self._store = MissionStore()
+        self._battery = Battery(config.endurance_s, config.battery_failsafe)
         self._now_s = start_s
         self._power_up(config, start_s)
 
@@ -79,16 +81,18 @@ class Vehicle:
             self._parameters,
             self._store,
             self._outbox,
+            self._battery,
             now_s,
-            mode_changed=self._say_heartbeat,
+            mode_changed=self._on_mode_changed,
         )
         self._telemetry = Telemetry(self._pilot)
         self._commands = Commands(self._pilot, self._telemetry, self._streams, self._outbox)
         self._transfer = MissionTransfer(
             self._store,
             self._outbox,
-            asks_for_int=self._flavour.uploads_by_int,
-            home_item=self._pilot.home_item if self._flavour.first_item > 0 else None,
+            habits=self._flavour.missions,
+            current=lambda: self._pilot.run.told,
+            home_item=self._pilot.home_item if self._flavour.missions.first_item > 0 else None,
             uploaded=self._pilot.mission_uploaded,
             clear=self._pilot.run.clear,
         )
@@ -148,7 +152,8 @@ class Vehicle:
                 self._reboot(now_s)
             case Tick():
                 pass
-        self._advance(now_s)
+        if not isinstance(event, Tick):  # which has brought about nothing more that is due
+            self._advance(now_s)
         self._report(now_s)
         return self._outbox.take()
 
@@ -174,6 +179,10 @@ class Vehicle:
         for channel, message_id in self._streams.take_due(now_s):
             self._say(message_id, channel, now_s)
 
+    def _on_mode_changed(self, now_s: float) -> None:
+        if self._flavour.modes.told_at_once:
+            self._say_heartbeat(now_s)
+
     def _say_heartbeat(self, now_s: float) -> None:
         for channel in self._streams.channels:
             self._say(mavlink.MAVLINK_MSG_ID_HEARTBEAT, channel, now_s)
@@ -195,6 +204,7 @@ class Vehicle:
             self._streams.close(channel)
             self._streams.open(channel, self._flavour.unasked_streams, now_s)
         self._outbox.take()
+        self._battery.stop(now_s)
         self._power_up(here, now_s)
 
     def _receive(self, channel: int, message: mavlink.MAVLink_message, now_s: float) -> None:

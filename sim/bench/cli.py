@@ -1,8 +1,9 @@
 """The commands of the family `swarm bench`.
 
-Leaves out: the commands about fleets in trouble (`sim.bench.trouble_commands`), what the
-others do (`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown
-(`sim.bench.plan_report`, `sim.bench.plan_plot`).
+Leaves out: the commands about fleets in trouble (`sim.bench.trouble_commands`) and about
+simulated vehicles (`sim.bench.autopilot_commands`), what the others do
+(`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown (`sim.bench.plan_report`,
+`sim.bench.plan_plot`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sim.bench.autopilot_commands import AUTOPILOT_HELP, autopilot
 from sim.bench.trouble_commands import FAILOVER_HELP, FLOOD_HELP, failover, flood
 from sim.bench.words import each
 from swarm.errors import Fault, InputError
@@ -218,6 +220,7 @@ bench.command("failover", help=FAILOVER_HELP, short_help="Measure fleets in trou
 bench.command("flood", help=FLOOD_HELP, short_help="Fly while a hostile peer floods the bus.")(
     flood
 )
+bench.command("autopilot", help=AUTOPILOT_HELP, short_help="Measure simulated vehicles.")(autopilot)
 
 
 def _sources(scenario: Path | None, sizes: str | None, default: str) -> list[tuple[str, Source]]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sim.bench.failover import What
     from sim.launch.fleet import BusKind
 
-__all__ = ["FAILOVER_HELP", "FLOOD_HELP", "failover", "flood"]
+__all__ = ["FAILOVER_HELP", "FLOOD_HELP", "failover", "flood", "progress"]
 
 _LONGEST_S = 86_400.0
 FAILOVER_HELP = """Measure fleets of real processes in trouble.
@@ -113,7 +113,7 @@ def failover(
         sizes=tuple(each("--sizes", sizes, _fleet_size)),
         seed=seed,
     )
-    with _progress() as tell:
+    with progress() as tell:
         done = measure(wanted, settings, tell)
     if json:
         typer.echo(dumps(failover_as_json(done), allow_nan=False))
@@ -146,7 +146,7 @@ def flood(
     from sim.chaos.flood import fly_flooded, times_for
 
     kind, machine = _bus(bus), this_machine()
-    with _progress() as tell:
+    with progress() as tell:
         done = asyncio.run(fly_flooded(times_for(seconds), seed=seed, bus=kind, on_progress=tell))
     if json:
         typer.echo(dumps(flood_as_json(machine, seed, done), allow_nan=False))
@@ -156,7 +156,7 @@ def flood(
 
 
 @contextlib.contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
+def progress() -> Iterator[Callable[[str], None]]:
     """A place to say what is being done: a line that changes, on a terminal only."""
     from rich.console import Console
 

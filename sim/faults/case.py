@@ -24,7 +24,7 @@ from sim.faults.transcript import Broken
 from sim.processes import LocalClock
 from sim.rough_network import Conditions, RoughNetwork, Topology
 from sim.streams import stream
-from sim.world import ONLOOKER, STANDBY, Planner, Setting, World
+from sim.world import ONLOOKER, OPERATOR_PATIENCE_S, STANDBY, Planner, Setting, World
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.config import Timing
 from swarm.errors import Fault as InputFault
@@ -168,8 +168,8 @@ def play(case: Case, make_plan: Planner = quick_plan) -> Verdict:
 def limit_s(case: Case) -> float:
     """By then every living agent must be home: one UAV alone could have done it all.
 
-    The slowest flies from task to task across the area; refusals, a missing coordinator and
-    a stalemate take their time.
+    The slowest flies from task to task across the area; refusals, a missing coordinator, an
+    operator who is not heard and a stalemate take their time.
     """
     mission = case.flown()
     last_s = max((each.ends_s for each in case.schedule), default=0.0)
@@ -180,6 +180,8 @@ def limit_s(case: Case) -> float:
     speed_m_s = slow * min(uav.speed_m_s for uav in mission.uavs)
     appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
     work_s = sum(task.service_s + across_m / speed_m_s for task in mission.tasks)
+    if any(each.kind is Kind.HOLD for each in case.schedule):
+        last_s += OPERATOR_PATIENCE_S
     waits_s = TIMING.abandon_s + TIMING.stalemate_s + 2.0 * TIMING.reconsider_s + 60.0
     return max(last_s, appears_s) + work_s + waits_s
 

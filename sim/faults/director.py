@@ -11,9 +11,11 @@ from collections.abc import Callable, Iterable
 from functools import partial
 
 from sim.faults.schedule import Disturbance, Kind
+from sim.operator.seat import OperatorSeat
 from sim.processes import Process
 from sim.rough_network import RoughNetwork
 from sim.world import Recall, World
+from swarm.wire.messages import CommandKind
 
 __all__ = ["Director"]
 
@@ -85,6 +87,13 @@ class Director:
                 self._until(what, partial(world.refuses.discard, refusal))
             case Kind.WITHDRAW:
                 world.withdraw(names[0])
+            case Kind.HOLD:
+                held = world.command(CommandKind.HOLD, names[0])
+                self._until(what, partial(self._let_go_on, names[0], held))
+            case Kind.RETURN:
+                world.command(CommandKind.RETURN, names[0])
+            case Kind.ABORT:
+                world.command(CommandKind.ABORT)
 
     def _hold(self, process: Process, what: Disturbance) -> None:
         """Hold one life of a process; several holds end with the last of them."""
@@ -109,6 +118,13 @@ class Director:
             self._network.cont(process)
         if not self._holds[process]:
             process.resume()
+
+    def _let_go_on(self, uav: str, held: OperatorSeat) -> None:
+        """Nobody takes a command back before they know what came of it."""
+        if held.verdict is None:
+            self._world.queue.after(0.5, partial(self._let_go_on, uav, held))
+        else:
+            self._world.command(CommandKind.RESUME, uav)
 
     def _until(self, what: Disturbance, end: Callable[[], object]) -> None:
         if what.lasts_s is None:

@@ -9,6 +9,8 @@ Beside the invariants of the messages (sim.faults.transcript):
 - *disagree*: and each knows what the others claim, the epoch in force and the board;
 - *two coordinators*: and only one of them coordinates;
 - *winners differ*: whenever two have equal registers, they see the same states and winners;
+- *disobeys*: no agent that knows of it takes tasks in an aborted mission, or though the
+  operator's last word to its UAV was to hold or to come home;
 - *task lost*: in the end each posted task is done, failed, withdrawn, or open with no UAV
   able to do it that knew of it, and of a mission that had begun, and came home of its own accord;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
@@ -38,7 +40,8 @@ from sim.world import World
 from swarm.events import Note
 from swarm.state.board import TaskState
 from swarm.state.claims import holders
-from swarm.wire.messages import Message, Result, StatusPhase
+from swarm.state.commands import aborted, newest
+from swarm.wire.messages import CommandKind, Message, Result, StatusPhase
 
 __all__ = ["SETTLED_S", "Judge"]
 
@@ -120,12 +123,21 @@ class Judge:
         if self._there.alive:
             self._there.queue.after(LOOK_EVERY_S, self._look)
         agents = [(p, core) for p, core in self._living() if isinstance(core, AgentCore)]
+        self._look_for_disobedience(agents)
         self._look_for_shared_tasks(agents)
         self._look_for_equal_registers(agents)
         if self._calm_for_s > SETTLED_S:
             self._look_for_disagreement(agents)
             self._look_for_two_coordinators()
         self._stop_if_broken()
+
+    def _look_for_disobedience(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        for process, core in agents:
+            word = newest(core.replica, core.uav)
+            resumed = word is None or word[1].kind is CommandKind.RESUME
+            if core.claim is not None and (aborted(core.replica) is not None or not resumed):
+                kind = "abort" if word is None else word[1].kind
+                self._break("disobeys", f"{process.name} is {core.phase} after {kind}")
 
     def _look_for_shared_tasks(self, agents: list[tuple[Process, AgentCore]]) -> None:
         now_s, shared = self._now_s, set()
@@ -188,7 +200,11 @@ class Judge:
     def _look_for_lost_tasks(self) -> None:
         transcript, world = self.transcript, self._there
         settled = transcript.done | transcript.failed | transcript.withdrawn
-        home = [u for u in world.mission.uavs if world.finished.get(u.id) == 0]
+        home = [
+            uav
+            for uav in world.mission.uavs
+            if world.finished.get(uav.id) == 0 and not transcript.sent_home(uav.id)
+        ]
         to_do = {
             uav: {task for task, entry in core.replica.board.items() if not entry.withdrawn}
             for uav, core in world.agents.items()

@@ -53,6 +53,12 @@ class Kind(StrEnum):
     """A vehicle will not fly to a task."""
     WITHDRAW = "withdraw"
     """A task is taken off the board."""
+    HOLD = "hold"
+    """The operator stops a UAV, and lets it go on in the end."""
+    RETURN = "return"
+    """The operator sends a UAV home."""
+    ABORT = "abort"
+    """The operator aborts the mission."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +92,9 @@ _SHAPES: Final = {
     Kind.SLOW: Shape("uav", amount=True),
     Kind.REFUSE: Shape("uav task", lasts=True),
     Kind.WITHDRAW: Shape("task"),
+    Kind.HOLD: Shape("uav", lasts=True, must_end=True),
+    Kind.RETURN: Shape("uav"),
+    Kind.ABORT: Shape(""),
 }
 _COUNTS: Final = {"": 0, "process": 1, "uav": 1, "pair": 2, "task": 1, "uav task": 2}
 

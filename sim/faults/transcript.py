@@ -5,8 +5,8 @@
 - *stamps*: a process never says a register with a smaller stamp than before, in this life or
   an earlier one, nor with the same stamp and other contents;
 - *keeps its task*: a UAV leaves a task it claimed only when the task is done or withdrawn,
-  another has a stronger claim on it, its vehicle refused, its process started anew, or the
-  mission has ended for it; so never because of re-planning.
+  another has a stronger claim on it, its vehicle refused, its process started anew, the
+  operator has said so, or the mission has ended for it; so never because of re-planning.
 
 It knows no process from within, so recordings of real ones can be told as well. Leaves out:
 what takes a view into the processes (sim.faults.judge).
@@ -23,6 +23,8 @@ from swarm.wire.messages import (
     Board,
     Claim,
     ClaimPhase,
+    Command,
+    CommandKind,
     Epoch,
     EpochPhase,
     Message,
@@ -61,6 +63,8 @@ class Transcript:
         """Tasks an attempt at which failed."""
         self.ended = False
         """Whether a coordinator has said that the mission is over."""
+        self.commands: dict[CommandKind, set[str]] = defaultdict(set)
+        """Whom the operator has ever told what."""
         self._said: dict[tuple[str, str], Message] = {}
         self._claims: dict[tuple[str, int], Claim] = {}
         self._rivals: dict[str, dict[str, list[Claim]]] = defaultdict(lambda: defaultdict(list))
@@ -80,6 +84,15 @@ class Transcript:
     def duplicates(self) -> int:
         """Visits to tasks that had been visited before."""
         return sum(map(len, self.visits.values())) - len(self.done)
+
+    @property
+    def aborted(self) -> bool:
+        """Whether the operator has aborted the mission."""
+        return bool(self.commands[CommandKind.ABORT])
+
+    def sent_home(self, uav: str) -> bool:
+        """Whether the operator has ended the mission for ``uav``."""
+        return self.aborted or uav in self.commands[CommandKind.RETURN]
 
     def refused(self, uav: str, task: str) -> None:
         """The vehicle of ``uav`` will not fly to ``task``."""
@@ -108,6 +121,8 @@ class Transcript:
                 self.failed.add(task)
             case Claim() as claim:
                 self._check_claim(at_s, message.writer, life, claim)
+            case Command(target=target, kind=kind):
+                self.commands[kind].add(target)
             case _:
                 pass
 
@@ -139,7 +154,9 @@ class Transcript:
         task = str(before.task)
         if task in self.done | self.failed | self.withdrawn or (uav, task) in self._refused:
             return True
-        if claim.phase is ClaimPhase.OUT and self.ended:
+        if claim.phase is ClaimPhase.OUT and (self.ended or self.sent_home(uav)):
+            return True
+        if claim.phase is ClaimPhase.PAUSED and uav in self.commands[CommandKind.HOLD]:
             return True
         own = claim_strength(uav, before)
         return any(

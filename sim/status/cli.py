@@ -18,13 +18,13 @@ from swarm.options import (
     LeaseOption,
     LinkOption,
     ListenOption,
+    SomeMissionOption,
     SpeedupOption,
 )
 
 if TYPE_CHECKING:
     from sim.status.table import MissionStatus
     from swarm.bus.config import BusConfig
-    from swarm.bus.port import Bus
     from swarm.clock import ScaledClock
     from swarm.config import Timing
 
@@ -32,15 +32,7 @@ __all__ = ["status"]
 
 
 def status(
-    mission: Annotated[
-        str | None,
-        typer.Option(
-            "--mission",
-            metavar="NAME",
-            help="Name of the mission. Default: the only one on the bus.",
-            show_default=False,
-        ),
-    ] = None,
+    mission: SomeMissionOption = None,
     timeout_s: Annotated[
         float,
         typer.Option(
@@ -107,7 +99,7 @@ async def _look(
     name: str | None, config: BusConfig, timing: Timing, clock: ScaledClock, patience_s: float
 ) -> MissionStatus:
     """Learn how a mission stands."""
-    from sim.status.onlooker import Onlooker
+    from sim.status.onlooker import Onlooker, only_mission
     from sim.status.table import mission_status
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.events import BusFact, Wish
@@ -115,7 +107,7 @@ async def _look(
 
     seat = await open_zenoh_bus(config, timeout_s=patience_s)
     try:
-        mission = name or await _only_mission(seat, patience_s)
+        mission = name or await only_mission(seat, patience_s)
         onlooker = Onlooker(mission, timing, patience_s * clock.speedup)
         shell: Shell[BusFact, Wish] = Shell(
             onlooker,
@@ -129,22 +121,7 @@ async def _look(
         )
         take_seat(seat, mission, None, status=True)
         if await shell.run() != 0:
-            there = sorted(onlooker.observer.present)
-            who = f"{', '.join(there)} cannot tell it yet" if there else "nobody is there"
-            raise SwarmError(f"nothing is known of mission {mission}: {who}")
+            raise SwarmError(onlooker.lack)
         return mission_status(onlooker.observer, clock.now_s())
     finally:
         seat.close()
-
-
-async def _only_mission(seat: Bus, patience_s: float) -> str:
-    """The mission that is meant when none is named."""
-    from sim.status.onlooker import find_missions
-
-    missions = await find_missions(seat, patience_s)
-    if not missions:
-        raise SwarmError(f"nobody on the bus flies a mission (looked for {patience_s:g} s)")
-    if len(missions) > 1:
-        problem = f"there are several missions: {', '.join(missions)}"
-        raise InputError(Fault("--mission", "", problem, "name one of them"))
-    return missions[0]

@@ -11,12 +11,13 @@ import asyncio
 from coordinator.observer import Observer
 from swarm.bus.port import Bus, TokenSeen
 from swarm.config import Timing
+from swarm.errors import Fault, InputError, SwarmError
 from swarm.events import BusFact, Finish, Learned, Wish
 from swarm.model import Mission
 from swarm.state.board import mission_of
 from swarm.wire.keys import ANY_TOKEN, mission_of_token
 
-__all__ = ["Onlooker", "find_missions"]
+__all__ = ["Onlooker", "find_missions", "only_mission"]
 
 SETTLE_S = 0.4
 """Wall time after the first token of a mission in which those of others come too."""
@@ -42,6 +43,26 @@ async def find_missions(bus: Bus, patience_s: float) -> list[str]:
             wait_s = SETTLE_S if new else wait_s
     except TimeoutError:
         return sorted(found)
+
+
+async def only_mission(bus: Bus, patience_s: float) -> str:
+    """The mission that is meant when none is named.
+
+    Args:
+        bus: open; its inbox is read.
+        patience_s: how long to wait for it [wall s].
+
+    Raises:
+        SwarmError: there is none.
+        InputError: there are several.
+    """
+    missions = await find_missions(bus, patience_s)
+    if not missions:
+        raise SwarmError(f"nobody on the bus flies a mission (looked for {patience_s:g} s)")
+    if len(missions) > 1:
+        problem = f"there are several missions: {', '.join(missions)}"
+        raise InputError(Fault("--mission", "", problem, "name one of them"))
+    return missions[0]
 
 
 class Onlooker:
@@ -89,6 +110,13 @@ class Onlooker:
     def known(self) -> bool:
         """Whether there is anything to show."""
         return self.observer.replica.brief is not None
+
+    @property
+    def lack(self) -> str:
+        """What to say when there is nothing to show."""
+        there = sorted(self.observer.present)
+        who = f"{', '.join(there)} cannot tell it yet" if there else "nobody is there"
+        return f"nothing is known of mission {self.observer.mission.name}: {who}"
 
     @property
     def informed(self) -> bool:

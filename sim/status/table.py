@@ -21,8 +21,10 @@ from sim.view.scene import LOST, Scene, scene_of
 from sim.view.signs import BAD, Signs, uav_colour
 from sim.view.story import clean, shown_value
 from swarm.model import TaskId, UavId
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, FLEET
 from swarm.state.board import TaskState
+from swarm.state.commands import in_force, words
+from swarm.wire.messages import Command, CommandKind
 
 __all__ = ["MissionStatus", "UavStatus", "mission_status", "status_as_json", "status_table"]
 
@@ -64,6 +66,8 @@ class MissionStatus:
     others: tuple[str, ...]
     """Who else is there under a name that is no UAV's."""
     uavs: tuple[UavStatus, ...]
+    commands: tuple[Command, ...]
+    """The operator's newest word to each whom there was any, in this flight."""
 
     @property
     def dropped(self) -> Mapping[str, int]:
@@ -102,6 +106,7 @@ def mission_status(observer: Observer, now_s: float) -> MissionStatus:
         coordinator=COORDINATOR in observer.present,
         others=tuple(sorted(observer.present - known)),
         uavs=tuple(uavs),
+        commands=tuple(in_force(observer.replica).values()),
     )
 
 
@@ -125,6 +130,11 @@ def status_as_json(status: MissionStatus) -> dict[str, Any]:
         },
         "coordinator": status.coordinator,
         "others": list(status.others),
+        "aborted": any(command.kind is CommandKind.ABORT for command in status.commands),
+        "commands": {
+            command.target: {"command": command.kind.value, "reason": command.reason}
+            for command in status.commands
+        },
         "uavs": [asdict(uav) for uav in status.uavs],
         "dropped": dict(status.dropped),
     }
@@ -144,6 +154,9 @@ def status_table(status: MissionStatus, width: int, signs: Signs) -> RenderableT
     facts.add_row("coordinator", there)
     if status.others:
         facts.add_row("also there", _line(", ".join(status.others), signs))
+    for command in status.commands:
+        whom = "mission" if command.target == FLEET else command.target
+        facts.add_row("operator", _line(f"{whom} {words(command)}", signs))
     parts: list[RenderableType] = [title(scene, width, 1.0, signs), facts, ""]
     parts.append(_fleet(status, signs))
     if status.dropped:

@@ -19,6 +19,8 @@ LOST = "lost"
 STARTING = "starting"
 _UNREADY = (STARTING, StatusPhase.LEARNING, StatusPhase.PREPARING)
 _BUSY = (StatusPhase.FLYING, StatusPhase.SERVING)
+_PHASES = {ClaimPhase.OUT: StatusPhase.OUT, ClaimPhase.PAUSED: StatusPhase.HOLDING}
+"""What a UAV does that claims nothing, where it is not idle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +157,7 @@ def _uav_view(
     elif task is not None and does not in _BUSY:
         does = StatusPhase.FLYING  # claims never lag, status may
     elif claim is not None and does == STARTING:
-        does = StatusPhase.OUT if claim.phase is ClaimPhase.OUT else StatusPhase.IDLE
+        does = _PHASES.get(claim.phase, StatusPhase.IDLE)
     elif task is None and does in _BUSY:
         does = StatusPhase.IDLE
     eta_s = None

@@ -3,15 +3,35 @@
 from __future__ import annotations
 
 import re
-from typing import NewType
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, NewType
 
-__all__ = ["COORDINATOR", "ID_RULE", "TaskId", "UavId", "require_id", "valid_id"]
+__all__ = [
+    "COORDINATOR",
+    "FLEET",
+    "ID_RULE",
+    "OPERATOR",
+    "RESERVED",
+    "TaskId",
+    "UavId",
+    "require_id",
+    "valid_id",
+]
 
 UavId = NewType("UavId", str)
 TaskId = NewType("TaskId", str)
 
 COORDINATOR = "coordinator"
-"""Name of the coordinator among the writers on the bus; no UAV may bear it."""
+"""Name of the coordinator among the writers on the bus."""
+OPERATOR = "operator"
+"""Name of the operator among the writers on the bus, whatever machine a command comes from."""
+FLEET = "fleet"
+"""Target of a command that concerns every UAV."""
+RESERVED: Final[Mapping[str, str]] = MappingProxyType(
+    {COORDINATOR: "the coordinator", OPERATOR: "the operator", FLEET: "the whole fleet"}
+)
+"""Names that no UAV may bear, and what they stand for on the bus."""
 
 ID_RULE = "1 to 64 letters, digits, '_', '-' or '.', beginning with a letter or digit"
 _PATTERN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from swarm.model.ids import COORDINATOR, UavId, require_id
+from swarm.model.ids import RESERVED, UavId, require_id
 
 __all__ = ["Uav", "require_point", "require_probabilities"]
 
@@ -32,8 +32,10 @@ class Uav:
 
     def __post_init__(self) -> None:
         require_id(self.id, "UAV id")
-        if self.id == COORDINATOR:
-            raise ValueError(f"UAV id {self.id!r} is taken: it names the coordinator on the bus")
+        if self.id in RESERVED:
+            raise ValueError(
+                f"UAV id {self.id!r} is taken: it names {RESERVED[self.id]} on the bus"
+            )
         require_point(self.position_enu_m, f"position of UAV {self.id}")
         if not (math.isfinite(self.speed_m_s) and self.speed_m_s > 0.0):
             raise ValueError(f"speed of UAV {self.id} must be > 0 m/s, not {self.speed_m_s}")

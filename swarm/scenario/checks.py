@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from swarm.model.frames import Origin, enu_from_wgs84
+from swarm.model.ids import RESERVED
 from swarm.scenario.findings import Document, Finding, Path, absent, close_match, number_of, shown
 
 __all__ = ["check", "origin_of"]
@@ -28,6 +29,7 @@ def check(document: Document) -> list[Finding]:
     return [
         *_doubled_ids("uav", uavs),
         *_doubled_ids("task", tasks),
+        *_reserved_ids(uavs),
         *_misplaced(document, "uav", uavs),
         *_misplaced(document, "task", tasks),
         # Without an array of tasks every reference is unknown; that says nothing new.
@@ -50,6 +52,14 @@ def _doubled_ids(name: str, entries: list[_Entry]) -> Iterator[Finding]:
         if isinstance(identity, str) and first.setdefault(identity, index) != index:
             problem = f"{shown(identity)} is already the id of {name}[{first[identity]}]"
             yield Finding((name, index, "id"), problem, "give every one an id of its own")
+
+
+def _reserved_ids(uavs: list[_Entry]) -> Iterator[Finding]:
+    for index, entry in uavs:
+        identity = entry.get("id")
+        if isinstance(identity, str) and identity in RESERVED:
+            problem = f"{shown(identity)} is the name of {RESERVED[identity]} on the bus"
+            yield Finding(("uav", index, "id"), problem, "give the UAV another id")
 
 
 def _misplaced(document: Document, name: str, entries: list[_Entry]) -> Iterator[Finding]:

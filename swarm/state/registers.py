@@ -12,7 +12,17 @@ from collections.abc import Collection, Iterable, Iterator
 
 from swarm.wire.codec import encode, key_of
 from swarm.wire.digest import fingerprint
-from swarm.wire.messages import Board, Brief, Claim, Epoch, Message, Outcome, Status
+from swarm.wire.messages import (
+    Board,
+    Brief,
+    Claim,
+    Command,
+    Epoch,
+    Message,
+    Outcome,
+    Stamp,
+    Status,
+)
 
 __all__ = ["Replica"]
 
@@ -35,6 +45,10 @@ class Replica:
         """By UAV id."""
         self.outcomes: dict[tuple[str, str], Outcome] = {}
         """By UAV id and task id."""
+        self.commands: dict[str, tuple[Stamp, Command]] = {}
+        """By target, those for other flights of the mission among them; see swarm.state.commands.
+
+        All have one writer, so their stamps tell which is the newest of several."""
         self.stale = 0
         """Statements that were older than what was known."""
         self.board_version = 0
@@ -66,6 +80,8 @@ class Replica:
                 self.claims[message.writer] = claim
             case Outcome(task=task) as outcome:
                 self.outcomes[message.writer, task] = outcome
+            case Command(target=target) as command:
+                self.commands[target] = message.stamp, command
         return True
 
     def join_all(self, messages: Iterable[Message]) -> bool:

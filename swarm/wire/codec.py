@@ -17,7 +17,7 @@ from typing import Any, Final
 import msgpack
 from pydantic import TypeAdapter, ValidationError
 
-from swarm.model.ids import COORDINATOR, valid_id
+from swarm.model.ids import COORDINATOR, OPERATOR, valid_id
 from swarm.wire.keys import Keys
 from swarm.wire.messages import (
     LATEST_S,
@@ -27,6 +27,7 @@ from swarm.wire.messages import (
     Body,
     Brief,
     Claim,
+    Command,
     Epoch,
     Message,
     Outcome,
@@ -57,6 +58,7 @@ _KINDS: Final[dict[str, type[Body]]] = {
     "claim": Claim,
     "outcome": Outcome,
     "status": Status,
+    "command": Command,
 }
 _NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in _KINDS.items()}
 _LARGE: Final = frozenset({"brief", "epoch"})
@@ -78,6 +80,8 @@ def key_of(message: Message) -> str:
             return keys.outcome(writer, task)
         case Status():
             return keys.status(writer)
+        case Command(target=target):
+            return keys.operator(target)
 
 
 def encode(message: Message | Snapshot) -> bytes:
@@ -205,9 +209,19 @@ class Codec:
             body = _bodies(kind).validate_python(fields)
         except (ValidationError, RecursionError):
             raise _UnacceptableError("malformed") from None
-        from_coordinator = isinstance(body, Brief | Epoch | Board)
-        _require((writer == COORDINATOR) == from_coordinator, "said on another's key")
+        _require(_may_say(writer, body), "said on another's key")
         return Message(mission, writer, stamp, body)
+
+
+def _may_say(writer: str, body: Body) -> bool:
+    """Whether statements of that kind are this writer's to make."""
+    match body:
+        case Brief() | Epoch() | Board():
+            return writer == COORDINATOR
+        case Command():
+            return writer == OPERATOR
+        case Claim() | Outcome() | Status():
+            return writer not in (COORDINATOR, OPERATOR)
 
 
 class _UnacceptableError(Exception):

@@ -1,8 +1,9 @@
 """Key expressions of one mission; every register key has exactly one writer.
 
 ``swarm/<mission>/…``: ``brief``, ``plan`` and ``board/<task>`` are written by the
-coordinator, ``uav/<id>/…`` by that UAV's agent, ``alive/<id>`` holds the liveliness
-token of a process and ``state/<id>`` answers what that process knows.
+coordinator, ``uav/<id>/…`` by that UAV's agent, ``operator/<target>`` by the operator;
+``alive/<id>`` holds the liveliness token of a process and ``state/<id>`` answers what that
+process knows.
 """
 
 from __future__ import annotations
@@ -69,6 +70,10 @@ class Keys:
     def status(self, uav: str) -> str:
         """Where a UAV is and how it does; ``*`` for all."""
         return f"{self.root}/uav/{uav}/status"
+
+    def operator(self, target: str) -> str:
+        """The operator's newest command to a UAV, or to the fleet; ``*`` for all."""
+        return f"{self.root}/operator/{target}"
 
     def alive(self, writer: str) -> str:
         """Liveliness token of a process; ``*`` for all."""

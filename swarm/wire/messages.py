@@ -15,7 +15,7 @@ from annotated_types import Ge, Gt, Le, Len, Predicate
 from pydantic import Strict
 
 from swarm.model import Origin, valid_id
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import FLEET, RESERVED
 
 __all__ = [
     "LATEST_S",
@@ -26,6 +26,8 @@ __all__ = [
     "Brief",
     "Claim",
     "ClaimPhase",
+    "Command",
+    "CommandKind",
     "Epoch",
     "EpochPhase",
     "Fleet",
@@ -60,6 +62,7 @@ Value = Annotated[float, Strict(), Ge(0.0), Le(1e12)]
 Probability = Annotated[float, Strict(), Ge(0.0), Le(1.0)]
 Count = Annotated[int, Strict(), Ge(0), Le(MAX_COUNT)]
 Reason = Annotated[str, Strict(), Len(1, 40)]
+Words = Annotated[str, Strict(), Len(0, 200)]
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -109,8 +112,9 @@ class Brief:
 
     def __post_init__(self) -> None:
         Origin(*self.origin)
-        if len({COORDINATOR, *(uav.id for uav in self.uavs)}) != 1 + len(self.uavs):
-            raise ValueError("UAV ids must differ, from each other and from the coordinator's")
+        ids = {uav.id for uav in self.uavs}
+        if len(ids) != len(self.uavs) or not ids.isdisjoint(RESERVED):
+            raise ValueError(f"UAV ids must differ, from each other and from {', '.join(RESERVED)}")
 
 
 class EpochPhase(StrEnum):
@@ -134,7 +138,7 @@ class Epoch:
     """Best rank first."""
     mission_s: Instant
     """Mission time at which this statement was made [s]."""
-    reason: Annotated[str, Strict(), Len(0, 200)]
+    reason: Words
     """Why this epoch, in words."""
     routes: Mapping[Id, tuple[Id, ...]]
     """Planned task lists by UAV; what rules make of them is theirs."""
@@ -163,6 +167,8 @@ class ClaimPhase(StrEnum):
     HELD = "held"
     IDLE = "idle"
     """Airborne and free to take a task."""
+    PAUSED = "paused"
+    """Stopped by the operator, in the air or on the ground: takes no task until told to go on."""
     OUT = "out"
     """Not taking part (any more)."""
 
@@ -175,7 +181,7 @@ class Claim:
 
     phase: ClaimPhase
     task: Id | None
-    """None exactly when idle or out: the tombstone of an earlier claim."""
+    """None exactly when idle, paused or out: the tombstone of an earlier claim."""
     decided_s: Instant
     """Mission time at which the UAV was free to decide [s]."""
     rank: Count
@@ -187,7 +193,7 @@ class Claim:
     def __post_init__(self) -> None:
         if self.handed_over and self.phase is not ClaimPhase.OUT:
             raise ValueError(f"handed over, but {self.phase}")
-        if (self.task is None) != (self.phase in (ClaimPhase.IDLE, ClaimPhase.OUT)):
+        if (self.task is None) != (self.phase not in (ClaimPhase.PROPOSED, ClaimPhase.HELD)):
             raise ValueError(f"a claim that is {self.phase} names {self.task}")
 
 
@@ -219,6 +225,8 @@ class StatusPhase(StrEnum):
     IDLE = "idle"
     FLYING = "flying"
     SERVING = "serving"
+    HOLDING = "holding"
+    """Stopped by the operator."""
     RETURNING = "returning"
     HOME = "home"
     OUT = "out"
@@ -240,11 +248,43 @@ class Status:
     dropped: Annotated[Mapping[Reason, Count], Len(0, 20)]
     """Messages this process has dropped, by reason: those of `swarm.wire.codec`, "too many"
     where the inbox was full, "stale" for registers older than known."""
-    note: Annotated[str, Strict(), Len(0, 200)]
+    note: Words
     """What it waits for, in words."""
 
 
-Body = Brief | Epoch | Board | Claim | Outcome | Status
+class CommandKind(StrEnum):
+    """What an operator may want."""
+
+    HOLD = "hold"
+    """Stop where it is, give its task up and wait; on the ground, stay there."""
+    RESUME = "resume"
+    """Go on after a hold."""
+    RETURN = "return"
+    """Go home and take no further part."""
+    ABORT = "abort"
+    """Everybody goes home, and the mission is over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Register ``operator/<target>``: the operator's newest word to one UAV, or to the fleet."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    target: Id
+    """Id of a UAV, or the name that stands for the fleet."""
+    kind: CommandKind
+    run: Count
+    """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
+    reason: Words
+    """Why, in the operator's words; empty when there are none."""
+
+    def __post_init__(self) -> None:
+        if (self.target == FLEET) != (self.kind is CommandKind.ABORT):
+            raise ValueError(f"{self.kind} is no command to {self.target}")
+
+
+Body = Brief | Epoch | Board | Claim | Outcome | Status | Command
 
 
 @dataclass(frozen=True, slots=True)

@@ -214,11 +214,13 @@ def test_client_that_hangs_up_is_forgotten_and_can_come_back() -> None:
             for _ in range(3):
                 async with connected(server.url) as client:
                     await client.until("HEARTBEAT")
+            vehicle = server.vehicle
+            assert isinstance(vehicle, Vehicle)
             for _ in range(100):
-                if not server.vehicle._streams.channels:
+                if not vehicle._streams.channels:
                     break
                 await asyncio.sleep(0.01)
-            assert not server.vehicle._streams.channels
+            assert not vehicle._streams.channels
 
     asyncio.run(talk())
 
@@ -315,6 +317,37 @@ def test_command_serves_one_uav_under_another_system_id(start: Started) -> None:
     assert process.stdout.read() == process.stderr.read() == ""
 
 
+def test_command_gives_its_vehicles_the_faults_and_physics_asked_for(start: Started) -> None:
+    process = start(
+        *("--fault", "a:wrong-id@0", "--fault", "b:silent@0+2", "--acceleration-m-s2", "2"),
+        *("--wind-m-s", "1,-1", "--gust-m-s", "2", "--seed", "3", "--endurance-s", "600"),
+        *("--battery-failsafe", "--position-failsafe-s", "5"),
+    )
+    first, second = ready_lines(process, 2)
+
+    async def id_heard(url: str) -> int:
+        async with connected(url) as client:
+            heartbeat = await client.until("HEARTBEAT")
+            return int(heartbeat.get_srcSystem())
+
+    assert asyncio.run(id_heard(first["url"])) == 2
+    assert asyncio.run(id_heard(second["url"])) == 2
+
+
+@pytest.mark.parametrize(("flavour", "autopilot"), [("ardupilot", 3), ("px4", 12)])
+def test_command_flies_the_firmware_it_is_told(
+    start: Started, flavour: str, autopilot: int
+) -> None:
+    process = start("--uav", "a", "--flavour", flavour)
+    [line] = ready_lines(process, 1)
+
+    async def hear() -> None:
+        async with connected(line["url"]) as client:
+            assert (await client.until("HEARTBEAT")).autopilot == autopilot
+
+    asyncio.run(hear())
+
+
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
@@ -322,6 +355,14 @@ def test_command_serves_one_uav_under_another_system_id(start: Started) -> None:
         (["--listen", "tcp:x"], "--listen: 'tcp:x' is no endpoint; write tcp:HOST:PORT"),
         (["--listen", "tcp:192.0.2.1:5760"], "--listen: tcp:192.0.2.1:5760: cannot be opened"),
         (["--listen", "tcp:127.0.0.1:65535"], "--listen: tcp:127.0.0.1:65536: cannot be opened"),
+        (
+            ["--fault", "a:explode@3"],
+            "--fault: a:explode@3: no kind of fault 'explode'; write",
+        ),
+        (["--fault", "c:stuck@3"], "--fault: c:stuck@3: no UAV 'c'; the scenario has a, b"),
+        (["--wind-m-s", "6,0"], "--wind-m-s: a: 6 m/s is too much for a vehicle of 6 m/s"),
+        (["--wind-m-s", "west"], "--wind-m-s: west: no wind; write EAST,NORTH"),
+        (["--endurance-s", "inf"], "--endurance-s: inf is no number to go by"),
     ],
 )
 def test_wrong_usage_is_one_clear_line(start: Started, options: list[str], complaint: str) -> None:

@@ -33,7 +33,14 @@ LAND_NOW = mavlink.MAVLink_command_long_message(1, 1, 176, 0, 1, 9, 0, 0, 0, 0, 
 class Fleet:
     """One simulated vehicle, and the bridge that flies it."""
 
-    def __init__(self, server: VehicleServer, key: SigningKey | None, clock: ScaledClock) -> None:
+    def __init__(
+        self,
+        machine: Vehicle,
+        server: VehicleServer,
+        key: SigningKey | None,
+        clock: ScaledClock,
+    ) -> None:
+        self.machine = machine
         self.server = server
         self.reports: list[Report] = []
         self.bridge = MavlinkVehicle(CONFIG, server.url, clock, self.reports.append, key=key)
@@ -55,7 +62,7 @@ async def fleet(
     endpoint = Endpoint(transport, "127.0.0.1", 0)
     server = VehicleServer(machine, endpoint, clock, signing_secret=secret)
     await server.start()
-    one = Fleet(server, bridge_key, clock)
+    one = Fleet(machine, server, bridge_key, clock)
     try:
         await one.bridge.start()
         yield one
@@ -133,7 +140,7 @@ def test_a_vehicle_without_the_key_is_not_believed() -> None:
             await until(lambda: NotReady(reason) in one.reports)
             assert list(one.bridge.dropped) == ["unsigned"]
             assert one.news == []
-            assert not one.server.vehicle.pilot.armed
+            assert not one.machine.pilot.armed
 
     asyncio.run(scenario())
 

@@ -14,8 +14,16 @@ from types import MappingProxyType
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import VehicleConfig
+from sim.autopilot.flavours.base import (
+    MissionHabits,
+    MissionView,
+    ModeHabits,
+    Refusals,
+    Sensors,
+)
 from sim.autopilot.modes import Mode
-from sim.autopilot.params import Parameter, Setting
+from sim.autopilot.occasions import Occasion, OwnCommand, Text
+from sim.autopilot.params import Parameter, ParameterHabits, Setting
 from sim.autopilot.readiness import Stage
 
 __all__ = ["ArduCopter"]
@@ -44,6 +52,21 @@ _ALWAYS_SET = (
     | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 )
 
+_PRESENT = 0x5371FC0F
+_ENABLED = 0x53419C0F
+_HEALTHY = 0x47519C0F
+_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+_AHRS = mavlink.MAV_SYS_STATUS_AHRS
+_PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_POSITION_CONTROL = (
+    mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+    | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+)
+
+_INFO = mavlink.MAV_SEVERITY_INFO
+_WARNING = mavlink.MAV_SEVERITY_WARNING
+_CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
+
 
 class ArduCopter:
     """Numbers, names and habits of ArduCopter.
@@ -62,39 +85,93 @@ class ArduCopter:
         | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
         | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
     )
-    boot_mode: Mode = Mode.STABILIZE
-    reposition_mode: Mode = Mode.GUIDED
-    take_off_above_home: bool = True
-    uploads_by_int: bool = False
-    first_item: int = 1
-    unanswered_parameters: frozenset[str] = frozenset({"SYSID_THISMAV"})
-    """As recorded: the old name of a renamed parameter got neither value nor error."""
-    unasked_streams: Mapping[int, float] = MappingProxyType({})
-
-    stage_texts: Mapping[Stage, str] = MappingProxyType(
-        {
-            Stage.BOOTED: "ArduPilot Ready",
-            Stage.ORIGIN: "EKF3 IMU0 origin set",
-            Stage.POSITION: "EKF3 IMU0 is using GPS",
-        }
+    vtol_state: int = mavlink.MAV_VTOL_STATE_MC
+    modes: ModeHabits = ModeHabits(
+        at_boot=Mode.STABILIZE,
+        for_reposition=Mode.GUIDED,
+        for_take_off=None,
+        after_flight=None,
+        unarmable=frozenset({Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE}),
+        change_speed=frozenset({Mode.GUIDED, Mode.AUTO, Mode.RTL}),
+        reposition_needs_flag=False,
+        told_at_once=True,
+        flies_when_armed=False,
+        acknowledgements=1,
+        set_mode_acknowledged_as=mavlink.MAVLINK_MSG_ID_SET_MODE,
     )
-    unarmable_modes: frozenset[Mode] = frozenset({Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE})
+    missions: MissionHabits = MissionHabits(
+        asks_for_int=False,
+        int_frames=False,
+        marks_current=False,
+        first_item=1,
+        check_s=0.0,
+        restarts=True,
+        upload_rewinds=False,
+        climbs_first=False,
+        repeats_reached=0,
+        keeps_number=False,
+        forgets_mode=False,
+    )
+    refusals: Refusals = Refusals(
+        not_now=mavlink.MAV_RESULT_FAILED,
+        no_such_mode=mavlink.MAV_RESULT_FAILED,
+        reposition_without_flag=mavlink.MAV_RESULT_DENIED,
+        no_such_stream=mavlink.MAV_RESULT_DENIED,
+        no_such_message=mavlink.MAV_RESULT_FAILED,
+    )
+
+    take_off_above_home: bool = True
+    reads_frames: bool = True
     forgets_speed: bool = True
     """Its position controller starts with the speed parameter at the first target."""
+    obeys_leg_speed: bool = False
+    tells_origin_when_armed: bool = True
+
+    unasked_streams: Mapping[int, float] = MappingProxyType({})
+    fixed_streams: frozenset[int] = frozenset()
+    missing_messages: frozenset[int] = frozenset()
+
+    stage_texts: Mapping[Stage, Text] = MappingProxyType(
+        {
+            Stage.BOOTED: Text(_INFO, "ArduPilot Ready"),
+            Stage.ORIGIN: Text(_INFO, "EKF3 IMU0 origin set"),
+            Stage.POSITION: Text(_INFO, "EKF3 IMU0 is using GPS"),
+        }
+    )
+    texts: Mapping[Occasion, Text] = MappingProxyType(
+        {
+            Occasion.ARMED: Text(_INFO, "Arming motors"),
+            Occasion.ARMING_REFUSED: Text(_CRITICAL, "Arm: {obstacle}"),
+            Occasion.NOT_READY: Text(_CRITICAL, "PreArm: {obstacle}"),
+            Occasion.DISARMED: Text(_INFO, "Disarming motors"),
+            Occasion.DISARMED_UNUSED: Text(_INFO, "Disarming motors"),
+            Occasion.DISARMED_LANDED: Text(_INFO, "Disarming motors"),
+            Occasion.NO_SUCH_MODE: Text(_WARNING, "No such mode {number}"),
+            Occasion.MODE_REFUSED: Text(_WARNING, "Mode change to {mode} failed: {reason}"),
+            Occasion.MISSION_RECEIVED: Text(_INFO, "Flight plan received"),
+            Occasion.MISSION_REPLACED: Text(_CRITICAL, "Auto mission changed, restarted command"),
+            Occasion.MISSION_REPLACED_IN_VAIN: Text(
+                _CRITICAL, "Auto mission changed but failed to restart command"
+            ),
+            Occasion.MISSION_WITHOUT_TAKE_OFF: Text(_CRITICAL, "Auto: Missing Takeoff Cmd"),
+            Occasion.ITEM_BEGUN: Text(_INFO, "Mission: {seq} {name}"),
+            Occasion.WAYPOINT_REACHED: Text(_INFO, "Reached command #{seq}"),
+        }
+    )
+    own_commands: Mapping[Occasion, OwnCommand] = MappingProxyType({})
+    numbers_texts: bool = False
 
     def __init__(self, *, old_names: bool = False) -> None:
         self._old_names = old_names
-        self.reports_parameter_errors: bool = not old_names
+        self.parameter_habits: ParameterHabits = ParameterHabits(
+            reports_errors=not old_names,
+            integers_bytewise=False,
+            index_by_name=False,
+            # As recorded: the old name of a renamed parameter got neither value nor error.
+            unanswered=frozenset({"SYSID_THISMAV"}),
+        )
         minor = 6 if old_names else 8
         self.version: int = 4 << 24 | minor << 16
-
-    def cannot_arm(self, obstacle: str) -> str:
-        """What is said to people when arming is refused."""
-        return f"Arm: {obstacle}"
-
-    def not_ready(self, obstacle: str) -> str:
-        """What is said to people, now and then, while arming would be refused."""
-        return f"PreArm: {obstacle}"
 
     def parameters(self, config: VehicleConfig) -> tuple[Parameter, ...]:
         """The parameter table at power-up."""
@@ -139,9 +216,17 @@ class ArduCopter:
             Parameter("SR0_POSITION", 0.0, _INT16, least=0.0),
         )
 
+    def disarm_delay(self, mode: Mode) -> Setting | None:
+        """At once where the mode was to land; otherwise as after arming."""
+        return None if mode in (Mode.RTL, Mode.LAND) else Setting.DISARM_DELAY_S
+
     def custom_mode(self, mode: Mode) -> int:
         """Number of the mode in a heartbeat."""
         return _NUMBERS[mode]
+
+    def mode_name(self, mode: Mode) -> str:
+        """What the firmware calls the mode."""
+        return mode.value
 
     def mode_of(self, custom_mode: int) -> Mode | None:
         """The mode of that number, if the simulated vehicle has it."""
@@ -165,3 +250,42 @@ class ArduCopter:
         if armed:
             bits |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
         return bits
+
+    def system_status(self, *, armed: bool, on_ground: bool, booted: bool) -> int:
+        """MAV_STATE of a heartbeat: active in the air only."""
+        del armed
+        if not booted:
+            return int(mavlink.MAV_STATE_BOOT)
+        return int(mavlink.MAV_STATE_STANDBY if on_ground else mavlink.MAV_STATE_ACTIVE)
+
+    def sensors(self, mode: Mode, *, has_origin: bool, can_arm: bool) -> Sensors:
+        """Bits of SYS_STATUS, as recorded."""
+        seen = _GPS if has_origin else 0
+        running = _AHRS if has_origin else 0
+        if mode.controls_position:
+            running |= _POSITION_CONTROL
+        return Sensors(
+            present=_PRESENT | seen,
+            enabled=_ENABLED | seen | running,
+            health=_HEALTHY | seen | running | (_PREARM if can_arm else 0),
+        )
+
+    def mission_state(self, view: MissionView) -> int:
+        """MISSION_STATE of MISSION_CURRENT."""
+        if not view.present:
+            return int(mavlink.MISSION_STATE_NO_MISSION)
+        if view.over:
+            return int(mavlink.MISSION_STATE_COMPLETE)
+        if view.running:
+            return int(mavlink.MISSION_STATE_ACTIVE)
+        return int(
+            mavlink.MISSION_STATE_PAUSED if view.stopped else mavlink.MISSION_STATE_NOT_STARTED
+        )
+
+    def mission_mode(self, view: MissionView) -> int:
+        """1 while the mission mode is on, 0 (not told) otherwise."""
+        return 1 if view.mode is Mode.AUTO else 0
+
+    def mission_total(self, view: MissionView) -> int:
+        """Home doesn't count."""
+        return view.items

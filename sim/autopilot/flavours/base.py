@@ -6,14 +6,111 @@ Leaves out: any firmware in particular.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.modes import Mode
-from sim.autopilot.params import Parameter
+from sim.autopilot.occasions import Occasion, OwnCommand, Text
+from sim.autopilot.params import Parameter, ParameterHabits, Setting
 from sim.autopilot.readiness import Stage
 
-__all__ = ["Flavour"]
+__all__ = ["Flavour", "MissionHabits", "MissionView", "ModeHabits", "Refusals", "Sensors"]
+
+
+@dataclass(frozen=True, slots=True)
+class Refusals:
+    """MAV_RESULT of what is refused; 0 (accepted) for what is ignored in silence."""
+
+    not_now: int
+    """The vehicle can't do it in its state."""
+    no_such_mode: int
+    reposition_without_flag: int
+    """DO_REPOSITION that may not change the mode, in another mode."""
+    no_such_stream: int
+    """SET_MESSAGE_INTERVAL of a message it doesn't stream."""
+    no_such_message: int
+    """REQUEST_MESSAGE of a message it doesn't have."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModeHabits:
+    """When modes change, by command and by themselves."""
+
+    at_boot: Mode
+    for_reposition: Mode
+    """Mode in which DO_REPOSITION is flown."""
+    for_take_off: Mode | None
+    """Mode that NAV_TAKEOFF enters, until the vehicle is up; None: it must be guided already."""
+    after_flight: Mode | None
+    """Mode entered by itself when the motors stop after an automatic flight."""
+    unarmable: frozenset[Mode]
+    """Modes in which a ground station can't arm."""
+    change_speed: frozenset[Mode]
+    """Modes in which DO_CHANGE_SPEED is obeyed."""
+    reposition_needs_flag: bool
+    """Whether DO_REPOSITION needs its flag also in the mode it is flown in."""
+    told_at_once: bool
+    """Whether a change of mode is followed by a heartbeat at once."""
+    flies_when_armed: bool
+    """Whether take-off and mission modes begin to fly as soon as the motors run."""
+    acknowledgements: int
+    """How often DO_SET_MODE is acknowledged."""
+    set_mode_acknowledged_as: int
+    """The command in the acknowledgement of the older message SET_MODE."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionHabits:
+    """How missions are taken, flown and ended."""
+
+    asks_for_int: bool
+    """Whether items are asked for by MISSION_REQUEST_INT."""
+    int_frames: bool
+    """Whether items are given back in the ``_INT`` variant of their frame."""
+    marks_current: bool
+    """Whether the current item says so when it is given back."""
+    first_item: int
+    """Number of the first item that is flown: 1 where item 0 is home."""
+    check_s: float
+    """Time after an upload [s] in which the mission mode is acknowledged but not entered."""
+    restarts: bool
+    """Whether a mission that is over begins again when its mode is entered again."""
+    upload_rewinds: bool
+    """Whether another mission is begun from its first item, and not from the current number."""
+    climbs_first: bool
+    """Whether the vehicle rises straight up before its first item, from the ground too."""
+    repeats_reached: int
+    """How many times more MISSION_ITEM_REACHED is sent, once a second."""
+    keeps_number: bool
+    """Whether MISSION_CURRENT goes on telling the last item after the motors stopped."""
+    forgets_mode: bool
+    """Whether the mode becomes another one at the end, or at an item that returns home."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionView:
+    """What MISSION_CURRENT is made from."""
+
+    mode: Mode
+    current: int | None
+    items: int
+    """Number of items that are flown."""
+    present: bool
+    running: bool
+    stopped: bool
+    over: bool
+    task_done: bool
+    """What the mode was entered for (a take-off, a mission, a landing) is done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """Bits of SYS_STATUS."""
+
+    present: int
+    enabled: int
+    health: int
 
 
 class Flavour(Protocol):
@@ -23,47 +120,56 @@ class Flavour(Protocol):
     """MAV_AUTOPILOT."""
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY."""
+    vtol_state: int
+    """MAV_VTOL_STATE of a multicopter."""
     version: int
     """``flight_sw_version`` of AUTOPILOT_VERSION."""
-    boot_mode: Mode
-    """Mode after power-up."""
-    reposition_mode: Mode
-    """Mode in which DO_REPOSITION is flown."""
+    modes: ModeHabits
+    missions: MissionHabits
+    refusals: Refusals
+    parameter_habits: ParameterHabits
+
     take_off_above_home: bool
     """Whether NAV_TAKEOFF by command gives its height above home, rather than above the sea."""
-    uploads_by_int: bool
-    """Whether mission items are asked for by MISSION_REQUEST_INT."""
-    first_item: int
-    """Number of the first mission item that is flown: 1 where item 0 is home."""
-    reports_parameter_errors: bool
-    """Whether an unknown parameter is answered by PARAM_ERROR; otherwise by nothing."""
-    unanswered_parameters: frozenset[str]
-    """Unknown parameters that are answered by nothing all the same."""
-    unasked_streams: Mapping[int, float]
-    """Messages and intervals [s] streamed on a new channel; heartbeats go without saying."""
-
-    stage_texts: Mapping[Stage, str]
-    """What is said to people when something has become ready."""
-    unarmable_modes: frozenset[Mode]
-    """Modes in which a ground station can't arm."""
+    reads_frames: bool
+    """Whether commands are read in their frame, rather than always above the sea."""
     forgets_speed: bool
     """Whether a speed ordered before the first target, after the commanded mode was entered
     or after a take-off, is lost."""
+    obeys_leg_speed: bool
+    """Whether DO_REPOSITION may give the speed of its leg."""
+    tells_origin_when_armed: bool
 
-    def cannot_arm(self, obstacle: str) -> str:
-        """What is said to people when arming is refused."""
-        ...
+    unasked_streams: Mapping[int, float]
+    """Messages and intervals [s] streamed on a new channel; heartbeats go without saying."""
+    fixed_streams: frozenset[int]
+    """Messages whose interval can't be changed."""
+    missing_messages: frozenset[int]
+    """Messages the firmware doesn't know."""
 
-    def not_ready(self, obstacle: str) -> str:
-        """What is said to people, now and then, while arming would be refused."""
-        ...
+    stage_texts: Mapping[Stage, Text]
+    """What is said to people when something has become ready."""
+    texts: Mapping[Occasion, Text]
+    """What is said to people otherwise."""
+    own_commands: Mapping[Occasion, OwnCommand]
+    """Commands it sends to other components, which ground stations hear too."""
+    numbers_texts: bool
+    """Whether texts end in a tab, are numbered, and are sent in pieces if they are long."""
 
     def parameters(self, config: VehicleConfig) -> tuple[Parameter, ...]:
-        """The parameter table at power-up; it has every `Setting`."""
+        """The parameter table at power-up; it has every `Setting` that has no default."""
+        ...
+
+    def disarm_delay(self, mode: Mode) -> Setting | None:
+        """What says how long after landing the motors stop; None where that is at once."""
         ...
 
     def custom_mode(self, mode: Mode) -> int:
         """Number of the mode in a heartbeat."""
+        ...
+
+    def mode_name(self, mode: Mode) -> str:
+        """What the firmware calls the mode when it talks to people."""
         ...
 
     def mode_of(self, custom_mode: int) -> Mode | None:
@@ -76,4 +182,24 @@ class Flavour(Protocol):
 
     def base_mode(self, mode: Mode, *, armed: bool, on_ground: bool, booted: bool) -> int:
         """MAV_MODE_FLAG bits of a heartbeat."""
+        ...
+
+    def system_status(self, *, armed: bool, on_ground: bool, booted: bool) -> int:
+        """MAV_STATE of a heartbeat."""
+        ...
+
+    def sensors(self, mode: Mode, *, has_origin: bool, can_arm: bool) -> Sensors:
+        """Bits of SYS_STATUS."""
+        ...
+
+    def mission_state(self, view: MissionView) -> int:
+        """MISSION_STATE of MISSION_CURRENT."""
+        ...
+
+    def mission_mode(self, view: MissionView) -> int:
+        """``mission_mode`` of MISSION_CURRENT."""
+        ...
+
+    def mission_total(self, view: MissionView) -> int:
+        """``total`` of MISSION_CURRENT."""
         ...

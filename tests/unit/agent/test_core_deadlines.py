@@ -33,11 +33,13 @@ from swarm.events import (
     Stop,
     Tick,
 )
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.wire.codec import Codec, encode, key_of
 from swarm.wire.messages import (
     Body,
     ClaimPhase,
+    Command,
+    CommandKind,
     EpochPhase,
     Snapshot,
     Stamp,
@@ -74,7 +76,8 @@ class Storm:
         self.counter = 0
         memory = self.answer("u0") if self.rng.random() < 0.3 else None
         age_s = float(self.pick(1.0, 1e3))
-        self.core = AgentCore(MISSION, "u0", 1, TIMING, memory, age_s)
+        without_bus_s = self.pick(None, None, None, 5.0)
+        self.core = AgentCore(MISSION, "u0", 1, TIMING, memory, age_s, without_bus_s=without_bus_s)
         self.ordered: list[Orders] = []
         self.stamps: dict[str, Stamp] = {}
         self.codec = Codec(MISSION)
@@ -123,6 +126,8 @@ class Storm:
         claim = self.core.claim
         if claim is not None and self.core.phase in ("flying", "serving"):
             assert claim.phase in (ClaimPhase.PROPOSED, ClaimPhase.HELD)
+        if self.core.phase == "holding" and self.ordered:
+            assert not isinstance(self.ordered[-1], GoTo), "it flies on"
 
     def event(self) -> Event:
         makers: list[Callable[[], Event]] = [
@@ -136,6 +141,8 @@ class Storm:
             self.report,
             self.report,
         ]
+        if self.rng.random() < 0.03:
+            return self.command()
         if self.rng.random() < 0.01:
             return self.pick(Stop("told"), self.echo())  # type: ignore[no-any-return]  # events
         event: Event = self.pick(*makers)()
@@ -173,6 +180,13 @@ class Storm:
         rule = self.pick("greedy", "lookahead")
         body: Body = self.pick(BRIEF, posted, posted, epoch(*sequence, phase=phase, rule=rule))
         return body
+
+    def command(self) -> Heard:
+        """The operator speaks, and seldom means the end."""
+        kinds = [CommandKind.HOLD, CommandKind.RESUME, CommandKind.RESUME] * 9
+        kind = self.pick(*kinds, CommandKind.RETURN, CommandKind.ABORT)
+        target = FLEET if kind is CommandKind.ABORT else self.pick("u0", *OTHERS)
+        return self.heard(OPERATOR, Command(target, kind, BRIEF.run, ""))
 
     def learned(self) -> Learned:
         answers = [self.answer(writer) for writer in WRITERS]
@@ -223,7 +237,7 @@ def test_no_storm_of_events_raises_or_leaves_a_deadline_behind(block: int) -> No
 def test_the_storms_reach_every_phase() -> None:
     """Else the test above would prove little."""
     phases = set()
-    for seed in range(80):
+    for seed in range(160):
         storm = Storm(seed)
         for _ in range(150):
             storm.blow()

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.events import Reboot, Received, Tick
+from sim.autopilot.flavours import FlavourName, flavour_of
 from tests.ground_station import GroundStation, ground_station, only
 
 UNDERSTOOD = [
@@ -57,10 +58,15 @@ NUMBERS: dict[str, st.SearchStrategy[Any]] = {
         )
     },
     "char": st.one_of(
-        st.sampled_from([b"WP_SPD", b"RTL_ALT_M", b"DISARM_DELAY", b"NO_SUCH"]),
+        st.sampled_from(
+            [b"WP_SPD", b"RTL_ALT_M", b"DISARM_DELAY", b"MPC_XY_CRUISE", b"NAV_DLL_ACT", b"NO_SUCH"]
+        ),
         st.binary(max_size=16),
     ),
 }
+
+
+FLAVOURS = st.sampled_from(FlavourName)
 
 
 @st.composite
@@ -78,6 +84,17 @@ def messages(draw: st.DrawFn) -> Any:
     return message_type(**values)
 
 
+def in_the_air(ground: GroundStation) -> None:
+    """Bring a vehicle of any flavour to a hover."""
+    pilot = ground.vehicle.pilot
+    ground.wait(5.0)
+    pilot.set_mode(pilot.flavour.modes.for_reposition, ground.now_s)
+    pilot.arm(ground.now_s, forced=False)
+    assert pilot.take_off(10.0, ground.now_s)
+    ground.wait(10.0)
+    assert not pilot.flight.on_ground
+
+
 def all_messages_of_the_vehicle(ground: GroundStation) -> None:
     """Encode every report there is, so that none holds a number that doesn't fit."""
     for message_id in sorted(ground.vehicle._telemetry.known):
@@ -86,12 +103,16 @@ def all_messages_of_the_vehicle(ground: GroundStation) -> None:
 
 @settings(deadline=None, max_examples=150)
 @given(
-    steps=st.lists(st.tuples(messages(), st.floats(0.0, 20.0)), max_size=25), airborne=st.booleans()
+    steps=st.lists(st.tuples(messages(), st.floats(0.0, 20.0)), max_size=25),
+    airborne=st.booleans(),
+    flavour=FLAVOURS,
 )
-def test_arbitrary_messages_are_survived(steps: list[tuple[Any, float]], airborne: bool) -> None:
-    ground = ground_station()
+def test_arbitrary_messages_are_survived(
+    steps: list[tuple[Any, float]], airborne: bool, flavour: FlavourName
+) -> None:
+    ground = ground_station(flavour_of(flavour))
     if airborne:
-        ground.take_off(10.0)
+        in_the_air(ground)
     else:
         ground.wait(5.0)
     for message, pause_s in steps:
@@ -122,9 +143,15 @@ def test_random_bytes_are_dropped(pieces: list[bytes], datagrams: bool) -> None:
 
 
 @settings(deadline=None, max_examples=200)
-@given(message=messages(), changes=st.lists(st.tuples(st.integers(0, 400), st.integers(0, 255))))
-def test_mutated_frames_are_survived(message: Any, changes: list[tuple[int, int]]) -> None:
-    ground = ground_station()
+@given(
+    message=messages(),
+    changes=st.lists(st.tuples(st.integers(0, 400), st.integers(0, 255))),
+    flavour=FLAVOURS,
+)
+def test_mutated_frames_are_survived(
+    message: Any, changes: list[tuple[int, int]], flavour: FlavourName
+) -> None:
+    ground = ground_station(flavour_of(flavour))
     frame = bytearray(ground._outgoing.encode(message))
     for place, value in changes:
         frame[place % len(frame)] = value

@@ -242,6 +242,16 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         '"u\\n2"',
         [f"uav[1] \"u\\n2\".id: 'u\\n2' is not an id; give {ID}"],
     ),
+    "uav id reserved": (
+        '"uav2"',
+        '"fleet"',
+        [
+            (
+                "uav[1] \"fleet\".id: 'fleet' is the name of the whole fleet on the bus; "
+                "give the UAV another id"
+            )
+        ],
+    ),
     "uav id doubled": (
         '"uav2"',
         '"uav1"',

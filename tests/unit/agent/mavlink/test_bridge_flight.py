@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from agent.mavlink.bridge import Phase
@@ -12,7 +11,7 @@ from agent.mavlink.commands import CommandPolicy
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import LinkDown, LinkUp, Tick
 from agent.vehicle import Arrived, GoTo, HandedOver, Home, Refused, Return, VehicleReady
-from tests.bridge_flight import ORIGIN, START, BridgeFlight
+from tests.bridge_flight import ORIGIN, START, BridgeFlight, rough_link
 from tests.fake_copter import (
     ACCEPTED,
     BUSY,
@@ -449,13 +448,9 @@ def test_second_mission_follows_the_first(fake: type[FakeCopter]) -> None:
 def test_lossy_doubling_link_delays_but_does_not_break_a_flight(
     fake: type[FakeCopter], seed: int
 ) -> None:
-    chance = np.random.default_rng(seed)
-
-    def spoil(data: bytes) -> list[bytes]:
-        return [data] * int(chance.choice([0, 1, 2], p=[0.2, 0.7, 0.1]))
-
+    rough = rough_link(seed)
     config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, commands=CommandPolicy(tries=9))
-    flight = BridgeFlight(fake(ORIGIN), config, to_vehicle=spoil, to_bridge=spoil)
+    flight = BridgeFlight(fake(ORIGIN), config, to_vehicle=rough, to_bridge=rough)
     flight.order(START)
     flight.run_until(VehicleReady(), limit_s=120.0)
     for leg, target in enumerate((NORTH, SOUTH, HERE), start=1):

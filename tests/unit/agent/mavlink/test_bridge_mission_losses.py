@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
-import numpy as np
 import pytest
 
 from agent.mavlink.config import BridgeConfig, CommandStyle
 from agent.vehicle import Arrived, GoTo, HandedOver, Hold, Home, Refused, Return
-from tests.bridge_flight import ORIGIN, BridgeFlight
+from tests.bridge_flight import ORIGIN, BridgeFlight, rough_link
 from tests.fake_copter import FakeCopter
 
 MISSIONS = BridgeConfig(1, ORIGIN, command=CommandStyle.MISSION, mission_patience_s=30.0)
 OLD, NEW, EAST = (405.0, 0.0, 12.0), (5.0, 60.0, 12.0), (45.0, 0.0, 12.0)
 _MISSION_IDS = frozenset({40, 41, 43, 44, 47, 51, 73})
-_HEARTBEAT = bytes(3)
 _MESSAGES = 11
 """Of ours in an upload to ArduCopter; PX4 takes two less."""
-
-Spoil = Callable[[bytes], list[bytes]]
 
 
 class Cut:
@@ -164,15 +159,8 @@ def test_vehicle_whose_mission_is_not_known_is_stopped_and_told_so(
 def test_a_fifth_of_all_messages_lost_delays_but_does_not_break_a_flight(
     fake: type[FakeCopter], seed: int
 ) -> None:
-    chance = np.random.default_rng(seed)
-
-    def spoil(data: bytes) -> list[bytes]:
-        if data[7:10] == _HEARTBEAT:  # five lost in a row are silence, which is tested apart
-            return [data]
-        return [data] * int(chance.choice([0, 1, 2], p=[0.2, 0.7, 0.1]))
-
     flight = BridgeFlight(fake(ORIGIN), MISSIONS).prepared()
-    flight.to_vehicle = flight.to_bridge = spoil
+    flight.to_vehicle = flight.to_bridge = rough_link(seed)
     leg = 0
     for target in (EAST, NEW, EAST):
         for _ in range(3):

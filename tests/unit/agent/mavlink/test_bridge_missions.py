@@ -279,7 +279,9 @@ def test_refused_mission_leaves_the_old_target_in_force(
     order = GoTo(2, (5.0, 40.0, 20.0))
     flight.order(order)
     refusal = flight.run_until(Refused)
-    assert refusal == Refused(order, f"the vehicle refused the mission (result {result})")
+    assert isinstance(refusal, Refused)
+    assert refusal.order == order
+    assert f"the vehicle refused the mission (result {result})" in refusal.reason
     flight.run(5.0)
     assert copter.mode == copter.mission_mode
     assert copter.target_m is not None

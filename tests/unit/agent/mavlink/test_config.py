@@ -42,6 +42,7 @@ def test_fast_vehicle_time_leaves_wall_time_for_answers() -> None:
     assert fast.commands.ack_timeout_s / 60.0 >= 0.5
     assert fast.silence_timeout_s / 60.0 >= 3.0
     assert fast.acceptance_radius_m == CONFIG.acceptance_radius_m
+    assert fast.mission_patience_s >= 20.0 * fast.commands.ack_timeout_s
     assert CONFIG.for_speedup(1.0) == CONFIG
     with pytest.raises(ValueError, match="speedup"):
         CONFIG.for_speedup(0.0)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -243,3 +245,91 @@ def test_loss_doubling_and_reordering_end_right_or_reported(seed: int) -> None:
         assert machine.in_force == OLD
         if result.old_mission_verified:
             assert held == OLD[1:]
+
+
+def test_vehicle_is_asked_what_stands_on_it() -> None:
+    machine, store = MissionTransfer(MissionPolicy()), FakeStore()
+    transfer(machine, store, OLD)
+    outbox = machine.read(len(OLD), 0.0)
+    while machine.result is None:
+        answers = [answer for message in outbox for answer in store.on_message(message, 0.0)]
+        outbox = [out for answer in answers for out in machine.on_message(answer, 0.0)]
+    assert isinstance(machine.result, MissionRead)
+    assert machine.result.items[1:] == OLD[1:]
+    assert machine.in_force == OLD
+
+
+def test_missions_of_another_length_are_not_read() -> None:
+    machine = MissionTransfer(MissionPolicy())
+    assert machine.read(4, 0.0) == [MissionRequestList()]
+    machine.on_message(MissionCount(7), 0.1)
+    assert machine.result == MissionRead(7, ())
+    machine.upload(NEW, 0.2)
+    with pytest.raises(ValueError, match="under way"):
+        machine.read(4, 0.2)
+
+
+def test_vehicle_busy_with_an_older_transfer_is_asked_again() -> None:
+    machine = MissionTransfer(MissionPolicy())
+    machine.upload(NEW, 0.0)
+    assert machine.on_message(MissionAck(1), 0.1) == []
+    assert machine.busy
+    assert machine.on_time(1.6) == [MissionCount(len(NEW))]
+
+
+def test_older_upload_that_the_vehicle_goes_on_with_is_cancelled() -> None:
+    machine = MissionTransfer(MissionPolicy(tries=3))
+    machine.upload(NEW, 0.0)
+    assert machine.on_message(MissionRequest(2), 0.1) == [MissionAck(15), MissionCount(len(NEW))]
+    machine.on_message(MissionRequest(2), 0.2)
+    machine.on_message(MissionRequest(2), 0.3)
+    assert machine.result == MissionFailed(
+        "the vehicle is busy with another transfer", old_mission_verified=True
+    )
+
+
+def test_mission_left_half_uploaded_is_not_taken_for_verified_by_the_next_upload() -> None:
+    machine, store = MissionTransfer(MissionPolicy()), FakeStore()
+    transfer(machine, store, OLD)
+    machine.upload(NEW, 0.0)
+    machine.on_message(MissionRequest(0), 0.0)
+    machine.abort("somebody else has the vehicle")
+    result = transfer(machine, store, NEW, up=lambda _: 0)
+    assert isinstance(result, MissionFailed)
+    assert not result.old_mission_verified
+
+
+@pytest.mark.parametrize(
+    ("told", "same"),
+    [
+        ({}, True),
+        ({"alt_m": 19.99}, True),
+        ({"params": (60.0, 0.0, 0.0, 0.0)}, True),
+        ({"params": (60.0, 0.0, 0.0, 1.0)}, False),
+        ({"params": (59.0, 0.0, 0.0, math.nan)}, False),
+        ({"alt_m": 20.5}, False),
+        ({"lat_deg": 47.00001}, False),
+        ({"frame": AltitudeFrame.HOME}, False),
+        ({"command": 17}, False),
+    ],
+)
+def test_read_back_is_compared_with_tolerance_for_the_wire_and_for_nothing_else(
+    told: dict[str, Any], *, same: bool
+) -> None:
+    params = (60.0, 0.0, 0.0, math.nan)
+    meant = MissionItem(0, 16, AltitudeFrame.MEAN_SEA_LEVEL, 47.0, 8.0, 20.0, params)
+    machine = MissionTransfer(MissionPolicy(vehicle_items=0))
+    machine.upload([meant], 0.0)
+    for message in (MissionRequest(0), MissionAck(0), MissionCount(1), replace(meant, **told)):
+        machine.on_message(message, 0.1)
+    assert (machine.result == MissionInForce((meant,))) is same
+
+
+def test_frame_of_an_item_without_a_place_is_the_vehicles_own_affair() -> None:
+    meant = MissionItem(0, 20, AltitudeFrame.NONE, 0.0, 0.0, 0.0)
+    machine = MissionTransfer(MissionPolicy(vehicle_items=0))
+    machine.upload([meant], 0.0)
+    told = replace(meant, frame=AltitudeFrame.MEAN_SEA_LEVEL)
+    for message in (MissionRequest(0), MissionAck(0), MissionCount(1), told):
+        machine.on_message(message, 0.1)
+    assert machine.result == MissionInForce((meant,))

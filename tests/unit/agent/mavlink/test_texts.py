@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from agent.mavlink.codec import MavlinkCodec
 from agent.mavlink.messages import Text
 from agent.mavlink.texts import TextJoiner
+from tests.mavlink_frames import frame
 
 LONG = "x" * 50
 
@@ -62,3 +65,21 @@ def test_whatever_comes_texts_stay_short_and_printable(chunks: list[tuple[str, i
         for said in joiner.add(4, text, text_id, seq):
             assert len(said.text) <= 8 * 53 + 3
             assert said.text.isprintable()
+
+
+def test_texts_of_two_speakers_are_not_mixed_up() -> None:
+    def said(system: int, text: str, seq: int) -> bytes:
+        return frame(mavlink.MAVLink_statustext_message(2, text.encode(), 7, seq), system)
+
+    codec = MavlinkCodec(1)
+    stream = said(1, LONG, 0) + said(2, "from another", 0) + said(1, "end", 1)
+    heard = [(one.system_id, one.message) for one in codec.decode(stream)]
+    assert heard == [(2, Text(2, "from another")), (1, Text(2, LONG + "end"))]
+
+
+def test_a_new_link_does_not_end_a_text_of_the_old_one() -> None:
+    codec = MavlinkCodec(1)
+    codec.decode(frame(mavlink.MAVLink_statustext_message(2, LONG.encode(), 7, 0)))
+    codec.reset_link()
+    [heard] = codec.decode(frame(mavlink.MAVLink_statustext_message(2, b"new", 8, 0)))
+    assert heard.message == Text(2, "new")

@@ -11,8 +11,9 @@ from coordinator.observer import Observer
 from sim.status.table import mission_status, status_as_json, status_table
 from sim.view.signs import signs_for
 from swarm.events import PeerGone, PeerSeen, Tick
-from swarm.wire.messages import Status, StatusPhase
-from tests.builders import TIMING
+from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.wire.messages import Command, CommandKind, Status, StatusPhase
+from tests.builders import TIMING, brief_of
 from tests.observed_mission import Teller, random_mission, shipped
 
 MALFORMED = {"malformed": 48, "stale": 2}
@@ -116,3 +117,37 @@ def test_long_ids_and_notes_still_fit() -> None:
     assert "\x1b" not in text
     assert "-12346, 98765, 120" in text
     assert "does not come" in " ".join(text.split())
+
+
+def commanded() -> Teller:
+    """table-1, whose uav1 the operator holds; then the mission is aborted."""
+    teller = flying()
+    teller.say(COORDINATOR, brief_of(shipped("table-1")), 2.5)
+    teller.say(OPERATOR, Command("uav1", CommandKind.HOLD, 1, "helicopter"), 2.6)
+    teller.say(OPERATOR, Command("uav2", CommandKind.HOLD, 0, "of an earlier flight"), 2.6)
+    return teller
+
+
+def test_the_operators_words_are_told() -> None:
+    teller = commanded()
+    teller.say(OPERATOR, Command("fleet", CommandKind.ABORT, 1, ""), 2.7)
+
+    told = json.loads(json.dumps(status_as_json(mission_status(teller.observer, 3.0))))
+    assert told["aborted"] is True
+    assert told["commands"] == {
+        "uav1": {"command": "hold", "reason": "helicopter"},
+        "fleet": {"command": "abort", "reason": ""},
+    }
+    lines = rendered(teller.observer, 3.0).splitlines()
+    assert "operator     uav1 held by the operator: helicopter" in [line.rstrip() for line in lines]
+    assert "operator     mission aborted by the operator" in [line.rstrip() for line in lines]
+    assert [line.text for line in teller.observer.story][-2:] == [
+        "operator holds uav1: helicopter",
+        "operator aborts the mission",
+    ]
+
+
+def test_without_a_word_of_the_operator_nothing_is_told_of_any() -> None:
+    told = status_as_json(mission_status(flying().observer, 3.0))
+
+    assert (told["aborted"], told["commands"]) == (False, {})

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.bus.port import MAX_PAYLOAD_BYTES
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, OPERATOR, RESERVED
 from swarm.wire.codec import (
     LARGE_LIMIT_BYTES,
     SMALL_LIMIT_BYTES,
@@ -24,7 +24,15 @@ from swarm.wire.codec import (
     key_of,
 )
 from swarm.wire.keys import Keys
-from swarm.wire.messages import MAX_COUNT, Epoch, EpochPhase, Message, Snapshot
+from swarm.wire.messages import (
+    MAX_COUNT,
+    Command,
+    CommandKind,
+    Epoch,
+    EpochPhase,
+    Message,
+    Snapshot,
+)
 from tests.builders import (
     MISSION,
     brief,
@@ -44,7 +52,8 @@ BOARD = message(COORDINATOR, entry("t0"))
 CLAIM = message("u0", held("t0", 1.0))
 OUTCOME = message("u0", done("t0"))
 STATUS = message("u0", status())
-EVERY_KIND = [BRIEF, EPOCH, BOARD, CLAIM, OUTCOME, STATUS]
+COMMAND = message(OPERATOR, Command("u0", CommandKind.HOLD, 1, ""))
+EVERY_KIND = [BRIEF, EPOCH, BOARD, CLAIM, OUTCOME, STATUS, COMMAND]
 EVERY_KIND_IDS = [type(said.body).__name__ for said in EVERY_KIND]
 
 Parts = list[Any]
@@ -336,9 +345,10 @@ def test_a_brief_that_describes_one_uav_twice_is_malformed() -> None:
     assert reason_with(BRIEF, _name_uavs("u0", "u0")) == "malformed"
 
 
-def test_a_brief_that_calls_a_uav_like_the_coordinator_is_malformed() -> None:
+@pytest.mark.parametrize("name", RESERVED)
+def test_a_brief_that_calls_a_uav_by_a_reserved_name_is_malformed(name: str) -> None:
     """A replica could make no mission of it."""
-    assert reason_with(BRIEF, _name_uavs("u0", COORDINATOR)) == "malformed"
+    assert reason_with(BRIEF, _name_uavs("u0", name)) == "malformed"
 
 
 def _name_uavs(*names: str) -> Callable[[Parts], object]:
@@ -354,6 +364,7 @@ def test_what_is_said_on_anothers_key_is_dropped(said: Message) -> None:
     keys = Keys(MISSION)
     others = [keys.brief, keys.plan, keys.board("t0"), keys.board("t9"), keys.claim("u0")]
     others += [keys.claim("u1"), keys.outcome("u0", "t0"), keys.outcome("u0", "t1")]
+    others += [keys.operator("u0"), keys.operator("u1"), keys.operator("fleet")]
     others += [keys.outcome("u1", "t0"), keys.status("u0"), keys.status("u1"), keys.state("u0")]
     for key in set(others) - {key_of(said)}:
         assert drop_reason(key, encode(said)) == "said on another's key"
@@ -371,6 +382,23 @@ def test_what_only_a_uav_may_say_is_dropped_from_the_coordinator(said: Message) 
     by_coordinator = replace(said, writer=COORDINATOR)
 
     assert drop_reason(key_of(by_coordinator), encode(by_coordinator)) == "said on another's key"
+
+
+@pytest.mark.parametrize("writer", [COORDINATOR, "u0"])
+def test_what_only_the_operator_may_say_is_dropped_from_others(writer: str) -> None:
+    by_another = replace(COMMAND, writer=writer)
+
+    assert drop_reason(key_of(COMMAND), encode(by_another)) == "said on another's key"
+
+
+@pytest.mark.parametrize(
+    ("target", "kind"), [("u0", "abort"), ("fleet", "hold"), ("fleet", "return"), ("u0", "land")]
+)
+def test_commands_that_there_are_not_are_malformed(target: str, kind: str) -> None:
+    def change(parts: Parts) -> None:
+        parts[6].update(target=target, kind=kind)
+
+    assert reason_with(COMMAND, change) == "malformed"
 
 
 def test_small_kinds_end_at_the_small_limit() -> None:

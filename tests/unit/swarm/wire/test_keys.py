@@ -7,6 +7,7 @@ import pytest
 from swarm.bus.keyexpr import intersects
 from swarm.wire.codec import key_of
 from swarm.wire.keys import ANY_TOKEN, Keys, mission_of_token
+from swarm.wire.messages import Command, CommandKind
 from tests.builders import MISSION, brief, done, entry, epoch, held, message, status, uav
 
 
@@ -18,6 +19,11 @@ def test_keys_are_those_that_access_control_is_written_for() -> None:
         (message("u0", held("t0", 0.0)), "swarm/test/uav/u0/claim"),
         (message("u0", done("t0")), "swarm/test/uav/u0/outcome/t0"),
         (message("u0", status()), "swarm/test/uav/u0/status"),
+        (message("operator", Command("u0", CommandKind.HOLD, 1, "")), "swarm/test/operator/u0"),
+        (
+            message("operator", Command("fleet", CommandKind.ABORT, 1, "")),
+            "swarm/test/operator/fleet",
+        ),
     ]
     for statement, key in said:
         assert key_of(statement) == key

@@ -1,0 +1,79 @@
+"""What everything shares that commands one vehicle: who is heard, and how to speak to it.
+
+Leaves out: what is said and why (agent.mavlink.duty).
+"""
+
+from __future__ import annotations
+
+from agent.mavlink.codec import MavlinkCodec
+from agent.mavlink.commands import Commands
+from agent.mavlink.config import BridgeConfig
+from agent.mavlink.contact import Contact
+from agent.mavlink.events import Action, Send
+from agent.mavlink.flavours import Flavour
+from agent.mavlink.guards import Guards
+from agent.mavlink.messages import Outbound
+from agent.mavlink.signing import Signing
+from agent.mavlink.state import VehicleState
+from agent.vehicle import Report
+
+__all__ = ["Seat"]
+
+
+class Seat:
+    """One vehicle, as far as it is heard; and what was made of it in the step under way.
+
+    Args:
+        config: its settings.
+    """
+
+    def __init__(self, config: BridgeConfig, signing: Signing | None = None) -> None:
+        self.config = config
+        self.contact = Contact(config.system_id)
+        self.codec = MavlinkCodec(
+            config.system_id,
+            source_system_id=config.ground_system_id,
+            source_component_id=config.ground_component_id,
+            signing=signing,
+        )
+        self.commands = Commands(config.commands)
+        self.vehicle = VehicleState()
+        self.guards = Guards(config)
+        self.flavour: Flavour | None = None
+        self.now_s = 0.0
+        self._actions: list[Action] = []
+
+    @property
+    def silent(self) -> bool:
+        """Whether its last heartbeat is too old."""
+        heard_s = self.vehicle.heartbeat_at_s
+        return heard_s is not None and self.now_s - heard_s >= self.config.silence_timeout_s
+
+    def missing(self) -> str | None:
+        """Why there is no vehicle to command yet; None if there is one."""
+        return self.contact.missing(
+            self.vehicle.heartbeat,
+            self.flavour,
+            silent=self.silent,
+            distrusted=self.codec.distrusted,
+        )
+
+    def say(self, *messages: Outbound) -> None:
+        """To the vehicle."""
+        self._actions += [Send(self.codec.encode(message)) for message in messages]
+
+    def report(self, report: Report) -> None:
+        """To whoever gave the orders."""
+        self._actions.append(report)
+
+    def take_actions(self) -> list[Action]:
+        """What was said and reported, in order, once."""
+        actions, self._actions = self._actions, []
+        return actions
+
+    def forget_vehicle(self) -> None:
+        """The autopilot began anew: nothing is known of it any more."""
+        self.vehicle = VehicleState()
+        self.guards = Guards(self.config)
+        self.flavour = None
+        self.commands.cancel_all()

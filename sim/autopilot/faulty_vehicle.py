@@ -1,0 +1,184 @@
+"""A simulated vehicle to which faults happen, each at its own instant.
+
+It takes the place of a `Vehicle` and is driven in the same way. Leaves out: what the faults
+mean in words (sim.autopilot.faults).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sim.autopilot.config import VehicleConfig
+from sim.autopilot.events import Event, Reboot, Received, Send, Tick
+from sim.autopilot.faults import FaultKind, VehicleFault
+from sim.autopilot.flight import Activity
+from sim.autopilot.modes import Mode
+from sim.autopilot.pilot import Pilot
+from sim.autopilot.vehicle import COMPONENT_ID, Vehicle
+
+__all__ = ["FaultyVehicle"]
+
+_DEFECT = "Compass not healthy"
+_SYSTEM_IDS = 254
+_PILOT_MODE = {mavlink.MAV_AUTOPILOT_PX4: 3 << 16}
+"""Number of the mode a pilot flies in: POSCTL on PX4, LOITER on ArduCopter."""
+_LOITER = 5
+
+_NAVIGATION = frozenset({Activity.NAVIGATING})
+_NEEDS_POSITION = frozenset({Activity.NAVIGATING, Activity.RETURNING})
+
+
+class FaultyVehicle:
+    """A vehicle and its faults.
+
+    Args:
+        vehicle: the machine, not yet used.
+        faults: what happens to it, in any order.
+        start_s: when it is powered up [s].
+    """
+
+    def __init__(self, vehicle: Vehicle, faults: tuple[VehicleFault, ...], start_s: float) -> None:
+        self._vehicle = vehicle
+        self._unscheduled = [fault for fault in faults if fault.at_s > 0.0]
+        """Faults that wait for the first arming."""
+        self._ahead: list[tuple[float, bool, VehicleFault]] = []
+        """When each fault begins (True) or ends (False), soonest first."""
+        self._active: list[VehicleFault] = []
+        self._pilot = vehicle.pilot
+        """The one that has been told of the active faults."""
+        self._mode_before: Mode | None = None
+        """What the vehicle flew in when the pilot took over."""
+        self._schedule([fault for fault in faults if fault.at_s == 0.0], start_s)
+
+    @property
+    def config(self) -> VehicleConfig:
+        """What the vehicle is."""
+        return self._vehicle.config
+
+    @property
+    def pilot(self) -> Pilot:
+        """The autopilot inside, to look at."""
+        return self._vehicle.pilot
+
+    def next_deadline_s(self) -> float:
+        """When `step` should be called at the latest [s]."""
+        deadline_s = self._vehicle.next_deadline_s()
+        return min(deadline_s, self._ahead[0][0]) if self._ahead else deadline_s
+
+    def step(self, event: Event, now_s: float) -> list[Send]:
+        """Take an event at ``now_s``, after the faults that are due by then.
+
+        Returns:
+            What is to be sent, in order.
+        """
+        said: list[Send] = []
+        while self._ahead and self._ahead[0][0] <= now_s:
+            at_s, begins, fault = self._ahead.pop(0)
+            said += self._take(Tick(), at_s)
+            said += self._begin(fault, at_s) if begins else self._end(fault, at_s)
+        if isinstance(event, Received) and self._active:
+            said += self._receive(event, now_s)
+        else:
+            said += self._take(event, now_s)
+        if self._unscheduled and self._vehicle.pilot.armed:
+            faults, self._unscheduled = self._unscheduled, []
+            self._schedule(faults, now_s)
+        return said
+
+    def _schedule(self, faults: list[VehicleFault], start_s: float) -> None:
+        for fault in faults:
+            begins_s = start_s + fault.at_s
+            self._ahead.append((begins_s, True, fault))
+            if fault.duration_s < math.inf:
+                self._ahead.append((begins_s + fault.duration_s, False, fault))
+        self._ahead.sort(key=lambda due: due[0])
+
+    def _is(self, kind: FaultKind) -> bool:
+        return any(fault.kind is kind for fault in self._active)
+
+    def _begin(self, fault: VehicleFault, at_s: float) -> list[Send]:
+        pilot = self._vehicle.pilot
+        match fault.kind:
+            case FaultKind.REBOOT:
+                return self._take(Reboot(), at_s)
+            case FaultKind.BATTERY_LOW:
+                pilot.battery.drop_to(fault.charge_frac, at_s)
+            case FaultKind.FAILSAFE_RTL:
+                pilot.failsafes.lose_radio(at_s)
+            case FaultKind.PILOT:
+                self._mode_before = pilot.mode
+                self._fly_by_hand(pilot, at_s)
+                self._active.append(fault)
+            case _:
+                self._active.append(fault)
+                self._apply(at_s)
+        return self._take(Tick(), at_s)
+
+    def _end(self, fault: VehicleFault, at_s: float) -> list[Send]:
+        self._active.remove(fault)
+        if fault.kind is FaultKind.PILOT and self._mode_before is not None:
+            self._vehicle.pilot.set_mode(self._mode_before, at_s)
+        self._apply(at_s)
+        return self._take(Tick(), at_s)
+
+    def _apply(self, now_s: float) -> None:
+        """Make the autopilot have the active faults, and no others."""
+        pilot = self._pilot = self._vehicle.pilot
+        pilot.readiness.defect = _DEFECT if self._is(FaultKind.REFUSE_ARMING) else None
+        hindered: frozenset[Activity] = frozenset()
+        if self._is(FaultKind.STUCK):
+            hindered |= _NAVIGATION
+        if self._is(FaultKind.GPS_LOST):
+            hindered |= _NEEDS_POSITION
+            pilot.failsafes.lose_gps(now_s)
+        else:
+            pilot.failsafes.regain_gps(now_s)
+        pilot.flight.hinder(hindered, now_s)
+
+    def _fly_by_hand(self, pilot: Pilot, now_s: float) -> None:
+        mode = pilot.flavour.mode_of(_PILOT_MODE.get(pilot.flavour.autopilot, _LOITER))
+        if mode is None:
+            raise ValueError("the firmware has no mode for pilots")
+        pilot.set_mode(mode, now_s)
+
+    def _receive(self, event: Received, now_s: float) -> list[Send]:
+        """Hear a message the way a vehicle with faults does."""
+        message = event.message
+        target = getattr(message, "target_system", 0)
+        own_id = self.config.system_id
+        if self._is(FaultKind.SILENT):
+            return self._take(Tick(), now_s)
+        if self._is(FaultKind.WRONG_ID) and target == own_id:
+            return self._take(Tick(), now_s)
+        if (
+            self._is(FaultKind.REJECT_MISSION)
+            and message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_COUNT
+            and target in (0, own_id)
+            and message.target_component in (0, COMPONENT_ID)
+        ):
+            refusal = mavlink.MAVLink_mission_ack_message(
+                message.get_srcSystem(),
+                message.get_srcComponent(),
+                mavlink.MAV_MISSION_ERROR,
+                message.mission_type,
+            )
+            return [*self._take(Tick(), now_s), *self._altered([Send(refusal, event.channel)])]
+        return self._take(event, now_s)
+
+    def _take(self, event: Event, now_s: float) -> list[Send]:
+        said = self._vehicle.step(event, now_s)
+        if self._vehicle.pilot is not self._pilot:  # it has begun anew, and knows of no faults
+            self._apply(now_s)
+        return self._altered(said) if self._active else said
+
+    def _altered(self, said: list[Send]) -> list[Send]:
+        """What others hear of it."""
+        if self._is(FaultKind.SILENT):
+            return []
+        if self._is(FaultKind.WRONG_ID):
+            other_id = self.config.system_id % _SYSTEM_IDS + 1
+            return [replace(send, system_id=other_id) for send in said]
+        return said

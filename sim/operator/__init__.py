@@ -1,0 +1,1 @@
+"""`swarm hold`, `resume`, `return` and `abort`: an operator's words to a mission being flown."""

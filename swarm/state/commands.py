@@ -1,0 +1,54 @@
+"""What the operator has said about the flight that is on: which command counts for whom.
+
+A command names the run it was given for, so a new flight of the same mission inherits none.
+Of those to one UAV and those to the fleet the newest decides what the UAV does; that the
+mission is aborted holds whatever is said to a single UAV afterwards. Leaves out: obeying
+(agent.core, coordinator.core).
+"""
+
+from __future__ import annotations
+
+from swarm.model.ids import FLEET
+from swarm.state.registers import Replica
+from swarm.wire.messages import Command, CommandKind, Stamp
+
+__all__ = ["aborted", "in_force", "newest", "words"]
+
+_WORDS = {
+    CommandKind.HOLD: "held by the operator",
+    CommandKind.RESUME: "told by the operator to go on",
+    CommandKind.RETURN: "sent home by the operator",
+    CommandKind.ABORT: "aborted by the operator",
+}
+
+
+def in_force(replica: Replica) -> dict[str, Command]:
+    """Target -> newest command to it; of the flight that the brief tells of, and no other."""
+    return {target: command for target, (_, command) in _of_this_run(replica).items()}
+
+
+def newest(replica: Replica, uav: str) -> tuple[Stamp, Command] | None:
+    """The newest command that concerns ``uav``, with its stamp; None if there is none."""
+    commands = _of_this_run(replica)
+    concerning = [commands[target] for target in (uav, FLEET) if target in commands]
+    return max(concerning, key=lambda stamped: stamped[0], default=None)
+
+
+def aborted(replica: Replica) -> Command | None:
+    """The command that has ended this flight; None if there is none."""
+    return in_force(replica).get(FLEET)
+
+
+def words(command: Command) -> str:
+    """What has happened to whom it concerns, and why."""
+    said = _WORDS[command.kind]
+    return f"{said}: {command.reason}"[:200] if command.reason else said
+
+
+def _of_this_run(replica: Replica) -> dict[str, tuple[Stamp, Command]]:
+    if not replica.commands or replica.brief is None:
+        return {}
+    run = replica.brief.run
+    return {
+        target: stamped for target, stamped in replica.commands.items() if stamped[1].run == run
+    }

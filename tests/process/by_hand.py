@@ -1,0 +1,118 @@
+"""A mission whose processes are started by hand, as an operator does."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.model import Mission
+from swarm.scenario.write import format_scenario
+from tests.process.mission import wait_until
+
+__all__ = ["LIMIT_S", "ByHand"]
+
+LIMIT_S = 150.0
+SPEEDUP = "2"
+
+
+class ByHand:
+    """The processes of one mission; each logs into a file of its own.
+
+    Args:
+        folder: for scenario and logs.
+        stack: ends the processes.
+        mission: flown, at twice the speed of the wall's clock.
+    """
+
+    def __init__(self, folder: Path, stack: contextlib.ExitStack, mission: Mission) -> None:
+        self.folder = folder
+        self.mission = mission
+        self.uavs: list[str] = [uav.id for uav in mission.uavs]
+        self._stack = stack
+        self._scenario = folder / "scenario.toml"
+        self._scenario.write_text(format_scenario(mission))
+        (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
+        self.seat = ["--connect", endpoint, "--speedup", SPEEDUP]
+        router = self.start("router", ["router", "--listen", endpoint, "--json"])
+        self._line(router)
+        chosen = [word for uav in self.uavs for word in ("--uav", uav)]
+        listen = ["--listen", "tcp:127.0.0.1:0", "--speedup", SPEEDUP, "--json"]
+        autopilot = ["autopilot", str(self._scenario), *chosen, *listen]
+        flying = self.start("autopilot", autopilot)
+        vehicles = [self._line(flying) for _ in self.uavs]
+        self.agents = [self._agent(vehicle) for vehicle in vehicles]
+
+    def coordinator(self, name: str, *options: str) -> subprocess.Popen[str]:
+        """Start a coordinator; ``name`` is that of its log."""
+        words = ["coordinator", str(self._scenario), "--method", "greedy", "--json"]
+        return self.start(name, [*words, *self.seat, *options])
+
+    def start(self, name: str, arguments: list[str]) -> subprocess.Popen[str]:
+        log = self._stack.enter_context((self.folder / f"{name}.log").open("w"))
+        process = subprocess.Popen(
+            [sys.executable, "-m", "swarm", *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+            env={**os.environ, "NO_COLOR": "1", "SWARM_LOG_FORMAT": "lines"},
+        )
+        self._stack.callback(_end, process)
+        return process
+
+    def log(self, name: str) -> str:
+        """All that process has logged so far."""
+        return (self.folder / f"{name}.log").read_text()
+
+    def wait_for(self, name: str, text: str) -> None:
+        """Wait for a line in a log."""
+        wait_until(lambda: text in self.log(name), LIMIT_S, f"{text!r} in {name}: {self.log(name)}")
+
+    def done(self) -> list[str]:
+        """Tasks done so far, once for every visit."""
+        logs = "".join(self.log(uav) for uav in self.uavs)
+        return re.findall(r'event="task done".*?\btask=(\w+)', logs)
+
+    def wait_for_done(self, count: int) -> None:
+        """Wait until so many tasks are done."""
+        wait_until(lambda: len(self.done()) >= count, LIMIT_S, f"the end of {count} tasks")
+
+    def assert_all_done(self) -> None:
+        """Every task was visited once, and everybody came home."""
+        assert [agent.wait(60) for agent in self.agents] == [0] * len(self.uavs)
+        assert sorted(self.done()) == sorted(task.id for task in self.mission.tasks)
+
+    def _agent(self, vehicle: dict[str, object]) -> subprocess.Popen[str]:
+        uav = str(vehicle["uav"])
+        words = ["agent", "--mission", self.mission.name, "--uav", uav]
+        words += ["--mavlink", str(vehicle["url"]), "--system-id", str(vehicle["system_id"])]
+        return self.start(uav, [*words, *self.seat])
+
+    @staticmethod
+    def _line(process: subprocess.Popen[str]) -> dict[str, object]:
+        assert process.stdout is not None
+        said = json.loads(process.stdout.readline())
+        assert isinstance(said, dict)
+        return said
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    if process.poll() is None:
+        process.send_signal(signal.SIGCONT)
+        process.terminate()
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    assert process.stdout is not None
+    process.stdout.close()

@@ -1,0 +1,85 @@
+"""An operator commands a fleet of real processes whose coordinator has been killed."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from tests.process.by_hand import ByHand
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+
+UAVS = ["uav1", "uav2", "uav3"]
+MISSION = Mission(
+    "commanded",
+    9000.0,
+    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 5.0) for n, u in enumerate(UAVS)),
+    tuple(
+        Task(TaskId(f"t{n}"), (20.0 * n, 60.0, 0.0), 1.0, service_s=900.0)
+        for n in range(2 * len(UAVS))
+    ),
+    origin=Origin(46.8, 9.7, 1100.0),
+)
+
+
+def swarm(by_hand: ByHand, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "swarm", *words, *by_hand.seat],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def does(by_hand: ByHand, uav: str) -> str:
+    told = json.loads(swarm(by_hand, "status", "--json").stdout)
+    (found,) = [each["does"] for each in told["uavs"] if each["id"] == uav]
+    return str(found)
+
+
+def test_an_operator_commands_a_fleet_without_a_coordinator(tmp_path: Path) -> None:
+    with contextlib.ExitStack() as stack:
+        by_hand = ByHand(tmp_path, stack, MISSION)
+        coordinator = by_hand.coordinator("coordinator")
+        for uav in UAVS:
+            by_hand.wait_for(uav, "event=decided")
+        coordinator.kill()
+        coordinator.wait()
+
+        held = swarm(by_hand, "hold", "uav1", "--reason", "helicopter")
+        assert (held.returncode, held.stderr) == (0, "")
+        assert held.stdout == "uav1 is holding: held by the operator: helicopter\n"
+        assert does(by_hand, "uav1") == "holding"
+        assert "held" in swarm(by_hand, "status").stdout
+
+        resumed = swarm(by_hand, "resume", "uav1")
+        assert (resumed.returncode, resumed.stderr) == (0, "")
+        by_hand.wait_for("uav1", "command=resume")
+
+        sent_home = swarm(by_hand, "return", "uav2")
+        assert (sent_home.returncode, sent_home.stderr) == (0, "")
+        assert by_hand.agents[1].wait(60) == 0, by_hand.log("uav2")
+
+        unknown = swarm(by_hand, "hold", "uav9")
+        assert unknown.returncode == 2
+        assert unknown.stderr == (
+            "UAV: 'uav9' is not in mission commanded; the fleet is uav1, uav2, uav3\n"
+        )
+        late = swarm(by_hand, "hold", "uav2", "--timeout-s", "2")
+        assert late.returncode == 1
+        assert late.stderr.startswith("swarm: nobody flies uav2")
+
+        aborted = swarm(by_hand, "abort", "--json")
+        assert (aborted.returncode, aborted.stderr) == (0, "")
+        told = json.loads(aborted.stdout)
+        assert (told["command"], told["obeyed"]) == ("abort", True)
+        assert [by_hand.agents[n].wait(90) for n in (0, 2)] == [0, 0]
+        assert by_hand.done() == []
