@@ -14,7 +14,7 @@ from agent.events import Action, Order
 from agent.peers import Peers
 from agent.picture import Picture
 from agent.speech import Speech
-from agent.vehicle import GoTo, Hold
+from agent.vehicle import GoTo
 from swarm.allocation.lower_level import Decision, Rule
 from swarm.config import Timing
 from swarm.events import Note
@@ -292,10 +292,10 @@ class Tasking:
         ]
 
     def _stay_idle(self, now_s: float) -> list[Action]:
-        actions = self._give_up_claim()
-        if self._adrift:
+        actions, telemetry = self._give_up_claim(), self._picture.telemetry
+        if self._adrift and telemetry is not None:
             # Nothing to fly to any more: stop here rather than at a lost target.
-            actions.append(Order(Hold("the task flown to is no longer this UAV's")))
+            actions.append(self._order_to(telemetry.position_enu_m, 0.0))
         self._adrift = self._to_decide = False
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         self._awaits_peers = patience_ends_s is not None

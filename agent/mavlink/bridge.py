@@ -103,9 +103,9 @@ class Bridge:
         deadlines_s = [self._heartbeat_at_s, self._duty.next_deadline_s()]
         if (commands_s := seat.commands.next_deadline_s()) is not None:
             deadlines_s.append(commands_s)
-        heard_s = seat.vehicle.heartbeat_at_s
-        if heard_s is not None and self._duty.in_our_hands() and not seat.silent:
-            deadlines_s.append(heard_s + self.config.silence_timeout_s)
+        silent_at_s = seat.vehicle.silent_at_s(self.config.silence_timeout_s)
+        if silent_at_s is not None and self._duty.in_our_hands() and not seat.silent:
+            deadlines_s.append(silent_at_s)
         return min(deadlines_s)
 
     # What is heard.
@@ -114,6 +114,7 @@ class Bridge:
         seat, message = self._seat, heard.message
         if not seat.contact.is_from_vehicle(heard):
             return
+        seat.vehicle.heard_at_s = seat.now_s
         seat.guards.on_message(message, seat.now_s)
         if self._streams is not None:
             self._streams.on_message(message, seat.now_s)
@@ -226,7 +227,7 @@ class Bridge:
         seat.say(*out)
         self._on_ended(ended)
         if seat.silent and self._duty.in_our_hands():
-            self._duty.hand_over(f"no heartbeat for {self.config.silence_timeout_s:g} s")
+            self._duty.hand_over(seat.vehicle.silence(now_s))
         if self._streams is not None and not seat.silent:
             seat.say(*self._streams.advance(seat.commands, now_s))
         self._duty.advance()

@@ -45,9 +45,9 @@ class Seat:
 
     @property
     def silent(self) -> bool:
-        """Whether its last heartbeat is too old."""
-        heard_s = self.vehicle.heartbeat_at_s
-        return heard_s is not None and self.now_s - heard_s >= self.config.silence_timeout_s
+        """Whether it has not been heard for too long."""
+        at_s = self.vehicle.silent_at_s(self.config.silence_timeout_s)
+        return at_s is not None and self.now_s >= at_s
 
     def missing(self) -> str | None:
         """Why there is no vehicle to command yet; None if there is one."""

@@ -27,6 +27,8 @@ _BOOT_REGRESSION_S = 2.0
 _REBOOT_MESSAGES = 3
 """That many positions in a row, each later than the one before, prove a reboot."""
 _BOOT_WRAP_S = 2**32 / 1e3
+_HEARTLESS = 3.0
+"""Without a heartbeat for that many silence timeouts it is silent, whatever else it says."""
 _WARNING = 4
 """MAV_SEVERITY_WARNING; smaller is worse."""
 
@@ -50,6 +52,8 @@ class VehicleState:
     heartbeat: Heartbeat | None = None
     heartbeat_at_s: float | None = None
     """Vehicle time at which the last heartbeat came."""
+    heard_at_s: float | None = None
+    """Vehicle time at which anything came last."""
     position: Position | None = None
     """The newest known position."""
     prearm_ok: bool | None = None
@@ -69,7 +73,24 @@ class VehicleState:
     def excuse_silence(self, now_s: float) -> None:
         """Nobody listened for a while: what it said meanwhile is still unread."""
         if self.heartbeat_at_s is not None:
-            self.heartbeat_at_s = now_s
+            self.heartbeat_at_s = self.heard_at_s = now_s
+
+    def silent_at_s(self, timeout_s: float) -> float | None:
+        """When it falls silent unless something comes before; None if it never spoke.
+
+        A lost heartbeat is no silence while other messages come, but nobody knows its mode
+        then: that is borne for a few timeouts only.
+        """
+        if self.heartbeat_at_s is None or self.heard_at_s is None:
+            return None
+        return min(self.heard_at_s + timeout_s, self.heartbeat_at_s + _HEARTLESS * timeout_s)
+
+    def silence(self, now_s: float) -> str:
+        """What has not been heard, and for how long, in words."""
+        heard_s, heartbeat_s = self.heard_at_s or now_s, self.heartbeat_at_s or now_s
+        if now_s - heartbeat_s >= _HEARTLESS * (now_s - heard_s):
+            return f"no heartbeat for {now_s - heartbeat_s:.0f} s, though other messages come"
+        return f"nothing heard for {now_s - heard_s:.0f} s"
 
     @property
     def armed(self) -> bool:

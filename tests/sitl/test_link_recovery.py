@@ -94,7 +94,7 @@ async def test_vehicle_behind_a_half_open_connection_is_handed_over_and_heard_ag
         await until(lambda: VehicleReady() in reports)
         vehicle.order(GoTo(1, (5.0, 500.0, 10.0)))
         served.cut_silently()
-        silent = HandedOver("no heartbeat for 10 s")
+        silent = HandedOver("nothing heard for 10 s")
         await until(lambda: silent in reports)
         before = len(reports)
         await until(lambda: len(reports) > before)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from agent.vehicle import GoTo, Hold, Refused, Return
+from agent.vehicle import GoTo, Refused, Return
 from swarm.events import Heard, LinkChanged, PeerGone, PeerSeen
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Board, Claim, ClaimPhase
@@ -267,7 +267,7 @@ def test_it_releases_a_withdrawn_task_and_stops_if_there_is_no_other() -> None:
     actions = agent.hear(COORDINATOR, entry("near", east_m=10.0, withdrawn=True), 4.0)
 
     assert [claim.phase for claim in claims(actions)] == [ClaimPhase.IDLE]
-    assert [type(order) for order in orders(actions)] == [Hold]
+    assert orders(actions) == [GoTo(2, (4.0, 0.0, 10.0))]
     actions = agent.arrive(5.0)
     assert (claims(actions), orders(actions)) == ([], [])
 

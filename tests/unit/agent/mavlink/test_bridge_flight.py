@@ -345,7 +345,7 @@ def test_a_vehicle_that_stays_silent_after_the_bridge_was_held_up_is_handed_over
     flight.copter.silent = True
     flight.now_s += 30.0
     held_up_s = flight.now_s
-    assert flight.run_until(HandedOver) == HandedOver("no heartbeat for 5 s")
+    assert flight.run_until(HandedOver) == HandedOver("nothing heard for 5 s")
     assert 4.0 <= flight.now_s - held_up_s <= 6.0
 
 
@@ -353,7 +353,7 @@ def test_silent_vehicle_is_handed_over_and_can_be_prepared_again(fake: type[Fake
     flight = BridgeFlight(fake(ORIGIN)).flying()
     flight.copter.silent = True
     before_s = flight.now_s
-    assert flight.run_until(HandedOver) == HandedOver("no heartbeat for 5 s")
+    assert flight.run_until(HandedOver) == HandedOver("nothing heard for 5 s")
     assert 4.0 <= flight.now_s - before_s <= 6.0
     order = Return("mission ended")
     assert flight.order(order) == [Refused(order, "the autopilot is silent")]

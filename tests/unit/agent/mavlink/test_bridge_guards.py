@@ -121,7 +121,7 @@ def reboot(flight: BridgeFlight) -> None:
         ),
         (terminate, "the flight was terminated"),
         (disarm, "the vehicle disarmed by itself"),
-        (fall_silent, "no heartbeat for 5 s"),
+        (fall_silent, "nothing heard for 5 s"),
         (reboot, "the autopilot rebooted"),
     ],
 )
@@ -352,3 +352,17 @@ def test_a_target_the_autopilot_refuses_is_told_with_its_own_words(fake: Fake) -
         order,
         "the autopilot did not take the target (failed): Reposition is outside geofence",
     )
+
+
+def test_lost_heartbeats_are_no_silence_while_other_messages_come(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying()
+
+    def without_heartbeats(data: bytes) -> list[bytes]:
+        return [] if data[7:10] == bytes(3) else [data]
+
+    flight.to_bridge = without_heartbeats
+    flight.run(12.0)
+    assert flight.bridge.phase is Phase.FLYING
+    handed_over = flight.run_until(HandedOver, limit_s=5.0)
+    assert isinstance(handed_over, HandedOver)
+    assert handed_over.reason.startswith("no heartbeat for 15 s, though other messages come")

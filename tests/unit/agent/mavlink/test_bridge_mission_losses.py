@@ -99,7 +99,7 @@ def test_vehicle_that_is_heard_no_more_is_handed_over(fake: type[FakeCopter], in
     flight.order(GoTo(2, NEW))
     watch(flight, HandedOver, Arrived, limit_s=60.0)
     if Arrived(2) not in flight.reports:
-        assert flight.reports[-1] == HandedOver("no heartbeat for 5 s")
+        assert flight.reports[-1] == HandedOver("nothing heard for 5 s")
 
 
 @pytest.mark.parametrize("index", range(_MESSAGES))
