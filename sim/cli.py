@@ -61,6 +61,73 @@ def run(
         ),
     ] = 1,
     link: LinkOption = Link.NORMAL,
+    autopilot: Annotated[
+        str,
+        typer.Option(
+            "--autopilot",
+            metavar="sim|sim-px4|ardupilot|px4|URL,…",
+            help="What flies: an autopilot simulated like ArduCopter or like PX4, real firmware "
+            "in software-in-the-loop, or vehicles that run already, one URL for each UAV in the "
+            "scenario's order or as UAV=URL; #ID at its end is the vehicle's system id, by "
+            "default the UAV's place in the scenario.",
+        ),
+    ] = "sim",
+    firmware: Annotated[
+        Path | None,
+        typer.Option(
+            "--firmware",
+            metavar="PATH",
+            help="With ardupilot: the arducopter binary; default: SWARM_SITL_ARDUCOPTER. With "
+            "px4: a build folder such as build/px4_sitl_default; default: SWARM_SITL_PX4.",
+            show_default=False,
+        ),
+    ] = None,
+    command: Annotated[
+        str | None,
+        typer.Option(
+            "--command",
+            metavar="STYLE|UAV=STYLE,…",
+            help="How vehicles are commanded: reposition or mission, for all or by UAV.",
+            show_default=False,
+        ),
+    ] = None,
+    forward: Annotated[
+        str | None,
+        typer.Option(
+            "--forward",
+            metavar="udp:HOST:PORT",
+            help="Let a ground station there watch every vehicle; see swarm agent.",
+            show_default=False,
+        ),
+    ] = None,
+    signing_key: Annotated[
+        Path | None,
+        typer.Option(
+            "--signing-key",
+            metavar="FILE",
+            help="Sign MAVLink messages with this key; see swarm agent.",
+            show_default=False,
+        ),
+    ] = None,
+    battery_reserve: Annotated[
+        str | None,
+        typer.Option(
+            "--battery-reserve",
+            metavar="FRAC|off",
+            help="Charge at which a UAV goes home; see swarm agent.",
+            show_default=False,
+        ),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="UAV:KIND@T+DURATION",
+            help="Something that befalls a simulated autopilot; may be repeated. See swarm "
+            "autopilot.",
+            show_default=False,
+        ),
+    ] = None,
     position_rate_hz: Annotated[
         float | None,
         typer.Option(
@@ -68,31 +135,35 @@ def run(
             min=1.0,
             max=200.0,
             metavar="HZ",
-            help="Position reports of each autopilot per wall second. Default: 100, less for "
-            "more than 20 UAVs.",
+            help="Position reports of each autopilot per wall second. Default: 100 of simulated "
+            "ones, less for more than 20 UAVs; 50 of firmware, less for more than 10; else 10.",
             show_default=False,
         ),
     ] = None,
     acceptance_radius_m: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--acceptance-radius-m",
             min=0.01,
             max=1000.0,
             metavar="M",
-            help="Within this distance of a task, and stopped, a UAV has arrived.",
+            help="Within this distance of a task, and stopped, a UAV has arrived. Default: 0.5 "
+            "for simulated autopilots, else 2.",
+            show_default=False,
         ),
-    ] = 0.5,
+    ] = None,
     start_timeout_s: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--start-timeout-s",
             min=1.0,
             metavar="S",
             help="UAVs that are not airborne by then are given up; mission seconds, or wall "
-            "seconds where the mission runs faster.",
+            "seconds where the mission runs faster. Default: 120 for simulated autopilots, "
+            "else 300.",
+            show_default=False,
         ),
-    ] = 120.0,
+    ] = None,
     report: ReportOption = None,
     json: JsonOption = False,
     verbose: Annotated[
@@ -103,19 +174,28 @@ def run(
 
     Starts the bus, the coordinator and, for every UAV, an agent and a simulated autopilot;
     shows the mission live and ends with a report. Exit status 0: every task was done.
+    Instead of simulated autopilots it starts real firmware, or none where vehicles run.
 
     Examples:
         swarm run table-1
         swarm run valley-survey --speedup 20 --report flight.md
+        swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
+        swarm run valley-survey --speedup 20 --fault uav03:pilot@60
+        swarm run table-1 --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
+        SWARM_SITL_PX4=~/PX4-Autopilot/build/px4_sitl_default swarm run table-1 --autopilot px4
+        swarm run pair.toml --autopilot udpin:0.0.0.0:14550,serial:/dev/ttyUSB0:57600#7
         swarm run table-1 --json
     """
     import asyncio
+    import os
     import sys
 
     from rich.console import Console
 
     from coordinator.planner.plan import check_online_method
-    from sim.launch.fleet import LaunchOptions, default_position_rate_hz
+    from sim.launch.autopilots import parse_autopilots
+    from sim.launch.fleet import LaunchOptions, defaults_for
+    from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
     from sim.launch.run import fly
     from sim.view.live import LiveView
     from sim.view.report import MissionReport, check_report_path
@@ -127,17 +207,30 @@ def run(
     if report is not None:
         check_report_path(report)
     mission = load_scenario(scenario)
+    uavs = [uav.id for uav in mission.uavs]
+    autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
+    handed_on = HandedOn(
+        command=parse_command_styles(command, uavs),
+        forward=forward,
+        signing_key=signing_key,
+        battery_reserve=battery_reserve,
+        faults=tuple(fault or ()),
+    )
+    check_handed_on(handed_on, autopilots, uavs)
+    defaults = defaults_for(autopilots, len(uavs))
     options = LaunchOptions(
         scenario=scenario,
         method=method,
         seed=seed,
         speedup=speedup,
         bus=_bus_kind(bus),
-        position_rate_hz=position_rate_hz or default_position_rate_hz(len(mission.uavs)),
-        acceptance_radius_m=acceptance_radius_m,
-        start_timeout_s=start_timeout_s,
+        position_rate_hz=position_rate_hz or defaults.position_rate_hz,
+        acceptance_radius_m=acceptance_radius_m or defaults.acceptance_radius_m,
+        start_timeout_s=start_timeout_s or defaults.start_timeout_s,
         routers=routers,
         link=link,
+        autopilots=autopilots,
+        handed_on=handed_on,
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.

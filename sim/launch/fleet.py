@@ -6,12 +6,15 @@ Leaves out: starting and ending them (sim.launch.run).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
 
+from sim.launch.autopilots import Autopilots, Running, Simulated
+from sim.launch.firmware import Firmware
+from sim.launch.handed_on import HandedOn
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
 from swarm.bus.endpoints import free_loopback_endpoints
 from swarm.config import Link, preset
@@ -21,11 +24,13 @@ from swarm.model.ids import COORDINATOR
 __all__ = [
     "AUTO_MESH_LIMIT",
     "BusKind",
+    "Defaults",
     "DialedLink",
     "LaunchOptions",
     "Layout",
     "autopilot_groups",
     "default_position_rate_hz",
+    "defaults_for",
 ]
 
 AUTO_MESH_LIMIT = 16
@@ -72,6 +77,10 @@ class LaunchOptions:
     """What the network is like: sets lease and timers."""
     address: str = "127.0.0.1"
     """Where routers and peers listen; an address of this machine."""
+    autopilots: Autopilots = field(default_factory=Simulated)
+    """What flies."""
+    handed_on: HandedOn = field(default_factory=HandedOn)
+    """What agents and simulated autopilots are told besides."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -153,8 +162,15 @@ class Layout:
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
         chosen = _repeated("--uav", uavs)
-        listen = ["--listen", "tcp:127.0.0.1:0"]
-        return ["autopilot", str(self._options.scenario), *chosen, *listen, *self._speed()]
+        options = self._options
+        return [
+            *("autopilot", str(options.scenario)),
+            *chosen,
+            *("--listen", "tcp:127.0.0.1:0"),
+            *self._flavour(),
+            *options.handed_on.to_autopilot(uavs),
+            *self._speed(),
+        ]
 
     def coordinator(self) -> list[str]:
         """Arguments of the coordinator's process."""
@@ -179,10 +195,17 @@ class Layout:
             *("--mavlink", url, "--system-id", str(system_id)),
             *("--position-rate-hz", repr(rate_hz)),
             *("--acceptance-radius-m", repr(options.acceptance_radius_m)),
+            *options.handed_on.to_agent(uav),
             *self._memory(),
             *self._speed(),
             *self.seat_arguments(uav),
         ]
+
+    def _flavour(self) -> list[str]:
+        autopilots = self._options.autopilots
+        if autopilots == Simulated():
+            return []
+        return ["--flavour", autopilots.flavour] if isinstance(autopilots, Simulated) else []
 
     def _speed(self) -> list[str]:
         return ["--speedup", repr(self._options.speedup)]
@@ -231,6 +254,31 @@ def default_position_rate_hz(n_uav: int) -> float:
     handles some 2000 reports a second beside everything else.
     """
     return min(100.0, 2000.0 / max(1, n_uav))
+
+
+@dataclass(frozen=True, slots=True)
+class Defaults:
+    """What suits the kind of autopilots, where nothing is asked for."""
+
+    position_rate_hz: float
+    acceptance_radius_m: float
+    start_timeout_s: float
+
+
+def defaults_for(autopilots: Autopilots, n_uav: int) -> Defaults:
+    """Simulated vehicles are exact and quick; firmware and real ones are neither.
+
+    Firmware waits for its estimator, half a minute and more of its own time, and drifts in
+    what it takes for wind and noise of its GPS; a vehicle that runs already may be at the
+    other end of a radio, and somebody may have to switch it on first.
+    """
+    match autopilots:
+        case Simulated():
+            return Defaults(default_position_rate_hz(n_uav), 0.5, 120.0)
+        case Firmware():
+            return Defaults(min(50.0, 500.0 / max(1, n_uav)), 2.0, 300.0)
+        case Running():
+            return Defaults(10.0, 2.0, 300.0)
 
 
 def autopilot_groups(uavs: Sequence[str]) -> list[list[str]]:

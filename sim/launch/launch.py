@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import asyncio
 import tempfile
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sim.launch.autopilots import Running, Simulated, VehiclePlace
+from sim.launch.firmware import Firmware
 from sim.launch.fleet import DialedLink, LaunchOptions, Layout, autopilot_groups
-from sim.launch.process import Child
+from sim.launch.process import Child, Setting
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 
@@ -90,16 +92,54 @@ class Launch:
         for router in layout.routers:
             await self._start(router, layout.router(router))
             await self.child(router).ready()
+        match self.options.autopilots:
+            case Simulated():
+                vehicles = await self._start_simulated()
+            case Firmware() as firmware:
+                vehicles = await self._start_firmware(firmware, layout.state)
+            case Running(places):
+                vehicles = _there(places)
+        await self._start(COORDINATOR, layout.coordinator())
+        async for place in vehicles:
+            arguments = layout.agent(place.uav, place.url, place.system_id)
+            await self._start(place.uav, arguments)
+
+    async def _start_simulated(self) -> AsyncIterator[VehiclePlace]:
+        """Start simulated autopilots; the vehicles come as they are ready."""
         groups = autopilot_groups([uav.id for uav in self.mission.uavs])
-        autopilots = [
-            await self._start(f"autopilot of {', '.join(group)}", layout.autopilot(group))
+        children = [
+            await self._start(f"autopilot of {', '.join(group)}", self.layout.autopilot(group))
             for group in groups
         ]
-        await self._start(COORDINATOR, layout.coordinator())
-        for child, group in zip(autopilots, groups, strict=True):
-            for said in await child.ready(len(group)):
-                uav, url, system_id = said["uav"], said["url"], int(said["system_id"])
-                await self._start(uav, layout.agent(uav, url, system_id))
+
+        async def vehicles() -> AsyncIterator[VehiclePlace]:
+            for child, group in zip(children, groups, strict=True):
+                for said in await child.ready(len(group)):
+                    yield VehiclePlace(said["uav"], said["url"], int(said["system_id"]))
+
+        return vehicles()
+
+    async def _start_firmware(
+        self, firmware: Firmware, folder: Path
+    ) -> AsyncIterator[VehiclePlace]:
+        """Start real firmware, each instance in a folder of its own below ``folder``."""
+        processes = firmware.processes(self.mission, self.options.speedup)
+        children = {}
+        for uav, process in processes.items():
+            own = folder / f"{firmware.kind} of {uav}"
+            own.mkdir()
+            for name, text in process.files.items():
+                (own / name).write_text(text, encoding="utf-8")
+            setting = Setting(own, process.environment)
+            name = f"autopilot of {uav}"
+            children[uav] = await self._start(name, list(process.command), setting)
+
+        async def vehicles() -> AsyncIterator[VehiclePlace]:
+            await asyncio.gather(*(child.settled() for child in children.values()))
+            for uav, process in processes.items():
+                yield VehiclePlace(uav, process.url, process.system_id)
+
+        return vehicles()
 
     async def stop(self) -> None:
         """End every process that is left; paused ones too."""
@@ -152,7 +192,7 @@ class Launch:
             ChildFailedError: a router did not come up.
         """
         former = self.child(name)
-        if former.arguments[0] == "autopilot":
+        if former.setting is not None or former.arguments[0] == "autopilot":
             raise ValueError(f"{name} cannot be restarted: its vehicles would be back at the start")
         await former.kill()
         child = await self._start(name, list(former.arguments))
@@ -160,10 +200,18 @@ class Launch:
             await child.ready()
         return child
 
-    async def _start(self, name: str, arguments: list[str]) -> Child:
+    async def _start(
+        self, name: str, arguments: list[str], setting: Setting | None = None
+    ) -> Child:
         on_line = self._on_plan if name == COORDINATOR else None
-        child = Child(name, arguments, on_line=on_line, on_log=self._on_log)
+        child = Child(name, arguments, on_line=on_line, on_log=self._on_log, setting=setting)
         self.lives.append(child)
         await child.start()
         self._current[name] = child
         return child
+
+
+async def _there(places: Sequence[VehiclePlace]) -> AsyncIterator[VehiclePlace]:
+    """Vehicles for which nothing is to be started."""
+    for place in places:
+        yield place

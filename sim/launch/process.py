@@ -15,15 +15,20 @@ import os
 import signal
 import sys
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from sim.launch import guard
 from swarm.errors import SwarmError
 
-__all__ = ["Child", "ChildFailedError"]
+__all__ = ["Child", "ChildFailedError", "Setting"]
 
 READY_TIMEOUT_S = 30.0
 """Wall time a child may take to say that it is ready."""
+SETTLE_S = 1.0
+"""Wall time in which a foreign program that cannot run at all, as its port is taken, ends."""
 TERMINATE_TIMEOUT_S = 4.0
 """Wall time a child may take to leave after SIGTERM; then it is killed."""
 KILL_TIMEOUT_S = 4.0
@@ -38,14 +43,26 @@ class ChildFailedError(SwarmError):
     """A child ended, or stayed silent, before it was ready."""
 
 
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """In what a program runs that is not `swarm`."""
+
+    folder: Path
+    """Its working folder."""
+    environment: Mapping[str, str]
+    """Variables beside those of this process."""
+
+
 class Child:
-    """One `swarm` command as a process.
+    """One `swarm` command, or another program under a guard, as a process.
 
     Args:
         name: what people call it.
-        arguments: of the `swarm` command; ``--lifeline`` is added.
+        arguments: of the `swarm` command; ``--lifeline`` is added. Of another program
+            its whole command line.
         on_line: called with every JSON object the child prints on standard output.
         on_log: called with every line of its standard error.
+        setting: of another program than `swarm`.
     """
 
     def __init__(
@@ -55,9 +72,11 @@ class Child:
         *,
         on_line: Callable[[dict[str, Any]], None] | None = None,
         on_log: Callable[[str, str], None] | None = None,
+        setting: Setting | None = None,
     ) -> None:
         self.name = name
         self.arguments = tuple(arguments)
+        self.setting = setting
         self.log: deque[str] = deque(maxlen=KEPT_LINES)
         """Newest lines of its standard error."""
         self.stopped = False
@@ -92,12 +111,15 @@ class Child:
 
     async def start(self) -> None:
         """Start it; returns at once."""
+        setting = self.setting
+        if setting is None:
+            command = [sys.executable, "-m", "swarm", *self.arguments, "--lifeline"]
+        else:
+            command = [sys.executable, "-I", guard.__file__, *self.arguments]
         self._process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
-            "swarm",
-            *self.arguments,
-            "--lifeline",
+            *command,
+            cwd=None if setting is None else setting.folder,
+            env=None if setting is None else {**os.environ, **setting.environment},
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
@@ -127,6 +149,18 @@ class Child:
             ended.cancel()
             await asyncio.gather(ended, return_exceptions=True)
         return said
+
+    async def settled(self) -> None:
+        """Wait a moment, in which a program that cannot run at all ends.
+
+        Raises:
+            ChildFailedError: it has ended.
+        """
+        # Unlike the process, the wait is cancelled at the end of that time.
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(SETTLE_S):
+                await self.ended()
+                raise ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
 
     async def _next_line(self, ended: asyncio.Task[int]) -> dict[str, Any]:
         line = asyncio.get_running_loop().create_task(self._lines.get())

@@ -1,0 +1,99 @@
+"""Options of `swarm run` that it hands on to agents and simulated autopilots.
+
+Each is checked by the rules of the command it is for, before anything is started. Leaves
+out: what they do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from agent.mavlink.config import CommandStyle
+from sim.launch.autopilots import Autopilots, Simulated
+from swarm.errors import Fault, InputError
+
+__all__ = ["HandedOn", "check_handed_on", "parse_command_styles"]
+
+_COMMAND = "--command"
+
+
+@dataclass(frozen=True, slots=True)
+class HandedOn:
+    """Values as the commands take them; None and empty: not given."""
+
+    command: Mapping[str, CommandStyle] = field(default_factory=dict)
+    """By UAV; the others get the default of `swarm agent`."""
+    forward: str | None = None
+    signing_key: Path | None = None
+    battery_reserve: str | None = None
+    faults: tuple[str, ...] = ()
+    """Each ``UAV:KIND@T+DURATION``."""
+
+    def to_agent(self, uav: str) -> list[str]:
+        """Arguments of the agent of ``uav``."""
+        style = self.command.get(uav)
+        return [
+            *([] if style is None else ["--command", style]),
+            *([] if self.forward is None else ["--forward", self.forward]),
+            *([] if self.battery_reserve is None else ["--battery-reserve", self.battery_reserve]),
+            *self._signing(),
+        ]
+
+    def to_autopilot(self, uavs: Sequence[str]) -> list[str]:
+        """Arguments of the process that simulates the autopilots of ``uavs``."""
+        faults = [fault for fault in self.faults if fault.partition(":")[0] in uavs]
+        return [*(word for fault in faults for word in ("--fault", fault)), *self._signing()]
+
+    def _signing(self) -> list[str]:
+        return [] if self.signing_key is None else ["--signing-key", str(self.signing_key)]
+
+
+def parse_command_styles(text: str | None, uavs: Sequence[str]) -> dict[str, CommandStyle]:
+    """How each UAV is commanded, by UAV: one word for all, or ``UAV=STYLE`` with commas between.
+
+    Raises:
+        InputError: no such style, no such UAV, or one named twice.
+    """
+    if text is None:
+        return {}
+    if "=" not in text:
+        return dict.fromkeys(uavs, _style(text))
+    found: dict[str, CommandStyle] = {}
+    for part in text.split(","):
+        uav, marked, style = part.strip().partition("=")
+        if not marked:
+            remedy = "give one style for all UAVs, or UAV=STYLE with commas between"
+            raise InputError(Fault(_COMMAND, text, f"{part.strip()!r} names no UAV", remedy))
+        if uav not in uavs:
+            remedy = f"the scenario has {', '.join(uavs)}"
+            raise InputError(Fault(_COMMAND, text, f"no UAV {uav!r}", remedy))
+        if uav in found:
+            raise InputError(Fault(_COMMAND, text, f"{uav} is named twice", "name each UAV once"))
+        found[uav] = _style(style)
+    return found
+
+
+def _style(text: str) -> CommandStyle:
+    try:
+        return CommandStyle(text)
+    except ValueError:
+        remedy = f"choose one of {', '.join(CommandStyle)}"
+        raise InputError(Fault(_COMMAND, text, "no such way to command", remedy)) from None
+
+
+def check_handed_on(handed_on: HandedOn, autopilots: Autopilots, uavs: Sequence[str]) -> None:
+    """Refuse what a command to be started would refuse, and what would reach nobody.
+
+    Raises:
+        InputError: a value is wrong, or does not go with the autopilots.
+    """
+    for fault in handed_on.faults:
+        uav = fault.partition(":")[0]
+        if not isinstance(autopilots, Simulated):
+            remedy = "use --autopilot sim or sim-px4"
+            raise InputError(Fault("--fault", fault, "only befalls simulated autopilots", remedy))
+        if uav not in uavs:
+            remedy = f"the scenario has {', '.join(uavs)}"
+            raise InputError(Fault("--fault", fault, f"no UAV {uav!r}", remedy))
