@@ -92,11 +92,12 @@ def run(
         ),
     ] = None,
     forward: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             "--forward",
             metavar="udp:HOST:PORT",
-            help="Let a ground station there watch every vehicle; see swarm agent.",
+            help="Show every vehicle to a ground station there, which cannot command them; may "
+            "be repeated.",
             show_default=False,
         ),
     ] = None,
@@ -105,7 +106,8 @@ def run(
         typer.Option(
             "--signing-key",
             metavar="FILE",
-            help="Sign MAVLink messages with this key; see swarm agent.",
+            help="Sign what is said to the vehicles, and believe nothing that is not; see swarm "
+            "agent.",
             show_default=False,
         ),
     ] = None,
@@ -211,7 +213,7 @@ def run(
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
     handed_on = HandedOn(
         command=parse_command_styles(command, uavs),
-        forward=forward,
+        forward=tuple(forward or ()),
         signing_key=signing_key,
         battery_reserve=battery_reserve,
         faults=tuple(fault or ()),

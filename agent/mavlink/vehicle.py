@@ -17,11 +17,15 @@ from agent.mavlink.forwarding import Forwarding
 from agent.mavlink.link import Link, open_link
 from agent.mavlink.link_address import parse_forward, parse_link
 from agent.mavlink.signing import Signing, SigningKey
+from agent.mavlink.turnaround import TurnaroundMeter
 from agent.vehicle import Orders, Report
 from swarm.clock import Clock, unix_s
 from swarm.log import get_logger
 
-__all__ = ["MavlinkVehicle"]
+__all__ = ["TURNAROUNDS", "MavlinkVehicle"]
+
+TURNAROUNDS = "next targets sent"
+"""Event in whose log line a vehicle tells how long each next target took."""
 
 _SHORTEST_WAIT_S = 0.001
 _REDIAL_TIMEOUTS = 2.0
@@ -64,6 +68,7 @@ class MavlinkVehicle:
         self._log = get_logger(__name__, link=self.link.url)
         self._told_dropped: set[str] = set()
         self._told_unchecked = False
+        self._meter = TurnaroundMeter()
         self._clock = clock
         self._on_report = on_report
         self._events: deque[Event] = deque()
@@ -97,6 +102,7 @@ class MavlinkVehicle:
             self._timer = None
         await self.link.close()
         await self._forwarding.close()
+        self._tell_turnarounds()
 
     def link_up(self) -> None:
         """Called by the link."""
@@ -108,6 +114,7 @@ class MavlinkVehicle:
 
     def received(self, data: bytes) -> None:
         """Called by the link."""
+        self._meter.received(self._clock.now_s())
         self._happen(Received(data))
         self._forwarding.show(self.bridge.codec.take_frames())
         self._tell_of_signatures()
@@ -124,6 +131,17 @@ class MavlinkVehicle:
                 "the vehicle signs, and may obey nobody who does not; give --signing-key"
             )
 
+    def _tell_turnarounds(self) -> None:
+        """Log how long each next target took, in wall time; once."""
+        done, self._meter.turnarounds = self._meter.turnarounds, []
+        if done:
+            targets_ms = [self._wall_ms(each.target_s) for each in done]
+            in_force_ms = [self._wall_ms(each.in_force_s) for each in done if each.in_force_s]
+            self._log.info(TURNAROUNDS, target_ms=targets_ms, in_force_ms=in_force_ms)
+
+    def _wall_ms(self, duration_s: float) -> float:
+        return round(1e3 * self._clock.wall_delay_s(duration_s), 3)
+
     def _happen(self, event: Event) -> None:
         """Step the bridge; events that come up meanwhile follow in order."""
         if self._closed:
@@ -134,10 +152,15 @@ class MavlinkVehicle:
         self._busy = True
         try:
             while self._events:
-                for action in self.bridge.step(self._events.popleft(), self._clock.now_s()):
+                event = self._events.popleft()
+                if isinstance(event, Orders):
+                    self._meter.ordered(event)
+                for action in self.bridge.step(event, self._clock.now_s()):
                     if isinstance(action, Send):
                         self.link.send(action.data)
+                        self._meter.sent(action.data, self._clock.now_s())
                     else:
+                        self._meter.reported(action)
                         self._on_report(action)
         finally:
             self._busy = False

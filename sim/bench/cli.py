@@ -1,9 +1,9 @@
 """The commands of the family `swarm bench`.
 
-Leaves out: the commands about fleets in trouble (`sim.bench.trouble_commands`) and about
-simulated vehicles (`sim.bench.autopilot_commands`), what the others do
-(`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown (`sim.bench.plan_report`,
-`sim.bench.plan_plot`).
+Leaves out: the commands about fleets that fly (`sim.bench.trouble_commands`,
+`sim.bench.turnaround_command`) and about simulated vehicles (`sim.bench.autopilot_commands`),
+what the others do (`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown
+(`sim.bench.plan_report`, `sim.bench.plan_plot`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import typer
 
 from sim.bench.autopilot_commands import AUTOPILOT_HELP, autopilot
 from sim.bench.trouble_commands import FAILOVER_HELP, FLOOD_HELP, failover, flood
+from sim.bench.turnaround_command import TURNAROUND_HELP, turnaround
 from sim.bench.words import each
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, SeedOption
@@ -221,6 +222,9 @@ bench.command("flood", help=FLOOD_HELP, short_help="Fly while a hostile peer flo
     flood
 )
 bench.command("autopilot", help=AUTOPILOT_HELP, short_help="Measure simulated vehicles.")(autopilot)
+bench.command(
+    "turnaround", help=TURNAROUND_HELP, short_help="Time from each arrival to the next target."
+)(turnaround)
 
 
 def _sources(scenario: Path | None, sizes: str | None, default: str) -> list[tuple[str, Source]]:

@@ -135,11 +135,11 @@ def _place(uav: str, url: str, system_id: int) -> VehiclePlace:
 
 
 def _check_shared(places: Iterable[VehiclePlace]) -> None:
-    """Two agents cannot share a link, whatever their vehicles' ids."""
+    """A serial port or a port to listen at serves one agent, whatever the vehicles' ids."""
     by_url: dict[str, str] = {}
     for place in places:
         other = by_url.setdefault(place.url, place.uav)
-        if other != place.uav:
-            problem = f"{other} and {place.uav} have the same URL"
-            remedy = "give each vehicle a link of its own; a MAVLink router can split one"
+        if other != place.uav and place.url.startswith(("serial:", "udpin:")):
+            problem = f"{other} and {place.uav} cannot share it"
+            remedy = "let a MAVLink router serve both by TCP"
             raise InputError(Fault(_SOURCE, place.url, problem, remedy))

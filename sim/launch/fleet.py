@@ -18,6 +18,7 @@ from sim.launch.handed_on import HandedOn
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
 from swarm.bus.endpoints import free_loopback_endpoints
 from swarm.config import Link, preset
+from swarm.log import LogFormat
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 
@@ -81,6 +82,8 @@ class LaunchOptions:
     """What flies."""
     handed_on: HandedOn = field(default_factory=HandedOn)
     """What agents and simulated autopilots are told besides."""
+    log_format: LogFormat = LogFormat.AUTO
+    """What a line of an agent's log looks like."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -196,6 +199,7 @@ class Layout:
             *("--position-rate-hz", repr(rate_hz)),
             *("--acceptance-radius-m", repr(options.acceptance_radius_m)),
             *options.handed_on.to_agent(uav),
+            *("--log-format", options.log_format),
             *self._memory(),
             *self._speed(),
             *self.seat_arguments(uav),

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from agent.mavlink.config import CommandStyle
+from agent.mavlink.link_address import parse_forward
+from agent.mavlink.signing_key import load_signing_key
 from sim.launch.autopilots import Autopilots, Simulated
 from swarm.errors import Fault, InputError
 
@@ -25,7 +27,7 @@ class HandedOn:
 
     command: Mapping[str, CommandStyle] = field(default_factory=dict)
     """By UAV; the others get the default of `swarm agent`."""
-    forward: str | None = None
+    forward: tuple[str, ...] = ()
     signing_key: Path | None = None
     battery_reserve: str | None = None
     faults: tuple[str, ...] = ()
@@ -36,7 +38,7 @@ class HandedOn:
         style = self.command.get(uav)
         return [
             *([] if style is None else ["--command", style]),
-            *([] if self.forward is None else ["--forward", self.forward]),
+            *(word for url in self.forward for word in ("--forward", url)),
             *([] if self.battery_reserve is None else ["--battery-reserve", self.battery_reserve]),
             *self._signing(),
         ]
@@ -89,6 +91,10 @@ def check_handed_on(handed_on: HandedOn, autopilots: Autopilots, uavs: Sequence[
     Raises:
         InputError: a value is wrong, or does not go with the autopilots.
     """
+    for url in handed_on.forward:
+        parse_forward(url)
+    if handed_on.signing_key is not None:
+        load_signing_key(handed_on.signing_key)
     for fault in handed_on.faults:
         uav = fault.partition(":")[0]
         if not isinstance(autopilots, Simulated):

@@ -57,6 +57,10 @@ def test_a_url_may_say_the_system_id_of_its_vehicle() -> None:
     assert [place.system_id for place in running(f"{A}#17,{B},uav3={C}#255")] == [17, 2, 255]
 
 
+def test_vehicles_behind_one_router_are_told_apart_by_their_ids() -> None:
+    assert [place.system_id for place in running(f"{A}#4,{A}#5,{A}#6")] == [4, 5, 6]
+
+
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
@@ -67,7 +71,8 @@ def test_a_url_may_say_the_system_id_of_its_vehicle() -> None:
         (f"{A},,{C}", "a URL is missing"),
         (f"uav9={A},{B},{C}", "no UAV 'uav9'"),
         (f"uav1={A},uav1={B},{C}", "uav1 has a URL already"),
-        (f"{A},{A},{C}", "uav1 and uav2 have the same URL"),
+        (f"{B},{B},{C}", "uav1 and uav2 cannot share it"),
+        (f"{C},{B},{C}#9", "uav1 and uav3 cannot share it"),
         (f"{A}#0,{B},{C}", r"system id 0 is not within 1\.\.255"),
         (f"{A}#300,{B},{C}", r"system id 300 is not within 1\.\.255"),
         (f"{A}#x,{B},{C}", "'x' is no system id"),
