@@ -31,13 +31,14 @@ Examples:
 
 def turnaround(
     scenario: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
-            metavar="SCENARIO",
-            help="Scenario file, or the name of a shipped one.",
+            metavar="[SCENARIO]",
+            help="Scenario file, or the name of a shipped one; default: valley-survey.",
             parser=resolve_scenario,
+            show_default=False,
         ),
-    ] = Path("valley-survey"),
+    ] = None,
     rounds: Annotated[
         int, typer.Option("--rounds", min=1, max=1000, metavar="N", help="Flights.")
     ] = 3,
@@ -80,12 +81,13 @@ def turnaround(
     from swarm.log import LogFormat
     from swarm.scenario import load_scenario
 
-    mission = load_scenario(resolve_scenario(str(scenario)))
+    path = scenario or resolve_scenario("valley-survey")
+    mission = load_scenario(path)
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, None, os.environ)
     defaults = defaults_for(autopilots, len(uavs))
     options = LaunchOptions(
-        scenario=resolve_scenario(str(scenario)),
+        scenario=path,
         method="guided",
         seed=seed,
         speedup=speedup,
