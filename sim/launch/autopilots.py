@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 
 from agent.mavlink.link_address import parse_link
+from sim.autopilot.flavours import FlavourName
 from sim.launch.firmware import Firmware, FirmwareKind, find_firmware
 from swarm.errors import Fault, InputError
 
-__all__ = ["Autopilots", "Flavour", "Running", "Simulated", "VehiclePlace", "parse_autopilots"]
+__all__ = ["Autopilots", "Running", "Simulated", "VehiclePlace", "parse_autopilots"]
 
 _SOURCE = "--autopilot"
 _REMEDY = (
@@ -24,18 +24,11 @@ _REMEDY = (
 _LARGEST_SYSTEM_ID = 255
 
 
-class Flavour(StrEnum):
-    """Which firmware a simulated autopilot behaves like."""
-
-    ARDUPILOT = "ardupilot"
-    PX4 = "px4"
-
-
 @dataclass(frozen=True, slots=True)
 class Simulated:
     """Simulated autopilots, started with the run."""
 
-    flavour: Flavour = Flavour.ARDUPILOT
+    flavour: FlavourName = FlavourName.ARDUPILOT
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +77,7 @@ def parse_autopilots(
         case "sim":
             return Simulated()
         case "sim-px4":
-            return Simulated(Flavour.PX4)
+            return Simulated(FlavourName.PX4)
         case "ardupilot" | "px4":
             return find_firmware(FirmwareKind(kind), len(uavs), firmware, environment)
     if ":" not in kind:

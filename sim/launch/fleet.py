@@ -207,8 +207,6 @@ class Layout:
 
     def _flavour(self) -> list[str]:
         autopilots = self._options.autopilots
-        if autopilots == Simulated():
-            return []
         return ["--flavour", autopilots.flavour] if isinstance(autopilots, Simulated) else []
 
     def _speed(self) -> list[str]:

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from agent.mavlink.config import CommandStyle
-from sim.launch.autopilots import Flavour, Running, Simulated, VehiclePlace, parse_autopilots
+from sim.autopilot.flavours import FlavourName
+from sim.launch.autopilots import Running, Simulated, VehiclePlace, parse_autopilots
 from sim.launch.firmware import Firmware, FirmwareKind
 from sim.launch.fleet import defaults_for
 from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
@@ -24,8 +25,8 @@ def running(text: str) -> tuple[VehiclePlace, ...]:
 
 
 def test_simulated_autopilots_come_in_two_flavours() -> None:
-    assert parse_autopilots("sim", UAVS, None, {}) == Simulated(Flavour.ARDUPILOT)
-    assert parse_autopilots("sim-px4", UAVS, None, {}) == Simulated(Flavour.PX4)
+    assert parse_autopilots("sim", UAVS, None, {}) == Simulated(FlavourName.ARDUPILOT)
+    assert parse_autopilots("sim-px4", UAVS, None, {}) == Simulated(FlavourName.PX4)
 
 
 def test_firmware_is_looked_for(tmp_path: Path) -> None:
