@@ -37,6 +37,7 @@ from swarm.wire.messages import (
     Result,
     Stamp,
     Status,
+    StatusPhase,
 )
 
 __all__ = ["Happening", "MissionResult", "Observer"]
@@ -56,6 +57,10 @@ class Happening:
     mission_s: float | None
     """Mission time [s]; None before the start."""
     text: str
+
+
+_LEAVING = {StatusPhase.OUT: "gave its vehicle up", StatusPhase.RETURNING: "goes home"}
+"""Parts of an agent's life in which it takes no tasks any more, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +102,8 @@ class Observer:
         """The offline plan; set by whoever knows it."""
         self.replica = Replica()
         self.board = TaskBoard(self.replica, mission.name)
+        self._left: set[str] = set()
+        """UAVs of which has been told why they left, while there was something to do."""
         self.statuses: dict[str, Status] = {}
         """Newest status by UAV id, whatever order they arrived in."""
         self.heard_s: dict[str, float] = {}
@@ -262,7 +269,7 @@ class Observer:
 
     def _hear(self, message: Message, now_s: float) -> None:
         if isinstance(message.body, Status):
-            self._hear_status(message.writer, message.stamp, message.body)
+            self._hear_status(message.writer, message.stamp, message.body, now_s)
             return
         before = self.replica.claims.get(message.writer)
         earlier = self.replica.known(message)
@@ -288,7 +295,7 @@ class Observer:
         """Whether the task is a pop-up, or one that the scenario does not know at all."""
         return self._zero_s is not None and task not in self._known_at_start
 
-    def _hear_status(self, uav: str, stamp: Stamp, status: Status) -> None:
+    def _hear_status(self, uav: str, stamp: Stamp, status: Status, now_s: float) -> None:
         known = self._stamps.get(uav)
         if known is not None and stamp <= known:
             return
@@ -296,7 +303,12 @@ class Observer:
             # A new process counts from nought.
             before = self._dropped_before.setdefault(uav, Counter())
             before.update(self.statuses[uav].dropped)
+            self._left.discard(uav)
         self._stamps[uav], self.statuses[uav] = stamp, status
+        unfinished = TaskState.OPEN in self.board.states.values()
+        if status.phase in _LEAVING and status.note and unfinished and uav not in self._left:
+            self._left.add(uav)
+            self._tell(f"{uav} {_LEAVING[status.phase]}: {status.note}", now_s)
 
     def _hear_outcome(
         self, uav: str, outcome: Outcome, earlier: Message | None, now_s: float

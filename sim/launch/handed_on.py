@@ -13,6 +13,7 @@ from pathlib import Path
 from agent.mavlink.config import CommandStyle
 from agent.mavlink.link_address import parse_forward
 from agent.mavlink.signing_key import load_signing_key
+from sim.autopilot.options import faults_by_uav
 from sim.launch.autopilots import Autopilots, Simulated
 from swarm.errors import Fault, InputError
 
@@ -95,11 +96,8 @@ def check_handed_on(handed_on: HandedOn, autopilots: Autopilots, uavs: Sequence[
         parse_forward(url)
     if handed_on.signing_key is not None:
         load_signing_key(handed_on.signing_key)
-    for fault in handed_on.faults:
-        uav = fault.partition(":")[0]
-        if not isinstance(autopilots, Simulated):
-            remedy = "use --autopilot sim or sim-px4"
-            raise InputError(Fault("--fault", fault, "only befalls simulated autopilots", remedy))
-        if uav not in uavs:
-            remedy = f"the scenario has {', '.join(uavs)}"
-            raise InputError(Fault("--fault", fault, f"no UAV {uav!r}", remedy))
+    if handed_on.faults and not isinstance(autopilots, Simulated):
+        remedy = "use --autopilot sim or sim-px4"
+        problem = "only befalls simulated autopilots"
+        raise InputError(Fault("--fault", handed_on.faults[0], problem, remedy))
+    faults_by_uav(handed_on.faults, uavs)

@@ -23,7 +23,7 @@ from swarm.events import (
 )
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Body, EpochPhase, Message, Snapshot
+from swarm.wire.messages import Body, EpochPhase, Message, Snapshot, StatusPhase
 from tests.builders import (
     IDLE,
     MISSION,
@@ -447,3 +447,35 @@ def test_one_who_joins_late_learns_time_and_result_but_tells_no_tales_of_pop_ups
     assert onlooker.observer.mission_s(onlooker.now_s) == 41.0
     assert onlooker.observer.result().done == ("t0",)
     assert not any("appeared" in sentence for sentence in onlooker.story)
+
+
+def leaving(phase: StatusPhase, note: str, counter: int, incarnation: int = 1) -> Heard:
+    said = replace(status(phase), note=note)
+    return Heard(message("u0", said, counter, incarnation=incarnation))
+
+
+def test_why_a_uav_leaves_is_told_once() -> None:
+    onlooker = Onlooker().running()
+    onlooker.happen(leaving(StatusPhase.FLYING, "", 90))
+    onlooker.happen(leaving(StatusPhase.OUT, "its pilot switched it to LOITER", 91))
+    onlooker.happen(leaving(StatusPhase.OUT, "its pilot switched it to LOITER", 92))
+
+    assert onlooker.story[1:] == ["u0 gave its vehicle up: its pilot switched it to LOITER"]
+
+
+def test_who_leaves_again_in_another_life_is_told_again() -> None:
+    onlooker = Onlooker().running()
+    onlooker.happen(leaving(StatusPhase.RETURNING, "the battery is low", 90))
+    onlooker.happen(leaving(StatusPhase.RETURNING, "told to stop", 1, incarnation=2))
+
+    assert onlooker.story[1:] == ["u0 goes home: the battery is low", "u0 goes home: told to stop"]
+
+
+def test_going_home_when_all_is_done_is_no_news() -> None:
+    onlooker = Onlooker().running()
+    for name in onlooker.observer.board.states:
+        onlooker.hear("u0", done(name, 2.0), 2.0)
+    told = list(onlooker.story)
+    onlooker.happen(leaving(StatusPhase.RETURNING, "every task has ended", 90))
+
+    assert onlooker.story == told
