@@ -1,0 +1,69 @@
+"""The whole system while something happens to its vehicles: the others do what is left.
+
+Each run strikes two of three UAVs, since a run takes its time. Faults count from the arming
+of their vehicle: 20 s later it is about to reach its first task, or still waits for others.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.sitl.whole_run import fly
+
+pytestmark = [pytest.mark.sitl, pytest.mark.process, pytest.mark.timeout(240)]
+
+REASONS = {
+    "pilot": "its pilot or a failsafe switched it to ",
+    "reboot": "the autopilot rebooted",
+    "silent": "no heartbeat for ",
+    "failsafe-rtl": "its pilot or a failsafe switched it to ",
+    "battery-low": "battery",
+}
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "faults"),
+    [
+        ("sim", ["uav2:pilot@20", "uav3:reboot@20"]),
+        ("sim-px4", ["uav2:silent@20+100", "uav3:pilot@20"]),
+        ("sim", ["uav2:battery-low@18", "uav3:failsafe-rtl@20"]),
+    ],
+    ids=["pilot-and-reboot", "silent-and-pilot", "battery-and-failsafe"],
+)
+def test_what_a_lost_vehicle_leaves_is_done_by_others_and_the_story_says_why(
+    tmp_path: Path, autopilot: str, faults: list[str]
+) -> None:
+    struck = [word for fault in faults for word in ("--fault", fault)]
+
+    flown = fly(tmp_path, "--autopilot", autopilot, *struck)
+
+    flown.assert_all_done()
+    for fault in faults:
+        uav, _, what = fault.partition(":")
+        assert REASONS[what.partition("@")[0]] in flown.said_of(uav), flown.story
+    assert len(flown.told["executed_routes"]["uav1"]) >= 3, flown.story
+    assert flown.told["lost_uavs"] == [], flown.story  # agents live on, and say so
+
+
+def test_tasks_of_vehicles_that_do_not_move_are_done_by_another(tmp_path: Path) -> None:
+    flown = fly(
+        tmp_path,
+        *("--fault", "uav2:stuck@16", "--fault", "uav3:gps-lost@18+200"),
+        *("--command", "uav2=mission"),
+    )
+
+    flown.assert_all_done()
+    assert len(flown.told["executed_routes"]["uav1"]) >= 3, flown.story
+
+
+def test_a_fleet_does_without_a_vehicle_that_never_arms(tmp_path: Path) -> None:
+    flown = fly(
+        tmp_path,
+        *("--autopilot", "sim-px4", "--fault", "uav2:refuse-arming@0"),
+        *("--start-timeout-s", "20"),
+    )
+
+    flown.assert_all_done()
+    assert flown.told["executed_routes"]["uav2"] == []

@@ -1,0 +1,140 @@
+"""The whole system against each firmware, commanded in each way.
+
+Real firmware flies where SWARM_SITL_ARDUCOPTER or SWARM_SITL_PX4 says where it is, else the
+simulated autopilot in that flavour; the recorded property ``flown`` says which it was.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from agent.mavlink.config import CommandStyle
+from sim.launch.firmware import FirmwareKind
+from tests.process.mission import alive, wait_until
+from tests.sitl.firmware_stand_in import arducopter_stand_in, px4_stand_in
+from tests.sitl.whole_run import FIELD, UAVS, autopilot_of, fly
+
+pytestmark = [pytest.mark.sitl, pytest.mark.process, pytest.mark.timeout(240)]
+
+
+@pytest.mark.parametrize("style", CommandStyle)
+@pytest.mark.parametrize("kind", FirmwareKind)
+def test_the_plan_is_flown(
+    tmp_path: Path,
+    kind: FirmwareKind,
+    style: CommandStyle,
+    record_property: Callable[[str, object], None],
+) -> None:
+    autopilot = autopilot_of(kind)
+    record_property("flown", f"{autopilot.option}, {'real' if autopilot.real else 'simulated'}")
+
+    flown = fly(
+        tmp_path,
+        *("--autopilot", autopilot.option, "--command", style),
+        speedup=autopilot.speedup,
+    )
+
+    flown.assert_all_done()
+    told = flown.told
+    assert autopilot.real or told["executed_routes"] == told["routes"], flown.story
+    assert told["lost_uavs"] == [], flown.story
+    assert told["executed_objective"] >= autopilot.worth * told["objective"], flown.story
+
+
+@pytest.mark.parametrize("kind", FirmwareKind)
+def test_firmware_is_started_on_the_ports_where_agents_look_for_it(
+    tmp_path: Path, kind: FirmwareKind
+) -> None:
+    make = arducopter_stand_in if kind is FirmwareKind.ARDUPILOT else px4_stand_in
+    programs, work = tmp_path / "programs", tmp_path / "work"
+    programs.mkdir()
+    work.mkdir()
+    scenario = programs / "field.toml"  # a name that only this test's vehicles carry
+    scenario.write_text(FIELD.read_text())
+    place = make(programs, str(scenario), list(UAVS))
+
+    flown = fly(work, "--autopilot", kind, "--firmware", str(place), speedup=20.0)
+
+    flown.assert_all_done()
+    wait_until(lambda: not _vehicles(str(scenario)), 10, "the end of all firmware")
+
+
+def test_vehicles_that_run_already_are_flown_and_left_running(tmp_path: Path) -> None:
+    vehicles = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "swarm", "autopilot", str(FIELD), "--json"),
+            *("--system-id", "41", "--speedup", "20"),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert vehicles.stdout is not None
+        places = {
+            said["uav"]: f"{said['url']}#{said['system_id']}"
+            for said in (json.loads(vehicles.stdout.readline()) for _ in UAVS)
+        }
+        first, second, third = (places[uav] for uav in UAVS)
+
+        flown = fly(tmp_path, "--autopilot", f"uav2={second},{first},{third}", speedup=20.0)
+
+        flown.assert_all_done()
+        assert flown.told["lost_uavs"] == []
+        assert alive(vehicles.pid)
+    finally:
+        vehicles.send_signal(signal.SIGTERM)
+        assert vehicles.wait(20) == 0
+        if vehicles.stdout is not None:
+            vehicles.stdout.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--autopilot", "ardupilot"], "--autopilot: ardupilot: no firmware is known; "),
+        (["--autopilot", "tcp:127.0.0.1:1"], "no URL for uav2, uav3; "),
+        (["--command", "uav9=mission"], "--command: uav9=mission: no UAV 'uav9'; "),
+        (["--forward", "tcp:127.0.0.1:1"], "--forward: tcp:127.0.0.1:1: 'tcp' is no kind of link"),
+        (["--signing-key", "/no/such/key"], "/no/such/key: cannot be read"),
+        (["--battery-reserve", "much"], "--battery-reserve"),
+        (["--fault", "uav1:rain@5"], "--fault: "),
+        (["--fault", "uav9:pilot@5"], "--fault: "),
+    ],
+)
+def test_a_wrong_value_is_one_clear_line_before_anything_is_started(
+    monkeypatch: pytest.MonkeyPatch, arguments: list[str], line: str
+) -> None:
+    for kind in FirmwareKind:
+        monkeypatch.delenv(kind.variable, raising=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "swarm", "run", str(FIELD), *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+    assert done.returncode == 2
+    assert line in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stdout == ""
+
+
+def _vehicles(scenario: str) -> list[str]:
+    """Command lines of processes that simulate vehicles of that scenario."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        try:
+            words = (entry / "cmdline").read_bytes().decode().split("\0")
+        except (OSError, UnicodeDecodeError):
+            continue
+        if "autopilot" in words and scenario in words:
+            found.append(" ".join(words))
+    return found
