@@ -60,6 +60,17 @@ def turnaround(
             show_default=False,
         ),
     ] = None,
+    position_rate_hz: Annotated[
+        float,
+        typer.Option(
+            "--position-rate-hz",
+            min=1.0,
+            max=200.0,
+            metavar="HZ",
+            help="Position reports of each autopilot per wall second; half an interval is "
+            "about what an arrival is seen late.",
+        ),
+    ] = 20.0,
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
@@ -92,7 +103,7 @@ def turnaround(
         seed=seed,
         speedup=speedup,
         bus=BusKind.AUTO,
-        position_rate_hz=defaults.position_rate_hz,
+        position_rate_hz=position_rate_hz,
         acceptance_radius_m=defaults.acceptance_radius_m,
         start_timeout_s=defaults.start_timeout_s,
         autopilots=autopilots,

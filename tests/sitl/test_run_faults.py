@@ -15,11 +15,11 @@ from tests.sitl.whole_run import fly
 pytestmark = [pytest.mark.sitl, pytest.mark.process, pytest.mark.timeout(240)]
 
 REASONS = {
-    "pilot": "its pilot or a failsafe switched it to ",
+    "pilot": " switched it to ",
     "reboot": "the autopilot rebooted",
     "silent": "no heartbeat for ",
-    "failsafe-rtl": "its pilot or a failsafe switched it to ",
-    "battery-low": "battery",
+    "failsafe-rtl": "a failsafe switched it to RTL",
+    "battery-low": "battery at 10%",
 }
 
 

@@ -95,38 +95,6 @@ def test_vehicles_that_run_already_are_flown_and_left_running(tmp_path: Path) ->
             vehicles.stdout.close()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "line"),
-    [
-        (["--autopilot", "ardupilot"], "--autopilot: ardupilot: no firmware is known; "),
-        (["--autopilot", "tcp:127.0.0.1:1"], "no URL for uav2, uav3; "),
-        (["--command", "uav9=mission"], "--command: uav9=mission: no UAV 'uav9'; "),
-        (["--forward", "tcp:127.0.0.1:1"], "--forward: tcp:127.0.0.1:1: 'tcp' is no kind of link"),
-        (["--signing-key", "/no/such/key"], "/no/such/key: cannot be read"),
-        (["--battery-reserve", "much"], "--battery-reserve"),
-        (["--fault", "uav1:rain@5"], "--fault: "),
-        (["--fault", "uav9:pilot@5"], "--fault: "),
-    ],
-)
-def test_a_wrong_value_is_one_clear_line_before_anything_is_started(
-    monkeypatch: pytest.MonkeyPatch, arguments: list[str], line: str
-) -> None:
-    for kind in FirmwareKind:
-        monkeypatch.delenv(kind.variable, raising=False)
-    done = subprocess.run(
-        [sys.executable, "-m", "swarm", "run", str(FIELD), *arguments],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-
-    assert done.returncode == 2
-    assert line in done.stderr
-    assert len(done.stderr.splitlines()) == 1
-    assert done.stdout == ""
-
-
 def _vehicles(scenario: str) -> list[str]:
     """Command lines of processes that simulate vehicles of that scenario."""
     found = []

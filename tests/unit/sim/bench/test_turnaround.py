@@ -1,0 +1,69 @@
+"""What agents tell of their turnarounds is gathered and summed up."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from rich.console import Console
+
+from agent.mavlink.vehicle import TURNAROUNDS
+from sim.bench.machine import this_machine
+from sim.bench.turnaround import (
+    Round,
+    Turnarounds,
+    listen,
+    turnarounds_as_json,
+    turnarounds_as_rich,
+)
+
+FLIGHTS = Turnarounds(
+    "valley",
+    2,
+    4.0,
+    20.0,
+    (
+        Round((1.0, 2.0, 9.0), (30.0,), 101.0, 100.0, 3, 3, 0.5),
+        Round((4.0,), (), 50.0, None, 3, 2, 0.5),
+    ),
+)
+
+
+def test_turnarounds_are_read_from_lines_of_a_log() -> None:
+    said = {"event": TURNAROUNDS, "target_ms": [1.5], "in_force_ms": []}
+
+    assert list(listen(json.dumps(said))) == [said]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["", "no JSON", f"no JSON about {TURNAROUNDS}", f'["{TURNAROUNDS}"]', '{"event": "airborne"}'],
+)
+def test_other_lines_tell_of_none(line: str) -> None:
+    assert list(listen(line)) == []
+
+
+def test_times_of_all_flights_are_summed_up_and_each_flight_is_set_beside_its_plan() -> None:
+    told = turnarounds_as_json(this_machine(), 7, FLIGHTS)
+
+    assert told["sent_ms"] == {"count": 4, "p50": 2.0, "p90": 9.0, "p99": 9.0, "max": 9.0}
+    assert told["in_force_ms"]["count"] == 1
+    first, second = told["rounds"]
+    assert first["ratio"] == pytest.approx(1.01)
+    assert second["ratio"] is None
+    assert second["in_force_ms"] == {
+        "count": 0,
+        **dict.fromkeys(("p50", "p90", "p99", "max")),
+    }
+    json.dumps(told, allow_nan=False)
+    assert not FLIGHTS.ok
+
+
+def test_people_are_shown_times_ratio_and_what_was_wanted() -> None:
+    console = Console(width=120)
+    with console.capture() as captured:
+        console.print(turnarounds_as_rich(this_machine(), 7, FLIGHTS))
+
+    shown = captured.get()
+    for words in ("next target sent", "its mission in force", "1.0100", "2 of 3", "below 20 ms"):
+        assert words in shown

@@ -1,0 +1,42 @@
+"""`swarm run` refuses what the processes it starts would refuse."""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.launch.firmware import FirmwareKind
+from sim.launch.launch import Launch
+from swarm.cli import main
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--autopilot", "ardupilot"], "--autopilot: ardupilot: no firmware is known; "),
+        (["--autopilot", "tcp:127.0.0.1:1"], "no URL for uav2, uav3; "),
+        (["--command", "uav9=mission"], "--command: uav9=mission: no UAV 'uav9'; "),
+        (["--forward", "tcp:127.0.0.1:1"], "--forward: tcp:127.0.0.1:1: 'tcp' is no kind of link"),
+        (["--signing-key", "/no/such/key"], "/no/such/key: cannot be read"),
+        (["--battery-reserve", "much"], "--battery-reserve"),
+        (["--fault", "uav1:rain@5"], "--fault: "),
+        (["--fault", "uav9:pilot@5"], "--fault: "),
+    ],
+)
+def test_a_wrong_value_is_one_clear_line_before_anything_is_started(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    line: str,
+) -> None:
+    for kind in FirmwareKind:
+        monkeypatch.delenv(kind.variable, raising=False)
+    started: list[object] = []
+    monkeypatch.setattr(Launch, "start", started.append)
+
+    assert main(["run", "table-1", *arguments]) == 2
+
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert line in err
+    assert len(err.splitlines()) == 1
+    assert started == []
