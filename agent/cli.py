@@ -172,6 +172,7 @@ def agent(
       --connect tcp/192.168.1.2:7447 --state /var/lib/peckorder
     """
     import asyncio
+    import gc
     from collections.abc import Callable
 
     from agent.core import AgentCore
@@ -252,6 +253,9 @@ def agent(
                 seat.close()
 
     store = None if state is None else Store(state, mission, uav, speedup=speedup)
+    # What has been imported stays: a full collection would look through all of it for tens of
+    # milliseconds, in which a vehicle may wait for its next target.
+    gc.freeze()
     try:
         return asyncio.run(run())
     finally:

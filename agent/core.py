@@ -474,6 +474,8 @@ class AgentCore:
         actions, self._actions = self._actions, []
         if self._stage is not StatusPhase.LEARNING and self._worth_keeping(actions):
             actions.insert(0, Save())
+        # The vehicle first: it waits, while keeping and telling take their time.
+        actions.sort(key=lambda action: not isinstance(action, Order))
         self._pulse.promise(self.next_deadline_s())
         return actions
 
