@@ -112,11 +112,14 @@ def run(
         ),
     ] = None,
     battery_reserve: Annotated[
-        str | None,
+        float | None,
         typer.Option(
             "--battery-reserve",
-            metavar="FRAC|off",
-            help="Charge at which a UAV goes home; see swarm agent.",
+            min=0.0,
+            max=0.99,
+            metavar="FRAC",
+            help="Charge below which a UAV goes home; 0 leaves the battery to the autopilot. See "
+            "swarm agent.",
             show_default=False,
         ),
     ] = None,

@@ -30,7 +30,7 @@ class HandedOn:
     """By UAV; the others get the default of `swarm agent`."""
     forward: tuple[str, ...] = ()
     signing_key: Path | None = None
-    battery_reserve: str | None = None
+    battery_reserve: float | None = None
     faults: tuple[str, ...] = ()
     """Each ``UAV:KIND@T+DURATION``."""
 
@@ -40,7 +40,7 @@ class HandedOn:
         return [
             *([] if style is None else ["--command", style]),
             *(word for url in self.forward for word in ("--forward", url)),
-            *([] if self.battery_reserve is None else ["--battery-reserve", self.battery_reserve]),
+            *self._reserve(),
             *self._signing(),
         ]
 
@@ -48,6 +48,10 @@ class HandedOn:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
         faults = [fault for fault in self.faults if fault.partition(":")[0] in uavs]
         return [*(word for fault in faults for word in ("--fault", fault)), *self._signing()]
+
+    def _reserve(self) -> list[str]:
+        reserve = self.battery_reserve
+        return [] if reserve is None else ["--battery-reserve", repr(reserve)]
 
     def _signing(self) -> list[str]:
         return [] if self.signing_key is None else ["--signing-key", str(self.signing_key)]
