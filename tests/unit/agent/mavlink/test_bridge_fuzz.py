@@ -35,7 +35,7 @@ noise = st.lists(st.one_of(known_frames, any_frames, st.binary(max_size=40)), ma
 
 
 @pytest.mark.parametrize("fake", FAKES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(pieces=noise)
 def test_noise_in_flight_never_raises_and_sends_no_new_target(
     fake: type[FakeCopter], pieces: list[bytes]
@@ -56,7 +56,7 @@ def test_noise_in_flight_never_raises_and_sends_no_new_target(
 
 
 @pytest.mark.parametrize("fake", FAKES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(pieces=noise)
 def test_noise_in_preparation_never_raises(fake: type[FakeCopter], pieces: list[bytes]) -> None:
     flight = BridgeFlight(fake(ORIGIN))
@@ -69,7 +69,7 @@ def test_noise_in_preparation_never_raises(fake: type[FakeCopter], pieces: list[
 
 
 @pytest.mark.parametrize("fake", FAKES)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(garbage=st.binary(min_size=1, max_size=200))
 def test_bit_errors_on_the_link_are_survived(fake: type[FakeCopter], garbage: bytes) -> None:
     flips = list(garbage)
