@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 from agent.mavlink.config import BridgeConfig, CommandStyle
@@ -49,6 +51,16 @@ def test_mission_of_an_earlier_life_is_not_renewed_before_the_call_home(
 ) -> None:
     flight = at_its_target(fake).restart()
     flight.run(3.0)
+    copter, later_ms = flight.copter, itertools.count(1)
+
+    def with_position(data: bytes) -> list[bytes]:
+        """What tells the mission tells in the same read that the vehicle waits at its target."""
+        if int.from_bytes(data[7:10], "little") != 73:
+            return [data]
+        copter.position(round((flight.now_s - copter.on_at_s) * 1e3) + next(later_ms))
+        return [data + b"".join(copter._flush())]
+
+    flight.to_bridge = with_position
     flight.copter.heard.clear()
     flight.order(Return("enough", resume=True))
     flight.run_until(Home(), limit_s=200.0)
