@@ -87,6 +87,8 @@ class MissionRun:
         self._repeats_left = 0
         self._reached_seq = 0
         self._hold_until_s: float | None = None
+        self._set_seq: int | None = None
+        """Item that was asked for while the mission did not run, if it is begun there."""
         self._landing = False
         """A landing item has reached its place and is descending."""
 
@@ -106,7 +108,7 @@ class MissionRun:
         """Go on with the current item; from the beginning if there is none."""
         if self.state is RunState.STOPPED and self.current is not None:
             self.state = RunState.RUNNING
-            self._begin_from(self.current, now_s)
+            self._begin_from(self.current if self._set_seq is None else self._set_seq, now_s)
             return
         self.state = RunState.RUNNING
         self._begin_from(self._first_seq, now_s)
@@ -121,7 +123,7 @@ class MissionRun:
     def reset(self) -> None:
         """Forget the place in the mission, as disarming does."""
         self.stop()
-        self.current = None
+        self.current = self._set_seq = None
         if self.state is RunState.COMPLETE and not self._habits.restarts:
             self.state = RunState.NOT_STARTED
         if not self._habits.keeps_number:
@@ -144,6 +146,7 @@ class MissionRun:
             self._begin_from(max(seq, self._first_seq), now_s)
         else:
             self._go_to(first)
+            self._set_seq = max(seq, self._first_seq)
             self.state = RunState.STOPPED
         return True
 
@@ -217,7 +220,7 @@ class MissionRun:
 
     def _begin_from(self, seq: int, now_s: float) -> None:
         """Do what is done at once, and begin the first item that takes time."""
-        self._hold_until_s = None
+        self._hold_until_s = self._set_seq = None
         self._landing = False
         while (item := self._store.item(seq)) is not None:
             self._narrator.tell(Occasion.ITEM_BEGUN, seq=seq, name=item.name)
@@ -262,7 +265,7 @@ class MissionRun:
 
     def _rewind(self) -> None:
         self.state = RunState.NOT_STARTED
-        self.current = None
+        self.current = self._set_seq = None
         self.told = 0
         self._repeat_s = None
 

@@ -90,10 +90,12 @@ async def seeing(
 
 
 @asynccontextmanager
-async def connected(flavour: FlavourName, delays: Delays) -> AsyncIterator[Pilot]:
+async def connected(
+    flavour: FlavourName, delays: Delays, config: VehicleConfig = CONFIG
+) -> AsyncIterator[Pilot]:
     """A vehicle that has just been powered up, and MAVSDK connected to it."""
     clock = ScaledClock(SPEEDUP)
-    vehicle = Vehicle(replace(CONFIG, delays=delays), flavour_of(flavour), clock.now_s())
+    vehicle = Vehicle(replace(config, delays=delays), flavour_of(flavour), clock.now_s())
     server = VehicleServer(vehicle, parse_endpoint("tcp:127.0.0.1:0"), clock)
     await server.start()
     settings = Configuration.create_with_component_type(ComponentType.GROUND_STATION)

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.mavlink.bridge import Phase
 from agent.mavlink.config import BridgeConfig, CommandStyle
@@ -19,8 +20,10 @@ from agent.vehicle import (
     Return,
     VehicleReady,
 )
+from swarm.model.frames import enu_from_wgs84
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.fake_copter import ARM, DENIED, INTERVAL, REPOSITION, SET_MODE, FakeCopter
+from tests.fake_px4 import FakePx4
 
 HOLD = Hold("the operator says so")
 RESUME = replace(START, resume=True)
@@ -280,3 +283,86 @@ def test_return_that_cannot_be_stopped_goes_on(flight: BridgeFlight) -> None:
     flight.order(HOLD)
     flight.run_until(Refused)
     flight.run_until(Home())
+
+
+# -- positions that are not to be believed --------------------------------------------------
+
+
+def glitch(flight: BridgeFlight, east_m: float, times: int = 1) -> None:
+    """Let the vehicle tell a place where it is not."""
+    copter, truth_m = flight.copter, flight.copter.position_m
+    copter.position_m = (east_m, *truth_m[1:])
+    for _ in range(times):
+        flight.run(0.02)
+        copter.position()
+        flight.run(0.02)
+    copter.position_m = (truth_m[0] + 0.2 * times, *truth_m[1:])
+
+
+def place_told(flight: BridgeFlight) -> tuple[float, float, float] | None:
+    """Where the vehicle was last told to stop, in the mission's frame; None if nowhere."""
+    told = [m for m in flight.copter.commands(REPOSITION) if m.get_type() == "COMMAND_INT"]
+    if not told:
+        return None
+    return enu_from_wgs84(ORIGIN, told[-1].x / 1e7, told[-1].y / 1e7, told[-1].z)
+
+
+def by_targets(fake: type[FakeCopter]) -> BridgeFlight:
+    return under_way(BridgeFlight(fake(ORIGIN), BridgeConfig(1, ORIGIN, fence_radius_m=500.0)))
+
+
+def test_glitch_of_the_position_does_not_lead_the_vehicle_away(fake: type[FakeCopter]) -> None:
+    flight = by_targets(fake)
+    here_m = flight.copter.position_m
+    flight.copter.heard.clear()
+    glitch(flight, -300.0)
+    flight.order(HOLD)
+    flight.run(8.0)
+    told_m = place_told(flight)
+    assert told_m is None or math.dist(told_m, here_m) < 20.0
+    assert math.dist(flight.copter.position_m, here_m) < 20.0
+    assert hovers(flight)
+
+
+def test_px4_is_paused_without_any_place() -> None:
+    flight = by_targets(FakePx4)
+    flight.copter.heard.clear()
+    flight.order(HOLD)
+    flight.run(5.0)
+    [pause] = flight.copter.commands(REPOSITION)
+    assert all(math.isnan(value) for value in (pause.param5, pause.param6, pause.param7))
+    assert hovers(flight)
+
+
+def test_vehicle_beyond_the_fence_is_stopped_at_its_edge() -> None:
+    flight = by_targets(FakeCopter)
+    flight.copter.heard.clear()
+    flight.copter.position_m = (530.0, 0.0, 12.0)
+    flight.run(0.6)
+    flight.order(HOLD)
+    flight.run(15.0)
+    told_m = place_told(flight)
+    assert told_m is not None
+    assert 490.0 < math.hypot(*told_m[:2]) <= 500.0
+    assert hovers(flight)
+
+
+def test_vehicle_whose_place_is_never_clear_is_not_sent_anywhere() -> None:
+    flight = by_targets(FakeCopter)
+    flight.copter.deaf_to.add(33)
+    flight.run(4.0)
+    flight.copter.heard.clear()
+    flight.order(HOLD)
+    for far in range(120):
+        flight.run(0.1)
+        flight.copter.say(
+            mavlink.MAVLink_global_position_int_message(
+                round((flight.now_s - flight.copter.on_at_s) * 1e3),
+                round((ORIGIN.lat_deg + (1 + far % 7) * 1e-2) * 1e7),
+                round(ORIGIN.lon_deg * 1e7),
+                *(500_000, 12_000, 0, 0, 0, 0),
+            )
+        )
+    assert place_told(flight) is None
+    [refused] = [r for r in flight.reports if isinstance(r, Refused)]
+    assert "too far apart" in refused.reason

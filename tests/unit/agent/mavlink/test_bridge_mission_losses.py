@@ -42,7 +42,7 @@ def under_way(fake: type[FakeCopter]) -> BridgeFlight:
 
 def watch(flight: BridgeFlight, *wanted: type, limit_s: float) -> None:
     """Run on, and see that nothing but whole missions to known places is ever flown."""
-    places = {tuple(round(c, 1) for c in place[:2]) for place in (OLD, NEW)}
+    places = {tuple(round(c, 1) for c in place[:2]) for place in (OLD, NEW, EAST)}
     end_s = flight.now_s + limit_s
     while flight.now_s < end_s and not any(isinstance(r, wanted) for r in flight.reports):
         flight.step()
@@ -56,6 +56,13 @@ def target_of(flight: BridgeFlight) -> tuple[float, float, float]:
     target_m = flight.copter.target_m
     assert target_m is not None
     return target_m
+
+
+def keeps(flight: BridgeFlight, target: tuple[float, float, float]) -> bool:
+    """Whether the vehicle flies to that target or waits there, or was stopped."""
+    copter = flight.copter
+    stopped = copter.mode == copter.own_mode and copter.velocity_m_s == (0.0, 0.0, 0.0)
+    return stopped or math.dist(target_of(flight), target) < 0.1
 
 
 @pytest.mark.parametrize("up", [True, False], ids=["to the vehicle", "from it"])
@@ -125,9 +132,7 @@ def test_outage_of_the_missions_alone_keeps_or_restores_the_old_target(
     assert isinstance(refused, Refused)
     assert refused.order == order
     flight.run(8.0)
-    copter = flight.copter
-    stopped = copter.mode == copter.own_mode and copter.velocity_m_s == (0.0, 0.0, 0.0)
-    assert stopped or math.dist(target_of(flight), OLD) < 0.1
+    assert keeps(flight, OLD)
     flight.reports.clear()
     flight._read = 0
     flight.order(GoTo(3, NEW))
@@ -161,19 +166,25 @@ def test_a_fifth_of_all_messages_lost_delays_but_does_not_break_a_flight(
 ) -> None:
     flight = BridgeFlight(fake(ORIGIN), MISSIONS).prepared()
     flight.to_vehicle = flight.to_bridge = rough_link(seed)
-    leg = 0
+    leg, last = 0, None
     for target in (EAST, NEW, EAST):
         for _ in range(3):
             leg += 1
-            order = GoTo(leg, target)
-            flight.order(order)
-            end = flight.run_until(Arrived(leg), Refused, limit_s=200.0)
+            flight.reports.clear()
+            flight.order(GoTo(leg, target))
+            watch(flight, Arrived, Refused, limit_s=200.0)
+            [end] = flight.reports
             if end == Arrived(leg):
                 assert math.dist(flight.copter.position_m, target) < 1.0
+                last = target
                 break
             assert isinstance(end, Refused)
             assert isinstance(end.order, GoTo | Hold)
+            flight.run(10.0)
+            assert last is None or keeps(flight, last)
         else:
             raise AssertionError(f"no luck with {target}: {flight.reports}")
+    flight.reports.clear()
+    flight._read = 0
     flight.order(Return("mission ended"))
     flight.run_until(Home(), limit_s=200.0)
