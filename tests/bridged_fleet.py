@@ -6,7 +6,7 @@ reports is written down. Leaves out: what is to come of a flight.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -19,7 +19,6 @@ from agent.vehicle import Arrived, HandedOver, Orders, Refused, Report, ReturnAd
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.faults import VehicleFault, parse_fault
 from sim.autopilot.flavours import FlavourName
-from sim.autopilot.modes import Mode
 from sim.bridged_vehicle import BridgedVehicle, Equipment, LinkQuality
 from sim.event_queue import EventQueue
 from sim.network import IdealNetwork, Network
@@ -28,13 +27,13 @@ from sim.world import Planner, Setting, Watch, World
 from swarm.config import Timing
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.frames import DEFAULT_ORIGIN
-from swarm.wire.messages import CommandKind
+from swarm.wire.messages import CommandKind, StatusPhase
 from tests.bridge_watch import BridgeWatch
 from tests.fake_copter import INTERVAL, FakeCopter
 from tests.fake_px4 import FakePx4
 from tests.fleet_builders import plan_for
 
-__all__ = ["FIELD", "KINDS", "BridgedFleet", "Logbook", "Sent", "fault"]
+__all__ = ["FIELD", "KINDS", "BridgedFleet", "Change", "Logbook", "Sent", "fault", "fenced"]
 
 KINDS = [(flavour, style) for flavour in FlavourName for style in CommandStyle]
 LIMIT_S = 400.0
@@ -116,11 +115,18 @@ class Logbook:
 class _Watched:
     """The bridge of one life of an agent."""
 
-    def __init__(self, config: BridgeConfig, fake: type[FakeCopter], book: Logbook) -> None:
+    def __init__(
+        self,
+        config: BridgeConfig,
+        fake: type[FakeCopter],
+        book: Logbook,
+        tell: Callable[[Sent], None],
+    ) -> None:
         book.lives += 1
         self.bridge = Bridge(config)
         self._watch = BridgeWatch(self.bridge, fake)
         self._book = book
+        self._tell = tell
         self._life = book.lives
         self._parser = mavlink.MAVLink(None)
 
@@ -133,7 +139,9 @@ class _Watched:
         for action in actions:
             if isinstance(action, Send):
                 for message in self._parser.parse_buffer(action.data) or ():
-                    book.sent.append(Sent(now_s, self._life, self.bridge.phase, message))
+                    sent = Sent(now_s, self._life, self.bridge.phase, message)
+                    book.sent.append(sent)
+                    self._tell(sent)
             elif not isinstance(action, Telemetry):
                 book.reported.append((now_s, action))
         return actions
@@ -181,6 +189,8 @@ class BridgedFleet:
         self.vehicles: dict[str, BridgedVehicle] = {}
         self.books = {str(uav.id): Logbook() for uav in mission.uavs}
         self.seats: list[OperatorSeat] = []
+        self.on_sent: Callable[[str, Sent], None] = lambda _uav, _sent: None
+        """Is told of every message of a bridge as it is sent, before it is on the link."""
         self._faults = {uav: fault(text) for uav, text in (faults or {}).items()}
         self._change = change or {}
         self._mission = mission
@@ -232,23 +242,18 @@ class BridgedFleet:
         status = self.world.observer.statuses.get(uav)
         return "" if status is None else status.note
 
-    def story_of(self, uav: str) -> str:
-        """What people were told of a UAV."""
-        lines = (line.text for line in self.world.observer.story)
-        return "\n".join(text for text in lines if text.startswith(f"{uav} "))
+    def phase(self, uav: str) -> StatusPhase:
+        """What a UAV last said that it does."""
+        return self.world.observer.statuses[uav].phase
 
-    def mode(self, uav: str, after_s: float = 0.0) -> Mode:
-        """What the autopilot does when nobody has said anything to it for a while."""
-        return self.vehicles[uav].pilot(after_s).mode
-
-    def assert_all_done(self, *without: str) -> None:
+    def assert_all_done(self, *, without: Collection[str] = ()) -> None:
         """Every task is done once, by none of those, and every process has ended well."""
         result, world = self.world.observer.result(), self.world
         told = "\n".join(self.told())
         assert sorted(result.done) == sorted(task.id for task in self._mission.tasks), told
         assert (result.failed, result.open, result.lost_uavs) == ((), (), ()), told
         assert [uav for uav in without if self.done_by(uav)] == [], told
-        assert world.finished == dict.fromkeys(["coordinator", *self.books], 0), told
+        assert set(world.finished.values()) == {0}, told
 
     def assert_left_alone_after(self, uav: str, kind: type) -> None:
         """Nothing was commanded any more after that report, in whatever life."""
@@ -265,7 +270,7 @@ class BridgedFleet:
         origin = self._mission.origin or DEFAULT_ORIGIN
         equipment = Equipment(
             VehicleConfig(number + 1, start.position_enu_m, origin, start.speed_m_s),
-            BridgeConfig(number + 1, origin, self.style),
+            BridgeConfig(number + 1, origin, self.style, position_rate_hz=5.0),
             self.flavour,
             self._faults.get(uav, ()),
             self._link,
@@ -278,7 +283,7 @@ class BridgedFleet:
             report,
             equipment,
             self._seed,
-            lambda config: _Watched(config, fake, book),
+            lambda config: _Watched(config, fake, book, lambda sent: self.on_sent(uav, sent)),
         )
         self.vehicles[uav] = made
         return made
