@@ -120,7 +120,7 @@ class _Watched:
         config: BridgeConfig,
         fake: type[FakeCopter],
         book: Logbook,
-        tell: Callable[[Sent], None],
+        tell: Callable[[Sent | Report], None],
     ) -> None:
         book.lives += 1
         self.bridge = Bridge(config)
@@ -144,6 +144,7 @@ class _Watched:
                     self._tell(sent)
             elif not isinstance(action, Telemetry):
                 book.reported.append((now_s, action))
+                self._tell(action)
         return actions
 
     def next_deadline_s(self) -> float:
@@ -189,8 +190,8 @@ class BridgedFleet:
         self.vehicles: dict[str, BridgedVehicle] = {}
         self.books = {str(uav.id): Logbook() for uav in mission.uavs}
         self.seats: list[OperatorSeat] = []
-        self.on_sent: Callable[[str, Sent], None] = lambda _uav, _sent: None
-        """Is told of every message of a bridge as it is sent, before it is on the link."""
+        self.on_said: Callable[[str, Sent | Report], None] = lambda _uav, _said: None
+        """Is told of every message of a bridge before it is on the link, and of every report."""
         self._faults = {uav: fault(text) for uav, text in (faults or {}).items()}
         self._change = change or {}
         self._mission = mission
@@ -212,7 +213,11 @@ class BridgedFleet:
 
     def at(self, at_s: float, act: Callable[[], object]) -> None:
         """Do that at a virtual time."""
-        self.world.queue.at(at_s, lambda: act() and None)
+
+        def do() -> None:
+            act()
+
+        self.world.queue.at(at_s, do)
 
     def say(self, at_s: float, kind: CommandKind, *uav: str) -> None:
         """Let an operator say that."""
@@ -283,7 +288,7 @@ class BridgedFleet:
             report,
             equipment,
             self._seed,
-            lambda config: _Watched(config, fake, book, lambda sent: self.on_sent(uav, sent)),
+            lambda config: _Watched(config, fake, book, lambda said: self.on_said(uav, said)),
         )
         self.vehicles[uav] = made
         return made
