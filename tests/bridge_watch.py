@@ -5,13 +5,16 @@
    and to nobody else.
 3. Of the commands there are only those of its phase, and those give what was ordered: a
    mode of ours, motors, a takeoff and targets.
-4. A target is one that was ordered and lies within the fence, or, while the vehicle is
-   being stopped, a place where it said it was since the order.
+4. A target lies within the fence and is one that was ordered, or, while the vehicle is
+   being stopped, where it said it was since the order, or the nearest place within the
+   fence; and that is in reach of another place that it told. What names no place is a
+   pause, only told to stop a vehicle.
 5. After a hand-over it says nothing but heartbeats and requests for messages, until it is
    given a new order.
-6. It reports what was asked for: the leg under way, once; numbers that are numbers.
-7. It wants to be called again within a heartbeat's interval, and not at once for ever.
-8. It remembers no more for hearing more.
+6. What goes home, or is not known to be ours, is given no mission.
+7. It reports what was asked for: the leg under way, once; numbers that are numbers.
+8. It wants to be called again within a heartbeat's interval, and not at once for ever.
+9. It remembers no more for hearing more.
 
 Leaves out: whether it does anything useful.
 """
@@ -19,6 +22,7 @@ Leaves out: whether it does anything useful.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
@@ -26,7 +30,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.mavlink.bridge import Bridge, Phase
-from agent.mavlink.config import CommandStyle
+from agent.mavlink.config import BridgeConfig, CommandStyle
 from agent.mavlink.events import Action, Event, Send, Tick
 from agent.mavlink.flavours.ardupilot import ArduCopter
 from agent.mavlink.flavours.px4 import Px4Copter
@@ -56,6 +60,10 @@ _MOST_REMEMBERED = 4_000
 _MOST_BUFFERED_BYTES = 280
 """The longest frame there is."""
 _PLACES = 50
+_FASTEST_M_S = 50.0
+_RECENT = 20
+_LEAP_M = 25.0
+"""Two places that a vehicle told are farther apart only if it was somewhere else."""
 _FAKES: dict[type, type[FakeCopter]] = {ArduCopter: FakeCopter, Px4Copter: FakePx4}
 _MISSION_MESSAGES = {
     "MISSION_COUNT",
@@ -65,6 +73,8 @@ _MISSION_MESSAGES = {
     "MISSION_ACK",
     "MISSION_SET_CURRENT",
 }
+_MISSION_READING = {"MISSION_REQUEST_INT", "MISSION_REQUEST_LIST", "MISSION_ACK"}
+_WITHOUT_MISSION = {Phase.IDLE, Phase.RETURNING}
 _WAYPOINT = 16
 _COMMANDS: dict[Phase, set[int]] = {
     Phase.IDLE: {ARM},
@@ -107,8 +117,8 @@ class _Task:
     if the vehicle does not take a newer one, and may be taken up again after a hand-over."""
     leg: int | None = None
     """Under way."""
-    told_m: list[Point] = field(default_factory=list)
-    """Where the vehicle said it was when it was ordered, and since."""
+    told_m: list[tuple[Point, float]] = field(default_factory=list)
+    """Where the vehicle said it was when it was ordered, and since; and when."""
 
 
 class BridgeWatch:
@@ -125,8 +135,9 @@ class BridgeWatch:
         self.fake = fake
         self.steps = 0
         self._parser = mavlink.MAVLink(None)
-        self._here_m: Point | None = None
-        """Where the vehicle says it is."""
+        self._heres_m: deque[tuple[Point, float]] = deque(maxlen=_RECENT)
+        """Where the vehicle last said it was, and when."""
+        self._now_s = 0.0
         self._task = _Task()
         self._task_before = self._task
         """As it was before this step."""
@@ -141,6 +152,7 @@ class BridgeWatch:
     def step(self, event: Event, now_s: float) -> list[Action]:
         """Step the bridge and look at what it does."""
         self.steps += 1
+        self._now_s = now_s
         before = self.bridge.phase
         self._task_before, self._ordered = self._task, event
         if isinstance(event, Prepare | GoTo | Hold | Return):
@@ -168,8 +180,7 @@ class BridgeWatch:
                 self._task = _Task((*places_m[-_PLACES:], position_enu_m), leg)
             case Hold() | Return():
                 self._task = _Task(places_m)
-        if self._here_m is not None:
-            self._task.told_m.append(self._here_m)
+        self._task.told_m.extend(self._heres_m)
 
     # What it sends.
 
@@ -201,6 +212,7 @@ class BridgeWatch:
             hold(message.param_id in self.fake.speed_names, f"{name} of {message.param_id}")
         elif name in _MISSION_MESSAGES:
             hold(missions, f"{name}, though commanded by targets")
+            hold(name in _MISSION_READING or not self._gives_no_mission(phases), f"{name} {phases}")
             if name == "MISSION_ITEM_INT":
                 hold(message.command in _MISSION_ITEMS, f"mission item {message.command}")
                 if message.command == _WAYPOINT:
@@ -210,6 +222,9 @@ class BridgeWatch:
         else:
             hold(False, f"sends {name}")
 
+    def _gives_no_mission(self, phases: set[Phase]) -> bool:
+        return phases <= _WITHOUT_MISSION or isinstance(self._ordered, Return)
+
     def _see_command(self, message: Any, phases: set[Phase], *, missions: bool) -> None:
         allowed = set[int]().union(*(_COMMANDS[phase] for phase in phases))
         if missions:
@@ -217,8 +232,10 @@ class BridgeWatch:
         hold(message.command in allowed, f"commands {message.command} while {phases}")
         match message.command:
             case 192:
-                hold(message.get_type() == "COMMAND_INT", "a target without a place")
-                self._see_place(message, phases)
+                if message.get_type() == "COMMAND_INT":
+                    self._see_place(message, phases)
+                else:
+                    self._see_pause(message, phases)
             case 22:
                 self._see_takeoff(message)
             case 400:
@@ -246,13 +263,32 @@ class BridgeWatch:
         config = self.bridge.config
         place_m = enu_from_wgs84(config.origin, message.x / 1e7, message.y / 1e7, message.z)
         hold(math.isfinite(message.z), f"sent to height {message.z}")
-        if Phase.HOLDING in phases and any(_near(place_m, told) for told in self._task.told_m):
-            return
         fault = config.out_of_bounds(place_m)
         hold(fault is None, f"sent beyond the fence, to {place_m}: {fault}")
+        if Phase.HOLDING in phases and self._is_borne_out(place_m):
+            return
         places_m = self._task.places_m
         ordered = any(_near(place_m, place) for place in places_m)
         hold(ordered, f"sent to {place_m}, not to {places_m[-3:]}")
+
+    def _is_borne_out(self, place_m: Point) -> bool:
+        """Whether the vehicle told it is there, and another place from which it can have come."""
+        told_m = self._task.told_m
+        return any(
+            _near(place_m, _fenced(there_m, self.bridge.config))
+            and any(
+                other is not told_m[place]
+                and math.dist(other[0], there_m) <= _LEAP_M + _FASTEST_M_S * abs(at_s - other[1])
+                for other in told_m
+            )
+            for place, (there_m, at_s) in enumerate(told_m)
+        )
+
+    def _see_pause(self, message: Any, phases: set[Phase]) -> None:
+        named = [p for p in (message.param5, message.param6, message.param7) if not math.isnan(p)]
+        hold(not named, f"a place in a long command: {named}")
+        hold(self.fake.autopilot == mavlink.MAV_AUTOPILOT_PX4, "a pause that it does not know")
+        hold(Phase.HOLDING in phases, f"paused while {phases}")
 
     def _see_takeoff(self, message: Any) -> None:
         """Above home on ArduPilot, above the sea on PX4: at most across the fence."""
@@ -285,8 +321,8 @@ class BridgeWatch:
             case Refused():
                 self._task = replace(self._task, leg=None)
             case Telemetry(position, velocity, battery_frac):
-                self._here_m = position
-                self._task.told_m.append(position)
+                self._heres_m.append((position, self._now_s))
+                self._task.told_m.append((position, self._now_s))
                 numbers = (*position, *velocity, battery_frac or 0.0)
                 hold(all(math.isfinite(n) for n in numbers), f"telemetry {report}")
             case _:
@@ -317,6 +353,18 @@ class BridgeWatch:
         if self.steps % 500 == 0:
             size = sum(len(part) for part in _collections(self.bridge, set()))
             hold(size <= _MOST_REMEMBERED, f"remembers {size} things")
+
+
+def _fenced(place_m: Point, config: BridgeConfig) -> Point:
+    """That place, or the one nearest to it that is a little within the fence."""
+    east_m, north_m, up_m = place_m
+    away_m = math.hypot(east_m, north_m)
+    if away_m > config.fence_radius_m:
+        scale = 0.999 * config.fence_radius_m / away_m
+        east_m, north_m = scale * east_m, scale * north_m
+    if abs(up_m) > config.fence_height_m:
+        up_m = math.copysign(0.999 * config.fence_height_m, up_m)
+    return (east_m, north_m, up_m)
 
 
 def _near(a: Point, b: Point) -> bool:

@@ -138,14 +138,22 @@ class FakePx4(FakeCopter):
     def _reposition(self, m: Any) -> int:
         if not int(m.param2) & 1:
             return UNSUPPORTED
-        assert m.frame in (0, 5), "above mean sea level"
+        nowhere = m.get_type() == "COMMAND_LONG"
+        if nowhere:
+            assert all(math.isnan(p) for p in (m.param4, m.param5, m.param6, m.param7)), "a pause"
+        else:
+            assert m.frame in (0, 5), "above mean sea level"
         if self.mode != AUTO_LOITER:
             self.speed_m_s = self.default_speed_m_s
             self.set_mode(AUTO_LOITER)
         if m.param1 > 0.0:
             self.speed_m_s = m.param1
         if not self.stuck:
-            self.target_m = enu_from_wgs84(self.origin, m.x / 1e7, m.y / 1e7, m.z)
+            self.target_m = (
+                self.position_m
+                if nowhere
+                else enu_from_wgs84(self.origin, m.x / 1e7, m.y / 1e7, m.z)
+            )
         return ACCEPTED
 
     def set_mode(self, mode: int) -> None:

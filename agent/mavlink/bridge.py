@@ -20,7 +20,7 @@ from agent.mavlink.codec import MavlinkCodec
 from agent.mavlink.commands import CommandEnded
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.contact import Contact
-from agent.mavlink.duty import Duty, Phase
+from agent.mavlink.duty import Duty
 from agent.mavlink.events import Action, Event, LinkDown, LinkUp, Received, Tick
 from agent.mavlink.flavours import flavour_of
 from agent.mavlink.messages import (
@@ -30,10 +30,12 @@ from agent.mavlink.messages import (
     Heartbeat,
     Position,
 )
+from agent.mavlink.orders import OrderTaker
 from agent.mavlink.seat import Seat
 from agent.mavlink.signing import Signing
 from agent.mavlink.state import PositionNews
 from agent.mavlink.streams import Streams
+from agent.mavlink.work import Phase, Work
 from agent.vehicle import GoTo, Hold, Prepare, Return, ReturnAdvised, Telemetry
 from swarm.model.frames import enu_from_wgs84
 from swarm.pulse import Pulse
@@ -51,7 +53,9 @@ class Bridge:
         self.strange_heartbeats = 0
         """Heartbeats dropped in flight: another kind of vehicle, under the same ids."""
         self._seat = Seat(config, signing)
-        self._duty = Duty(self._seat)
+        self._work = Work(self._seat)
+        self._orders = OrderTaker(self._seat, self._work)
+        self._duty = Duty(self._seat, self._work, self._orders)
         self._streams: Streams | None = None
         self._heartbeat_at_s = -math.inf
         self._pulse = Pulse(config.silence_timeout_s / 2.0)
@@ -59,7 +63,7 @@ class Bridge:
     @property
     def phase(self) -> Phase:
         """What it is doing."""
-        return self._duty.phase
+        return self._work.phase
 
     @property
     def codec(self) -> MavlinkCodec:
@@ -83,7 +87,7 @@ class Bridge:
                 for heard in seat.codec.decode(data):
                     self._hear(heard)
             case Prepare() | GoTo() | Hold() | Return():
-                self._duty.obey(event)
+                self._orders.obey(event)
             case LinkUp():
                 seat.contact.link_up = True
                 seat.codec.reset_link()
@@ -104,7 +108,7 @@ class Bridge:
         if (commands_s := seat.commands.next_deadline_s()) is not None:
             deadlines_s.append(commands_s)
         silent_at_s = seat.vehicle.silent_at_s(self.config.silence_timeout_s)
-        if silent_at_s is not None and self._duty.in_our_hands() and not seat.silent:
+        if silent_at_s is not None and self._work.in_our_hands() and not seat.silent:
             deadlines_s.append(silent_at_s)
         return min(deadlines_s)
 
@@ -133,7 +137,7 @@ class Bridge:
 
     def _on_heartbeat(self, heartbeat: Heartbeat) -> None:
         seat, before = self._seat, self._seat.vehicle.heartbeat
-        if self._duty.in_our_hands() and seat.flavour and not seat.flavour.flies(heartbeat):
+        if self._work.in_our_hands() and seat.flavour and not seat.flavour.flies(heartbeat):
             self.strange_heartbeats += 1
             return
         if (
@@ -149,36 +153,36 @@ class Bridge:
             self._streams = Streams(self.config, flavour) if flavour else None
             if flavour is not None:
                 seat.commands.acknowledged_twice = flavour.acknowledged_twice
-            self._duty.forget_mission()
+            seat.forget_mission()
         self._check_authority(heartbeat)
         self._check_guards()
 
     def _check_authority(self, heartbeat: Heartbeat) -> None:
         """Hand over a vehicle that somebody else flies now."""
-        seat, duty = self._seat, self._duty
-        if seat.flavour is None or not duty.in_our_hands():
+        seat, work = self._seat, self._work
+        if seat.flavour is None or not work.in_our_hands():
             return
         reason = intervention(
             seat.vehicle,
             heartbeat,
             seat.flavour,
             seat.now_s,
-            expected=duty.expects(heartbeat),
-            may_disarm=duty.may_disarm,
+            expected=work.expects(heartbeat),
+            may_disarm=work.may_disarm,
         )
         if reason is not None:
-            duty.hand_over(reason)
+            work.hand_over(reason)
 
     def _check_guards(self) -> None:
         """Let go of a vehicle that has lost its way, and advise one in trouble to go home."""
-        seat, duty = self._seat, self._duty
+        seat, work = self._seat, self._work
         flavour, now_s = seat.flavour, seat.now_s
-        if flavour is None or not duty.in_our_hands() or duty.phase is Phase.RETURNING:
+        if flavour is None or not work.in_our_hands() or work.phase is Phase.RETURNING:
             return
         if not flavour.airborne(seat.vehicle):
             return
         if (lost := seat.guards.position_lost(now_s)) is not None:
-            duty.hand_over(lost)
+            work.hand_over(lost)
         elif (advice := seat.guards.advice(seat.vehicle, flavour, now_s)) is not None:
             seat.report(ReturnAdvised(advice))
 
@@ -200,6 +204,8 @@ class Bridge:
         )
         fault = seat.flavour.position_fault(seat.vehicle) if seat.flavour else None
         seat.guards.on_position(place_enu_m, fault, seat.now_s)
+        if fault is None:
+            seat.whereabouts.on_position(place_enu_m, seat.now_s)
         velocity, battery_frac = position.velocity_enu_m_s, seat.vehicle.battery_frac
         seat.report(Telemetry(place_enu_m, velocity, battery_frac))
         self._duty.on_position(position, place_enu_m)
@@ -226,8 +232,8 @@ class Bridge:
         out, ended = seat.commands.on_time(now_s)
         seat.say(*out)
         self._on_ended(ended)
-        if seat.silent and self._duty.in_our_hands():
-            self._duty.hand_over(seat.vehicle.silence(now_s))
+        if seat.silent and self._work.in_our_hands():
+            self._work.hand_over(seat.vehicle.silence(now_s))
         if self._streams is not None and not seat.silent:
             seat.say(*self._streams.advance(seat.commands, now_s))
         self._duty.advance()

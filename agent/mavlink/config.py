@@ -12,6 +12,10 @@ from swarm.model.frames import Origin
 __all__ = ["BridgeConfig", "CommandStyle"]
 
 
+_INSIDE = 0.999
+"""Of the fence: rounding must not lead out of it again."""
+
+
 class CommandStyle(StrEnum):
     """How a vehicle is told where to fly."""
 
@@ -139,6 +143,18 @@ class BridgeConfig:
         if abs(up_m) > self.fence_height_m:
             return f"target height {up_m:g} m is beyond {self.fence_height_m:g} m"
         return None
+
+    def within_fence(
+        self, position_enu_m: tuple[float, float, float]
+    ) -> tuple[float, float, float]:
+        """The nearest place that may be a target: that one itself, or a little inside the fence."""
+        east_m, north_m, up_m = position_enu_m
+        away_m, radius_m = math.hypot(east_m, north_m), self.fence_radius_m
+        share = 1.0 if away_m <= radius_m else _INSIDE * radius_m / away_m
+        height_m = self.fence_height_m
+        if abs(up_m) > height_m:
+            up_m = math.copysign(_INSIDE * height_m, up_m)
+        return (share * east_m, share * north_m, up_m)
 
     def for_speedup(self, speedup: float) -> BridgeConfig:
         """The same, but with patience for a vehicle whose time runs ``speedup`` times as fast.

@@ -1,9 +1,10 @@
 """A vehicle is stopped where it is: in the air it hovers, on the ground it is disarmed.
 
 Out of a mission, a return or a takeoff in a mode of its own, the guided mode stops the
-vehicle; in the guided mode, a target at the place where it is. Both are told again until
-the effect is seen. Leaves out: what was under way before, and who may order it
-(agent.mavlink.bridge).
+vehicle. In the guided mode the firmware's own pause does, which needs no place; where there
+is none, a target at the place where the vehicle is, if what it told before bears that out,
+or the nearest within the fence. All are told again until the effect is seen. Leaves out:
+what was under way before, and who may order it (agent.mavlink.duty).
 """
 
 from __future__ import annotations
@@ -17,9 +18,13 @@ from agent.mavlink.flavours import Flavour
 from agent.mavlink.leg import TARGET_TAG
 from agent.mavlink.messages import Heartbeat, Landed, Outbound, Position
 from agent.mavlink.state import VehicleState
+from agent.mavlink.whereabouts import Whereabouts
 from agent.vehicle import Hold
+from swarm.model.frames import wgs84_from_enu
 
-__all__ = ["Holding"]
+__all__ = ["Holding", "modes_left"]
+
+Point = tuple[float, float, float]
 
 _MODE_TAG = "hold mode"
 _DISARM_TAG = "disarm"
@@ -60,7 +65,9 @@ class Holding:
         self._tries: dict[str, int] = {}
         self._next_s: dict[str, float] = {}
         self._refusal = ""
-        self._place: tuple[float, float, float] | None = None
+        self._stop: Command | None = None
+        """What stops it in the guided mode, once known."""
+        self._lost_since_s: float | None = None
         self._told = False
         """The vehicle has taken the place to hover at, or was taken out of another mode."""
         self._guided_seen = False
@@ -96,7 +103,9 @@ class Holding:
         if self._told and self._guided_seen and slow:
             self.done = True
 
-    def advance(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
+    def advance(
+        self, vehicle: VehicleState, heartbeat: Heartbeat, where: Whereabouts, now_s: float
+    ) -> list[Outbound]:
         """Tell the vehicle what is still to be told."""
         if self.done or self.failure is not None:
             return []
@@ -112,12 +121,21 @@ class Holding:
             self._next_s[TARGET_TAG] = now_s + self._config.effect_timeout_s
             return self._ask(_MODE_TAG, self._flavour.set_commanded_mode(), now_s)
         self._guided_seen = True
-        position = vehicle.position
-        if position is None:
-            return []
-        if self._place is None:
-            self._place = (position.lat_deg, position.lon_deg, position.alt_m)
-        return self._ask(TARGET_TAG, self._flavour.reposition(*self._place, self._speed_m_s), now_s)
+        if self._stop is None:
+            self._stop = self._flavour.pause() or self._stay_at(where, now_s)
+        return [] if self._stop is None else self._ask(TARGET_TAG, self._stop, now_s)
+
+    def _stay_at(self, where: Whereabouts, now_s: float) -> Command | None:
+        """A target where the vehicle is; None while that is not known."""
+        place_m = where.place_m(now_s - self._config.stream_timeout_s)
+        if place_m is not None:
+            place = wgs84_from_enu(self._config.origin, self._config.within_fence(place_m))
+            return self._flavour.reposition(*place, self._speed_m_s)
+        if self._lost_since_s is None:
+            self._lost_since_s = now_s
+        elif now_s - self._lost_since_s >= self._config.position_timeout_s:
+            self.failure = "the places that it tells are too far apart to stop it at one"
+        return None
 
     def _ask(self, tag: str, command: Command, now_s: float) -> list[Outbound]:
         if self._commands.pending(tag) or now_s < self._next_s.get(tag, -math.inf):
@@ -129,3 +147,27 @@ class Holding:
             return []
         self._tries[tag] = tries + 1
         return [*self._commands.send(tag, command, now_s)]
+
+
+def modes_left(
+    flavour: Flavour, mode: int, *, took_off: bool, on_missions: bool, returning: bool
+) -> Callable[[int], bool]:
+    """Which modes the vehicle may be taken out of: those that our orders led to.
+
+    Args:
+        flavour: the firmware.
+        mode: the one it is in.
+        took_off: it was told to take off.
+        on_missions: it may fly a mission of ours.
+        returning: it was told to return.
+    """
+
+    def leaves(custom_mode: int) -> bool:
+        return (
+            custom_mode == mode
+            or (took_off and flavour.is_taking_off(custom_mode))
+            or (on_missions and flavour.is_mission(custom_mode))
+            or (returning and flavour.is_returning(custom_mode))
+        )
+
+    return leaves

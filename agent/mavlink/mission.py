@@ -188,6 +188,12 @@ class MissionTransfer:
             return self._ask_count(now_s)
         return self._fail(f"no answer while {self._phase.value}", now_s)
 
+    def cancel(self, reason: str) -> list[Outbound]:
+        """Stop at once, and tell the vehicle; nothing is restored."""
+        out: list[Outbound] = [MissionAck(_OPERATION_CANCELLED)] if self.busy else []
+        self.abort(reason)
+        return out
+
     def abort(self, reason: str) -> None:
         """Stop at once without a word, because the link or the vehicle is lost."""
         if self.busy:

@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from agent.mavlink.codec import MavlinkCodec
 from agent.mavlink.commands import Commands
-from agent.mavlink.config import BridgeConfig
+from agent.mavlink.config import BridgeConfig, CommandStyle
 from agent.mavlink.contact import Contact
 from agent.mavlink.events import Action, Send
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.guards import Guards
 from agent.mavlink.messages import Outbound
 from agent.mavlink.signing import Signing
+from agent.mavlink.standing_mission import StandingMission
 from agent.mavlink.state import VehicleState
+from agent.mavlink.whereabouts import Whereabouts
 from agent.vehicle import Report
 
 __all__ = ["Seat"]
@@ -39,7 +41,10 @@ class Seat:
         self.commands = Commands(config.commands)
         self.vehicle = VehicleState()
         self.guards = Guards(config)
+        self.whereabouts = Whereabouts()
         self.flavour: Flavour | None = None
+        self.mission: StandingMission | None = None
+        """What stands on the vehicle; None if missions are not our way to command it."""
         self.now_s = 0.0
         self._actions: list[Action] = []
 
@@ -56,6 +61,34 @@ class Seat:
             self.flavour,
             silent=self.silent,
             distrusted=self.codec.distrusted,
+        )
+
+    def forget_mission(self) -> None:
+        """Know nothing of what stands on the vehicle."""
+        by_missions = self.config.command is CommandStyle.MISSION
+        self.mission = (
+            StandingMission(self.config, self.commands, self.flavour)
+            if by_missions and self.flavour is not None
+            else None
+        )
+
+    def flies_for_us(self, custom_mode: int) -> bool:
+        """Whether that mode is our doing, as far as targets go."""
+        if self.mission is not None:
+            return self.mission.expects(custom_mode, self.now_s)
+        return self.flavour is not None and self.flavour.is_commanded(custom_mode)
+
+    def flies_unknown_mission(self) -> bool:
+        """Whether the vehicle flies a mission of which it is not known whose it is."""
+        heartbeat = self.vehicle.heartbeat
+        return (
+            self.flavour is not None
+            and self.mission is not None
+            and heartbeat is not None
+            and heartbeat.armed
+            and self.flavour.is_mission(heartbeat.custom_mode)
+            and self.mission.is_ours is None
+            and not self.flies_for_us(heartbeat.custom_mode)
         )
 
     def say(self, *messages: Outbound) -> None:
@@ -75,5 +108,6 @@ class Seat:
         """The autopilot began anew: nothing is known of it any more."""
         self.vehicle = VehicleState()
         self.guards = Guards(self.config)
-        self.flavour = None
+        self.whereabouts = Whereabouts()
+        self.flavour = self.mission = None
         self.commands.cancel_all()

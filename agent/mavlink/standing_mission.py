@@ -137,6 +137,12 @@ class StandingMission:
         self.suspend()
         self._mode_asked = self._mode_seen = False
 
+    def call_off(self, now_s: float) -> list[Outbound]:
+        """The vehicle goes home: it is to fly no mission, and an upload under way ends here."""
+        self.stand_down()
+        out = self._transfer.cancel("the vehicle goes home")
+        return out + self._settle(now_s)
+
     def carry_on(self) -> None:
         """The vehicle could not be taken out of the mission mode after all."""
         if self._mode_seen and self._standing is not None:
@@ -305,7 +311,8 @@ class StandingMission:
         self._transfer.in_force = read.items
         self._wanted = self._standing = plan
         self._stage, self._mode_seen = _Stage.FLOWN, True
-        self._inherited = True
+        # Renewed once it is known that it is to wait: it may be called home.
+        self._inherited = self._awaited = True
         self._begun_s, self._near_since_s = now_s, None
 
     def _on_reached(self, now_s: float) -> None:

@@ -66,6 +66,11 @@ def command_from_message(message: mavlink.MAVLink_message) -> Command:
     return Command(message.command, params, frame, _e7(raw[0]), _e7(raw[1]), raw[2], raw)
 
 
+def _is_nowhere(command: Command) -> bool:
+    """Whether it names neither place nor height nor heading."""
+    return all(math.isnan(value) for value in (command.params[3], *command.raw))
+
+
 def _e7(degrees: float) -> int | None:
     return round(degrees * 1e7) if math.isfinite(degrees) else None
 
@@ -192,12 +197,13 @@ class Commands:
         needs_flag = habits.reposition_needs_flag or pilot.mode is not habits.for_reposition
         if needs_flag and not change_mode:
             return pilot.flavour.refusals.reposition_without_flag
-        target_enu_m = self._place(command)
+        pause = pilot.flavour.pauses_anywhere and _is_nowhere(command)
+        target_enu_m = pilot.position_enu_m(now_s) if pause else self._place(command)
         if target_enu_m is None:
             return _DENIED
         if not pilot.set_mode(habits.for_reposition, now_s):
             return pilot.flavour.refusals.not_now
-        if not pilot.within_fence(target_enu_m):
+        if not (pause or pilot.within_fence(target_enu_m)):
             # Acknowledged all the same, and ignored.
             pilot.narrator.tell(Occasion.TARGET_OUTSIDE_FENCE)
             return _ACCEPTED

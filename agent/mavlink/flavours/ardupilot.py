@@ -227,6 +227,15 @@ class ArduCopter:
             alt_m,
         )
 
+    def pause(self) -> CommandLong | None:
+        """None: GUIDED flies on to its target, and being told GUIDED again changes nothing.
+
+        BRAKE and LOITER would stop it, but in a mode in which it no longer obeys, as if its
+        pilot had taken it; DO_PAUSE_CONTINUE pauses every later target too until it is
+        told to continue, which may get lost.
+        """
+        return None
+
     def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
         """Copters keep the hold time only; their radius is WPNAV_RADIUS."""
         return (hold_s, 0.0, 0.0, 0.0)

@@ -132,6 +132,13 @@ class Flavour(Protocol):
         """
         ...
 
+    def pause(self) -> CommandLong | None:
+        """Stop in the mode that takes our targets, wherever that is.
+
+        None if the firmware cannot be told so without a place.
+        """
+        ...
+
     def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
         """Parameters of a mission's waypoint at which to wait so long, heading as it comes."""
         ...

@@ -212,6 +212,15 @@ class Px4Copter:
             alt_m,
         )
 
+    def pause(self) -> CommandLong:
+        """A target without a place, height and heading: PX4 brakes and stops, as in its code.
+
+        The navigator computes the point itself (navigator_main.cpp, "pause vehicle"), and
+        QGroundControl's pause is the same. A position that we heard wrongly plays no part.
+        """
+        nowhere = (math.nan, math.nan, math.nan, math.nan)
+        return CommandLong(_CMD_DO_REPOSITION, (_UNCHANGED, _CHANGE_MODE, 0.0, *nowhere))
+
     def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
         """The hold begins within a radius of 10 m (NAV_ACC_RAD) unless told another."""
         return (hold_s, _WAYPOINT_RADIUS_M, 0.0, math.nan)

@@ -125,6 +125,7 @@ class ArduCopter:
     forgets_speed: bool = True
     """Its position controller starts with the speed parameter at the first target."""
     obeys_leg_speed: bool = False
+    pauses_anywhere: bool = False
     tells_origin_when_armed: bool = True
 
     unasked_streams: Mapping[int, float] = MappingProxyType({})

@@ -138,6 +138,8 @@ class Flavour(Protocol):
     or after a take-off, is lost."""
     obeys_leg_speed: bool
     """Whether DO_REPOSITION may give the speed of its leg."""
+    pauses_anywhere: bool
+    """Whether DO_REPOSITION without a place, height and heading stops the vehicle."""
     tells_origin_when_armed: bool
 
     unasked_streams: Mapping[int, float]

@@ -128,6 +128,7 @@ class Px4:
     reads_frames: bool = False
     forgets_speed: bool = False
     obeys_leg_speed: bool = True
+    pauses_anywhere: bool = True
     tells_origin_when_armed: bool = False
 
     unasked_streams: Mapping[int, float] = MappingProxyType(

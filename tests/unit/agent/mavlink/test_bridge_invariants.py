@@ -85,7 +85,7 @@ class Misled(Bridge):
 
     def __init__(self, phase: Phase, action: Action) -> None:
         super().__init__(CONFIG)
-        self._duty.phase = phase
+        self._work.phase = phase
         self._action = action
 
     def step(self, event: Event, now_s: float) -> list[Action]:

@@ -1,0 +1,114 @@
+"""What is under way with one vehicle: one thing at a time, each by a machine of its own.
+
+Leaves out: what begins it (agent.mavlink.orders), and how it goes on (agent.mavlink.duty).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from agent.mavlink.holding import Holding
+from agent.mavlink.messages import Heartbeat
+from agent.mavlink.preparation import Preparation
+from agent.mavlink.returning import Returning
+from agent.mavlink.search import Search
+from agent.mavlink.seat import Seat
+from agent.mavlink.target import Target
+from agent.vehicle import HandedOver, NotReady, Prepare
+
+__all__ = ["Phase", "Work"]
+
+
+class Phase(Enum):
+    """What is being done."""
+
+    IDLE = "idle"
+    PREPARING = "preparing"
+    HOVERING = "hovering"
+    FLYING = "flying"
+    HOLDING = "being stopped"
+    RETURNING = "returning"
+    HANDED_OVER = "handed over"
+
+
+class Work:
+    """What one vehicle is being made to do.
+
+    Args:
+        seat: the vehicle.
+    """
+
+    def __init__(self, seat: Seat) -> None:
+        self.phase = Phase.IDLE
+        self._seat = seat
+        self.prepare: Prepare | None = None
+        self.preparation: Preparation | None = None
+        self.target: Target | None = None
+        self.holding: Holding | None = None
+        self.returning: Returning | None = None
+        self.search: Search | None = None
+        """For what the vehicle does, which may be in the air; then the order is carried out."""
+        self.prepare_next: Prepare | None = None
+        """Ordered of a vehicle that has to be stopped first."""
+        self.speed_m_s = 0.0
+        """Cruise speed of the last preparation [m/s]."""
+        self._told_not_ready: str | None = None
+
+    def in_our_hands(self) -> bool:
+        """Whether the vehicle is, or may be, in the air on our orders."""
+        if self.phase is Phase.PREPARING:
+            return self.preparation is not None and self.preparation.engaged
+        return self.phase in (Phase.HOVERING, Phase.FLYING, Phase.HOLDING, Phase.RETURNING)
+
+    def expects(self, heartbeat: Heartbeat) -> bool:
+        """Whether our orders lead to that mode."""
+        mode = heartbeat.custom_mode
+        if self.holding is not None:
+            return not heartbeat.armed or self.holding.expects(mode)
+        if self.returning is not None:
+            return not heartbeat.armed or self.returning.expects(mode)
+        return self.obeys(mode)
+
+    @property
+    def may_disarm(self) -> bool:
+        """Whether our orders may lead to stopped motors."""
+        if self.holding is not None:
+            return self.returning is not None or not self.holding.aloft
+        return self.phase in (Phase.PREPARING, Phase.RETURNING)
+
+    def obeys(self, custom_mode: int) -> bool:
+        """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
+        flavour = self._seat.flavour
+        return flavour is not None and (
+            self._seat.flies_for_us(custom_mode)
+            or (flavour.is_taking_off(custom_mode) and self.took_off())
+        )
+
+    def took_off(self) -> bool:
+        """Whether the preparation under way has asked for takeoff."""
+        return self.preparation is not None and self.preparation.took_off
+
+    def drop(self) -> None:
+        """Give up whatever is under way; nothing is sent about it any more."""
+        self.target = self.search = None
+        self.prepare = self.preparation = self.prepare_next = None
+        self.returning = self.holding = None
+        self._seat.commands.cancel_all()
+
+    def hand_over(self, reason: str) -> None:
+        """Command nothing any more."""
+        self.drop()
+        if self._seat.mission is not None:
+            self._seat.mission.abort(reason)
+        self.phase = Phase.HANDED_OVER
+        self._seat.report(HandedOver(reason))
+
+    def tell_not_ready(self, reason: str) -> None:
+        """What the vehicle is waited for, once."""
+        if reason != self._told_not_ready:
+            self._told_not_ready = reason
+            self._seat.report(NotReady(reason))
+
+    def tell_anew(self) -> None:
+        """Another wait begins."""
+        self._told_not_ready = None
