@@ -274,7 +274,13 @@ class BridgedFleet:
         start = self._mission.uavs[number]
         origin = self._mission.origin or DEFAULT_ORIGIN
         equipment = Equipment(
-            VehicleConfig(number + 1, start.position_enu_m, origin, start.speed_m_s),
+            VehicleConfig(
+                number + 1,
+                start.position_enu_m,
+                origin,
+                start.speed_m_s,
+                land_m_s=6.0,  # lest flights take most of their time to come down
+            ),
             BridgeConfig(number + 1, origin, self.style, position_rate_hz=5.0),
             self.flavour,
             self._faults.get(uav, ()),
