@@ -107,8 +107,8 @@ class BridgedVehicle:
         self._make_bridge = make_bridge
         self._draws: Iterator[float] = uniforms(stream(seed, "mavlink", uav))
         self._cut_until_s = -math.inf
-        self._lives = 0
-        """Of the agent, so far; also the number of the autopilot's channel."""
+        self._era = 0
+        """Another one whenever an agent comes or goes; also the number of the channel."""
         self._bridge: SteppedBridge | None = None
         self._codec = self._new_codec()
         self._ground_tick_s = self._air_tick_s = math.inf
@@ -127,8 +127,8 @@ class BridgedVehicle:
         """The agent's process has ended, and with it the bridge; the autopilot flies on."""
         if self._bridge is not None:
             self._bridge = None
-            self._machine.step(air.Disconnected(self._lives), self._queue.now_s())
-        self._lives += 1
+            self._machine.step(air.Disconnected(self._era), self._queue.now_s())
+        self._era += 1
 
     def telemetry(self) -> None:
         """Nothing: the bridge reports by itself where the vehicle is."""
@@ -148,12 +148,12 @@ class BridgedVehicle:
     # Either end of the link.
 
     def _connect(self) -> None:
-        self._lives += 1
+        self._era += 1
         self._bridge = self._make_bridge(self._equipment.bridge)
         self._codec = self._new_codec()
         self._ground_tick_s = self._air_tick_s = math.inf
         self._step_ground(ground.LinkUp())
-        self._step_air(air.Connected(self._lives))
+        self._step_air(air.Connected(self._era))
 
     def _new_codec(self) -> ChannelCodec:
         return ChannelCodec(self._equipment.vehicle.system_id, COMPONENT_ID, datagrams=True)
@@ -177,7 +177,7 @@ class BridgedVehicle:
 
     def _step_air(self, event: air.Event) -> None:
         said = self._machine.step(event, self._queue.now_s())
-        here = [send for send in said if send.channel in (None, self._lives)]
+        here = [send for send in said if send.channel in (None, self._era)]
         frames = [self._codec.encode(send.message, send.system_id) for send in here]
         self._carry(frames, self._hear_on_ground)
         at_s = self._wake_s(self._machine.next_deadline_s())
@@ -198,7 +198,7 @@ class BridgedVehicle:
     def _hear_in_air(self, frames: Sequence[bytes]) -> None:
         for frame in frames:
             for message in self._codec.decode(frame):
-                self._step_air(air.Received(self._lives, message))
+                self._step_air(air.Received(self._era, message))
 
     def _hear_on_ground(self, frames: Sequence[bytes]) -> None:
         for frame in frames:
@@ -220,10 +220,10 @@ class BridgedVehicle:
 
     def _later(self, delay_s: float, callback: Callable[[], None]) -> None:
         """Do that, unless the agent's process has ended by then."""
-        life = self._lives
+        era = self._era
 
         def do() -> None:
-            if life == self._lives:
+            if era == self._era:
                 callback()
 
         self._queue.after(delay_s, do)
