@@ -9,12 +9,33 @@ Leaves out: the autopilot's protocol (sim.autopilot).
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 from agent.vehicle import Arrived, GoTo, Hold, Home, Orders, Prepare, Report, Return, Telemetry
 from sim.event_queue import EventQueue
 from sim.kinematics import IdealMotion
 
-__all__ = ["VirtualVehicle"]
+__all__ = ["SimulatedVehicle", "VehicleFactory", "VirtualVehicle"]
+
+
+class SimulatedVehicle(Protocol):
+    """The vehicle of one UAV in virtual time, whatever lies between it and its agent."""
+
+    def order(self, order: Orders, ready: Report) -> None:
+        """Obey ``order``; ``ready`` is what an ideal vehicle says once it is prepared."""
+        ...
+
+    def leave(self) -> None:
+        """The process that commanded it has ended; it goes on with what it does."""
+        ...
+
+    def telemetry(self) -> Telemetry | None:
+        """Where it is now; None on the ground, and for one that reports that by itself."""
+        ...
+
+
+VehicleFactory = Callable[[EventQueue, str, Callable[[Report], None]], SimulatedVehicle]
+"""Makes the vehicle of a UAV in a queue's time; it says what it has to say by the callback."""
 
 
 class VirtualVehicle:
@@ -66,6 +87,9 @@ class VirtualVehicle:
         else:
             motion.fly_to(order.position_enu_m, self._speed_m_s, now_s)
             self._later(max(now_s, motion.arrives_s or now_s), ready)
+
+    def leave(self) -> None:
+        """Its agent has ended; it flies on."""
 
     def telemetry(self) -> Telemetry | None:
         """Where it is now; None on the ground."""

@@ -30,7 +30,7 @@ from sim.event_queue import EventQueue
 from sim.network import IdealNetwork, Network
 from sim.operator.seat import OperatorSeat
 from sim.processes import LocalClock, Process
-from sim.virtual_vehicle import VirtualVehicle
+from sim.virtual_vehicle import SimulatedVehicle, VehicleFactory, VirtualVehicle
 from swarm.config import Timing
 from swarm.events import Ask, Finish, Note, Publish, Save, Tick
 from swarm.model import Mission, Plan, UavId
@@ -73,6 +73,14 @@ def planned_anew(wanted: Replan) -> NewPlan:
     """What the coordinator's process would do, without a limit in time."""
     situation, course = wanted.situation, wanted.course
     return replan(situation, course, wanted.method, seed=wanted.seed, threads=1)
+
+
+def ideal_vehicle(
+    queue: EventQueue, uav: str, report: Callable[[Report], None]
+) -> SimulatedVehicle:
+    """One that flies ideally, whoever it belongs to."""
+    del uav
+    return VirtualVehicle(queue, report)
 
 
 class Recall(StrEnum):
@@ -149,6 +157,8 @@ class Setting:
     """Shortest interval at which vehicles tell where they are [s]."""
     without_bus_s: float | None = None
     """Agents without their link for that long go home [s]; None: they fly on."""
+    vehicle: VehicleFactory = ideal_vehicle
+    """Makes the vehicle of a UAV."""
 
 
 class World:
@@ -256,9 +266,10 @@ class World:
         return True
 
     def slow(self, uav: str, speed_frac: float) -> None:
-        """Let a vehicle fly at that share of its speed, from its next order on."""
-        if uav in self._vehicles:
-            self._vehicles[uav].speed_frac = speed_frac
+        """Let an ideal vehicle fly at that share of its speed, from its next order on."""
+        vehicle = self._vehicles.get(uav)
+        if isinstance(vehicle, VirtualVehicle):
+            vehicle.speed_frac = speed_frac
 
     def withdraw(self, task: str) -> None:
         """Take a task off the board, as an operator would ask every coordinator there is."""
@@ -380,14 +391,14 @@ class World:
         tasks = (task.id for task in self.mission.tasks if task.position_enu_m[:2] == target)
         return next((task for task in tasks if (uav, task) in self.refuses), None)
 
-    def _vehicle(self, uav: str) -> VirtualVehicle:
+    def _vehicle(self, uav: str) -> SimulatedVehicle:
         def report(news: Report) -> None:
             # A process that starts anew knows nothing of what an earlier one had ordered.
             commander = self._commanders.get(uav)
             if uav in self._vehicles and commander is self.processes[uav]:
                 commander.step(news)
 
-        return VirtualVehicle(self.queue, report)
+        return self._setting.vehicle(self.queue, uav, report)
 
     def _telemetry(self, uav: str) -> Telemetry | None:
         return self._vehicles[uav].telemetry()
@@ -482,6 +493,9 @@ class World:
     def _end(self, process: Process) -> None:
         process.over = True
         self.network.leave(process)
+        vehicle = self._vehicles.get(process.name)
+        if vehicle is not None:
+            vehicle.leave()
 
     def _schedule_faults(self, zero_s: float) -> None:
         """Mission time has begun: from now on things may go wrong."""

@@ -1,0 +1,158 @@
+"""Fleets of real bridges and simulated autopilots: what befalls a vehicle, and who does its tasks.
+
+Two of three UAVs are struck in one flight, since a flight takes its time. Faults count from
+the arming of their vehicle: 11 s later it is on its way to its first task.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from agent.mavlink.config import CommandStyle
+from agent.vehicle import HandedOver, NotReady, Refused, ReturnAdvised
+from sim.autopilot.flavours import FlavourName
+from sim.bridged_vehicle import Equipment
+from swarm.wire.messages import StatusPhase
+from tests.bridged_fleet import FIELD, KINDS, BridgedFleet, fenced
+
+pytestmark = pytest.mark.parametrize(
+    ("flavour", "style"), KINDS, ids=[f"{flavour}-{style}" for flavour, style in KINDS]
+)
+
+LONG_S = 150.0
+"""By then a vehicle that comes home by itself is there."""
+
+
+def assert_let_go(fleet: BridgedFleet, uav: str, reason: str) -> None:
+    """It was handed over for that reason, says so, and was not commanded any more."""
+    told = fleet.books[uav].reasons(HandedOver)
+    assert len(told) == 1
+    assert reason in told[0]
+    assert fleet.phase(uav) is StatusPhase.OUT
+    assert fleet.note(uav) == told[0]
+    claim = fleet.world.observer.replica.claims[uav]
+    assert (claim.task, claim.handed_over) == (None, True)
+    fleet.assert_left_alone_after(uav, HandedOver)
+
+
+def assert_sent_home(fleet: BridgedFleet, uav: str, reason: str) -> None:
+    """It was advised to return for that reason, and did, commanded by nothing but that mode."""
+    book = fleet.books[uav]
+    told = book.reasons(ReturnAdvised)
+    assert len(told) == 1
+    assert reason in told[0]
+    assert book.reasons(HandedOver) == []
+    assert fleet.phase(uav) is StatusPhase.HOME
+    assert fleet.note(uav) == told[0]
+    assert not fleet.world.observer.replica.claims[uav].handed_over
+    assert {line.split()[1] for line in book.commands_after(book.first_s(ReturnAdvised))} <= {
+        "COMMAND_LONG"
+    }
+    assert not fleet.vehicles[uav].pilot().armed
+
+
+def test_a_pilot_and_a_reboot_take_vehicles_away(flavour: FlavourName, style: CommandStyle) -> None:
+    fleet = BridgedFleet(flavour, style, faults={"u0": "pilot@11", "u2": "reboot@11"}).fly()
+
+    fleet.assert_all_done(without=("u0", "u2"))
+    assert_let_go(fleet, "u0", "its pilot switched it to ")
+    assert_let_go(fleet, "u2", "the autopilot rebooted")
+    assert fleet.vehicles["u0"].pilot(LONG_S).armed, "it is its pilot's to bring it home"
+    assert not fleet.vehicles["u2"].pilot(LONG_S).armed, "nobody starts its motors again"
+
+
+def test_low_batteries_go_home_and_failsafes_are_left_to_themselves(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    faults = {"u0": "battery-low@11", "u2": "failsafe-rtl@11"}
+    fleet = BridgedFleet(flavour, style, faults=faults).fly()
+
+    fleet.assert_all_done(without=("u0", "u2"))
+    assert_sent_home(fleet, "u0", "battery at 10%, below the reserve of 20%")
+    assert_let_go(fleet, "u2", "a failsafe switched it to ")
+    assert not fleet.vehicles["u2"].pilot(LONG_S).armed, "the failsafe has brought it home"
+
+
+def test_who_is_silent_or_blind_is_commanded_no_more(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    """The silent one is heard again after 10 s, still flying to where it was sent.
+
+    PX4 tells on what it takes for its position; but it lands, or whatever its owner wants.
+    """
+
+    def descends(equipment: Equipment) -> Equipment:
+        return replace(equipment, vehicle=replace(equipment.vehicle, position_failsafe_s=2.0))
+
+    faults = {"u0": "silent@11+10", "u2": "gps-lost@11"}
+    change = {"u2": descends} if flavour is FlavourName.PX4 else {}
+    fleet = BridgedFleet(flavour, style, faults=faults, change=change).fly()
+
+    fleet.assert_all_done(without=("u0", "u2"))
+    assert_let_go(fleet, "u0", "nothing heard for 5 s")
+    comes_home = style is CommandStyle.MISSION
+    assert fleet.vehicles["u0"].pilot(LONG_S).armed is not comes_home
+    blind = flavour is FlavourName.ARDUPILOT
+    assert_let_go(
+        fleet, "u2", "no valid position for 5 s" if blind else "a failsafe switched it to "
+    )
+
+
+def test_who_cannot_arm_stays_and_who_does_not_move_gives_its_tasks_away(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    faults = {"u0": "refuse-arming@0", "u2": "stuck@11"}
+    fleet = BridgedFleet(flavour, style, faults=faults).fly()
+
+    fleet.assert_all_done(without=("u0", "u2"))
+    waits = [r.reason for _, r in fleet.books["u0"].reported if isinstance(r, NotReady)]
+    assert waits[-1].startswith("pre-arm checks do not pass")
+    assert not {"takeoff", "climbing"} & set(waits)
+    assert not any(sent.name == "COMMAND_INT" for sent in fleet.books["u0"].sent)
+    assert {"the vehicle stands still"} == {
+        reason[:24] for reason in fleet.books["u2"].reasons(Refused)
+    }
+    assert fleet.phase("u2") is StatusPhase.HOME
+
+
+def test_another_vehicle_than_the_configured_one_is_never_commanded(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    def other(equipment: Equipment) -> Equipment:
+        return replace(equipment, vehicle=replace(equipment.vehicle, system_id=42))
+
+    fleet = BridgedFleet(
+        flavour, style, change={"u0": other}, faults={"u2": "wrong-id@11+20"}
+    ).fly()
+
+    fleet.assert_all_done(without=("u0", "u2"))
+    book = fleet.books["u0"]
+    assert {sent.name for sent in book.sent} == {"HEARTBEAT"}
+    assert "heartbeat of system id 1" in str(book.reported)
+    assert_let_go(fleet, "u2", "nothing heard for 5 s")
+
+
+def test_a_fence_keeps_targets_from_one_uav_and_brings_a_strayed_one_home(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    fleet = BridgedFleet(flavour, style, change={"u0": fenced(75.0), "u2": fenced(130.0)})
+
+    def blow() -> None:
+        """Away from where it flies to, in whatever mode."""
+        fleet.vehicles["u2"].pilot().flight.motion.fly_to(
+            (24.0, 9000.0, 16.0), 14.0, fleet.world.queue.now_s()
+        )
+
+    fleet.at(16.0, blow)
+    fleet.fly()
+
+    fleet.assert_all_done(without=("u2",))
+    refused = fleet.books["u0"].reasons(Refused)
+    assert refused
+    assert set(refused) == {"target is farther than 75 m from the origin"}
+    near = {task.id for task in FIELD.tasks if math.hypot(*task.position_enu_m[:2]) <= 75.0}
+    assert set(fleet.done_by("u0")) <= near
+    assert_sent_home(fleet, "u2", "from the origin, outside the fence of 130 m")

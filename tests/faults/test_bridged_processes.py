@@ -1,0 +1,123 @@
+"""Agents of real bridges die and start anew in flight, and operators step in."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+
+from agent.mavlink.bridge import Phase
+from agent.mavlink.config import CommandStyle
+from agent.vehicle import GoTo, HandedOver, Hold, Return
+from sim.autopilot.flavours import FlavourName
+from sim.operator.seat import Result
+from sim.world import Recall
+from swarm.wire.messages import CommandKind, StatusPhase
+from tests.bridged_fleet import KINDS, BridgedFleet, Logbook
+from tests.fake_copter import ARM, TAKEOFF
+
+pytestmark = pytest.mark.parametrize(
+    ("flavour", "style"), KINDS, ids=[f"{flavour}-{style}" for flavour, style in KINDS]
+)
+
+HOLD, RESUME, RETURN, ABORT = CommandKind
+IN_FLIGHT_S = 15.0
+"""On the way to the first task."""
+LONG_S = 150.0
+
+
+def commands(book: Logbook, *, life: int) -> set[int]:
+    """Numbers of the commands that were sent in that life of the agent."""
+    of_life = (sent for sent in book.sent if sent.life == life and not sent.harmless)
+    return {sent.message.command for sent in of_life if sent.name.startswith("COMMAND")}
+
+
+@pytest.mark.parametrize("found", [Recall.DISK, Recall.NONE])
+def test_an_agent_that_starts_anew_takes_its_vehicle_on_in_the_air(
+    flavour: FlavourName, style: CommandStyle, found: Recall
+) -> None:
+    fleet = BridgedFleet(flavour, style)
+    fleet.at(IN_FLIGHT_S, partial(fleet.world.crash, "u0"))
+    fleet.at(IN_FLIGHT_S + 2.0, partial(fleet.world.restart, "u0", found))
+    fleet.fly()
+
+    fleet.assert_all_done()
+    book = fleet.books["u0"]
+    assert book.lives == 2
+    assert fleet.done_by("u0") != ()
+    assert not {ARM, TAKEOFF} & commands(book, life=2)
+    assert book.reasons(HandedOver) == []
+    assert fleet.phase("u0") is StatusPhase.HOME
+    assert not fleet.vehicles["u0"].pilot().armed
+
+
+def test_a_vehicle_whose_agent_stays_away_comes_home_if_a_mission_stands_on_it(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    fleet = BridgedFleet(flavour, style)
+    fleet.at(IN_FLIGHT_S, partial(fleet.world.crash, "u0"))
+    fleet.fly()
+
+    result = fleet.world.observer.result()
+    assert result.open == ()
+    assert result.lost_uavs == ("u0",)
+    assert fleet.done_by("u0") == ()
+    assert all(sent.at_s <= IN_FLIGHT_S for sent in fleet.books["u0"].sent)
+    pilot = fleet.vehicles["u0"].pilot(LONG_S)
+    comes_home = style is CommandStyle.MISSION
+    assert pilot.armed is not comes_home
+
+
+def test_a_vehicle_that_is_held_stays_where_it_is_until_it_may_go_on(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    fleet = BridgedFleet(flavour, style)
+    places = []
+
+    def look() -> None:
+        now_s = fleet.world.queue.now_s()
+        places.append(fleet.vehicles["u0"].pilot().position_enu_m(now_s))
+
+    fleet.say(IN_FLIGHT_S, HOLD, "u0")
+    fleet.at(IN_FLIGHT_S + 5.0, look)
+    fleet.at(IN_FLIGHT_S + 12.0, look)
+    fleet.say(IN_FLIGHT_S + 12.0, RESUME, "u0")
+    fleet.fly()
+
+    fleet.assert_all_done()
+    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [Result.OBEYED] * 2
+    assert places[0] == pytest.approx(places[1], abs=0.01)
+    assert places[0][2] == pytest.approx(10.0, abs=0.5)
+    orders = [type(order) for _, order in fleet.books["u0"].ordered]
+    assert Hold in orders
+    assert fleet.books["u0"].reasons(HandedOver) == []
+    assert fleet.done_by("u0") != ()
+
+
+def test_a_vehicle_that_is_sent_home_takes_no_further_task(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    fleet = BridgedFleet(flavour, style)
+    fleet.say(IN_FLIGHT_S, RETURN, "u0")
+    fleet.fly()
+
+    fleet.assert_all_done(without=("u0",))
+    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [Result.OBEYED]
+    book = fleet.books["u0"]
+    assert isinstance(book.ordered[-1][1], Return)
+    last_targets = [sent for sent in book.sent if sent.phase is Phase.FLYING and not sent.harmless]
+    assert max(sent.at_s for sent in last_targets) <= book.ordered[-1][0]
+    assert not fleet.vehicles["u0"].pilot().armed
+
+
+def test_an_abort_brings_every_vehicle_home(flavour: FlavourName, style: CommandStyle) -> None:
+    fleet = BridgedFleet(flavour, style)
+    fleet.say(IN_FLIGHT_S, ABORT)
+    assert fleet.world.run(200.0)
+
+    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [Result.OBEYED]
+    assert fleet.world.observer.result().done == ()
+    for uav, book in fleet.books.items():
+        assert fleet.world.finished[uav] == 0
+        assert [type(order) for _, order in book.ordered if isinstance(order, GoTo)] == [GoTo]
+        assert not fleet.vehicles[uav].pilot().armed
