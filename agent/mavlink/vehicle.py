@@ -134,10 +134,11 @@ class MavlinkVehicle:
     def _tell_turnarounds(self) -> None:
         """Log how long each next target took, in wall time; once."""
         done, self._meter.turnarounds = self._meter.turnarounds, []
-        if done:
+        idled, self._meter.idled = self._meter.idled, 0
+        if done or idled:
             targets_ms = [self._wall_ms(each.target_s) for each in done]
             in_force_ms = [self._wall_ms(each.in_force_s) for each in done if each.in_force_s]
-            self._log.info(TURNAROUNDS, target_ms=targets_ms, in_force_ms=in_force_ms)
+            self._log.info(TURNAROUNDS, target_ms=targets_ms, in_force_ms=in_force_ms, idled=idled)
 
     def _wall_ms(self, duration_s: float) -> float:
         return round(1e3 * self._clock.wall_delay_s(duration_s), 3)
