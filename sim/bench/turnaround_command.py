@@ -21,7 +21,7 @@ TURNAROUND_HELP = """Time from each arrival, or end of a service, to the next ta
 Flies a scenario with real processes: what each agent's process takes to send its vehicle
 on, and the makespan beside the plan's. Exit status 0: every task was done.
 
-At wall speed valley-survey takes about nine minutes. A speed-up saves time, but has as
+At wall speed valley-survey takes about seven minutes. A speed-up saves time, but has as
 many turnarounds and messages in less of it: then processes wait for processors too.
 
 \b
