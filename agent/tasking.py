@@ -65,6 +65,7 @@ class Tasking:
         """How often the vehicle refused a task, and until when it is left alone."""
         self._adrift = False
         self._to_decide = False
+        self._idled = False
         self._awaits_peers = False
         self._held_at_s: float | None = None
         self._served_at_s: float | None = None
@@ -229,7 +230,7 @@ class Tasking:
         return [Note("released", {"task": claim.task, "reason": reason})]
 
     def _become_free(self, free_since_s: float) -> None:
-        self.phase, self._to_decide = StatusPhase.IDLE, True
+        self.phase, self._to_decide, self._idled = StatusPhase.IDLE, True, False
         self._free_since_s = free_since_s
         self._held_at_s = self._served_at_s = self._retry_at_s = self._ready_by_s = None
 
@@ -286,7 +287,9 @@ class Tasking:
             "completion_s": decision.completion_s,
         }
         return [
-            self._order_to(self._picture.in_layer(task.position_enu_m), task.service_s),
+            self._order_to(
+                self._picture.in_layer(task.position_enu_m), task.service_s, idled=self._idled
+            ),
             self._speech.say(claim),
             Note("decided", why),
         ]
@@ -297,6 +300,7 @@ class Tasking:
             # Nothing to fly to any more: stop here rather than at a lost target.
             actions.append(self._order_to(telemetry.position_enu_m, 0.0))
         self._adrift = self._to_decide = False
+        self._idled = True
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         self._awaits_peers = patience_ends_s is not None
         # Look again by and by while anything is open, lest a lost message strand it.
@@ -321,9 +325,9 @@ class Tasking:
         claim = self.claim
         return None if claim is None or claim.task is None else self._replica.board.get(claim.task)
 
-    def _order_to(self, place_enu_m: Point, stay_s: float) -> Action:
+    def _order_to(self, place_enu_m: Point, stay_s: float, *, idled: bool = False) -> Action:
         self._leg += 1
-        return Order(GoTo(self._leg, place_enu_m, stay_s))
+        return Order(GoTo(self._leg, place_enu_m, stay_s, idled))
 
     def _say_idle(self) -> Action:
         since_s = self._free_since_s

@@ -50,6 +50,8 @@ class GoTo:
     stay_s: float = 0.0
     """How long the UAV is going to stay there [s]; a return home that stands on the vehicle
     waits at least that long."""
+    idled: bool = False
+    """Whether the UAV had found nothing to fly to before; no vehicle minds."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,9 @@ A stay ends when the time at the target is over; where none is to be spent, with
 that prove the arrival. What follows until the first frame of the next target is handed to
 the link is this process's own doing: deciding, claiming, encoding, and whatever held it up.
 A mission counts until its first frame (MISSION_COUNT), and again until the vehicle has been
-heard to hold it, which is when our own MISSION_ACK ends the read-back. A UAV that finds
-nothing to do at first waits, and that is counted: the meter knows no reasons.
+heard to hold it, which is when our own MISSION_ACK ends the read-back. Not measured, but
+counted, are UAVs that found nothing to do at first and waited for a task or a peer. A UAV
+sent elsewhere before its stay is over waits for nothing.
 
 Pure: bytes, orders and instants in, durations out. Leaves out: the vehicle's and the
 radio's delays, and the time bytes wait in the socket while the process is busy.
@@ -56,6 +57,8 @@ class TurnaroundMeter:
     def __init__(self) -> None:
         self.turnarounds: list[Turnaround] = []
         """Those that are complete."""
+        self.idled = 0
+        """How often the UAV had found nothing to fly to at first."""
         self._received_s = 0.0
         self._stay_s = 0.0
         self._leg: int | None = None
@@ -74,8 +77,11 @@ class TurnaroundMeter:
 
     def ordered(self, order: Orders) -> None:
         """The bridge is given an order."""
-        self._awaits_target = isinstance(order, GoTo) and self._free_s is not None
         self._uploading = None
+        if isinstance(order, GoTo) and order.idled and self._free_s is not None:
+            self.idled += 1
+            self._free_s = None
+        self._awaits_target = isinstance(order, GoTo) and self._free_s is not None
         if isinstance(order, GoTo):
             self._leg, self._stay_s = order.leg, order.stay_s
         else:
@@ -93,10 +99,11 @@ class TurnaroundMeter:
         if self._awaits_target and self._free_s is not None:
             if not (announces or _is_reposition(message_id, payload)):
                 return
+            free_s, self._free_s = self._free_s, None
             self._awaits_target = False
-            self.turnarounds.append(Turnaround(at_s - self._free_s))
-            self._uploading = self._free_s if announces else None
-            self._free_s = None
+            if at_s >= free_s:
+                self.turnarounds.append(Turnaround(at_s - free_s))
+                self._uploading = free_s if announces else None
         elif self._uploading is not None and _ends_reading(message_id, payload):
             last = self.turnarounds.pop()
             self.turnarounds.append(Turnaround(last.target_s, at_s - self._uploading))

@@ -71,8 +71,8 @@ class MavlinkVehicle:
         self._meter = TurnaroundMeter()
         self._clock = clock
         self._on_report = on_report
-        self._events: deque[Event] = deque()
-        self._busy = False
+        self._reports: deque[Report] = deque()
+        self._reporting = False
         self._closed = False
         self._timer: asyncio.TimerHandle | None = None
         self._timer_due_s = float("inf")
@@ -134,37 +134,44 @@ class MavlinkVehicle:
     def _tell_turnarounds(self) -> None:
         """Log how long each next target took, in wall time; once."""
         done, self._meter.turnarounds = self._meter.turnarounds, []
-        if done:
+        idled, self._meter.idled = self._meter.idled, 0
+        if done or idled:
             targets_ms = [self._wall_ms(each.target_s) for each in done]
             in_force_ms = [self._wall_ms(each.in_force_s) for each in done if each.in_force_s]
-            self._log.info(TURNAROUNDS, target_ms=targets_ms, in_force_ms=in_force_ms)
+            self._log.info(TURNAROUNDS, target_ms=targets_ms, in_force_ms=in_force_ms, idled=idled)
 
     def _wall_ms(self, duration_s: float) -> float:
         return round(1e3 * self._clock.wall_delay_s(duration_s), 3)
 
     def _happen(self, event: Event) -> None:
-        """Step the bridge; events that come up meanwhile follow in order."""
+        """Step the bridge and send what it says; what it reports follows.
+
+        An order from inside a report is sent before the next report, and before whatever
+        else the hearer makes of its own: to publish or log may take longer than to decide.
+        """
         if self._closed:
             return
-        self._events.append(event)
-        if self._busy:
-            return
-        self._busy = True
+        if isinstance(event, Orders):
+            self._meter.ordered(event)
+        for action in self.bridge.step(event, self._clock.now_s()):
+            if isinstance(action, Send):
+                self.link.send(action.data)
+                self._meter.sent(action.data, self._clock.now_s())
+            else:
+                self._reports.append(action)
+        if not self._reporting:
+            self._report()
+            self._set_timer()
+
+    def _report(self) -> None:
+        self._reporting = True
         try:
-            while self._events:
-                event = self._events.popleft()
-                if isinstance(event, Orders):
-                    self._meter.ordered(event)
-                for action in self.bridge.step(event, self._clock.now_s()):
-                    if isinstance(action, Send):
-                        self.link.send(action.data)
-                        self._meter.sent(action.data, self._clock.now_s())
-                    else:
-                        self._meter.reported(action)
-                        self._on_report(action)
+            while self._reports:
+                report = self._reports.popleft()
+                self._meter.reported(report)
+                self._on_report(report)
         finally:
-            self._busy = False
-        self._set_timer()
+            self._reporting = False
 
     def _set_timer(self) -> None:
         loop = asyncio.get_running_loop()

@@ -51,6 +51,8 @@ class Round:
     """Wall times until the next target was sent, of all UAVs."""
     in_force_ms: tuple[float, ...]
     """Until the mission with it was verified; empty where targets are no missions."""
+    idled: int
+    """Next targets of UAVs that had found nothing to do before; in no time above."""
     makespan_s: float
     planned_s: float | None
     """None when there was no plan."""
@@ -119,6 +121,7 @@ async def _fly(mission: Mission, options: LaunchOptions) -> Round:
     return Round(
         target_ms=tuple(time_ms for each in told for time_ms in each["target_ms"]),
         in_force_ms=tuple(time_ms for each in told for time_ms in each["in_force_ms"]),
+        idled=sum(each["idled"] for each in told),
         makespan_s=result.makespan_s,
         planned_s=None if plan is None else max(plan.completion_s.values(), default=None),
         tasks=len(mission.tasks),
@@ -162,6 +165,7 @@ def turnarounds_as_json(machine: Machine, seed: int, done: Turnarounds) -> dict[
         "target_ms": TARGET_MS,
         "target_ratio": TARGET_RATIO,
         **{name: _summary(getter, done.rounds) for name, getter in _KINDS.items()},
+        "idled": sum(each.idled for each in done.rounds),
         "rounds": [
             {
                 "makespan_s": each.makespan_s,
@@ -222,6 +226,7 @@ def turnarounds_as_rich(machine: Machine, seed: int, done: Turnarounds) -> Rende
         f"{done.position_rate_hz:g} position reports a second each; seed {seed}",
         "",
         times,
+        f"besides {sum(each.idled for each in done.rounds)} after finding nothing to do at first",
         "",
         flights,
         "",

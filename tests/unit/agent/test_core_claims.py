@@ -95,9 +95,10 @@ def test_under_a_rule_it_does_not_know_it_stays_idle_and_says_so() -> None:
 
 def test_idle_it_takes_a_pop_up_at_once() -> None:
     agent = flying(others=0)
-    agent.hear(COORDINATOR, NEAR, 7.0)
+    actions = agent.hear(COORDINATOR, NEAR, 7.0)
 
     assert agent.claim == proposed("near", 7.0, 0, 17.0)
+    assert orders(actions) == [GoTo(1, (10.0, 0.0, 10.0), idled=True)]
 
 
 def test_busy_it_leaves_a_pop_up_for_later() -> None:

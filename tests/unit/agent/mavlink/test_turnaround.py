@@ -72,6 +72,22 @@ def test_time_at_the_target_does_not_count() -> None:
     assert meter.turnarounds == [Turnaround(0.5)]
 
 
+def test_a_vehicle_without_a_task_at_first_is_counted_apart() -> None:
+    meter = arrived()
+    meter.ordered(GoTo(2, PLACE, idled=True))
+    meter.sent(frame(REPOSITION), 17.0)
+
+    assert (meter.turnarounds, meter.idled) == ([], 1)
+
+
+def test_a_vehicle_sent_elsewhere_during_its_stay_has_not_waited() -> None:
+    meter = arrived(stay_s=5.0)
+    meter.ordered(GoTo(2, PLACE))
+    meter.sent(frame(REPOSITION), 12.0)
+
+    assert meter.turnarounds == []
+
+
 def test_the_first_target_of_all_follows_no_arrival() -> None:
     meter = TurnaroundMeter()
     meter.received(10.0)

@@ -23,14 +23,14 @@ FLIGHTS = Turnarounds(
     4.0,
     20.0,
     (
-        Round((1.0, 2.0, 9.0), (30.0,), 101.0, 100.0, 3, 3, 0.5),
-        Round((4.0,), (), 50.0, None, 3, 2, 0.5),
+        Round((1.0, 2.0, 9.0), (30.0,), 2, 101.0, 100.0, 3, 3, 0.5),
+        Round((4.0,), (), 1, 50.0, None, 3, 2, 0.5),
     ),
 )
 
 
 def test_turnarounds_are_read_from_lines_of_a_log() -> None:
-    said = {"event": TURNAROUNDS, "target_ms": [1.5], "in_force_ms": []}
+    said = {"event": TURNAROUNDS, "target_ms": [1.5], "in_force_ms": [], "idled": 0}
 
     assert list(listen(json.dumps(said))) == [said]
 
@@ -48,6 +48,7 @@ def test_times_of_all_flights_are_summed_up_and_each_flight_is_set_beside_its_pl
 
     assert told["sent_ms"] == {"count": 4, "p50": 2.0, "p90": 9.0, "p99": 9.0, "max": 9.0}
     assert told["in_force_ms"]["count"] == 1
+    assert told["idled"] == 3
     first, second = told["rounds"]
     assert first["ratio"] == pytest.approx(1.01)
     assert second["ratio"] is None
