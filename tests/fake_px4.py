@@ -44,7 +44,7 @@ class FakePx4(FakeCopter):
         AUTO_LAND: "AUTO.LAND",
     }
     takeoff_mode = AUTO_TAKEOFF
-    streams_asked = frozenset({33, 1, 245})
+    streams_asked = frozenset({33, 1, 230, 245})
     speed_names = ("MPC_XY_CRUISE",)
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -84,6 +84,10 @@ class FakePx4(FakeCopter):
             super().position(boot_ms)
 
     def _stream(self, message_id: int) -> None:
+        if message_id == 230:
+            flags = self.ekf_flags if self.ready else 167
+            self.say(mavlink.MAVLink_estimator_status_message(0, flags, *[0.0] * 8))
+            return
         if message_id != 1:
             super()._stream(message_id)
             return

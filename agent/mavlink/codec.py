@@ -341,6 +341,7 @@ _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: _system_status,
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery,
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: _ekf,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_state,
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK: _command_ack,
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,

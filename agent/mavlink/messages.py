@@ -111,10 +111,10 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class EkfStatus:
-    """EKF_STATUS_REPORT (ArduPilot)."""
+    """EKF_STATUS_REPORT (ArduPilot) or ESTIMATOR_STATUS (PX4)."""
 
     flags: int
-    """EKF_STATUS_FLAGS."""
+    """EKF_STATUS_FLAGS or ESTIMATOR_STATUS_FLAGS, whose bits mean the same."""
 
 
 @dataclass(frozen=True, slots=True)

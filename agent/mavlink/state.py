@@ -29,6 +29,8 @@ _REBOOT_MESSAGES = 3
 _BOOT_WRAP_S = 2**32 / 1e3
 _HEARTLESS = 3.0
 """Without a heartbeat for that many silence timeouts it is silent, whatever else it says."""
+_EKF_POS_HORIZ_ABS = 16
+_EKF_CONST_POS_MODE = 128
 _WARNING = 4
 """MAV_SEVERITY_WARNING; smaller is worse."""
 
@@ -91,6 +93,14 @@ class VehicleState:
         if now_s - heartbeat_s >= _HEARTLESS * (now_s - heard_s):
             return f"no heartbeat for {now_s - heartbeat_s:.0f} s, though other messages come"
         return f"nothing heard for {now_s - heard_s:.0f} s"
+
+    @property
+    def estimate_lost(self) -> bool:
+        """Whether its estimator knows no absolute position; False while it says nothing."""
+        flags = self.ekf_flags
+        return flags is not None and (
+            not flags & _EKF_POS_HORIZ_ABS or bool(flags & _EKF_CONST_POS_MODE)
+        )
 
     @property
     def armed(self) -> bool:

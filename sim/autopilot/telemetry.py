@@ -83,6 +83,7 @@ class Telemetry:
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self._battery,
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._version,
             mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: self._ekf_status,
+            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self._estimator_status,
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_state,
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._origin,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home,
@@ -296,12 +297,20 @@ class Telemetry:
 
     def _ekf_status(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s
+        ratios = (0.0, 0.0, 0.0, 0.0, 0.0)
+        return mavlink.MAVLink_ekf_status_report_message(self._estimator_flags(), *ratios)
+
+    def _estimator_status(self, now_s: float) -> mavlink.MAVLink_message:
+        ratios_and_accuracies = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0)
+        flags = self._estimator_flags() & ~mavlink.EKF_UNINITIALIZED
+        boot_us = int(self._boot_s(now_s) * 1e6)
+        return mavlink.MAVLink_estimator_status_message(boot_us, flags, *ratios_and_accuracies)
+
+    def _estimator_flags(self) -> int:
         readiness = self._pilot.readiness
         if not readiness.booted:
-            flags = mavlink.EKF_UNINITIALIZED
-        else:
-            flags = _EKF_WITH_POSITION if readiness.has_position else _EKF_WITHOUT_POSITION
-        return mavlink.MAVLink_ekf_status_report_message(flags, *(0.0, 0.0, 0.0, 0.0, 0.0))
+            return int(mavlink.EKF_UNINITIALIZED)
+        return int(_EKF_WITH_POSITION if readiness.has_position else _EKF_WITHOUT_POSITION)
 
     def _extended_state(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s

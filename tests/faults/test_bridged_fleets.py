@@ -79,26 +79,15 @@ def test_low_batteries_go_home_and_failsafes_are_left_to_themselves(
 def test_who_is_silent_or_blind_is_commanded_no_more(
     flavour: FlavourName, style: CommandStyle
 ) -> None:
-    """The silent one is heard again after 10 s, still flying to where it was sent.
-
-    PX4 tells on what it takes for its position; but it lands, or whatever its owner wants.
-    """
-
-    def descends(equipment: Equipment) -> Equipment:
-        return replace(equipment, vehicle=replace(equipment.vehicle, position_failsafe_s=2.0))
-
+    """The silent one is heard again after 10 s, still flying to where it was sent."""
     faults = {"u0": "silent@11+10", "u2": "gps-lost@11"}
-    change = {"u2": descends} if flavour is FlavourName.PX4 else {}
-    fleet = BridgedFleet(flavour, style, faults=faults, change=change).fly()
+    fleet = BridgedFleet(flavour, style, faults=faults).fly()
 
     fleet.assert_all_done(without=("u0", "u2"))
     assert_let_go(fleet, "u0", "nothing heard for 5 s")
     comes_home = style is CommandStyle.MISSION
     assert fleet.vehicles["u0"].pilot(LONG_S).armed is not comes_home
-    blind = flavour is FlavourName.ARDUPILOT
-    assert_let_go(
-        fleet, "u2", "no valid position for 5 s" if blind else "a failsafe switched it to "
-    )
+    assert_let_go(fleet, "u2", "no valid position for 5 s")
 
 
 def test_who_cannot_arm_stays_and_who_does_not_move_gives_its_tasks_away(

@@ -70,8 +70,6 @@ _MODE_NAMES = {
 
 _STATE_STANDBY = 3
 _STATE_ACTIVE = 4
-_EKF_POS_HORIZ_ABS = 16
-_EKF_CONST_POS_MODE = 128
 
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_SET_MODE = 176
@@ -156,10 +154,7 @@ class ArduCopter:
 
     def position_fault(self, vehicle: VehicleState) -> str | None:
         """By the EKF's flags: a lost position is told on, from dead reckoning."""
-        flags = vehicle.ekf_flags
-        if flags is None or _knows_position(flags):
-            return None
-        return "the position estimate is lost"
+        return "the position estimate is lost" if vehicle.estimate_lost else None
 
     def alarmed(self, heartbeat: Heartbeat) -> bool:
         """Never: a failsafe that acts changes the mode.
@@ -176,7 +171,7 @@ class ArduCopter:
             return "waiting for the pre-arm checks (SYS_STATUS)"
         if vehicle.ekf_flags is None:
             return "waiting for the position estimate's status (EKF_STATUS_REPORT)"
-        if not _knows_position(vehicle.ekf_flags):
+        if vehicle.estimate_lost:
             return "no position estimate yet"
         if vehicle.prearm_ok is False:
             return "pre-arm checks do not pass"
@@ -246,10 +241,6 @@ class ArduCopter:
             _CMD_DO_CHANGE_SPEED,
             (_GROUND_SPEED, speed_m_s, _UNCHANGED, 0.0, 0.0, 0.0, 0.0),
         )
-
-
-def _knows_position(ekf_flags: int) -> bool:
-    return bool(ekf_flags & _EKF_POS_HORIZ_ABS) and not ekf_flags & _EKF_CONST_POS_MODE
 
 
 def _set_mode(custom_mode: int) -> CommandLong:

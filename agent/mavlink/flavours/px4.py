@@ -16,6 +16,7 @@ from agent.mavlink.messages import (
     AltitudeFrame,
     CommandInt,
     CommandLong,
+    EkfStatus,
     ExtendedState,
     Heartbeat,
     Inbound,
@@ -88,7 +89,7 @@ class Px4Copter:
         EKF_STATUS_REPORT does not exist, and MISSION_CURRENT streams by itself: asked for
         either, PX4 answers "failed".
         """
-        return ((1, SystemStatus), (245, ExtendedState))
+        return ((1, SystemStatus), (230, EkfStatus), (245, ExtendedState))
 
     @property
     def mission_vehicle_items(self) -> int:
@@ -146,9 +147,8 @@ class Px4Copter:
         return vehicle.landed is not Landed.ON_GROUND
 
     def position_fault(self, vehicle: VehicleState) -> str | None:
-        """None: PX4 stops telling a position that it does not trust."""
-        del vehicle
-        return None
+        """By the estimator's flags; versions differ in whether such a position is still told."""
+        return "the position estimate is lost" if vehicle.estimate_lost else None
 
     def alarmed(self, heartbeat: Heartbeat) -> bool:
         """CRITICAL or EMERGENCY: PX4 warns, or holds for some seconds before it acts."""

@@ -130,7 +130,7 @@ class ArduCopter:
 
     unasked_streams: Mapping[int, float] = MappingProxyType({})
     fixed_streams: frozenset[int] = frozenset()
-    missing_messages: frozenset[int] = frozenset()
+    missing_messages: frozenset[int] = frozenset({mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS})
 
     stage_texts: Mapping[Stage, Text] = MappingProxyType(
         {

@@ -144,8 +144,8 @@ def test_a_vehicle_that_is_no_longer_ours_is_handed_over_and_not_commanded(
     assert set(flight.copter.count()) <= {INTERVAL}
 
 
-def test_a_position_estimate_that_ardupilot_does_not_trust_counts_for_no_position() -> None:
-    flight = flying(FakeCopter)
+def test_a_position_that_the_estimator_does_not_trust_counts_for_none(fake: Fake) -> None:
+    flight = flying(fake)
     flight.copter.ekf_flags = 167
     flight.copter.stuck = True
     began_s = flight.now_s
