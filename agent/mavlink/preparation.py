@@ -204,7 +204,16 @@ class Preparation:
         distance_m = math.hypot(east_m, north_m)
         if distance_m > config.fence_radius_m:
             return f"the vehicle stands {distance_m / 1e3:.0f} km from the mission's origin"
-        height_m = self._start_alt_m - _home_alt_m(position)
+        home_alt_m, ground_up_m = _home_alt_m(position), self._order.ground_up_m
+        if ground_up_m is not None:
+            east_m, north_m, _ = self._order.position_enu_m
+            _, _, ground_alt_m = wgs84_from_enu(config.origin, (east_m, north_m, ground_up_m))
+            if not abs(home_alt_m - ground_alt_m) <= config.home_tolerance_m:
+                return (
+                    f"home is at {home_alt_m:.0f} m above sea level, the scenario says "
+                    f"{ground_alt_m:.0f} m there: correct [origin] alt_m, or position_m"
+                )
+        height_m = self._start_alt_m - home_alt_m
         if height_m < config.takeoff_min_m:
             return (
                 f"the start lies {height_m:.1f} m above the vehicle's home, "
