@@ -361,8 +361,9 @@ class AgentCore:
 
     def _prepare(self, me: Fleet) -> None:
         self._enter(StatusPhase.PREPARING, "")
-        place_enu_m = self._picture.in_layer(me.position_enu_m)
-        self._actions.append(Order(Prepare(place_enu_m, me.speed_m_s, self._mission_runs)))
+        place_enu_m, ground_up_m = self._picture.in_layer(me.position_enu_m), me.position_enu_m[2]
+        order = Prepare(place_enu_m, me.speed_m_s, self._mission_runs, ground_up_m)
+        self._actions.append(Order(order))
 
     @property
     def _mission_runs(self) -> bool:

@@ -37,6 +37,8 @@ class Prepare:
     """Cruise ground speed to set [m/s]."""
     resume: bool = False
     """A vehicle that flies already is ready where it is, and flies on meanwhile."""
+    ground_up_m: float | None = None
+    """Height of the ground on which the vehicle stands [m; mission origin]; None if not known."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -92,6 +92,7 @@ class FakeCopter:
             "MISSION_ITEM_INT": self.mission.on_item,
             "MISSION_REQUEST_LIST": self.mission.on_request_list,
             "MISSION_REQUEST_INT": self.mission.on_request,
+            "MISSION_CLEAR_ALL": self.mission.on_clear_all,
             "MISSION_SET_CURRENT": self.mission.on_set_current,
             "MISSION_ACK": self.mission.on_ack,
         }

@@ -112,6 +112,13 @@ class CopterMissions:
             *_GROUND, seq, frame, m.command, 0, 1, *params, x, y, z
         )
 
+    def on_clear_all(self, _: Any) -> None:
+        if self._wanted is not None or self.runs:
+            self.ack(ERROR)
+            return
+        self.items, self.current = [], 0
+        self.ack(OK)
+
     def on_ack(self, m: Any) -> None:
         """ArduPilot does not listen to acknowledgements."""
 
@@ -287,6 +294,13 @@ class Px4Missions(CopterMissions):
         return mavlink.MAVLink_mission_item_int_message(
             *_GROUND, seq, m.frame, m.command, int(seq == self.current), 1, *fields
         )
+
+    def on_clear_all(self, _: Any) -> None:
+        if self._sending is not None or self._wanted is not None:
+            self.copter.text(2, "WPM: IGN CLEAR CMD: Busy")
+            return
+        self.items, self.current = [], 0
+        self.ack(OK)
 
     def on_ack(self, m: Any) -> None:
         self._sending = None

@@ -29,6 +29,7 @@ from agent.mavlink.messages import (
     Inbound,
     Landed,
     MissionAck,
+    MissionClearAll,
     MissionCount,
     MissionCurrent,
     MissionItem,
@@ -221,6 +222,8 @@ class MavlinkCodec:
                 return mavlink.MAVLink_mission_request_list_message(*to)
             case MissionAck(result):
                 return mavlink.MAVLink_mission_ack_message(*to, result)
+            case MissionClearAll():
+                return mavlink.MAVLink_mission_clear_all_message(*to)
             case MissionSetCurrent(seq):
                 return mavlink.MAVLink_mission_set_current_message(*to, seq)
 

@@ -72,6 +72,8 @@ class BridgeConfig:
     """A takeoff that gains no height for that long has failed."""
     takeoff_min_m: float = 0.5
     """Lowest height above home at which a start is accepted."""
+    home_tolerance_m: float = 10.0
+    """How far the vehicle's home may lie above or below the ground that the scenario tells."""
     stall_timeout_s: float = 5.0
     """A vehicle that stands still elsewhere than at its target for that long is told again."""
     stall_tries: int = 3
@@ -115,6 +117,7 @@ class BridgeConfig:
             "effect_timeout_s",
             "climb_timeout_s",
             "takeoff_min_m",
+            "home_tolerance_m",
             "stall_timeout_s",
             "stall_tries",
             "mission_patience_s",

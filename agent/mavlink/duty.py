@@ -83,7 +83,7 @@ class Duty:
         """The autopilot began anew."""
         if self._work.in_our_hands():
             self._work.hand_over("the autopilot rebooted")
-        self._work.preparation = None
+        self._work.preparation, self._work.prepares_ours = None, False
 
     # What time brings.
 
@@ -130,6 +130,7 @@ class Duty:
                 self._seat.flavour,
                 self._seat.guards,
                 self._seat.mission,
+                ours=self._work.prepares_ours,
             )
         preparation = self._work.preparation
         self._seat.say(*preparation.advance(self._seat.vehicle, heartbeat, self._seat.now_s))

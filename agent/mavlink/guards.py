@@ -2,8 +2,9 @@
 
 Each judgement is debounced, because readings err, and comes with a reason that a person
 understands. On the ground any doubt keeps the vehicle from being armed; in the air a
-judgement has to last. Leaves out: what is done about it (agent.mavlink.bridge), and who
-flies the vehicle (agent.mavlink.authority).
+judgement has to last. Each is told once a flight; the battery again whenever its charge has
+halved, since the return may have been broken off. Leaves out: what is done about it
+(agent.mavlink.bridge), and who flies the vehicle (agent.mavlink.authority).
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class Guards:
 
     def __init__(self, config: BridgeConfig) -> None:
         self._config = config
-        self._advised = False
+        self._battery_told_frac: float | None = None
+        self._outside_told = self._alarm_told = False
         self._readings: deque[float] = deque(maxlen=_BATTERY_READINGS)
         self._outside = ""
         self._outside_positions = 0
@@ -90,7 +92,8 @@ class Guards:
 
     def begin(self) -> None:
         """A new flight: what was advised in an earlier one may be advised again."""
-        self._advised = False
+        self._battery_told_frac = None
+        self._outside_told = self._alarm_told = False
 
     # What follows.
 
@@ -110,23 +113,19 @@ class Guards:
         return self._position_lost_for(now_s)
 
     def advice(self, vehicle: VehicleState, flavour: Flavour, now_s: float) -> str | None:
-        """Why a vehicle in the air should go home; told once a flight."""
-        if self._advised:
-            return None
-        reason = self._reason_to_return(vehicle, flavour, now_s)
-        self._advised = reason is not None
-        return reason
-
-    def _reason_to_return(
-        self, vehicle: VehicleState, flavour: Flavour, now_s: float
-    ) -> str | None:
+        """Why a vehicle in the air should go home; each reason is told once a flight."""
         low = self._low_readings()
-        if len(low) == _BATTERY_READINGS:
+        limit_frac = math.inf if self._battery_told_frac is None else self._battery_told_frac / 2.0
+        if len(low) == _BATTERY_READINGS and max(low) < limit_frac:
+            self._battery_told_frac = low[-1]
             return self._battery_text(low[-1])
         lasting = now_s - self._outside_since_s >= _FENCE_S
-        if self._outside_positions >= _FENCE_POSITIONS and lasting:
+        if self._outside_positions >= _FENCE_POSITIONS and lasting and not self._outside_told:
+            self._outside_told = True
             return self._outside
-        if vehicle.heartbeat is not None and flavour.alarmed(vehicle.heartbeat):
+        alarmed = vehicle.heartbeat is not None and flavour.alarmed(vehicle.heartbeat)
+        if alarmed and not self._alarm_told:
+            self._alarm_told = True
             text = vehicle.recent_warning(now_s)
             return f"the autopilot reports a failsafe{f' ({text})' if text else ''}"
         return None

@@ -23,6 +23,7 @@ __all__ = [
     "Inbound",
     "Landed",
     "MissionAck",
+    "MissionClearAll",
     "MissionCount",
     "MissionCurrent",
     "MissionItem",
@@ -293,6 +294,11 @@ class MissionSetCurrent:
     seq: int
 
 
+@dataclass(frozen=True, slots=True)
+class MissionClearAll:
+    """MISSION_CLEAR_ALL, answered by a `MissionAck`."""
+
+
 Outbound = (
     GroundHeartbeat
     | CommandLong
@@ -305,4 +311,5 @@ Outbound = (
     | MissionRequestList
     | MissionAck
     | MissionSetCurrent
+    | MissionClearAll
 )

@@ -4,9 +4,9 @@ The read-back decides: an upload whose acknowledgement got lost is still good if
 vehicle tells the same items, and one that was acknowledged is not if it tells others.
 After any failure the last verified mission stays the one in force; where the vehicle
 may hold part of the new one, the old one is uploaded again before the failure is
-reported. A vehicle may also be asked what stands on it. Leaves out: flying the mission
-and the flavour's item 0 (the comparison gets the number of leading items that the vehicle
-owns).
+reported; if none was ever verified, all is cleared, so that no half mission can be flown. A vehicle
+may also be asked what stands on it. Leaves out: flying the mission and the flavour's item 0
+(the comparison gets the number of leading items that the vehicle owns).
 
 Protocol: https://mavlink.io/en/services/mission.html
 """
@@ -22,6 +22,7 @@ from agent.mavlink.messages import (
     AltitudeFrame,
     Inbound,
     MissionAck,
+    MissionClearAll,
     MissionCount,
     MissionItem,
     MissionRequest,
@@ -77,7 +78,7 @@ class MissionFailed:
 
     reason: str
     old_mission_verified: bool
-    """The vehicle was seen to hold the old mission; if not, do not start a mission."""
+    """The vehicle was seen to hold the old mission, or none at all; if not, do not start one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +95,7 @@ class _Phase(Enum):
     IDLE = "idle"
     ANNOUNCING = "announcing"
     SENDING = "sending"
+    CLEARING = "clearing the mission"
     ASKING_COUNT = "asking for the count"
     ASKING_ITEMS = "asking for items"
 
@@ -114,6 +116,8 @@ class MissionTransfer:
         """The vehicle may hold part of a mission that was never verified."""
         self._second_reading = False
         self._began_reading_anew = False
+        self._cleared = False
+        """The vehicle says that it cleared what it held."""
         self._reading_count: int | None = None
         """Items wanted of a vehicle that is only asked; None while something is uploaded."""
         self._failure: str | None = None
@@ -139,7 +143,7 @@ class MissionTransfer:
         if not items or [item.seq for item in items] != list(range(len(items))):
             raise ValueError("mission items must be numbered 0, 1, 2, … without a gap")
         self._failure = self._reading_count = None
-        self.result = None
+        self.result, self._cleared = None, False
         return self._announce(tuple(items), now_s)
 
     def read(self, count: int, now_s: float) -> list[Outbound]:
@@ -151,7 +155,7 @@ class MissionTransfer:
         if self.busy:
             raise ValueError("a mission transfer is under way already")
         self._failure, self._reading_count = None, count
-        self.result = None
+        self.result, self._cleared = None, False
         return self._ask_count(now_s)
 
     def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
@@ -165,6 +169,10 @@ class MissionTransfer:
                 if result == _ERROR:
                     return []  # PX4 is busy with an older transfer until that times out
                 return self._fail(f"the vehicle refused the mission (result {result})", now_s)
+            case MissionAck(result) if self._phase is _Phase.CLEARING and result == _ACCEPTED:
+                # Perhaps an older transfer's: the count will tell.
+                self._cleared = True
+                return self._ask_count(now_s)
             case MissionCount(count) if self._phase is _Phase.ASKING_COUNT:
                 return self._on_count(count, now_s)
             case MissionItem() if self._phase is _Phase.ASKING_ITEMS:
@@ -245,6 +253,8 @@ class MissionTransfer:
         return self._say([MissionRequestList()], now_s)
 
     def _on_count(self, count: int, now_s: float) -> list[Outbound]:
+        if self._cleared:
+            return self._on_count_of_cleared(count, now_s)
         if self._reading_count is not None and count != self._reading_count:
             self._phase = _Phase.IDLE
             self.result = MissionRead(count, ())
@@ -253,6 +263,14 @@ class MissionTransfer:
             return self._differs(f"it holds {count} items, not {len(self._items)}", now_s)
         self._phase = _Phase.ASKING_ITEMS
         return self._say([MissionRequest(0)], now_s)
+
+    def _on_count_of_cleared(self, count: int, now_s: float) -> list[Outbound]:
+        if count > self._policy.vehicle_items:
+            return self._fail("it is not cleared", now_s)
+        self._touched = False
+        self._phase = _Phase.IDLE
+        self.result = MissionFailed(self._failure or "", old_mission_verified=True)
+        return [MissionAck(_ACCEPTED)]
 
     def _on_item(self, item: MissionItem, now_s: float) -> list[Outbound]:
         wanted = len(self._read_back)
@@ -291,8 +309,11 @@ class MissionTransfer:
         out: list[Outbound] = [MissionAck(_OPERATION_CANCELLED)]
         if self._failure is None:
             self._failure = reason
-            if self._touched and self._reading_count is None and self.in_force is not None:
-                return out + self._announce(self.in_force, now_s)
+            if self._touched and self._reading_count is None:
+                if self.in_force is not None:
+                    return out + self._announce(self.in_force, now_s)
+                self._phase = _Phase.CLEARING
+                return out + self._say([MissionClearAll()], now_s)
         self._phase = _Phase.IDLE
         self.result = MissionFailed(self._failure or reason, not self._touched)
         return out

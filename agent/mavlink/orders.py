@@ -56,11 +56,12 @@ class OrderTaker:
             self._hold(Hold("to be prepared anew"))
             work.prepare_next = order
             return
+        ours = work.in_our_hands()
         work.drop()
         self._seat.forget_mission()
         self._seat.guards.begin()
         work.phase = Phase.PREPARING
-        work.prepare = order
+        work.prepare, work.prepares_ours = order, ours
         work.speed_m_s = order.speed_m_s
         work.tell_anew()
 

@@ -2,10 +2,11 @@
 
 No script: every time something is heard, the next step follows from the state *seen*,
 so an overwritten mode, an automatic disarming on the ground or a vehicle that flies
-already need no cases of their own. Every step has a limit. A vehicle that is resumed in
-the air keeps its old target meanwhile: only its speed is set, and not even that if it
-flies a mission of ours. Leaves out: who may give the vehicle orders
-(agent.mavlink.bridge).
+already need no cases of their own. A vehicle that somebody else armed or flies is waited
+for, and once it is disarmed it does not start by itself. Every step has a limit. A vehicle
+that is resumed in the air keeps its old target meanwhile: only its speed is set, and not
+even that if it flies a mission of ours. Leaves out: who may give the vehicle orders
+(agent.mavlink.bridge), and what counts as consent to fly it (agent.mavlink.consent).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 
 from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, result_text
 from agent.mavlink.config import BridgeConfig
+from agent.mavlink.consent import Consent
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.guards import Guards
 from agent.mavlink.leg import RepositionLeg
@@ -34,6 +36,7 @@ _CLIMB_TOLERANCE_M = 1.0
 _PREARM_TEXT_AGE_S = 35.0
 """ArduPilot repeats what fails before arming every 30 s."""
 _CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
+_ARMED_BY_OTHERS = "somebody else armed it and disarmed it again; prepare it again to take off"
 _FLOWN_BY_PILOT = "its pilot flew and landed it; prepare it again to take off"
 
 
@@ -61,6 +64,7 @@ class Preparation:
         flavour: the firmware.
         mission: what an earlier life may have left on the vehicle; None if missions are
             not our way to command it.
+        ours: the vehicle flies, or may fly, on our orders already.
     """
 
     def __init__(
@@ -71,6 +75,8 @@ class Preparation:
         flavour: Flavour,
         guards: Guards,
         mission: StandingMission | None = None,
+        *,
+        ours: bool = False,
     ) -> None:
         self._order = order
         self._mission = mission
@@ -92,6 +98,8 @@ class Preparation:
         self._saw_takeoff = False
         self._flew = False
         self._flown_by_pilot = False
+        self._armed_by_others = False
+        self._consent = Consent(flavour, ours=ours or order.resume)
         self._leg: RepositionLeg | None = None
         self._speed = SpeedSetting(order.speed_m_s, flavour, config)
         self.waiting_for = "waiting for the autopilot"
@@ -146,6 +154,7 @@ class Preparation:
             return []
         if not flavour.has_booted(heartbeat):
             return self._wait("the autopilot is booting")
+        self._consent.on_heartbeat(heartbeat)
         if heartbeat.armed and flavour.is_taking_off(heartbeat.custom_mode):
             return self._follow_takeoff(now_s)
         if not flavour.is_commanded(heartbeat.custom_mode):
@@ -158,13 +167,12 @@ class Preparation:
                     f"armed in {mode} by its pilot: land it, "
                     f"or switch it to {flavour.commanded_mode_name}"
                 )
-            if self._flown_by_pilot:
-                return self._fail(_FLOWN_BY_PILOT)
+            if reason := self._left_by_others():
+                return self._fail(reason)
             return self._ask(self._mode, flavour.set_commanded_mode(), vehicle, now_s)
         if not heartbeat.armed:
-            if self._flown_by_pilot:
-                # Somebody may be walking up to it: it does not start by itself.
-                return self._fail(_FLOWN_BY_PILOT)
+            if reason := self._left_by_others():
+                return self._fail(reason)
             return self._start_motors(vehicle, now_s)
         position = vehicle.position
         if position is None:
@@ -172,6 +180,10 @@ class Preparation:
         airborne = flavour.airborne(vehicle)
         if airborne is None:
             return self._wait("waiting to hear whether it flies (EXTENDED_SYS_STATE)")
+        if objection := self._consent.objection(airborne=airborne):
+            self._flown_by_pilot |= airborne
+            self._armed_by_others = True
+            return self._wait(objection)
         if not airborne:
             return self._take_off(position, vehicle, now_s)
         self._flew = True
@@ -181,6 +193,12 @@ class Preparation:
             return out
         self._climbing = False
         return out + self._settle(vehicle, now_s)
+
+    def _left_by_others(self) -> str | None:
+        """Why it does not start by itself: somebody may be walking up to it."""
+        if self._flown_by_pilot:
+            return _FLOWN_BY_PILOT
+        return _ARMED_BY_OTHERS if self._armed_by_others else None
 
     def _start_motors(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
         if self._flew:
@@ -193,6 +211,7 @@ class Preparation:
             return self._wait(f"{unready} ({text})" if text else unready)
         if vehicle.position is not None and (fault := self._misplaced(vehicle.position)):
             return self._fail(fault)
+        self._consent.arm()
         return self._ask(self._arm, self._flavour.arm(), vehicle, now_s)
 
     def _misplaced(self, position: Position) -> str | None:
@@ -204,7 +223,16 @@ class Preparation:
         distance_m = math.hypot(east_m, north_m)
         if distance_m > config.fence_radius_m:
             return f"the vehicle stands {distance_m / 1e3:.0f} km from the mission's origin"
-        height_m = self._start_alt_m - _home_alt_m(position)
+        home_alt_m, ground_up_m = _home_alt_m(position), self._order.ground_up_m
+        if ground_up_m is not None:
+            east_m, north_m, _ = self._order.position_enu_m
+            _, _, ground_alt_m = wgs84_from_enu(config.origin, (east_m, north_m, ground_up_m))
+            if not abs(home_alt_m - ground_alt_m) <= config.home_tolerance_m:
+                return (
+                    f"home is at {home_alt_m:.0f} m above sea level, the scenario says "
+                    f"{ground_alt_m:.0f} m there: correct [origin] alt_m, or position_m"
+                )
+        height_m = self._start_alt_m - home_alt_m
         if height_m < config.takeoff_min_m:
             return (
                 f"the start lies {height_m:.1f} m above the vehicle's home, "
@@ -232,7 +260,7 @@ class Preparation:
         self._saw_takeoff = True
         if not self.took_off:
             # An earlier life's, or a pilot's.
-            self._flown_by_pilot = not self._order.resume
+            self._flown_by_pilot = self._consent.needed
             return self._wait("waiting for the takeoff under way to end")
         # The heartbeat that tells its end may come as late as any other.
         patience_s = self._config.climb_timeout_s + self._config.silence_timeout_s

@@ -42,6 +42,8 @@ class Work:
         self.phase = Phase.IDLE
         self._seat = seat
         self.prepare: Prepare | None = None
+        self.prepares_ours = False
+        """The vehicle to be prepared flew, or was about to fly, on our orders."""
         self.preparation: Preparation | None = None
         self.target: Target | None = None
         self.holding: Holding | None = None

@@ -115,6 +115,11 @@ class ArduCopter:
         """GUIDED."""
         return "GUIDED"
 
+    @property
+    def commanded_by_choice(self) -> bool:
+        """Yes: GUIDED is entered on command or by a switch only."""
+        return True
+
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether it is an ArduPilot copter."""
         return (

@@ -51,6 +51,11 @@ class Flavour(Protocol):
         """The mode in which the vehicle takes our targets, for people."""
         ...
 
+    @property
+    def commanded_by_choice(self) -> bool:
+        """Whether the vehicle is never in that mode unless somebody put it there."""
+        ...
+
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether this flavour is the right one for that vehicle."""
         ...

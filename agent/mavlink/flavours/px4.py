@@ -106,6 +106,11 @@ class Px4Copter:
         """Called Hold by ground stations."""
         return "AUTO.LOITER (Hold)"
 
+    @property
+    def commanded_by_choice(self) -> bool:
+        """No: it boots into Hold and ends takeoffs and missions there; people hover in it."""
+        return False
+
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether it is a PX4 multicopter."""
         return heartbeat.autopilot == _AUTOPILOT_PX4 and heartbeat.vehicle_type in _COPTER_TYPES

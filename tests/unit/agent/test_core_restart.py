@@ -25,7 +25,7 @@ from tests.builders import MISSION, done, entry, epoch, held, message, proposed,
 from tests.lone_agent import ZERO_S, LoneAgent, claims, finishes, notes, orders, outcomes
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
-PREPARE = Prepare((0.0, 0.0, 10.0), 1.0)
+PREPARE = Prepare((0.0, 0.0, 10.0), 1.0, ground_up_m=0.0)
 RESUME = replace(PREPARE, resume=True)
 HELD = held("near", 0.0, 0, 10.0)
 AT_ONCE = Timing(announce_s=2.0, silence_s=5.0, pause_s=1e6)

@@ -21,7 +21,7 @@ from tests.builders import (
 )
 from tests.lone_agent import START_S, LoneAgent, claims, orders, outcomes, statuses
 
-PREPARE = Prepare((0.0, 0.0, 10.0), 1.0)
+PREPARE = Prepare((0.0, 0.0, 10.0), 1.0, ground_up_m=0.0)
 
 
 def test_it_asks_first_and_prepares_nothing_before_it_has_learned() -> None:

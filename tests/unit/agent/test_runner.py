@@ -137,7 +137,7 @@ def test_the_vehicle_is_made_at_the_missions_origin_and_prepared_at_its_start() 
             vehicle = await played.airborne()
 
             assert vehicle.origin == Origin(47.0, 8.0, 400.0)
-            assert vehicle.orders == [Prepare((3.0, 0.0, 10.0), 2.0)]
+            assert vehicle.orders == [Prepare((3.0, 0.0, 10.0), 2.0, ground_up_m=0.0)]
             assert len(played.vehicles) == 1
 
     play(scenario)

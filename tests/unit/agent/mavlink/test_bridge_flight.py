@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -361,7 +362,7 @@ def test_silent_vehicle_is_handed_over_and_can_be_prepared_again(fake: type[Fake
     flight.copter.silent = False
     flight.run(3.0)
     flight.copter.heard.clear()
-    flight.order(START)
+    flight.order(replace(START, resume=True))
     flight.run_until(VehicleReady())
     assert not flight.copter.commands(SET_MODE)
 

@@ -14,6 +14,7 @@ from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    Hold,
     Home,
     Prepare,
     Refused,
@@ -215,6 +216,34 @@ def test_a_vehicle_in_trouble_is_advised_to_return_and_obeys(
     flight.order(Return(advised.reason))
     flight.run_until(Home())
     assert not [r for r in flight.reports if isinstance(r, HandedOver)]
+
+
+def test_a_battery_that_runs_low_after_another_advice_is_told_too(fake: Fake) -> None:
+    flight = flying(fake, FENCED)
+    drift_off(flight)
+    first = flight.run_until(ReturnAdvised)
+    drain(flight)
+    second = flight.run_until(ReturnAdvised)
+    assert "outside the fence" in str(first)
+    assert second == ReturnAdvised("battery at 15%, below the reserve of 20%")
+
+
+def test_a_battery_is_told_again_at_half_if_its_return_was_broken_off(fake: Fake) -> None:
+    flight = flying(fake)
+    drain(flight)
+    flight.order(Return(str(flight.run_until(ReturnAdvised))))
+    flight.run(2.0)
+    flight.order(Hold("look at it"))
+    flight.copter.battery_percent = 8
+    flight.run(20.0)
+    assert flight.bridge.phase is Phase.HOVERING
+    assert len([r for r in flight.reports if isinstance(r, ReturnAdvised)]) == 1
+
+    flight.copter.battery_percent = 7
+    advised = ReturnAdvised("battery at 7%, below the reserve of 20%")
+    assert flight.run_until(ReturnAdvised) == advised
+    flight.order(Return(advised.reason))
+    flight.run_until(Home())
 
 
 def test_an_alarm_of_a_px4_that_still_obeys_is_a_reason_to_return() -> None:

@@ -290,6 +290,25 @@ def test_refused_mission_leaves_the_old_target_in_force(
     flight.run_until(Arrived(3))
 
 
+def test_first_mission_that_is_refused_leaves_no_half_mission_standing(
+    fake: type[FakeCopter],
+) -> None:
+    """A pilot's old mission has as many items, so half of ours would be flown with half of it."""
+    old = waiting(fake).copter.mission.items
+    flight = flight_of(fake).prepared()
+    mission = flight.copter.mission
+    mission.items = list(old)
+    mission.verdict = 4
+    flight.order(GoTo(1, FAR))
+    refusal = flight.run_until(Refused)
+    assert isinstance(refusal, Refused)
+    assert "refused the mission (result 4)" in refusal.reason
+    assert len(mission.items) == 0
+    mission.verdict = None
+    flight.order(GoTo(2, NORTH))
+    flight.run_until(Arrived(2))
+
+
 def test_mission_mode_that_is_refused_for_good_is_reported() -> None:
     flight = flight_of(FakeCopter).prepared()
     flight.copter.verdicts[SET_MODE] = [4] * 99

@@ -12,6 +12,7 @@ from agent.mavlink.bridge import Phase
 from agent.mavlink.config import BridgeConfig
 from agent.vehicle import (
     HandedOver,
+    Hold,
     Home,
     NotReady,
     Prepare,
@@ -277,6 +278,54 @@ def test_start_at_or_below_the_ground_is_refused_before_arming(
     assert not flight.copter.commands(ARM)
 
 
+@pytest.mark.parametrize(
+    ("ground_m", "home_m"), [(-24.0, 464), (24.0, 512), (10.1, 498), (-10.1, 478)]
+)
+def test_home_at_another_height_than_the_scenario_says_is_refused_before_arming(
+    fake: type[FakeCopter], ground_m: float, home_m: int
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN, ground_m=ground_m))
+    order = replace(START, position_enu_m=(5.0, 0.0, 50.0), ground_up_m=0.0)
+    flight.order(order)
+    assert flight.run_until(Refused) == Refused(
+        order,
+        f"home is at {home_m} m above sea level, the scenario says 488 m there: "
+        "correct [origin] alt_m, or position_m",
+    )
+    assert not flight.copter.commands(ARM)
+
+
+@pytest.mark.parametrize(("ground_m", "tolerance_m"), [(9.0, 10.0), (-9.0, 10.0), (25.0, 30.0)])
+def test_home_at_about_the_height_that_the_scenario_says_will_do(
+    fake: type[FakeCopter], ground_m: float, tolerance_m: float
+) -> None:
+    config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, home_tolerance_m=tolerance_m)
+    flight = BridgeFlight(fake(ORIGIN, ground_m=ground_m), config)
+    flight.order(replace(START, position_enu_m=(5.0, 0.0, 30.0), ground_up_m=0.0))
+    flight.run_until(VehicleReady())
+
+
+def test_home_of_a_vehicle_armed_on_the_ground_is_looked_at_before_takeoff(
+    fake: type[FakeCopter],
+) -> None:
+    copter = fake(ORIGIN, ground_m=-24.0, ready_s=1.0)
+    flight = BridgeFlight(copter)
+    flight.run(3.0)
+    copter.set_mode(fake.own_mode)
+    copter.armed, copter.armed_at_s = True, copter.now_s
+    flight.order(replace(START, resume=True, ground_up_m=0.0))
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert "home is at 464 m above sea level" in refused.reason
+    assert not copter.commands(TAKEOFF)
+
+
+def test_home_of_a_vehicle_resumed_in_the_air_does_not_matter(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).flying().restart()
+    flight.order(replace(START, resume=True, ground_up_m=100.0))
+    flight.run_until(VehicleReady())
+
+
 def test_vehicle_at_the_other_end_of_the_world_is_refused(fake: type[FakeCopter]) -> None:
     elsewhere = replace(ORIGIN, lat_deg=-35.0, lon_deg=149.0)
     flight = BridgeFlight(fake(elsewhere))
@@ -306,7 +355,10 @@ def test_impossible_start_is_refused_at_once(fake: type[FakeCopter], order: Prep
 
 def test_vehicle_that_flies_already_does_not_take_off_again(fake: type[FakeCopter]) -> None:
     flight = BridgeFlight(fake(ORIGIN)).flying()
-    again = BridgeFlight(flight.copter)  # the agent was restarted, its autopilot flew on
+    again = BridgeFlight(flight.copter)  # another agent, and its pilot hands it over
+    flight.copter.set_mode(fake.pilot_mode)
+    again.run(2.0)
+    flight.copter.set_mode(fake.own_mode)
     flight.copter.heard.clear()
     again.order(Prepare((60.0, 0.0, 12.0), 5.0))
     again.run_until(VehicleReady())
@@ -331,6 +383,103 @@ def test_vehicle_flown_by_its_pilot_is_waited_for_and_not_touched(fake: type[Fak
 
     flight.copter.set_mode(fake.own_mode)  # the pilot hands it to us
     again.run_until(VehicleReady())
+
+
+ARMED_BY_SOMEBODY = "armed by somebody else: disarm it"
+FLOWN_IN_HOLD = "flown by its pilot: land it, or switch it to AUTO.LOITER (Hold) from another mode"
+
+
+@pytest.mark.parametrize("ordered_first", [False, True])
+def test_vehicle_that_somebody_else_armed_on_the_ground_is_never_taken_off(
+    fake: type[FakeCopter], ordered_first: bool
+) -> None:
+    copter = fake(ORIGIN, ready_s=1.0)
+    copter.prearm_ok = False
+    flight = BridgeFlight(copter)
+    if ordered_first:
+        flight.order(START)
+    flight.run(5.0)
+    copter.set_mode(fake.own_mode)
+    copter.armed, copter.armed_at_s = True, copter.now_s + 30.0
+    flight.run(1.5)
+    copter.prearm_ok = True
+    if not ordered_first:
+        flight.order(START)
+    flight.run(20.0)
+    assert flight.reasons()[-1] == ARMED_BY_SOMEBODY
+    assert set(copter.count()) <= {INTERVAL, SET_MODE}
+
+    copter.armed = False
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert "somebody else armed it" in refused.reason
+    assert not {ARM, TAKEOFF} & set(copter.count())
+
+
+def test_vehicle_whose_arming_was_refused_to_us_and_done_after_all_is_ours(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
+    flight.copter.verdicts[ARM] = [FAILED]
+    flight.order(START)
+    while not flight.copter.commands(ARM):
+        flight.step()
+    flight.copter.armed, flight.copter.armed_at_s = True, flight.now_s
+    flight.run_until(VehicleReady())
+
+
+def hovering_in_hold(*, armed_s: float = 0.0) -> BridgeFlight:
+    """A PX4 that its pilot let hover in Hold, and a new agent."""
+    flight = BridgeFlight(BridgeFlight(FakePx4(ORIGIN)).flying().copter)
+    flight.copter.heard.clear()
+    flight.run(armed_s)
+    return flight
+
+
+@pytest.mark.parametrize("armed_s", [0.0, 5.0])
+def test_hold_of_a_px4_in_the_air_is_no_consent(armed_s: float) -> None:
+    flight = hovering_in_hold(armed_s=armed_s)
+    flight.order(START)
+    flight.run(30.0)
+    assert flight.reasons()[-1] == FLOWN_IN_HOLD
+    assert set(flight.copter.count()) <= {INTERVAL}
+
+    flight.copter.set_mode(flight.copter.return_mode)
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert "its pilot flew and landed it" in refused.reason
+    assert set(flight.copter.count()) <= {INTERVAL}
+
+
+def test_hold_that_a_px4_is_seen_to_enter_is_consent() -> None:
+    flight = hovering_in_hold()
+    flight.order(START)
+    flight.run(5.0)
+    flight.copter.set_mode(flight.copter.pilot_mode)
+    flight.run(2.0)
+    flight.copter.set_mode(flight.copter.own_mode)
+    flight.run_until(VehicleReady())
+    assert not {ARM, TAKEOFF} & set(flight.copter.count())
+
+
+def test_hold_that_a_px4_falls_into_by_a_failsafe_is_no_consent() -> None:
+    flight = hovering_in_hold()
+    flight.copter.set_mode(flight.copter.pilot_mode)
+    flight.order(START)
+    flight.run(3.0)
+    flight.copter.system_status = 5
+    flight.copter.set_mode(flight.copter.own_mode)
+    flight.run(10.0)
+    assert flight.reasons()[-1] == FLOWN_IN_HOLD
+    assert set(flight.copter.count()) <= {INTERVAL}
+
+
+def test_vehicle_that_hovers_on_our_orders_is_prepared_anew(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN)).prepared()
+    flight.order(Hold("wait"))
+    flight.run(3.0)
+    flight.order(START)
+    flight.run_until(VehicleReady())
 
 
 def test_vehicle_landed_by_its_pilot_does_not_start_by_itself(fake: type[FakeCopter]) -> None:

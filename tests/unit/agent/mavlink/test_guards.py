@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours.ardupilot import ArduCopter
+from agent.mavlink.flavours.px4 import Px4Copter
 from agent.mavlink.guards import Guards
 from agent.mavlink.messages import Battery, Heartbeat, SystemStatus
 from agent.mavlink.state import VehicleState
@@ -23,12 +24,12 @@ def advice(guards: Guards, now_s: float = 0.0) -> str | None:
 
 
 @given(st.lists(st.tuples(charges, st.booleans()), max_size=30))
-def test_a_battery_is_low_if_its_last_five_known_readings_are(
+def test_a_battery_is_low_if_its_last_five_known_readings_are_and_again_when_it_has_halved(
     readings: list[tuple[float | None, bool]],
 ) -> None:
     guards = Guards(CONFIG)
     known: list[float] = []
-    told = False
+    told_frac: float | None = None
     for number, (frac, by_battery) in enumerate(readings):
         guards.on_message(
             Battery(frac) if by_battery else SystemStatus(True, True, frac), float(number)
@@ -37,8 +38,11 @@ def test_a_battery_is_low_if_its_last_five_known_readings_are(
         last = known[-5:]
         low = [frac for frac in last if frac < 0.2]
         assert (guards.grounds(VehicleState(), float(number)) is not None) == bool(low)
-        assert (advice(guards) is not None) == (len(low) == 5 and not told)
-        told = told or len(low) == 5
+        limit_frac = 0.2 if told_frac is None else told_frac / 2.0
+        due = len([frac for frac in last if frac < limit_frac]) == 5
+        assert (advice(guards) is not None) == due
+        if due:
+            told_frac = last[-1]
 
 
 @given(st.lists(st.booleans(), max_size=40), st.floats(0.05, 0.5))
@@ -64,6 +68,21 @@ def test_what_was_advised_in_one_flight_is_advised_again_in_the_next() -> None:
     assert advice(guards) is None
     guards.begin()
     assert advice(guards) == "battery at 10%, below the reserve of 20%"
+
+
+def test_each_thing_is_advised_once_whatever_else_was() -> None:
+    guards = Guards(CONFIG)
+    for number in range(6):
+        guards.on_position((111.0, 0.0, 10.0), None, float(number))
+    assert advice(guards, 5.0) == "111 m from the origin, outside the fence of 100 m"
+    assert advice(guards, 5.0) is None
+    for _ in range(5):
+        guards.on_message(Battery(0.1), 6.0)
+    assert advice(guards, 6.0) == "battery at 10%, below the reserve of 20%"
+    alarmed = VehicleState(heartbeat=Heartbeat(2, 12, True, 0x3040000, 5))
+    alarm = guards.advice(alarmed, Px4Copter(), 6.0)
+    assert alarm == "the autopilot reports a failsafe"
+    assert guards.advice(alarmed, Px4Copter(), 7.0) is None
 
 
 def test_height_is_fenced_above_and_below() -> None:

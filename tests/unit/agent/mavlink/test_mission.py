@@ -14,6 +14,7 @@ from agent.mavlink.messages import (
     AltitudeFrame,
     Inbound,
     MissionAck,
+    MissionClearAll,
     MissionCount,
     MissionItem,
     MissionRequest,
@@ -64,6 +65,11 @@ class FakeStore:
                     return [MissionRequest(self.wanted)]
                 self.wanted = None
                 self.items[0] = replace(self.items[0], alt_m=488.0)  # home is its own
+                return [MissionAck(0)]
+            case MissionClearAll():
+                if self.wanted is not None:
+                    return [MissionAck(1)]
+                self.items.clear()
                 return [MissionAck(0)]
             case MissionRequestList():
                 return [MissionCount(len(self.items))]
@@ -180,10 +186,46 @@ def test_refused_mission_is_reported_with_its_result() -> None:
     machine = MissionTransfer(MissionPolicy())
     machine.upload(NEW, 0.0)
     machine.on_message(MissionRequest(0), 0.1)
-    machine.on_message(MissionAck(4), 0.2)
+    cancelled = MissionAck(15)
+    assert machine.on_message(MissionAck(4), 0.2) == [cancelled, MissionClearAll()]
+    machine.on_message(MissionAck(0), 0.3)
+    machine.on_message(MissionCount(1), 0.4)
     assert machine.result == MissionFailed(
-        "the vehicle refused the mission (result 4)", old_mission_verified=False
+        "the vehicle refused the mission (result 4)", old_mission_verified=True
     )
+    assert machine.in_force is None
+
+
+def test_mission_that_cannot_be_cleared_is_reported_as_unverified() -> None:
+    for answers in ((), (MissionAck(1),), (MissionAck(0), MissionCount(4))):
+        machine = MissionTransfer(MissionPolicy(tries=2))
+        machine.upload(NEW, 0.0)
+        machine.on_message(MissionRequest(0), 0.0)
+        machine.on_message(MissionAck(4), 0.0)
+        for answer in answers:
+            machine.on_message(answer, 0.0)
+        assert machine.on_time(2.0) in ([MissionClearAll()], [])
+        machine.on_time(4.0)
+        assert machine.result == MissionFailed(
+            "the vehicle refused the mission (result 4)", old_mission_verified=False
+        )
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_first_mission_that_fails_on_a_bad_link_leaves_none_or_says_so(seed: int) -> None:
+    chance = np.random.default_rng(seed)
+
+    def spoil(message: object) -> int:
+        lost = 0.9 if isinstance(message, MissionItem) and message.seq > 1 else 0.2
+        return int(chance.choice([0, 1], p=[lost, 1.0 - lost]))
+
+    machine, store = MissionTransfer(MissionPolicy(tries=3)), FakeStore()
+    store.items = list(OLD)
+    result = transfer(machine, store, NEW, up=spoil, down=spoil)
+    if isinstance(result, MissionInForce):
+        assert tuple(store.items[1:]) == NEW[1:]
+    elif result.old_mission_verified:
+        assert store.items in ([], list(OLD))
 
 
 def test_acknowledgement_of_an_older_upload_ends_nothing() -> None:

@@ -233,8 +233,10 @@ def test_a_takeoff_that_is_not_ours_is_waited_out_and_not_repeated() -> None:
     flight.run(1.0)
     assert flight.reasons()[-1] == "waiting for the takeoff under way to end"
     assert set(flight.copter.count()) <= {511}
-    flight.run_until(VehicleReady())
-    assert not flight.copter.commands(22)
+    flight.run(20.0)
+    assert flight.copter.mode == AUTO_LOITER
+    assert flight.reasons()[-1].startswith("flown by its pilot: land it")
+    assert set(flight.copter.count()) <= {511}
 
 
 def test_a_takeoff_of_the_pilot_in_flight_is_a_take_over() -> None:
@@ -248,7 +250,7 @@ def test_whether_it_flies_is_heard_before_anything_is_commanded() -> None:
     flight = BridgeFlight(FakePx4(ORIGIN)).flying().restart()
     flight.copter.deaf_to = {245}
     flight.copter.heard.clear()
-    flight.order(START)
+    flight.order(RESUME)
     flight.run(3.0)
     assert flight.reasons()[-1] == "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
     assert set(flight.copter.count()) <= {511}
