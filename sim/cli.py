@@ -67,9 +67,9 @@ def run(
             "--autopilot",
             metavar="sim|sim-px4|ardupilot|px4|URL,…",
             help="What flies: an autopilot simulated like ArduCopter or like PX4, real firmware "
-            "in software-in-the-loop, or vehicles that run already, one URL for each UAV in the "
-            "scenario's order or as UAV=URL; #ID at its end is the vehicle's system id, by "
-            "default the UAV's place in the scenario.",
+            "in software-in-the-loop (PX4 1.16 or newer), or vehicles that run already, one URL "
+            "for each UAV in the scenario's order or as UAV=URL; #ID at its end is the vehicle's "
+            "system id, by default the UAV's place in the scenario.",
         ),
     ] = "sim",
     firmware: Annotated[
@@ -183,8 +183,8 @@ def run(
         swarm run valley-survey --speedup 20 --report flight.md
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
-        swarm run table-1 --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
-        SWARM_SITL_PX4=~/PX4-Autopilot/build/px4_sitl_default swarm run table-1 --autopilot px4
+        swarm run meadow --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
+        SWARM_SITL_PX4=~/PX4-Autopilot/build/px4_sitl_default swarm run meadow --autopilot px4
         swarm run pair.toml --autopilot udpin:0.0.0.0:14550,serial:/dev/ttyUSB0:57600#7
         swarm run table-1 --json
     """
