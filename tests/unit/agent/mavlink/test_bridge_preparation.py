@@ -290,7 +290,7 @@ def test_vehicle_at_the_other_end_of_the_world_is_refused(fake: type[FakeCopter]
 def test_vehicle_that_an_older_px4_put_off_africa_is_refused_with_the_cause(
     fake: type[FakeCopter],
 ) -> None:
-    flight = BridgeFlight(fake(replace(ORIGIN, lat_deg=0.0, lon_deg=0.0)))
+    flight = BridgeFlight(fake(replace(ORIGIN, lat_deg=4.7e-6, lon_deg=8e-7)))
     flight.order(START)
     refused = flight.run_until(Refused)
     assert isinstance(refused, Refused)
