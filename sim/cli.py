@@ -112,11 +112,49 @@ def run(
         ),
     ] = None,
     battery_reserve: Annotated[
-        str | None,
+        float | None,
         typer.Option(
             "--battery-reserve",
-            metavar="FRAC|off",
+            min=0.0,
+            max=0.99,
+            metavar="FRAC",
             help="Charge at which a UAV goes home; see swarm agent.",
+            show_default=False,
+        ),
+    ] = None,
+    fence_radius_m: Annotated[
+        float | None,
+        typer.Option(
+            "--fence-radius-m",
+            min=1.0,
+            max=1e6,
+            metavar="M",
+            help="Distance from the mission's origin beyond which no UAV is sent, and from where "
+            "it goes home. Default: 1.2 times that of the farthest start or task, and 200 m.",
+            show_default=False,
+        ),
+    ] = None,
+    fence_height_m: Annotated[
+        float | None,
+        typer.Option(
+            "--fence-height-m",
+            min=1.0,
+            max=1e5,
+            metavar="M",
+            help="The same for the height above the origin, or below it. Default: 50 m above the "
+            "highest layer over the highest start or task.",
+            show_default=False,
+        ),
+    ] = None,
+    without_bus_s: Annotated[
+        float | None,
+        typer.Option(
+            "--without-bus-s",
+            min=0.1,
+            max=86400.0,
+            metavar="S",
+            help="UAVs go home when their link to the bus has been down for so many wall "
+            "seconds; see swarm agent.",
             show_default=False,
         ),
     ] = None,
@@ -195,7 +233,8 @@ def run(
     from rich.console import Console
 
     from coordinator.planner.plan import check_online_method
-    from sim.launch.autopilots import parse_autopilots
+    from sim.launch.autopilots import check_speedup, parse_autopilots
+    from sim.launch.fence import fence_around
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
     from sim.launch.run import fly
@@ -211,11 +250,14 @@ def run(
     mission = load_scenario(scenario)
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
+    check_speedup(autopilots, speedup)
     handed_on = HandedOn(
         command=parse_command_styles(command, uavs),
         forward=tuple(forward or ()),
         signing_key=signing_key,
         battery_reserve=battery_reserve,
+        fence=fence_around(mission, fence_radius_m, fence_height_m),
+        without_bus_s=without_bus_s,
         faults=tuple(fault or ()),
     )
     check_handed_on(handed_on, autopilots, uavs)

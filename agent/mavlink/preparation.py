@@ -205,7 +205,7 @@ class Preparation:
         distance_m = math.hypot(east_m, north_m)
         if distance_m > config.fence_radius_m:
             cause = _NULL_ISLAND if max(abs(position.lat_deg), abs(position.lon_deg)) < 1.0 else ""
-            return f"the vehicle stands {distance_m / 1e3:.0f} km from the mission's origin{cause}"
+            return f"the vehicle stands {distance_m / 1e3:.1f} km from the mission's origin{cause}"
         height_m = self._start_alt_m - _home_alt_m(position)
         if height_m < config.takeoff_min_m:
             return (
