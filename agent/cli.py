@@ -116,7 +116,7 @@ def agent(
             max=1e6,
             metavar="M",
             help="Farther than this from the mission's origin no target is flown to, and a UAV "
-            "that is there goes home.",
+            "that is there goes home. Set it to your mission: the default is hardly a fence.",
         ),
     ] = 20_000.0,
     fence_height_m: Annotated[
@@ -126,7 +126,7 @@ def agent(
             min=1.0,
             max=1e5,
             metavar="M",
-            help="The same for the height above the origin, or below it.",
+            help="The same for the height above the origin, or below it; set it too.",
         ),
     ] = 1_000.0,
     without_bus_s: Annotated[

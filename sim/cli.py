@@ -67,9 +67,9 @@ def run(
             "--autopilot",
             metavar="sim|sim-px4|ardupilot|px4|URL,…",
             help="What flies: an autopilot simulated like ArduCopter or like PX4, real firmware "
-            "in software-in-the-loop, or vehicles that run already, one URL for each UAV in the "
-            "scenario's order or as UAV=URL; #ID at its end is the vehicle's system id, by "
-            "default the UAV's place in the scenario.",
+            "in software-in-the-loop (PX4 1.16 or newer), or vehicles that run already, one URL "
+            "for each UAV in the scenario's order or as UAV=URL; #ID at its end is the vehicle's "
+            "system id, by default the UAV's place in the scenario.",
         ),
     ] = "sim",
     firmware: Annotated[
@@ -120,6 +120,42 @@ def run(
             metavar="FRAC",
             help="Charge below which a UAV goes home; 0 leaves the battery to the autopilot. See "
             "swarm agent.",
+            show_default=False,
+        ),
+    ] = None,
+    fence_radius_m: Annotated[
+        float | None,
+        typer.Option(
+            "--fence-radius-m",
+            min=1.0,
+            max=1e6,
+            metavar="M",
+            help="Distance from the mission's origin beyond which no UAV is sent, and from where "
+            "it goes home. Default: 1.2 times that of the farthest start or task, and 200 m.",
+            show_default=False,
+        ),
+    ] = None,
+    fence_height_m: Annotated[
+        float | None,
+        typer.Option(
+            "--fence-height-m",
+            min=1.0,
+            max=1e5,
+            metavar="M",
+            help="The same for the height above the origin, or below it. Default: 50 m above the "
+            "highest layer over the highest start or task.",
+            show_default=False,
+        ),
+    ] = None,
+    without_bus_s: Annotated[
+        float | None,
+        typer.Option(
+            "--without-bus-s",
+            min=0.1,
+            max=86400.0,
+            metavar="S",
+            help="UAVs go home when their link to the bus has been down for so many wall "
+            "seconds; see swarm agent.",
             show_default=False,
         ),
     ] = None,
@@ -186,8 +222,8 @@ def run(
         swarm run valley-survey --speedup 20 --report flight.md
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
-        swarm run table-1 --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
-        SWARM_SITL_PX4=~/PX4-Autopilot/build/px4_sitl_default swarm run table-1 --autopilot px4
+        swarm run meadow --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
+        SWARM_SITL_PX4=~/PX4-Autopilot/build/px4_sitl_default swarm run meadow --autopilot px4
         swarm run pair.toml --autopilot udpin:0.0.0.0:14550,serial:/dev/ttyUSB0:57600#7
         swarm run table-1 --json
     """
@@ -198,7 +234,8 @@ def run(
     from rich.console import Console
 
     from coordinator.planner.plan import check_online_method
-    from sim.launch.autopilots import parse_autopilots
+    from sim.launch.autopilots import check_speedup, parse_autopilots
+    from sim.launch.fence import fence_around
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
     from sim.launch.run import fly
@@ -214,11 +251,14 @@ def run(
     mission = load_scenario(scenario)
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
+    check_speedup(autopilots, speedup)
     handed_on = HandedOn(
         command=parse_command_styles(command, uavs),
         forward=tuple(forward or ()),
         signing_key=signing_key,
         battery_reserve=battery_reserve,
+        fence=fence_around(mission, fence_radius_m, fence_height_m),
+        without_bus_s=without_bus_s,
         faults=tuple(fault or ()),
     )
     check_handed_on(handed_on, autopilots, uavs)

@@ -75,6 +75,11 @@ class Bridge:
         """Who is heard."""
         return self._seat.contact
 
+    @property
+    def silent(self) -> bool:
+        """Whether the vehicle has not been heard for too long, at the last step."""
+        return self._seat.silent
+
     def step(self, event: Event, now_s: float) -> list[Action]:
         """What to do about ``event``, in order; never raises on anything received."""
         seat = self._seat

@@ -8,13 +8,16 @@
 A link reports what happens to three callbacks, in the loop's thread, and never raises
 because of its peer. Its own delays are wall seconds. A host is looked up whenever the
 link is opened, so it may become known later. A UDP link stays open once it is, whoever
-listens; its host is not looked up again. Leaves out: what the bytes mean.
+listens; its host is not looked up again. Nothing is delivered late: what this machine still
+holds when a link is closed or given up is thrown away. Leaves out: what the bytes mean.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -28,6 +31,14 @@ from agent.mavlink.link_address import (
 )
 from swarm.log import get_logger
 
+try:
+    import fcntl
+    import termios
+except ImportError:  # not POSIX
+    _POSIX = False
+else:
+    _POSIX = True
+
 __all__ = ["SILENCE_S", "Link", "LinkCounts", "LinkListener", "open_link"]
 
 _FIRST_PAUSE_S = 0.1
@@ -39,6 +50,12 @@ SILENCE_S = 10.0
 """A TCP connection that has said nothing for that long may have lost its other end without
 a word, as when a machine is switched off: it is given up and dialled again. Every autopilot
 says something each second."""
+_UNHEARD_FRAC = 0.5
+"""Of that time: after so long the system ends a connection whose other end acknowledges
+nothing (tcp(7), TCP_USER_TIMEOUT), and discards what it holds."""
+_DISCARD_AT_CLOSE = struct.pack("ii", 1, 0)
+"""SO_LINGER, on, 0 s: closing resets the connection, and the system's queue is discarded
+instead of being delivered once the peer reads again (socket(7))."""
 _PEER_SILENCE_S = 3.0
 """After that much silence of its peer a listening link turns to whoever speaks next."""
 
@@ -101,6 +118,16 @@ class Link:
             self.counts.unsent += 1
             self.counts.unsent_bytes += len(data)
 
+    def give_up(self) -> None:
+        """Open the link anew; what was sent and is still in this machine is never delivered."""
+        self._shut()
+        self._lost.set()
+
+    def discard(self) -> None:
+        """Throw away what was sent and is still in this machine, if there is anything."""
+        if self._holds_unsent():
+            self.give_up()
+
     async def close(self) -> None:
         """Close for good; closing twice is fine."""
         if self._task is not None:
@@ -152,7 +179,11 @@ class Link:
     def _write(self, data: bytes) -> bool:
         raise NotImplementedError
 
+    def _holds_unsent(self) -> bool:
+        raise NotImplementedError
+
     def _shut(self) -> None:
+        """Close without delivering anything more; shutting twice is fine."""
         raise NotImplementedError
 
 
@@ -174,6 +205,11 @@ class _TcpLink(Link):
             self._address.host,
             self._address.port,
         )
+        connection: socket.socket = self._transport.get_extra_info("socket")
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _DISCARD_AT_CLOSE)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux
+            unheard_ms = max(1, round(1e3 * _UNHEARD_FRAC * self._silence_s))
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, unheard_ms)
         self._heard_s = loop.time()
         self._look_again_at(self._heard_s + self._silence_s)
 
@@ -205,6 +241,15 @@ class _TcpLink(Link):
         transport.write(data)
         return True
 
+    def _holds_unsent(self) -> bool:
+        """Whether the peer's system has not acknowledged everything yet."""
+        transport = self._transport
+        if transport is None or transport.is_closing():
+            return False
+        return transport.get_write_buffer_size() > 0 or _unacknowledged(
+            transport.get_extra_info("socket")
+        )
+
     def _shut(self) -> None:
         if self._watch is not None:
             self._watch.cancel()
@@ -212,6 +257,17 @@ class _TcpLink(Link):
         if self._transport is not None:
             self._transport.abort()
             self._transport = None
+
+
+def _unacknowledged(connection: socket.socket) -> bool:
+    """Whether the system holds bytes of ours (tcp(7), SIOCOUTQ); if that is unknown, it may."""
+    if not _POSIX:
+        return True
+    try:
+        answer = fcntl.ioctl(connection.fileno(), termios.TIOCOUTQ, bytes(4))
+    except OSError:
+        return True
+    return any(answer)
 
 
 class _StreamProtocol(asyncio.Protocol):
@@ -254,6 +310,9 @@ class _UdpLink(Link):
             self._transport, _ = await loop.create_datagram_endpoint(protocol, local_addr=place)
         else:
             self._transport, _ = await loop.create_datagram_endpoint(protocol, remote_addr=place)
+        # Full with the first datagram that has to wait, so that none grows old. Typeshed puts
+        # what all transports of asyncio have in those of streams alone.
+        self._transport.set_write_buffer_limits(high=0)  # type: ignore[attr-defined]
 
     def on_datagram(self, data: bytes, sender: _Peer) -> None:
         if isinstance(self._address, UdpInAddress):
@@ -290,6 +349,9 @@ class _UdpLink(Link):
         else:
             transport.sendto(data)
         return True
+
+    def _holds_unsent(self) -> bool:
+        return self._full
 
     def _shut(self) -> None:
         if self._transport is not None:

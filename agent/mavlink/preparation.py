@@ -37,6 +37,7 @@ _PREARM_TEXT_AGE_S = 35.0
 """ArduPilot repeats what fails before arming every 30 s."""
 _CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
 _ARMED_BY_OTHERS = "somebody else armed it and disarmed it again; prepare it again to take off"
+_NULL_ISLAND = ", near 0° N 0° E: a PX4 before 1.16 starts its own simulator there"
 _FLOWN_BY_PILOT = "its pilot flew and landed it; prepare it again to take off"
 
 
@@ -222,7 +223,8 @@ class Preparation:
         )
         distance_m = math.hypot(east_m, north_m)
         if distance_m > config.fence_radius_m:
-            return f"the vehicle stands {distance_m / 1e3:.0f} km from the mission's origin"
+            cause = _NULL_ISLAND if max(abs(position.lat_deg), abs(position.lon_deg)) < 1.0 else ""
+            return f"the vehicle stands {distance_m / 1e3:.1f} km from the mission's origin{cause}"
         home_alt_m, ground_up_m = _home_alt_m(position), self._order.ground_up_m
         if ground_up_m is not None:
             east_m, north_m, _ = self._order.position_enu_m

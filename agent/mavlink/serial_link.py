@@ -101,6 +101,12 @@ class SerialLink(Link):
         except OSError:
             return False  # full, or gone: reading will notice
 
+    def discard(self) -> None:
+        """Throw away what the port has not sent yet; it stays open."""
+        if self._file is not None:
+            with contextlib.suppress(OSError, termios.error):  # gone: reading will notice
+                termios.tcflush(self._file, termios.TCOFLUSH)
+
     def _stop_reading(self) -> None:
         if self._file is not None:
             asyncio.get_running_loop().remove_reader(self._file)
@@ -108,6 +114,7 @@ class SerialLink(Link):
     def _shut(self) -> None:
         if self._file is not None:
             self._stop_reading()
+            self.discard()  # closing would wait until it is sent
             with contextlib.suppress(OSError):
                 os.close(self._file)
             self._file = None

@@ -18,7 +18,7 @@ from agent.mavlink.link import Link, open_link
 from agent.mavlink.link_address import parse_forward, parse_link
 from agent.mavlink.signing import Signing, SigningKey
 from agent.mavlink.turnaround import TurnaroundMeter
-from agent.vehicle import Orders, Report
+from agent.vehicle import HandedOver, Orders, Report
 from swarm.clock import Clock, unix_s
 from swarm.log import get_logger
 
@@ -29,8 +29,8 @@ TURNAROUNDS = "next targets sent"
 
 _SHORTEST_WAIT_S = 0.001
 _REDIAL_TIMEOUTS = 2.0
-"""A link that has been silent for that many of the bridge's timeouts is dialled again: after
-the vehicle was handed over, never before."""
+"""A link that has been silent for that many of the bridge's timeouts is dialled again, if the
+vehicle was not ours to hand over, which does so at once."""
 
 
 class MavlinkVehicle:
@@ -158,6 +158,8 @@ class MavlinkVehicle:
                 self.link.send(action.data)
                 self._meter.sent(action.data, self._clock.now_s())
             else:
+                if isinstance(action, HandedOver):
+                    self._let_go()
                 self._reports.append(action)
         if not self._reporting:
             self._report()
@@ -172,6 +174,13 @@ class MavlinkVehicle:
                 self._on_report(report)
         finally:
             self._reporting = False
+
+    def _let_go(self) -> None:
+        """No order may reach a vehicle that was handed over, however late its link delivers."""
+        if self.bridge.silent:
+            self.link.give_up()
+        else:
+            self.link.discard()
 
     def _set_timer(self) -> None:
         loop = asyncio.get_running_loop()

@@ -14,7 +14,14 @@ from sim.autopilot.flavours import FlavourName
 from sim.launch.firmware import Firmware, FirmwareKind, find_firmware
 from swarm.errors import Fault, InputError
 
-__all__ = ["Autopilots", "Running", "Simulated", "VehiclePlace", "parse_autopilots"]
+__all__ = [
+    "Autopilots",
+    "Running",
+    "Simulated",
+    "VehiclePlace",
+    "check_speedup",
+    "parse_autopilots",
+]
 
 _SOURCE = "--autopilot"
 _REMEDY = (
@@ -83,6 +90,21 @@ def parse_autopilots(
     if ":" not in kind:
         raise InputError(Fault(_SOURCE, text, "no such autopilot", _REMEDY))
     return Running(_places(kind, uavs))
+
+
+def check_speedup(autopilots: Autopilots, speedup: float) -> None:
+    """Refuse to hurry vehicles whose time cannot run faster.
+
+    Raises:
+        InputError: a vehicle hangs on a serial port, so it is real: every time limit that
+            keeps it safe would be stretched.
+    """
+    if speedup == 1.0 or not isinstance(autopilots, Running):
+        return
+    for place in autopilots.places:
+        if place.url.startswith("serial:"):
+            problem = f"the vehicle of {place.uav} at {place.url} is real, its time runs at 1"
+            raise InputError(Fault("--speedup", f"{speedup:g}", problem, "leave the option out"))
 
 
 def _places(text: str, uavs: Sequence[str]) -> tuple[VehiclePlace, ...]:

@@ -15,6 +15,7 @@ from agent.mavlink.link_address import parse_forward
 from agent.mavlink.signing_key import load_signing_key
 from sim.autopilot.options import faults_by_uav
 from sim.launch.autopilots import Autopilots, Simulated
+from sim.launch.fence import Fence
 from swarm.errors import Fault, InputError
 
 __all__ = ["HandedOn", "check_handed_on", "parse_command_styles"]
@@ -31,6 +32,8 @@ class HandedOn:
     forward: tuple[str, ...] = ()
     signing_key: Path | None = None
     battery_reserve: float | None = None
+    fence: Fence | None = None
+    without_bus_s: float | None = None
     faults: tuple[str, ...] = ()
     """Each ``UAV:KIND@T+DURATION``."""
 
@@ -40,7 +43,9 @@ class HandedOn:
         return [
             *([] if style is None else ["--command", style]),
             *(word for url in self.forward for word in ("--forward", url)),
-            *self._reserve(),
+            *_given("--battery-reserve", self.battery_reserve),
+            *([] if self.fence is None else self.fence.to_agent()),
+            *_given("--without-bus-s", self.without_bus_s),
             *self._signing(),
         ]
 
@@ -49,12 +54,12 @@ class HandedOn:
         faults = [fault for fault in self.faults if fault.partition(":")[0] in uavs]
         return [*(word for fault in faults for word in ("--fault", fault)), *self._signing()]
 
-    def _reserve(self) -> list[str]:
-        reserve = self.battery_reserve
-        return [] if reserve is None else ["--battery-reserve", repr(reserve)]
-
     def _signing(self) -> list[str]:
         return [] if self.signing_key is None else ["--signing-key", str(self.signing_key)]
+
+
+def _given(option: str, value: float | None) -> list[str]:
+    return [] if value is None else [option, repr(value)]
 
 
 def parse_command_styles(text: str | None, uavs: Sequence[str]) -> dict[str, CommandStyle]:

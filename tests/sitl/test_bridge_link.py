@@ -294,6 +294,11 @@ class ServedCopter(asyncio.Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         self._transport = None
 
+    @property
+    def connected(self) -> bool:
+        """Whether there is a connection that is served."""
+        return self._transport is not None
+
     def cut_silently(self) -> None:
         """Say nothing more on this connection, which stays open; only a new one is served."""
         self._transport = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import pty
 import socket
@@ -21,6 +22,7 @@ from agent.vehicle import GoTo, HandedOver, Report, VehicleReady
 from swarm.clock import ScaledClock
 from tests.bridge_flight import ORIGIN, START
 from tests.sitl.test_bridge_link import (
+    PATIENCE_S,
     Listener,
     ServedCopter,
     Server,
@@ -102,6 +104,127 @@ async def test_vehicle_behind_a_half_open_connection_is_handed_over_and_heard_ag
         await vehicle.close()
         await served.stop()
     assert [r for r in reports if isinstance(r, HandedOver)] == [silent]
+
+
+class Stalled:
+    """A server that accepts connections and reads nothing of them until it is told to."""
+
+    def __init__(self) -> None:
+        self._listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        self._listening.bind(("127.0.0.1", 0))
+        self._listening.listen()
+        self._listening.setblocking(False)
+        self.url = f"tcp:127.0.0.1:{self._listening.getsockname()[1]}"
+        self.accepted: list[socket.socket] = []
+
+    async def accept(self) -> None:
+        loop = asyncio.get_running_loop()
+        async with asyncio.timeout(PATIENCE_S):
+            self.accepted.append((await loop.sock_accept(self._listening))[0])
+
+    async def read_first(self) -> bytes:
+        """All that the first connection ever delivers."""
+        data = b""
+        async with asyncio.timeout(PATIENCE_S):
+            with contextlib.suppress(ConnectionError):
+                while more := await asyncio.get_running_loop().sock_recv(self.accepted[0], 65_536):
+                    data += more
+        return data
+
+    def stop(self) -> None:
+        for each in (self._listening, *self.accepted):
+            each.close()
+
+
+FILLER, OLD_ORDER = bytes(32_768), b"old order"
+
+
+@in_loop
+async def test_what_a_stalled_connection_holds_is_not_delivered_once_it_is_given_up() -> None:
+    server, listener = Stalled(), Listener()
+    async with opened(server.url, listener) as link:
+        await server.accept()
+        await up(listener)
+        for word in (FILLER, OLD_ORDER):
+            link.send(word)
+        link.discard()
+        await up(listener, 2)
+        assert listener.downs == 1
+        assert link.counts.unsent == 0
+        assert OLD_ORDER not in await server.read_first()
+    server.stop()
+
+
+@in_loop
+async def test_what_a_stalled_connection_holds_is_not_delivered_once_it_is_closed() -> None:
+    server, listener = Stalled(), Listener()
+    async with opened(server.url, listener) as link:
+        await server.accept()
+        await up(listener)
+        for word in (FILLER, OLD_ORDER):
+            link.send(word)
+    assert OLD_ORDER not in await server.read_first()
+    server.stop()
+
+
+@in_loop
+async def test_link_that_holds_nothing_stays_open_when_it_is_to_discard() -> None:
+    server, listener = Server(), Listener()
+    port = await server.listen()
+    async with opened(f"tcp:127.0.0.1:{port}", listener) as link:
+        await up(listener)
+        link.send(b"order")
+        await until(lambda: server.data == b"order")
+        link.discard()
+        await asyncio.sleep(0.05)
+        assert (listener.ups, listener.downs) == (1, 0)
+    await server.stop()
+
+
+@in_loop
+async def test_what_a_serial_port_has_not_sent_is_discarded() -> None:
+    far, near = pty.openpty()
+    os.set_blocking(far, False)
+    listener = Listener()
+    async with opened(f"serial:{os.ttyname(near)}:57600", listener) as link:
+        await up(listener)
+        sent = 0
+        while link.counts.unsent == 0:
+            link.send(bytes(512))
+            sent += 512
+        link.discard()
+        assert (listener.ups, listener.downs) == (1, 0)
+        received = 0
+        with contextlib.suppress(BlockingIOError):
+            while data := os.read(far, 65_536):
+                received += len(data)
+        assert received < sent - 512
+    os.close(far)
+    os.close(near)
+
+
+@in_loop
+async def test_silent_connection_is_given_up_with_the_vehicle() -> None:
+    speedup = 20.0
+    clock = ScaledClock(speedup)
+    served = ServedCopter(clock)
+    port = await served.listen()
+    reports: list[Report] = []
+    config = BridgeConfig(1, ORIGIN, silence_timeout_s=60.0, position_rate_hz=20.0)
+    vehicle = MavlinkVehicle(config, f"tcp:127.0.0.1:{port}", clock, reports.append)
+    try:
+        await vehicle.start()
+        vehicle.order(START)
+        await until(lambda: VehicleReady() in reports)
+        served.cut_silently()
+        await until(lambda: any(isinstance(each, HandedOver) for each in reports))
+        handed_over_s = clock.now_s()
+        await until(lambda: served.connected)
+        assert clock.now_s() - handed_over_s < 0.5 * config.silence_timeout_s
+    finally:
+        await vehicle.close()
+        await served.stop()
 
 
 class Names:

@@ -19,7 +19,7 @@ from agent.mavlink.config import CommandStyle
 from sim.launch.firmware import FirmwareKind
 from tests.process.mission import alive, wait_until
 from tests.sitl.firmware_stand_in import arducopter_stand_in, px4_stand_in
-from tests.sitl.whole_run import FIELD, UAVS, autopilot_of, fly
+from tests.sitl.whole_run import MEADOW, UAVS, autopilot_of, fly
 
 pytestmark = [pytest.mark.sitl, pytest.mark.process, pytest.mark.timeout(240)]
 
@@ -56,8 +56,8 @@ def test_firmware_is_started_on_the_ports_where_agents_look_for_it(
     programs, work = tmp_path / "programs", tmp_path / "work"
     programs.mkdir()
     work.mkdir()
-    scenario = programs / "field.toml"  # a name that only this test's vehicles carry
-    scenario.write_text(FIELD.read_text())
+    scenario = programs / "meadow.toml"  # a name that only this test's vehicles carry
+    scenario.write_text(MEADOW.read_text())
     place = make(programs, str(scenario), list(UAVS))
 
     flown = fly(work, "--autopilot", kind, "--firmware", str(place), speedup=20.0)
@@ -69,7 +69,7 @@ def test_firmware_is_started_on_the_ports_where_agents_look_for_it(
 def test_vehicles_that_run_already_are_flown_and_left_running(tmp_path: Path) -> None:
     vehicles = subprocess.Popen(
         [
-            *(sys.executable, "-m", "swarm", "autopilot", str(FIELD), "--json"),
+            *(sys.executable, "-m", "swarm", "autopilot", str(MEADOW), "--json"),
             *("--system-id", "41", "--speedup", "20"),
         ],
         stdout=subprocess.PIPE,

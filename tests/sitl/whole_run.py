@@ -13,12 +13,13 @@ from typing import Any
 
 from sim.launch.firmware import FirmwareKind
 from swarm.scenario import load_scenario
+from swarm.scenario.shipped import resolve_scenario
 from tests.process.mission import SwarmRun
 
-__all__ = ["FIELD", "TASKS", "UAVS", "Autopilot", "Flown", "autopilot_of", "fly"]
+__all__ = ["MEADOW", "TASKS", "UAVS", "Autopilot", "Flown", "autopilot_of", "fly"]
 
-FIELD = Path(__file__).parents[1] / "data" / "scenarios" / "field.toml"
-_MISSION = load_scenario(FIELD)
+MEADOW = resolve_scenario("meadow")
+_MISSION = load_scenario(MEADOW)
 UAVS = [uav.id for uav in _MISSION.uavs]
 TASKS = sorted(task.id for task in _MISSION.tasks)
 
@@ -46,8 +47,8 @@ class Flown:
 
 
 def fly(folder: Path, *arguments: str, speedup: float = 10.0) -> Flown:
-    """Fly `FIELD` with these arguments of `swarm run`."""
-    words = [str(FIELD), "--speedup", f"{speedup:g}", *arguments]
+    """Fly `MEADOW` with these arguments of `swarm run`."""
+    words = [str(MEADOW), "--speedup", f"{speedup:g}", *arguments]
     with SwarmRun(words, folder) as run:
         status, told = run.result(timeout_s=170.0)
         run.assert_nothing_left()

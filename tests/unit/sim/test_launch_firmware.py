@@ -61,6 +61,15 @@ def test_arducopter_reads_its_parameters_from_a_file_in_its_folder() -> None:
     assert parameters["BATT_MONITOR"] == "4"
 
 
+def test_battery_of_arducopter_lasts_for_a_shipped_mission() -> None:
+    made, _ = processes(FirmwareKind.ARDUPILOT, "/opt/arducopter")
+
+    text = made.files[value(made, "--defaults")]
+    capacity_mah = float(dict(line.split() for line in text.splitlines())["BATT_CAPACITY"])
+    # Recorded: 27 % of 3300 mAh in 110 s.
+    assert 0.8 * capacity_mah / (0.27 * 3300.0 / 110.0) > 3000.0
+
+
 def test_every_px4_has_ports_and_system_id_of_its_own() -> None:
     made = processes(FirmwareKind.PX4, "/opt/px4/bin/px4")
 

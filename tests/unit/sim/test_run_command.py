@@ -18,6 +18,13 @@ from swarm.cli import main
         (["--forward", "tcp:127.0.0.1:1"], "--forward: tcp:127.0.0.1:1: 'tcp' is no kind of link"),
         (["--signing-key", "/no/such/key"], "/no/such/key: cannot be read"),
         (["--battery-reserve", "much"], "--battery-reserve"),
+        (["--fence-radius-m", "0"], "--fence-radius-m"),
+        (["--fence-height-m", "high"], "--fence-height-m"),
+        (["--without-bus-s", "0"], "--without-bus-s"),
+        (
+            ["--speedup", "2", "--autopilot", "tcp:h:1,tcp:h:2,serial:/dev/ttyUSB0:57600"],
+            "--speedup: 2: the vehicle of uav3 at serial:/dev/ttyUSB0:57600 is real, ",
+        ),
         (["--fault", "uav1:rain@5"], "--fault: "),
         (["--fault", "uav9:pilot@5"], "--fault: "),
     ],

@@ -19,7 +19,7 @@ from swarm.model import Mission
 from swarm.scenario import format_scenario, load_scenario, parse_scenario
 from swarm.scenario.shipped import resolve_scenario, shipped_scenarios
 
-NAMES = ["table-1", "valley-popups", "valley-survey"]
+NAMES = ["meadow", "table-1", "valley-popups", "valley-survey"]
 
 
 def shipped(name: str) -> Mission:
@@ -53,9 +53,9 @@ def test_existing_file_wins_over_a_shipped_name(
             "valley-survey.toml",
             "valley-survey.toml: no such scenario file; did you mean 'valley-survey'? Shipped",
         ),
-        ("", "SCENARIO: no such scenario file; give a file or a shipped scenario: table-1, "),
-        ("a\nb", r"'a\nb': no such scenario file; give a file or a shipped scenario: table-1, "),
-        ("\0", r"'\x00': no such scenario file; give a file or a shipped scenario: table-1, "),
+        ("", "SCENARIO: no such scenario file; give a file or a shipped scenario: meadow, "),
+        ("a\nb", r"'a\nb': no such scenario file; give a file or a shipped scenario: meadow, "),
+        ("\0", r"'\x00': no such scenario file; give a file or a shipped scenario: meadow, "),
         ("x" * 5000, "x" * 5000 + ": no such scenario file; give a file or a shipped scenario: "),
     ],
 )

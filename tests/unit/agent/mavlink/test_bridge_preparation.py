@@ -332,7 +332,18 @@ def test_vehicle_at_the_other_end_of_the_world_is_refused(fake: type[FakeCopter]
     flight.order(START)
     refused = flight.run_until(Refused)
     assert isinstance(refused, Refused)
-    assert "km from the mission's origin" in refused.reason
+    assert refused.reason.endswith("km from the mission's origin")
+    assert not flight.copter.commands(ARM)
+
+
+def test_vehicle_that_an_older_px4_put_off_africa_is_refused_with_the_cause(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(replace(ORIGIN, lat_deg=4.7e-6, lon_deg=8e-7)))
+    flight.order(START)
+    refused = flight.run_until(Refused)
+    assert isinstance(refused, Refused)
+    assert "near 0° N 0° E: a PX4 before 1.16" in refused.reason
     assert not flight.copter.commands(ARM)
 
 
