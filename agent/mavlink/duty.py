@@ -57,6 +57,8 @@ class Duty:
             self._seat.say(*self._work.preparation.on_position(position, now_s))
         if self._work.holding is not None:
             self._work.holding.on_position(position)
+        elif self._work.returning is not None:
+            self._work.returning.on_position(place_enu_m, position.velocity_enu_m_s, now_s)
         if self._seat.mission is not None:
             self._seat.mission.on_position(place_enu_m, now_s)
         if self._work.target is not None:
@@ -213,6 +215,7 @@ class Duty:
                 self._seat.report(Refused(prepare, holding.failure))
             if returning is not None:
                 self._work.returning, self._work.phase = returning, Phase.RETURNING
+                self._seat.say(*returning.go_straight(self._seat.now_s))
         elif prepare is not None:
             self._orders.begin_preparation(prepare)
 
