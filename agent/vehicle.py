@@ -22,6 +22,7 @@ __all__ = [
     "Report",
     "Return",
     "ReturnAdvised",
+    "ReturnBegun",
     "Telemetry",
     "VehicleReady",
 ]
@@ -138,8 +139,23 @@ class ReturnAdvised:
 
 
 @dataclass(frozen=True, slots=True)
+class ReturnBegun:
+    """The vehicle was seen to return by itself: it lands at home whoever is there to see it."""
+
+
+@dataclass(frozen=True, slots=True)
 class Home:
     """The vehicle has landed and disarmed."""
 
 
-Report = VehicleReady | NotReady | Arrived | Telemetry | Refused | HandedOver | ReturnAdvised | Home
+Report = (
+    VehicleReady
+    | NotReady
+    | Arrived
+    | Telemetry
+    | Refused
+    | HandedOver
+    | ReturnAdvised
+    | ReturnBegun
+    | Home
+)

@@ -17,7 +17,7 @@ from agent.mavlink.preparation import Preparation
 from agent.mavlink.search import Search
 from agent.mavlink.seat import Seat
 from agent.mavlink.work import Phase, Work
-from agent.vehicle import Hold, Home, Refused, Return, ReturnAdvised, VehicleReady
+from agent.vehicle import Hold, Home, Refused, Return, ReturnAdvised, ReturnBegun, VehicleReady
 
 __all__ = ["Duty"]
 
@@ -224,6 +224,8 @@ class Duty:
         if returning is None or heartbeat is None:
             return
         self._seat.say(*returning.advance(heartbeat, self._seat.now_s))
+        if returning.has_begun():
+            self._seat.report(ReturnBegun())
         on_ground = self._seat.vehicle.landed in (Landed.ON_GROUND, Landed.UNDEFINED)
         if not heartbeat.armed and (on_ground or returning.disarmed_long(self._seat.now_s)):
             self._work.drop()

@@ -57,7 +57,7 @@ class Returning:
         self._tries = 0
         self._next_at_s = -math.inf
         self._disarmed_since_s: float | None = None
-        self._seen = False
+        self._seen = self._told_seen = False
         self._refusal = "never seen in the heartbeat"
         self.failure: str | None = None
         """Why the vehicle does not return; None while it may."""
@@ -82,6 +82,11 @@ class Returning:
         if self._homeward is not None:
             return self._homeward.expects(custom_mode, from_mission=self._from_mission)
         return self._obeys(custom_mode) and not self._seen
+
+    def has_begun(self) -> bool:
+        """Whether the return mode has been seen; true once."""
+        news, self._told_seen = self._seen and not self._told_seen, self._seen
+        return news
 
     @property
     def on_detour(self) -> bool:

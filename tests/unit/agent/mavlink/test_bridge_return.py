@@ -8,7 +8,7 @@ import pytest
 
 from agent.mavlink.bridge import Phase
 from agent.mavlink.config import BridgeConfig, CommandStyle
-from agent.vehicle import GoTo, HandedOver, Hold, Home, Refused, Return, ReturnAdvised
+from agent.vehicle import GoTo, HandedOver, Hold, Home, Refused, Return, ReturnAdvised, ReturnBegun
 from tests.bridge_flight import ORIGIN, START, BridgeFlight, rough_link
 from tests.fake_copter import DENIED, REPOSITION, SET_MODE, FakeCopter
 
@@ -45,10 +45,12 @@ def test_it_flies_to_its_start_in_its_layer_and_returns_from_there(flight: Bridg
     under_way(flight)
     flight.order(RETURN)
     while flight.copter.mode != flight.copter.return_mode:
+        assert flight.seen == []
         assert abs(flight.copter.position_m[2] - VIA[2]) < 0.5, "it left its layer"
         flight.step()
     assert math.dist(flight.copter.position_m, VIA) < 1.0
     flight.run_until(Home())
+    assert flight.seen == [ReturnBegun()]
     assert flight.reports == [Home()]
 
 
