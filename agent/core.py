@@ -127,6 +127,8 @@ class AgentCore:
         """Whether the vehicle may be in the air though this life has not brought it there."""
         self._homebound = False
         """Whether it takes no further part, so that home is all that is left to fly to."""
+        self._on_detour = False
+        """Whether the vehicle was told to fly to its start before it returns."""
         self._exit_status = 0
         self._finished = False
         self._kept: object = None
@@ -221,7 +223,7 @@ class AgentCore:
             case Stop(reason):
                 if self._stage is StatusPhase.LEARNING:
                     self._recollect(now_s, last_chance=True)
-                self._go_home(reason, now_s)
+                self._go_home(reason, now_s, hurry=True)
             case Tick():
                 pass
             case VehicleReady():
@@ -240,7 +242,7 @@ class AgentCore:
                 self._leave_vehicle(reason, now_s, handed_over=True)
             case ReturnAdvised(reason):
                 if self.phase is not StatusPhase.OUT:
-                    self._go_home(reason, now_s)
+                    self._go_home(reason, now_s, hurry=True)
             case Home():
                 self._come_home(now_s)
 
@@ -267,7 +269,7 @@ class AgentCore:
         if isinstance(order, GoTo):
             self._actions += self._tasking.refuse(order.leg, reason, now_s)
         elif isinstance(order, Prepare) and self._flew_before:
-            self._go_home(reason, now_s, status=1)  # it may be in the air
+            self._go_home(reason, now_s, status=1, hurry=True)  # it may be in the air
         elif isinstance(order, Hold) and self._stage is StatusPhase.HOLDING:
             self._speech.note = f"cannot hold: {reason}"[:200]
         elif isinstance(order, Prepare | Return):
@@ -435,15 +437,19 @@ class AgentCore:
         self._stage, self._speech.note = stage, note[:200]
         self._hearing.at_work = True
 
-    def _go_home(self, reason: str, now_s: float, *, status: int = 0) -> None:
+    def _go_home(self, reason: str, now_s: float, *, status: int = 0, hurry: bool = False) -> None:
+        """Bring the vehicle home; where there is time, in its own layer as far as its start."""
         if self.phase is StatusPhase.OUT:
             # The vehicle is not ours to command any more.
             self._finish(0, now_s)
-        elif self.phase is not StatusPhase.RETURNING:
+        elif self.phase is not StatusPhase.RETURNING or (hurry and self._on_detour):
             self._take_no_further_part(now_s)
             self._exit_status = max(self._exit_status, status)
             self._enter(StatusPhase.RETURNING, reason)
-            order = Return(reason, resume=self._flew_before)
+            me = None if hurry else self._picture.me
+            via_enu_m = None if me is None else self._picture.in_layer(me.position_enu_m)
+            self._on_detour = via_enu_m is not None
+            order = Return(reason, self._flew_before, via_enu_m)
             self._actions += [Note("returning", {"reason": reason}), Order(order)]
 
     def _take_no_further_part(self, now_s: float) -> None:

@@ -15,7 +15,7 @@ from typing import Protocol
 
 from agent.core import AgentCore
 from agent.events import Action, Event, Order
-from agent.vehicle import Home, Orders, Report, Return
+from agent.vehicle import Home, Orders, Report, Return, ReturnBegun
 from swarm.bus.port import Bus
 from swarm.clock import Clock
 from swarm.config import PRESETS, Link
@@ -30,9 +30,9 @@ __all__ = ["Vehicle", "run_agent", "seat_or_stop"]
 
 RETRY_S = 0.5
 """Wall time between a failed try for a seat on the bus and the next."""
-FAREWELL_S = 2.0
-"""Wall time that a vehicle has to come home when the agent is told to stop; after that
-it returns on its own."""
+FAREWELL_S = 15.0
+"""Longest wall time from being told to stop to leaving: what it takes to find a vehicle, and
+to see it return."""
 
 
 class Vehicle(Protocol):
@@ -133,7 +133,7 @@ async def run_agent(
         clock: gives the core's time.
         make_vehicle: makes the vehicle once the mission's origin is known, with a
             callback for its reports.
-        stop: asks to leave early: the vehicle is told to return first.
+        stop: asks to leave early: the vehicle is told to return first, and seen to.
         save: keeps what the core knows for its next life.
         answer_s: how long a question waits for the slowest answer [wall s].
 
@@ -143,12 +143,15 @@ async def run_agent(
     loop = asyncio.get_running_loop()
     vehicle: Vehicle | None = None
     starting: asyncio.Task[None] | None = None
+    returns = asyncio.Event()
 
     def execute(action: Action) -> None:
         nonlocal vehicle, starting
         if not isinstance(action, Order):
             return
         brief, order = core.replica.brief, action.order
+        if not isinstance(order, Return):
+            returns.clear()
         flown = not isinstance(order, Return) or order.resume
         if vehicle is None and brief is not None and flown:
             vehicle = make_vehicle(Origin(*brief.origin), report)
@@ -161,6 +164,8 @@ async def run_agent(
             loop.call_soon(report, Home())
 
     def report(news: Report) -> None:
+        if isinstance(news, ReturnBegun):
+            returns.set()
         shell.step(news)
 
     def failed(task: asyncio.Task[None]) -> None:
@@ -177,7 +182,12 @@ async def run_agent(
     async def farewell() -> int:
         status = await stop.wait()
         shell.step(Stop("the agent was told to stop"))
-        await asyncio.wait((flying,), timeout=FAREWELL_S)
+        seen = loop.create_task(returns.wait())
+        try:
+            first = asyncio.FIRST_COMPLETED
+            await asyncio.wait((flying, seen), timeout=FAREWELL_S, return_when=first)
+        finally:
+            seen.cancel()
         return status
 
     shell: Shell[Event, Action] = Shell(

@@ -22,6 +22,7 @@ __all__ = [
     "Report",
     "Return",
     "ReturnAdvised",
+    "ReturnBegun",
     "Telemetry",
     "VehicleReady",
 ]
@@ -69,11 +70,17 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Return:
-    """Return to launch and land."""
+    """Return to launch and land.
+
+    Ordered again without `via_enu_m`, a vehicle on its way there returns from where it is.
+    """
 
     reason: str
     resume: bool = False
     """An earlier life of this agent flew the vehicle: look whether it is in the air."""
+    via_enu_m: tuple[float, float, float] | None = None
+    """Where to fly first [m; mission origin, height included], if nothing is in the way of it:
+    return modes fly at a height of the vehicle's own. None to return at once."""
 
 
 Orders = Prepare | GoTo | Hold | Return
@@ -136,8 +143,23 @@ class ReturnAdvised:
 
 
 @dataclass(frozen=True, slots=True)
+class ReturnBegun:
+    """The vehicle was seen to return by itself: it lands at home whoever is there to see it."""
+
+
+@dataclass(frozen=True, slots=True)
 class Home:
     """The vehicle has landed and disarmed."""
 
 
-Report = VehicleReady | NotReady | Arrived | Telemetry | Refused | HandedOver | ReturnAdvised | Home
+Report = (
+    VehicleReady
+    | NotReady
+    | Arrived
+    | Telemetry
+    | Refused
+    | HandedOver
+    | ReturnAdvised
+    | ReturnBegun
+    | Home
+)

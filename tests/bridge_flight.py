@@ -10,7 +10,16 @@ from agent.mavlink.bridge import Bridge
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import Event, LinkUp, Received, Send, Tick
 from agent.mavlink.signing import Signing, SigningKey
-from agent.vehicle import GoTo, NotReady, Orders, Prepare, Report, Telemetry, VehicleReady
+from agent.vehicle import (
+    GoTo,
+    NotReady,
+    Orders,
+    Prepare,
+    Report,
+    ReturnBegun,
+    Telemetry,
+    VehicleReady,
+)
 from swarm.model.frames import Origin
 from tests.fake_copter import FakeCopter
 
@@ -59,7 +68,9 @@ class BridgeFlight:
             self.copter.power_on(100.0)
         self.now_s = self.copter.now_s
         self.reports: list[Report] = []
-        """All but telemetry, in order."""
+        """All but telemetry and what was seen, in order."""
+        self.seen: list[Report] = []
+        """What was seen of the effect of orders, in order."""
         self._read = 0
         self.telemetry: list[Telemetry] = []
         self.happen(LinkUp())
@@ -75,7 +86,8 @@ class BridgeFlight:
             else:
                 reports.append(action)
         self.telemetry += [r for r in reports if isinstance(r, Telemetry)]
-        self.reports += [r for r in reports if not isinstance(r, Telemetry)]
+        self.seen += [r for r in reports if isinstance(r, ReturnBegun)]
+        self.reports += [r for r in reports if not isinstance(r, Telemetry | ReturnBegun)]
         self._carry(answers)
         return reports
 

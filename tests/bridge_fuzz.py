@@ -410,7 +410,8 @@ class Episode:
             case 6 | 7:
                 return Hold("wait")
             case _:
-                return Return("enough", resume=random.random() < 0.5)
+                via = self._place() if random.random() < 0.5 else None
+                return Return("enough", resume=random.random() < 0.5, via_enu_m=via)
 
     def _go_to(self, *, inside: bool) -> GoTo:
         self._legs += 1

@@ -83,7 +83,7 @@ _COMMANDS: dict[Phase, set[int]] = {
     Phase.HOVERING: {REPOSITION},
     Phase.FLYING: {REPOSITION},
     Phase.HOLDING: {SET_MODE, REPOSITION, ARM},
-    Phase.RETURNING: {SET_MODE},
+    Phase.RETURNING: {SET_MODE, REPOSITION},
     Phase.HANDED_OVER: set(),
 }
 """What may be commanded in each phase, beside requests for messages; motors are started
@@ -179,6 +179,8 @@ class BridgeWatch:
                 self._task = _Task((*places_m[-_PLACES:], position_enu_m))
             case GoTo(leg, position_enu_m):
                 self._task = _Task((*places_m[-_PLACES:], position_enu_m), leg)
+            case Return(via_enu_m=tuple() as via_enu_m):
+                self._task = _Task((*places_m[-_PLACES:], via_enu_m))
             case Hold() | Return():
                 self._task = _Task(places_m)
         self._task.told_m.extend(self._heres_m)

@@ -35,6 +35,8 @@ START_S = 100.0
 """The agent's clock when its process begins."""
 ZERO_S = 200.0
 """The agent's clock at mission time 0."""
+ABOVE_START = (0.0, 0.0, 10.0)
+"""Where `u0` starts, in its layer: unless in a hurry, it flies there before it returns."""
 
 
 class LoneAgent:

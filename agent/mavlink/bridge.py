@@ -182,14 +182,21 @@ class Bridge:
         """Let go of a vehicle that has lost its way, and advise one in trouble to go home."""
         seat, work = self._seat, self._work
         flavour, now_s = seat.flavour, seat.now_s
-        if flavour is None or not work.in_our_hands() or work.phase is Phase.RETURNING:
+        if flavour is None or not work.in_our_hands() or not flavour.airborne(seat.vehicle):
             return
-        if not flavour.airborne(seat.vehicle):
+        returning = work.returning if work.phase is Phase.RETURNING else None
+        if returning is not None and not returning.on_detour:
             return
-        if (lost := seat.guards.position_lost(now_s)) is not None:
+        lost = seat.guards.position_lost(now_s)
+        if lost is not None and returning is None:
             work.hand_over(lost)
-        elif (advice := seat.guards.advice(seat.vehicle, flavour, now_s)) is not None:
-            seat.report(ReturnAdvised(advice))
+            return
+        advice = lost or seat.guards.advice(seat.vehicle, flavour, now_s)
+        if advice is None:
+            return
+        if returning is not None:
+            seat.say(*returning.go_straight(now_s))
+        seat.report(ReturnAdvised(advice))
 
     def _on_position(self, position: Position) -> None:
         match self._seat.vehicle.on_position(position):

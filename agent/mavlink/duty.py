@@ -17,7 +17,7 @@ from agent.mavlink.preparation import Preparation
 from agent.mavlink.search import Search
 from agent.mavlink.seat import Seat
 from agent.mavlink.work import Phase, Work
-from agent.vehicle import Hold, Home, Refused, Return, ReturnAdvised, VehicleReady
+from agent.vehicle import Hold, Home, Refused, Return, ReturnAdvised, ReturnBegun, VehicleReady
 
 __all__ = ["Duty"]
 
@@ -57,6 +57,8 @@ class Duty:
             self._seat.say(*self._work.preparation.on_position(position, now_s))
         if self._work.holding is not None:
             self._work.holding.on_position(position)
+        elif self._work.returning is not None:
+            self._work.returning.on_position(place_enu_m, position.velocity_enu_m_s, now_s)
         if self._seat.mission is not None:
             self._seat.mission.on_position(place_enu_m, now_s)
         if self._work.target is not None:
@@ -214,6 +216,7 @@ class Duty:
                 self._seat.report(Refused(prepare, holding.failure))
             if returning is not None:
                 self._work.returning, self._work.phase = returning, Phase.RETURNING
+                self._seat.say(*returning.go_straight(self._seat.now_s))
         elif prepare is not None:
             self._orders.begin_preparation(prepare)
 
@@ -222,6 +225,8 @@ class Duty:
         if returning is None or heartbeat is None:
             return
         self._seat.say(*returning.advance(heartbeat, self._seat.now_s))
+        if returning.has_begun():
+            self._seat.report(ReturnBegun())
         on_ground = self._seat.vehicle.landed in (Landed.ON_GROUND, Landed.UNDEFINED)
         if not heartbeat.armed and (on_ground or returning.disarmed_long(self._seat.now_s)):
             self._work.drop()

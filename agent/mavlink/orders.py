@@ -11,6 +11,7 @@ import math
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.holding import Holding, modes_left
+from agent.mavlink.homeward import Homeward
 from agent.mavlink.messages import Landed
 from agent.mavlink.returning import Returning
 from agent.mavlink.search import Search
@@ -143,6 +144,8 @@ class OrderTaker:
         """Bring a vehicle home, unless it is down, somebody else's, or not known well enough."""
         work = self._work
         if work.phase is Phase.RETURNING:
+            if order.via_enu_m is None and work.returning is not None:
+                self._seat.say(*work.returning.go_straight(self._seat.now_s))
             return
         in_air = (Phase.HOVERING, Phase.FLYING, Phase.HOLDING)
         took_off = work.phase in in_air or work.took_off()
@@ -188,15 +191,37 @@ class OrderTaker:
             self.come_home(order, flavour)
 
     def come_home(self, order: Return, flavour: Flavour) -> None:
-        """Bring home a vehicle that flies and obeys."""
+        """Bring home a vehicle that flies and obeys, or returns already."""
         self._work.returning = Returning(
             order,
             self._seat.config,
             self._seat.commands,
             flavour,
             from_mission=self._seat.mission is not None,
+            homeward=self._homeward(order, flavour),
         )
         self._work.phase = Phase.RETURNING
+
+    def _homeward(self, order: Return, flavour: Flavour) -> Homeward | None:
+        """The way to where the order says to fly first; None if there is none to be taken."""
+        seat, via_enu_m = self._seat, order.via_enu_m
+        heartbeat, config = seat.vehicle.heartbeat, seat.config
+        place_enu_m = seat.whereabouts.place_m(seat.now_s - config.stream_timeout_s)
+        if via_enu_m is None or heartbeat is None or place_enu_m is None:
+            return None
+        mode = heartbeat.custom_mode
+        obeys = flavour.is_commanded(mode) or flavour.is_mission(mode)
+        if not (obeys and flavour.airborne(seat.vehicle)) or config.out_of_bounds(via_enu_m):
+            return None
+        return Homeward(
+            via_enu_m,
+            place_enu_m,
+            self._work.speed_m_s,
+            config,
+            seat.commands,
+            flavour,
+            seat.now_s,
+        )
 
     def refuse_return(self, order: Return, reason: str) -> None:
         """Say that it cannot be brought home, and leave it alone."""

@@ -1,5 +1,8 @@
 """The way home: set the return mode until it is seen, then wait for the landing.
 
+Where the order says so, and all is well, the vehicle first flies to a place of its own layer
+(agent.mavlink.homeward).
+
 Leaves out: who may order it and what a landing is (agent.mavlink.bridge).
 """
 
@@ -10,12 +13,15 @@ import math
 from agent.mavlink.commands import CommandEnded, Commands, Ending, result_text
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours import Flavour
+from agent.mavlink.homeward import Homeward
 from agent.mavlink.messages import Heartbeat, Outbound
 from agent.vehicle import Return
 
 __all__ = ["Returning"]
 
 _TAG = "return"
+
+Point = tuple[float, float, float]
 _DISARMED_LONG_S = 5.0
 """A vehicle disarmed for that long is down, even if it does not say that it landed."""
 
@@ -29,6 +35,7 @@ class Returning:
         commands: carries the mode.
         flavour: the firmware.
         from_mission: the vehicle may fly a mission of ours.
+        homeward: flies it to a place first; None if it returns from where it is.
     """
 
     def __init__(
@@ -39,22 +46,26 @@ class Returning:
         flavour: Flavour,
         *,
         from_mission: bool = False,
+        homeward: Homeward | None = None,
     ) -> None:
         self.order = order
         self._from_mission = from_mission
+        self._homeward = homeward
         self._config = config
         self._commands = commands
         self._flavour = flavour
         self._tries = 0
         self._next_at_s = -math.inf
         self._disarmed_since_s: float | None = None
-        self._seen = False
+        self._seen = self._told_seen = False
         self._refusal = "never seen in the heartbeat"
         self.failure: str | None = None
         """Why the vehicle does not return; None while it may."""
 
     def on_ended(self, ended: CommandEnded, now_s: float) -> None:
-        """Take the outcome of setting the mode."""
+        """Take the outcome of a command."""
+        if self._homeward is not None:
+            self._homeward.on_ended(ended, now_s)
         if ended.tag != _TAG:
             return
         if ended.ending is Ending.ACCEPTED:
@@ -68,10 +79,42 @@ class Returning:
         if self._flavour.is_returning(custom_mode):
             self._seen = True
             return True
+        if self._homeward is not None:
+            return self._homeward.expects(custom_mode, from_mission=self._from_mission)
         return self._obeys(custom_mode) and not self._seen
+
+    def has_begun(self) -> bool:
+        """Whether the return mode has been seen; true once."""
+        news, self._told_seen = self._seen and not self._told_seen, self._seen
+        return news
+
+    @property
+    def on_detour(self) -> bool:
+        """Whether it flies to a place first."""
+        return self._homeward is not None
+
+    def go_straight(self, now_s: float) -> list[Outbound]:
+        """Return from where the vehicle is."""
+        homeward, self._homeward = self._homeward, None
+        return [] if homeward is None else homeward.end(now_s)
+
+    def on_position(self, place_enu_m: Point, velocity_enu_m_s: Point, now_s: float) -> None:
+        """See whether it is where it flies to first."""
+        if self._homeward is not None:
+            self._homeward.on_position(place_enu_m, velocity_enu_m_s, now_s)
 
     def advance(self, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
         """Set the mode as long as it is not seen and the vehicle still takes our orders."""
+        out: list[Outbound] = []
+        if self._homeward is not None:
+            if not self._seen:
+                out = self._homeward.advance(heartbeat, now_s)
+            if not (self._homeward.done or self._seen):
+                return out
+            out += self.go_straight(now_s)
+        return out + self._set_mode(heartbeat, now_s)
+
+    def _set_mode(self, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
         if heartbeat.armed:
             self._disarmed_since_s = None
         elif self._disarmed_since_s is None:

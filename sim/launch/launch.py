@@ -142,10 +142,15 @@ class Launch:
         return vehicles()
 
     async def stop(self) -> None:
-        """End every process that is left; paused ones too."""
+        """End every process that is left; paused ones too.
+
+        Agents first: each sees its vehicle return, which takes an autopilot.
+        """
         for child in self._current.values():
             if child.returncode is None:
                 child.resume()
+        agents = [child for child in self.lives if _is_agent(child)]
+        await asyncio.gather(*(child.stop() for child in agents))
         await asyncio.gather(*(child.stop() for child in self.lives))
         if self._folder is not None:
             self._folder.cleanup()
@@ -204,11 +209,22 @@ class Launch:
         self, name: str, arguments: list[str], setting: Setting | None = None
     ) -> Child:
         on_line = self._on_plan if name == COORDINATOR else None
-        child = Child(name, arguments, on_line=on_line, on_log=self._on_log, setting=setting)
+        child = Child(
+            name,
+            arguments,
+            on_line=on_line,
+            on_log=self._on_log,
+            setting=setting,
+            returns=arguments[0] == "agent" and not isinstance(self.options.autopilots, Simulated),
+        )
         self.lives.append(child)
         await child.start()
         self._current[name] = child
         return child
+
+
+def _is_agent(child: Child) -> bool:
+    return child.setting is None and child.arguments[0] == "agent"
 
 
 async def _there(places: Sequence[VehiclePlace]) -> AsyncIterator[VehiclePlace]:

@@ -31,6 +31,8 @@ SETTLE_S = 1.0
 """Wall time in which a foreign program that cannot run at all, as its port is taken, ends."""
 TERMINATE_TIMEOUT_S = 4.0
 """Wall time a child may take to leave after SIGTERM; then it is killed."""
+RETURN_TIMEOUT_S = 17.0
+"""Wall time an agent may take to leave, if it has a real vehicle to send home."""
 KILL_TIMEOUT_S = 4.0
 """Wall time the kernel may take to end it and close its pipes after SIGKILL; then it is left."""
 KEPT_LINES = 200
@@ -63,6 +65,7 @@ class Child:
         on_line: called with every JSON object the child prints on standard output.
         on_log: called with every line of its standard error.
         setting: of another program than `swarm`.
+        returns: it has a real vehicle to send home before it leaves.
     """
 
     def __init__(
@@ -73,6 +76,7 @@ class Child:
         on_line: Callable[[dict[str, Any]], None] | None = None,
         on_log: Callable[[str, str], None] | None = None,
         setting: Setting | None = None,
+        returns: bool = False,
     ) -> None:
         self.name = name
         self.arguments = tuple(arguments)
@@ -81,6 +85,7 @@ class Child:
         """Newest lines of its standard error."""
         self.stopped = False
         """Whether we ended it, or told it to end, ourselves."""
+        self._returns = returns
         self._on_line = on_line
         self._on_log = on_log
         self._process: asyncio.subprocess.Process | None = None
@@ -188,7 +193,9 @@ class Child:
             self.stopped = True
             self._signal(signal.SIGTERM)
             try:
-                async with asyncio.timeout(TERMINATE_TIMEOUT_S):
+                async with asyncio.timeout(
+                    RETURN_TIMEOUT_S if self._returns else TERMINATE_TIMEOUT_S
+                ):
                     await self._process.wait()
             except TimeoutError:
                 self._signal(signal.SIGKILL)

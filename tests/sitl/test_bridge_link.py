@@ -17,7 +17,17 @@ from agent.mavlink.config import BridgeConfig
 from agent.mavlink.link import Link, open_link
 from agent.mavlink.link_address import parse_link
 from agent.mavlink.vehicle import MavlinkVehicle
-from agent.vehicle import Arrived, GoTo, Home, NotReady, Report, Return, Telemetry, VehicleReady
+from agent.vehicle import (
+    Arrived,
+    GoTo,
+    Home,
+    NotReady,
+    Report,
+    Return,
+    ReturnBegun,
+    Telemetry,
+    VehicleReady,
+)
 from swarm.clock import ScaledClock
 from swarm.errors import InputError
 from tests.bridge_flight import ORIGIN, START
@@ -352,5 +362,5 @@ async def test_vehicle_is_flown_through_a_socket_from_preparation_to_landing() -
         await vehicle.close()
         await served.stop()
     others = [r for r in reports if not isinstance(r, Telemetry | NotReady)]
-    assert others == [VehicleReady(), Arrived(1), Arrived(2), Home()]
+    assert others == [VehicleReady(), Arrived(1), Arrived(2), ReturnBegun(), Home()]
     assert not served.copter.armed

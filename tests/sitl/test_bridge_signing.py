@@ -12,7 +12,17 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.signing import SigningKey
 from agent.mavlink.vehicle import MavlinkVehicle
-from agent.vehicle import Arrived, GoTo, Home, NotReady, Report, Return, Telemetry, VehicleReady
+from agent.vehicle import (
+    Arrived,
+    GoTo,
+    Home,
+    NotReady,
+    Report,
+    Return,
+    ReturnBegun,
+    Telemetry,
+    VehicleReady,
+)
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.endpoint import Endpoint, Transport
 from sim.autopilot.flavours.ardupilot import ArduCopter
@@ -87,7 +97,7 @@ def test_signed_mission_is_flown_and_a_station_without_the_key_is_not_heard(
                     await asyncio.sleep(0.02)
             one.bridge.order(Return("done"))
             await until(lambda: Home() in one.reports)
-            assert one.news == [VehicleReady(), Arrived(1), Home()]
+            assert one.news == [VehicleReady(), Arrived(1), ReturnBegun(), Home()]
             assert "COMMAND_ACK" not in stranger.heard
             assert "unsigned" not in one.bridge.dropped
 

@@ -9,7 +9,7 @@ from swarm.events import Heard, LinkChanged, PeerGone, PeerSeen
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Board, Claim, ClaimPhase
 from tests.builders import IDLE, OUT, done, entry, epoch, failed, held, message, proposed, uav
-from tests.lone_agent import LoneAgent, claims, notes, orders, statuses
+from tests.lone_agent import ABOVE_START, LoneAgent, claims, notes, orders, statuses
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
 
@@ -90,7 +90,7 @@ def test_under_a_rule_it_does_not_know_it_stays_idle_and_says_so() -> None:
     assert agent.task == "near"
     agent.arrive(12.0)
     assert agent.phase is ClaimPhase.IDLE
-    assert orders(agent.end_mission(13.0)) == [Return("over")]
+    assert orders(agent.end_mission(13.0)) == [Return("over", via_enu_m=ABOVE_START)]
 
 
 def test_idle_it_takes_a_pop_up_at_once() -> None:

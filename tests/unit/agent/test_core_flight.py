@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import pytest
 
-from agent.vehicle import Arrived, GoTo, HandedOver, Home, Prepare, Refused, Return, VehicleReady
+from agent.vehicle import (
+    Arrived,
+    GoTo,
+    HandedOver,
+    Home,
+    Prepare,
+    Refused,
+    Return,
+    ReturnAdvised,
+    VehicleReady,
+)
 from swarm.events import Heard, Stop
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Board, ClaimPhase, EpochPhase, StatusPhase
 from tests.builders import IDLE, OUT, done, entry, epoch, held, proposed, uav
-from tests.lone_agent import LoneAgent, claims, finishes, orders, outcomes, statuses
+from tests.lone_agent import ABOVE_START, LoneAgent, claims, finishes, orders, outcomes, statuses
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
 
@@ -153,7 +163,7 @@ def test_a_vehicle_that_refuses_to_return_fails_the_process() -> None:
 def test_at_the_end_of_the_mission_it_returns_and_ends_once_it_is_home() -> None:
     agent = flying(NEAR)
     actions = agent.end_mission(1.0)
-    assert orders(actions) == [Return("over")]
+    assert orders(actions) == [Return("over", via_enu_m=ABOVE_START)]
     assert [claim.phase for claim in claims(actions)] == [ClaimPhase.OUT]
     assert finishes(actions) == []
 
@@ -171,6 +181,16 @@ def test_told_to_stop_it_returns_whatever_it_does() -> None:
         assert finishes(agent.happen(Home())) == [0]
 
 
+@pytest.mark.parametrize("event", [Stop("told"), ReturnAdvised("battery low")])
+def test_in_a_hurry_it_returns_from_where_it_is(event: Stop | ReturnAdvised) -> None:
+    agent = flying(NEAR)
+    agent.end_mission(1.0)
+    (order,) = orders(agent.happen(event))
+    assert order == Return(event.reason)
+    assert orders(agent.happen(event)) == []
+    assert finishes(agent.happen(Home())) == [0]
+
+
 def test_home_means_nothing_to_one_who_was_not_sent_there() -> None:
     agent = flying(NEAR)
 
@@ -185,7 +205,7 @@ def test_on_its_way_home_it_takes_no_task() -> None:
     agent.hear(COORDINATOR, epoch("u0", number=3, mission_s=0.0))
     agent.arrive(9.0)
 
-    assert orders(agent.log)[-1] == Return("over")
+    assert orders(agent.log)[-1] == Return("over", via_enu_m=ABOVE_START)
     assert agent.phase is ClaimPhase.OUT
     assert outcomes(agent.log) == []
 
@@ -195,7 +215,7 @@ def test_an_agent_that_comes_after_the_end_does_not_take_off() -> None:
     ended = epoch("u0", phase=EpochPhase.ENDED, reason="over")
     agent.learn(*agent.coordinators(agent.brief, ended), mission_s=9.0)
 
-    assert orders(agent.log) == [Return("over")]
+    assert orders(agent.log) == [Return("over", via_enu_m=ABOVE_START)]
 
 
 def test_the_end_heard_during_preparation_ends_the_preparation() -> None:
@@ -227,7 +247,7 @@ def test_without_a_coordinator_it_finishes_the_tasks_and_then_goes_home() -> Non
 
     assert orders(agent.run_until(20.0 + 0.9 * agent.timing.linger_s)) == []
     (order,) = orders(agent.run_until(20.0 + 1.1 * agent.timing.linger_s))
-    assert order == Return("no coordinator and nothing left to do")
+    assert order == Return("no coordinator and nothing left to do", via_enu_m=ABOVE_START)
     assert finishes(agent.happen(Home())) == [0]
 
 

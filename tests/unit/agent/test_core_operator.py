@@ -21,7 +21,7 @@ from swarm.events import Heard, LinkChanged, Save, Stop
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.wire.messages import ClaimPhase, Command, CommandKind, EpochPhase, StatusPhase
 from tests.builders import PAUSED, entry, epoch, uav
-from tests.lone_agent import LoneAgent, finishes, notes, orders, outcomes, statuses
+from tests.lone_agent import ABOVE_START, LoneAgent, finishes, notes, orders, outcomes, statuses
 
 HOLD, RESUME, RETURN, ABORT = CommandKind
 
@@ -123,7 +123,7 @@ def test_a_uav_sent_home_takes_no_further_part_and_its_process_ends_with_0() -> 
     agent = on_its_way()
 
     actions = tell(agent, RETURN, 2.0, reason="camera")
-    assert orders(actions) == [Return("sent home by the operator: camera")]
+    assert orders(actions) == [Return("sent home by the operator: camera", via_enu_m=ABOVE_START)]
     assert agent.phase is ClaimPhase.OUT
 
     tell(agent, RESUME, 3.0)
@@ -136,7 +136,7 @@ def test_an_aborted_mission_brings_it_home_at_once() -> None:
 
     actions = tell(agent, ABORT, 2.0, reason="storm")
 
-    assert orders(actions) == [Return("aborted by the operator: storm")]
+    assert orders(actions) == [Return("aborted by the operator: storm", via_enu_m=ABOVE_START)]
     assert agent.phase is ClaimPhase.OUT
     assert finishes(agent.happen(Home(), 9.0)) == [0]
 
@@ -320,7 +320,7 @@ def test_without_the_bus_for_too_long_it_goes_home_and_says_why() -> None:
     assert orders(agent.run_until(39.9)) == []
     actions = agent.run_until(40.5)
 
-    assert orders(actions) == [Return("without the bus for 30 s")]
+    assert orders(actions) == [Return("without the bus for 30 s", via_enu_m=ABOVE_START)]
     assert "returning" in notes(actions)
     assert agent.phase is ClaimPhase.OUT
 

@@ -22,7 +22,16 @@ from swarm.wire.messages import (
     StatusPhase,
 )
 from tests.builders import MISSION, done, entry, epoch, held, message, proposed, uav
-from tests.lone_agent import ZERO_S, LoneAgent, claims, finishes, notes, orders, outcomes
+from tests.lone_agent import (
+    ABOVE_START,
+    ZERO_S,
+    LoneAgent,
+    claims,
+    finishes,
+    notes,
+    orders,
+    outcomes,
+)
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
 PREPARE = Prepare((0.0, 0.0, 10.0), 1.0, ground_up_m=0.0)
@@ -275,7 +284,9 @@ def test_with_nobody_there_an_old_memory_is_not_trusted_but_the_vehicle_is_broug
     assert orders(agent.run_until(began_s + 0.9 * agent.timing.abandon_s)) == []
 
     actions = agent.run_until(began_s + 1.1 * agent.timing.abandon_s)
-    assert orders(actions) == [Return("nobody knows of a mission", resume=True)]
+    assert orders(actions) == [
+        Return("nobody knows of a mission", resume=True, via_enu_m=ABOVE_START)
+    ]
     # Not a success: whoever runs it should start it again, in case a mission comes yet.
     assert finishes(agent.happen(Home())) == [1]
 
@@ -320,7 +331,7 @@ def test_a_mission_that_ended_meanwhile_brings_the_vehicle_home(from_peers: bool
     known = earlier.core.memory(0.0).messages if from_peers else ()
     actions = agent.learn(*known, *ended, mission_s=9.0)
 
-    assert orders(actions) == [Return("", resume=True)]
+    assert orders(actions) == [Return("", resume=True, via_enu_m=ABOVE_START)]
     assert agent.phase is ClaimPhase.OUT
     assert finishes(agent.happen(Home())) == [0]
 
@@ -334,7 +345,9 @@ def test_the_end_of_a_mission_heard_before_any_answer_is_asked_about_first() -> 
     actions = agent.end_mission(20.0)
     assert (orders(actions), actions.count(Ask())) == ([], 1)
 
-    assert orders(agent.learn_what_was_known_to(earlier)) == [Return("over", resume=True)]
+    assert orders(agent.learn_what_was_known_to(earlier)) == [
+        Return("over", resume=True, via_enu_m=ABOVE_START)
+    ]
 
 
 def test_one_whose_vehicle_will_not_be_resumed_brings_it_home() -> None:
@@ -354,7 +367,9 @@ def test_one_that_was_returning_returns() -> None:
     agent = earlier.reborn()
     actions = agent.learn_what_was_known_to(earlier)
 
-    assert orders(actions) == [Return("left the mission in an earlier life", resume=True)]
+    assert orders(actions) == [
+        Return("left the mission in an earlier life", resume=True, via_enu_m=ABOVE_START)
+    ]
     assert finishes(agent.happen(Home())) == [0]
 
 
@@ -430,7 +445,9 @@ def test_one_that_never_flew_needs_no_vehicle_to_go_home() -> None:
     agent = LoneAgent(uav("u0"))
     ended = epoch("u0", phase=EpochPhase.ENDED, reason="over")
 
-    assert orders(agent.learn(*agent.coordinators(agent.brief, ended))) == [Return("over")]
+    assert orders(agent.learn(*agent.coordinators(agent.brief, ended))) == [
+        Return("over", via_enu_m=ABOVE_START)
+    ]
 
 
 @pytest.mark.parametrize("age_s", [1.0, 1e4])

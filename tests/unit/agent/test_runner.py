@@ -13,7 +13,7 @@ from agent import runner
 from agent.core import AgentCore
 from agent.events import Action, Event
 from agent.runner import run_agent, seat_or_stop
-from agent.vehicle import Home, NotReady, Orders, Prepare, Report, Return, VehicleReady
+from agent.vehicle import Home, NotReady, Orders, Prepare, Report, Return, ReturnBegun, VehicleReady
 from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import Bus, BusEvent, Sample, TokenGone, TokenSeen
 from swarm.config import Timing
@@ -196,6 +196,37 @@ def test_told_to_stop_it_brings_the_vehicle_home_first() -> None:
             assert await played.running == INTERRUPTED
             assert isinstance(vehicle.orders[-1], Return)
             assert vehicle.closed == 1
+
+    play(scenario)
+
+
+def test_told_to_stop_it_leaves_once_the_vehicle_is_seen_to_return() -> None:
+    async def scenario() -> None:
+        async with at_work(stays_away=True) as played:
+            vehicle = await played.airborne()
+            played.stop.request(0)
+            await until(lambda: isinstance(vehicle.orders[-1], Return), "ordering the return")
+            for _ in range(100):
+                await asyncio.sleep(0)
+            assert not played.running.done()
+            assert vehicle.closed == 0
+
+            vehicle.report(ReturnBegun())
+            assert await played.running == 0
+            assert vehicle.closed == 1
+
+    play(scenario)
+
+
+def test_told_to_stop_while_the_vehicle_returns_it_leaves_at_once() -> None:
+    async def scenario() -> None:
+        async with at_work(stays_away=True) as played:
+            vehicle = await played.airborne()
+            played.say(ENDED)
+            await until(lambda: isinstance(vehicle.orders[-1], Return), "ordering the return")
+            vehicle.report(ReturnBegun())
+            played.stop.request(0)
+            assert await played.running == 0
 
     play(scenario)
 
