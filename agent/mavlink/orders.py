@@ -122,7 +122,8 @@ class OrderTaker:
             flavour,
             heartbeat.custom_mode,
             took_off=took_off,
-            on_missions=self._seat.mission is not None and work.phase is not Phase.PREPARING,
+            on_missions=self._seat.mission is not None
+            and (work.phase is not Phase.PREPARING or self._seat.mission.may_be_flown),
             returning=returning is not None,
         )
         work.drop()

@@ -5,8 +5,10 @@ so an overwritten mode, an automatic disarming on the ground or a vehicle that f
 already need no cases of their own. A vehicle that somebody else armed or flies is waited
 for, and once it is disarmed it does not start by itself. Every step has a limit. A vehicle
 that is resumed in the air keeps its old target meanwhile: only its speed is set, and not
-even that if it flies a mission of ours. Leaves out: who may give the vehicle orders
-(agent.mavlink.bridge), and what counts as consent to fly it (agent.mavlink.consent).
+even that if it flies a mission of ours. Commanded by missions, it gets one that ends at home
+while it stands on the ground, and is not ready before it flies it. Leaves out: who may give
+the vehicle orders (agent.mavlink.bridge), and what counts as consent to fly it
+(agent.mavlink.consent).
 """
 
 from __future__ import annotations
@@ -63,8 +65,8 @@ class Preparation:
         config: patience.
         commands: carries what is told.
         flavour: the firmware.
-        mission: what an earlier life may have left on the vehicle; None if missions are
-            not our way to command it.
+        mission: what stands on the vehicle, perhaps since an earlier life; None if missions
+            are not our way to command it.
         ours: the vehicle flies, or may fly, on our orders already.
     """
 
@@ -100,6 +102,9 @@ class Preparation:
         self._flew = False
         self._flown_by_pilot = False
         self._armed_by_others = False
+        self._layings = 0
+        self._lay_at_s = -math.inf
+        self._mission_begun = False
         self._consent = Consent(flavour, ours=ours or order.resume)
         self._leg: RepositionLeg | None = None
         self._speed = SpeedSetting(order.speed_m_s, flavour, config)
@@ -156,6 +161,8 @@ class Preparation:
         if not flavour.has_booted(heartbeat):
             return self._wait("the autopilot is booting")
         self._consent.on_heartbeat(heartbeat)
+        if self._mission is not None and self._mission_begun:
+            return self._follow_mission(self._mission, heartbeat)
         if heartbeat.armed and flavour.is_taking_off(heartbeat.custom_mode):
             return self._follow_takeoff(now_s)
         if not flavour.is_commanded(heartbeat.custom_mode):
@@ -212,6 +219,8 @@ class Preparation:
             return self._wait(f"{unready} ({text})" if text else unready)
         if vehicle.position is not None and (fault := self._misplaced(vehicle.position)):
             return self._fail(fault)
+        if self._mission is not None and not self._mission.is_laid:
+            return self._lay(self._mission, now_s)
         self._consent.arm()
         return self._ask(self._arm, self._flavour.arm(), vehicle, now_s)
 
@@ -254,6 +263,8 @@ class Preparation:
             return self._wait(grounds)
         if fault := self._misplaced(position):
             return self._fail(fault)
+        if self._mission is not None and not self._mission.is_laid and not self.took_off:
+            return self._lay(self._mission, now_s)
         command = self._flavour.takeoff(self._start_alt_m, _home_alt_m(position))
         return self._ask(self._takeoff, command, vehicle, now_s)
 
@@ -322,9 +333,44 @@ class Preparation:
         failure = self._speed.failure if leg is None else leg.failure or self._speed.failure
         if failure is not None:
             return out + self._fail(failure)
-        self.done = (leg is None or leg.arrived) and self._speed.done
+        there = (leg is None or leg.arrived) and self._speed.done
+        if there and leg is not None and self._mission is not None:
+            return out + self._begin_mission(self._mission, now_s)
+        self.done = there
         self._wait("setting the cruise speed" if leg is None else "flying to the start")
         return out
+
+    def _lay(self, mission: StandingMission, now_s: float) -> list[Outbound]:
+        """Put a mission on the vehicle that waits at the start and then comes home."""
+        reason = mission.failure
+        self._wait(
+            f"putting the way home on it failed ({reason}), trying again"
+            if reason
+            else "putting the way home on it"
+        )
+        if now_s < self._lay_at_s or mission.is_laying:
+            return []
+        if self._layings >= self._config.mode_tries:
+            return self._fail(f"the way home cannot be put on it: {reason}")
+        self._layings += 1
+        self._lay_at_s = now_s + self._config.retry_delay_s
+        return mission.lay(self._order.position_enu_m, self._order.speed_m_s, now_s)
+
+    def _begin_mission(self, mission: StandingMission, now_s: float) -> list[Outbound]:
+        """From now on the way home stands on the vehicle whatever becomes of us."""
+        if not mission.is_laid:  # as it was found in the air
+            return self._lay(mission, now_s)
+        mission.begin(now_s)
+        self._mission_begun = True
+        return self._wait("starting the mission")
+
+    def _follow_mission(self, mission: StandingMission, heartbeat: Heartbeat) -> list[Outbound]:
+        if not heartbeat.armed:
+            return self._fail("the vehicle disarmed after takeoff")
+        if mission.unverified or mission.failure is not None:
+            return self._fail(mission.failure or "which mission it flies is not known")
+        self.done = mission.is_flown
+        return []
 
     def _resumes(self, vehicle: VehicleState) -> bool:
         """Whether it flies on orders of an earlier life, beyond its takeoff."""

@@ -44,6 +44,8 @@ _HOLD_SLACK_S = 2.0
 class _Stage(Enum):
     IDLE = auto()
     """Nothing is wanted of the mission."""
+    LAYING = auto()
+    """Uploaded to stand on the vehicle, and not to be flown yet."""
     UPLOADING = auto()
     STARTING = auto()
     FLOWN = auto()
@@ -115,6 +117,37 @@ class StandingMission:
             # It was being taken out of the mission mode: whether it was is still to be seen.
             self._mode_seen, self._mode_asked = False, True
         return self._want(plan, now_s)
+
+    def lay(self, target_enu_m: Point, speed_m_s: float, now_s: float) -> list[Outbound]:
+        """Put a first target on the vehicle, which flies to it once it is told to `begin`."""
+        if self._stage is _Stage.LAYING:
+            return []
+        place = wgs84_from_enu(self._config.origin, target_enu_m)
+        hold_s = min(math.ceil(self._config.mission_patience_s), LONGEST_HOLD_S)
+        self.failure = None
+        out = self._want(MissionPlan(*place, speed_m_s, max(1, hold_s)), now_s)
+        self._stage = _Stage.LAYING
+        return out
+
+    def begin(self, now_s: float) -> None:
+        """Fly the mission that was laid."""
+        if self.is_laid:
+            self._begin(now_s)
+
+    @property
+    def is_laid(self) -> bool:
+        """Whether a mission of ours was verified on the vehicle, and is not flown yet."""
+        return self._stage is _Stage.IDLE and self._standing is not None
+
+    @property
+    def is_laying(self) -> bool:
+        """Whether the first mission is on its way to the vehicle."""
+        return self._stage is _Stage.LAYING
+
+    @property
+    def may_be_flown(self) -> bool:
+        """Whether the vehicle may be in the mission mode because of us."""
+        return self._mode_seen or self._mode_asked
 
     def restart(self, now_s: float) -> None:
         """Begin the mission anew: the vehicle stands still elsewhere than at its target."""
@@ -257,12 +290,15 @@ class StandingMission:
             self._adopt(result, now_s)
         elif isinstance(result, MissionInForce):
             self._standing = sent
-        if self._wanted is None or self._stage is not _Stage.UPLOADING:
+        laying = self._stage is _Stage.LAYING
+        if self._wanted is None or not (laying or self._stage is _Stage.UPLOADING):
             return []
         if sent != self._wanted:
             return self._upload(self._wanted, now_s)
         if isinstance(result, MissionFailed):
             self._give_up(result.reason, now_s, astray=not result.old_mission_verified)
+        elif laying:
+            self._stage = _Stage.IDLE
         else:
             self._begin(now_s)
         return []

@@ -8,7 +8,7 @@ import pytest
 
 from agent.mavlink.config import BridgeConfig, CommandStyle
 from agent.vehicle import Arrived, GoTo, HandedOver, Hold, Home, Refused, Return
-from tests.bridge_flight import ORIGIN, BridgeFlight, rough_link
+from tests.bridge_flight import ORIGIN, START, BridgeFlight, rough_link
 from tests.fake_copter import FakeCopter
 
 MISSIONS = BridgeConfig(1, ORIGIN, command=CommandStyle.MISSION, mission_patience_s=30.0)
@@ -42,7 +42,8 @@ def under_way(fake: type[FakeCopter]) -> BridgeFlight:
 
 def watch(flight: BridgeFlight, *wanted: type, limit_s: float) -> None:
     """Run on, and see that nothing but whole missions to known places is ever flown."""
-    places = {tuple(round(c, 1) for c in place[:2]) for place in (OLD, NEW, EAST)}
+    known = (START.position_enu_m, OLD, NEW, EAST)
+    places = {tuple(round(c, 1) for c in place[:2]) for place in known}
     end_s = flight.now_s + limit_s
     while flight.now_s < end_s and not any(isinstance(r, wanted) for r in flight.reports):
         flight.step()

@@ -14,6 +14,7 @@ from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    Hold,
     Home,
     Refused,
     Return,
@@ -21,7 +22,7 @@ from agent.vehicle import (
     VehicleReady,
 )
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
-from tests.fake_copter import SET_MODE, FakeCopter
+from tests.fake_copter import ARM, SET_MODE, TAKEOFF, FakeCopter
 
 MISSIONS = BridgeConfig(1, ORIGIN, command=CommandStyle.MISSION, mission_patience_s=20.0)
 NORTH, SOUTH, EAST = (5.0, 40.0, 12.0), (5.0, -40.0, 12.0), (45.0, 0.0, 12.0)
@@ -290,27 +291,76 @@ def test_refused_mission_leaves_the_old_target_in_force(
     flight.run_until(Arrived(3))
 
 
-def test_first_mission_that_is_refused_leaves_no_half_mission_standing(
+def test_first_mission_that_is_refused_leaves_no_half_mission_standing_and_no_takeoff(
     fake: type[FakeCopter],
 ) -> None:
     """A pilot's old mission has as many items, so half of ours would be flown with half of it."""
     old = waiting(fake).copter.mission.items
-    flight = flight_of(fake).prepared()
+    flight = flight_of(fake)
     mission = flight.copter.mission
-    mission.items = list(old)
-    mission.verdict = 4
-    flight.order(GoTo(1, FAR))
-    refusal = flight.run_until(Refused)
-    assert isinstance(refusal, Refused)
-    assert "refused the mission (result 4)" in refusal.reason
+    mission.items, mission.verdict = list(old), 4
+    flight.order(START)
+    refused = flight.run_until(Refused)
+    assert refused == Refused(
+        START,
+        "the way home cannot be put on it: the vehicle refused the mission (result 4)",
+    )
     assert len(mission.items) == 0
+    assert not {ARM, TAKEOFF} & set(flight.copter.count())
     mission.verdict = None
-    flight.order(GoTo(2, NORTH))
-    flight.run_until(Arrived(2))
+    flight.order(START)
+    flight.run_until(VehicleReady())
+
+
+def test_the_way_home_stands_on_the_vehicle_before_it_is_armed_and_is_flown_once_it_is_ready(
+    fake: type[FakeCopter],
+) -> None:
+    flight = flight_of(fake)
+    copter = flight.copter
+    flight.order(START)
+    while not copter.commands(ARM):
+        assert not copter.armed
+        flight.step()
+    *_, speed, target, home = copter.mission.items
+    assert (speed.param2, target.param1, home.command) == (4.0, 20.0, 20)
+    assert target.z == pytest.approx(ORIGIN.alt_m + START.position_enu_m[2])
+    flight.run_until(VehicleReady())
+    assert copter.mode == copter.mission_mode
+    assert math.dist(copter.position_m, START.position_enu_m) < 1.0
+
+
+def test_vehicle_comes_home_by_itself_if_its_companion_dies_before_the_first_target(
+    fake: type[FakeCopter],
+) -> None:
+    flight = flight_of(fake).prepared()
+    flight.run(3.0 * MISSIONS.mission_patience_s)
+    assert math.dist(flight.copter.position_m, START.position_enu_m) < 1.0, "the wait is renewed"
+    flight.happen = lambda _: []  # type: ignore[method-assign, assignment]
+    flight.run(100.0)
+    assert not flight.copter.armed
+    assert math.dist(flight.copter.position_m, flight.copter.home_m) < 0.5
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.1, 0.5, 1.0])
+def test_vehicle_is_stopped_while_its_first_mission_begins(
+    fake: type[FakeCopter], after_s: float
+) -> None:
+    flight = flight_of(fake)
+    flight.order(START)
+    while "starting the mission" not in flight.reasons():
+        flight.step()
+    flight.run(after_s)
+    flight.order(Hold("wait"))
+    flight.run(10.0)
+    assert flight.copter.mode == flight.copter.own_mode
+    assert flight.bridge.phase is Phase.HOVERING
+    assert not [r for r in flight.reports if isinstance(r, HandedOver)]
 
 
 def test_mission_mode_that_is_refused_for_good_is_reported() -> None:
     flight = flight_of(FakeCopter).prepared()
+    flight.order(Hold("wait"))
+    flight.run(5.0)
     flight.copter.verdicts[SET_MODE] = [4] * 99
     order = GoTo(1, NORTH)
     flight.order(order)
@@ -320,6 +370,18 @@ def test_mission_mode_that_is_refused_for_good_is_reported() -> None:
     flight.copter.verdicts.clear()
     flight.order(GoTo(2, NORTH))
     flight.run_until(Arrived(2))
+
+
+def test_first_mission_that_is_not_begun_ends_the_preparation_with_a_return() -> None:
+    flight = flight_of(FakeCopter)
+    flight.order(START)
+    while not flight.copter.airborne:
+        flight.step()
+    flight.copter.verdicts[SET_MODE] = [4] * 5
+    advised = ReturnAdvised("the mission mode cannot be set (failed)")
+    assert flight.run_until(ReturnAdvised) == advised
+    flight.order(Return(advised.reason))
+    flight.run_until(Home())
 
 
 @pytest.mark.parametrize("stay_s", [math.nan, math.inf, -1.0])
