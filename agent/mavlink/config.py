@@ -42,7 +42,7 @@ class BridgeConfig:
     """Zero of the mission's local frame."""
     command: CommandStyle = CommandStyle.REPOSITION
     ground_system_id: int = 255
-    """Our own MAVLink system id; failsafes of both firmwares listen to 255 unless told otherwise."""
+    """Our own MAVLink system id: the one to which failsafes of both firmwares listen."""
     ground_component_id: int = ONBOARD_COMPUTER
     """Our own MAVLink component id: an onboard computer's. Not a ground station's 190, which
     QGroundControl has on the same system id: its answers would be taken for ours."""
