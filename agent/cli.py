@@ -49,6 +49,15 @@ def agent(
             help="MAVLink system id of the autopilot; no other vehicle is ever commanded.",
         ),
     ] = 1,
+    ground_id: Annotated[
+        str,
+        typer.Option(
+            "--ground-id",
+            metavar="SYS[:COMP]",
+            help="Our own MAVLink ids towards the autopilot. Its ground station failsafe listens "
+            "to system 255; QGroundControl is 255:190.",
+        ),
+    ] = "255:191",
     position_rate_hz: Annotated[
         float,
         typer.Option(
@@ -198,6 +207,7 @@ def agent(
     parse_link(mavlink)
     for url in forward or ():
         parse_forward(url)
+    own_system_id, own_component_id = _ground_ids(ground_id)
     key = None if signing_key is None else load_signing_key(signing_key)
     log = get_logger(uav, mission=mission)
 
@@ -208,6 +218,8 @@ def agent(
             settings = BridgeConfig(
                 system_id=system_id,
                 origin=origin,
+                ground_system_id=own_system_id,
+                ground_component_id=own_component_id,
                 command=command,
                 acceptance_radius_m=acceptance_radius_m,
                 position_rate_hz=position_rate_hz,
@@ -261,6 +273,20 @@ def agent(
     finally:
         if store is not None:
             store.close()
+
+
+def _ground_ids(text: str) -> tuple[int, int]:
+    """Our own system and component id."""
+    from agent.mavlink.config import ONBOARD_COMPUTER
+    from swarm.errors import Fault, InputError
+
+    system, marked, component = text.partition(":")
+    parts = [system, component if marked else str(ONBOARD_COMPUTER)]
+    for part in parts:
+        if not (part.isascii() and part.isdigit() and len(part) < 4 and 1 <= int(part) <= 255):
+            problem = f"{part!r} is not a whole number within 1..255"
+            raise InputError(Fault("--ground-id", text, problem, "give SYS or SYS:COMP"))
+    return int(parts[0]), int(parts[1])
 
 
 def _check_ids(mission: str, uav: str) -> None:

@@ -189,7 +189,7 @@ class Hostile:
     def _acknowledgement(self) -> bytes:
         command = self._random.choice((SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, INTERVAL))
         result = self._random.choice((0, 0, 0, 1, 2, 3, 4, 5, 6, 9, 77))
-        to = self._random.choice(((255, 190), (255, 190), (0, 0), (254, 190), (1, 1)))
+        to = self._random.choice(((255, 191), (255, 191), (0, 0), (254, 190), (1, 1)))
         return self._frame(mavlink.MAVLink_command_ack_message(command, result, 0, 0, *to))
 
     def _heartbeat(self) -> bytes:

@@ -209,7 +209,7 @@ class FakeCopter:
             return
         self.ack(message.command, self._do(message))
 
-    def ack(self, command: int, result: int, target: tuple[int, int] = (255, 190)) -> None:
+    def ack(self, command: int, result: int, target: tuple[int, int] = (255, 191)) -> None:
         self.say(mavlink.MAVLink_command_ack_message(command, result, 0, 0, *target))
 
     def _do(self, m: Any) -> int:

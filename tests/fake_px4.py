@@ -98,7 +98,7 @@ class FakePx4(FakeCopter):
 
     # What it hears.
 
-    def ack(self, command: int, result: int, target: tuple[int, int] = (255, 190)) -> None:
+    def ack(self, command: int, result: int, target: tuple[int, int] = (255, 191)) -> None:
         for _ in range(2 if command == SET_MODE else 1):
             super().ack(command, result, target)
 

@@ -78,7 +78,7 @@ class MavlinkCodec:
         target_system_id: int,
         *,
         source_system_id: int = 255,
-        source_component_id: int = 190,
+        source_component_id: int = 191,
         signing: Signing | None = None,
     ) -> None:
         self._target = target_system_id

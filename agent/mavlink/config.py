@@ -9,8 +9,10 @@ from enum import StrEnum
 from agent.mavlink.commands import CommandPolicy
 from swarm.model.frames import Origin
 
-__all__ = ["BridgeConfig", "CommandStyle"]
+__all__ = ["ONBOARD_COMPUTER", "BridgeConfig", "CommandStyle"]
 
+ONBOARD_COMPUTER = 191
+"""Component id of a companion (MAV_COMP_ID_ONBOARD_COMPUTER, MAV_COMPONENT of common.xml)."""
 
 _INSIDE = 0.999
 """Of the fence: rounding must not lead out of it again."""
@@ -40,9 +42,10 @@ class BridgeConfig:
     """Zero of the mission's local frame."""
     command: CommandStyle = CommandStyle.REPOSITION
     ground_system_id: int = 255
-    """Our own MAVLink system id."""
-    ground_component_id: int = 190
-    """Our own MAVLink component id."""
+    """Our own MAVLink system id: the one to which failsafes of both firmwares listen."""
+    ground_component_id: int = ONBOARD_COMPUTER
+    """Our own MAVLink component id: an onboard computer's. Not a ground station's 190, which
+    QGroundControl has on the same system id: its answers would be taken for ours."""
     acceptance_radius_m: float = 1.0
     """Distance to the target, height included, within which the vehicle has arrived."""
     arrival_speed_m_s: float = 0.5

@@ -46,3 +46,13 @@ def test_a_ground_station_that_is_no_address_is_told(capsys: pytest.CaptureFixtu
     remedy = "give udp:HOST:PORT, such as udp:192.168.1.5:14550"
     line = f"--forward: udp:127.0.0.1: a part is missing; {remedy}\n"
     assert capsys.readouterr() == ("", line)
+
+
+@pytest.mark.parametrize("text", ["", "0", "256", "255:", "255:0", "a:b", "255:191:1"])
+def test_own_ids_that_are_none_are_told(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*AGENT, "--ground-id", text]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("--ground-id: ")
+    assert err.endswith("is not a whole number within 1..255; give SYS or SYS:COMP\n")
+    assert err.count("\n") == 1

@@ -79,7 +79,7 @@ def test_ground_station_heartbeat_comes_every_second(fake: type[FakeCopter]) -> 
     flight.run(10.0)
     beats = [m for m in flight.copter.heard if m.get_type() == "HEARTBEAT"]
     assert 10 <= len(beats) <= 11
-    assert {(m.type, m.get_srcSystem(), m.get_srcComponent()) for m in beats} == {(6, 255, 190)}
+    assert {(m.type, m.get_srcSystem(), m.get_srcComponent()) for m in beats} == {(6, 255, 191)}
 
 
 def test_refused_arming_is_tried_again_and_the_reason_is_told(fake: type[FakeCopter]) -> None:

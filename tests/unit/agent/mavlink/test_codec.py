@@ -51,7 +51,7 @@ def heartbeat(system: int = 1) -> bytes:
 
 @pytest.mark.parametrize("path", FIRMWARES, ids=lambda path: path.stem)
 def test_everything_recorded_is_read(path: Path) -> None:
-    codec = MavlinkCodec(1)
+    codec = MavlinkCodec(1, source_component_id=190)
     rows = recorded(path, "vehicle")
     stream = b"".join(frame(rebuilt(row), row["sys"], row["comp"]) for row in rows)
     heard = codec.decode(stream)
@@ -81,7 +81,7 @@ _NAMES: dict[type, str] = {
 
 def test_recorded_flight_shows_readiness_as_the_bridge_reads_it() -> None:
     path = next(p for p in RECORDINGS if "retarget" in p.name)
-    codec = MavlinkCodec(1)
+    codec = MavlinkCodec(1, source_component_id=190)
     heard = [
         one.message
         for row in recorded(path, "vehicle")
@@ -100,7 +100,7 @@ def test_recorded_flight_shows_readiness_as_the_bridge_reads_it() -> None:
 def test_what_the_ground_said_in_a_recording_is_what_we_would_say() -> None:
     path = next(p for p in RECORDINGS if "retarget" in p.name)
     [first, *_] = [r for r in recorded(path, "ground") if r.get("command") == 192]
-    sent = MavlinkCodec(1).encode(
+    sent = MavlinkCodec(1, source_component_id=190).encode(
         CommandInt(
             192,
             AltitudeFrame.HOME,
@@ -131,12 +131,12 @@ def test_what_the_ground_said_in_a_recording_is_what_we_would_say() -> None:
             Battery(None),
         ),
         (mavlink.MAVLink_extended_sys_state_message(3, 4), ExtendedState(Landed.LANDING)),
-        (mavlink.MAVLink_command_ack_message(400, 4, 0, 0, 255, 190), CommandAck(400, 4)),
+        (mavlink.MAVLink_command_ack_message(400, 4, 0, 0, 255, 191), CommandAck(400, 4)),
         (mavlink.MAVLink_command_ack_message(400, 4), CommandAck(400, 4)),
         (mavlink.MAVLink_statustext_message(2, b"Arm:\x07 no"), Text(2, "Arm:? no")),
         (mavlink.MAVLink_param_value_message(b"WP_SPD", 10.0, 9, 1, 0), Parameter("WP_SPD", 10.0)),
         (
-            mavlink.MAVLink_param_error_message(255, 190, b"WPNAV_SPEED", -1, 1),
+            mavlink.MAVLink_param_error_message(255, 191, b"WPNAV_SPEED", -1, 1),
             ParameterMissing("WPNAV_SPEED"),
         ),
     ],
@@ -153,7 +153,7 @@ def test_wire_units_become_si(raw: Any, meaning: object) -> None:
         mavlink.MAVLink_global_position_int_message(0, 0, 2_000_000_000, 0, 0, 0, 0, 0, 0),
         mavlink.MAVLink_extended_sys_state_message(3, 77),
         mavlink.MAVLink_param_value_message(b"WP_SPD", math.nan, 9, 1, 0),
-        mavlink.MAVLink_mission_count_message(255, 190, 3, 1),
+        mavlink.MAVLink_mission_count_message(255, 191, 3, 1),
         mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3),
     ],
 )
@@ -163,9 +163,10 @@ def test_implausible_contents_are_dropped_and_counted(raw: Any) -> None:
     assert codec.implausible == 1
 
 
-def test_messages_to_another_ground_station_are_not_ours() -> None:
+@pytest.mark.parametrize("other", [(254, 191), (255, 190)])
+def test_messages_to_another_ground_station_are_not_ours(other: tuple[int, int]) -> None:
     codec = MavlinkCodec(1)
-    assert codec.decode(frame(mavlink.MAVLink_command_ack_message(400, 0, 0, 0, 254, 190))) == []
+    assert codec.decode(frame(mavlink.MAVLink_command_ack_message(400, 0, 0, 0, *other))) == []
     assert codec.not_for_us == 1
 
 
@@ -189,7 +190,7 @@ def test_every_message_reaches_its_vehicle_by_name(message: Outbound, name: str)
     [raw] = mavlink.MAVLink(None).parse_buffer(codec.encode(message))
     assert raw.get_type() == name
     assert getattr(raw, "target_system", 9) == 9
-    assert (raw.get_srcSystem(), raw.get_srcComponent()) == (255, 190)
+    assert (raw.get_srcSystem(), raw.get_srcComponent()) == (255, 191)
 
 
 def test_mission_items_survive_the_wire() -> None:

@@ -40,7 +40,7 @@ RESUME = Prepare(START.position_enu_m, START.speed_m_s, resume=True)
 
 def heard(path: Path) -> list[Inbound]:
     """Everything the vehicle said, as the bridge reads it."""
-    codec = MavlinkCodec(1)
+    codec = MavlinkCodec(1, source_component_id=190)
     messages = [
         one.message
         for row in recorded(path, "vehicle")
@@ -142,7 +142,7 @@ def test_what_the_ground_said_is_what_we_would_say(
 ) -> None:
     payload = slice(10, -2)
     said = {frame(rebuilt(row))[payload] for row in commanded(path, ours.command)}
-    assert MavlinkCodec(1).encode(ours)[payload] in said
+    assert MavlinkCodec(1, source_component_id=190).encode(ours)[payload] in said
 
 
 def test_the_scripted_px4_answers_as_the_recorded_one() -> None:
