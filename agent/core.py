@@ -288,7 +288,8 @@ class AgentCore:
             self._finish(1, now_s)
 
     def _come_home(self, now_s: float) -> None:
-        if self.phase is StatusPhase.RETURNING:
+        held = self._stage is StatusPhase.HOLDING and self._homebound
+        if held or self.phase is StatusPhase.RETURNING:
             self._enter(StatusPhase.HOME, self._speech.note)
             self._actions.append(Note("landed at home"))
             self._finish(self._exit_status, now_s)

@@ -218,6 +218,8 @@ class Duty:
                 self._seat.say(*returning.go_straight(self._seat.now_s))
         elif prepare is not None:
             self._orders.begin_preparation(prepare)
+        elif returning is not None and not holding.aloft:
+            self._seat.report(Home())  # it landed before it could be stopped
 
     def _advance_return(self) -> None:
         returning, heartbeat = self._work.returning, self._seat.vehicle.heartbeat

@@ -155,6 +155,24 @@ def test_after_an_abort_one_uav_can_be_held_on_its_way_home_and_then_goes_on_hom
     assert finishes(agent.happen(Home(), 110.0)) == [0]
 
 
+def test_a_uav_held_on_its_way_home_that_lands_all_the_same_is_home() -> None:
+    agent = on_its_way()
+    assert finishes(agent.happen(Home())) == []
+    tell(agent, ABORT, 2.0)
+    tell(agent, HOLD, 3.0)
+
+    assert finishes(agent.happen(Home(), 4.0)) == [0]
+    assert agent.core.phase is StatusPhase.HOME
+
+
+def test_landing_ends_no_hold_of_a_uav_that_takes_part() -> None:
+    agent = on_its_way()
+    tell(agent, HOLD, 3.0)
+
+    assert finishes(agent.happen(Home(), 4.0)) == []
+    assert agent.core.phase is StatusPhase.HOLDING
+
+
 def test_an_abort_moves_a_uav_that_was_held_before() -> None:
     agent = on_its_way()
     tell(agent, HOLD, 2.0)

@@ -196,7 +196,18 @@ def test_hold_after_the_landing_lets_the_vehicle_come_home(flight: BridgeFlight)
     flight.order(HOLD)
     flight.run(5.0)
     assert not flight.copter.armed
-    assert not any(isinstance(r, Refused | HandedOver) for r in flight.reports)
+    assert flight.reports == [Home()]
+
+
+def test_vehicle_that_lands_before_it_is_stopped_is_home(flight: BridgeFlight) -> None:
+    under_way(flight)
+    flight.order(Return("mission ended"))
+    while flight.copter.position_m[2] > 0.5 or flight.copter.velocity_m_s[2] >= 0.0:
+        flight.step()
+    flight.copter.verdicts[SET_MODE] = [None] * 9
+    flight.order(HOLD)
+    flight.run_until(Home())
+    assert not flight.copter.armed
 
 
 # -- a new life -------------------------------------------------------------------------
