@@ -17,7 +17,16 @@ from agent.mavlink.preparation import Preparation
 from agent.mavlink.search import Search
 from agent.mavlink.seat import Seat
 from agent.mavlink.work import Phase, Work
-from agent.vehicle import Hold, Home, Refused, Return, ReturnAdvised, ReturnBegun, VehicleReady
+from agent.vehicle import (
+    Held,
+    Hold,
+    Home,
+    Refused,
+    Return,
+    ReturnAdvised,
+    ReturnBegun,
+    VehicleReady,
+)
 
 __all__ = ["Duty"]
 
@@ -220,6 +229,8 @@ class Duty:
             self._orders.begin_preparation(prepare)
         elif returning is not None and not holding.aloft:
             self._seat.report(Home())  # it landed before it could be stopped
+        else:
+            self._seat.report(Held())
 
     def _advance_return(self) -> None:
         returning, heartbeat = self._work.returning, self._seat.vehicle.heartbeat

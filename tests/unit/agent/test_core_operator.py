@@ -8,6 +8,7 @@ from agent.events import Action
 from agent.vehicle import (
     GoTo,
     HandedOver,
+    Held,
     Hold,
     Home,
     NotReady,
@@ -58,7 +59,11 @@ def test_a_held_uav_gives_its_task_up_stops_and_says_why() -> None:
     assert agent.core.phase is StatusPhase.HOLDING
     assert Save() in actions
     (status,) = statuses(agent.run_until(3.0))[-1:]
-    assert (status.phase, status.note) == (StatusPhase.HOLDING, "held by the operator: helicopter")
+    note = "held by the operator: helicopter"
+    assert (status.phase, status.note) == (StatusPhase.HOLDING, f"being stopped, {note}")
+    agent.happen(Held())
+    (status,) = statuses(agent.run_until(5.0))[-1:]
+    assert (status.phase, status.note) == (StatusPhase.HOLDING, note)
 
 
 def test_a_held_uav_takes_no_task_whatever_happens() -> None:

@@ -13,6 +13,7 @@ from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    Held,
     Hold,
     Home,
     Refused,
@@ -71,6 +72,7 @@ def test_flight_is_stopped_and_its_leg_given_up(flight: BridgeFlight) -> None:
     before_m = flight.copter.position_m
     flight.order(HOLD)
     flight.run(5.0)
+    assert flight.seen == [Held()]
     assert math.dist(before_m, flight.copter.position_m) < 5.0
     assert hovers(flight)
     assert flight.bridge.phase is Phase.HOVERING
@@ -185,6 +187,7 @@ def test_vehicle_on_the_ground_needs_no_stop(flight: BridgeFlight) -> None:
     flight.order(HOLD)
     flight.run(20.0)
     assert set(flight.copter.count()) <= {INTERVAL}
+    assert flight.seen == [Held()]
     assert not any(isinstance(r, Refused) for r in flight.reports)
 
 
@@ -275,6 +278,7 @@ def test_vehicle_that_goes_on_is_reported(flight: BridgeFlight) -> None:
     assert isinstance(refused, Refused)
     assert refused.order == HOLD
     assert "goes on" in refused.reason
+    assert flight.seen == []
     flight.run(5.0)
     assert len(flight.reports) == 1
     flight.copter.verdicts.clear()
