@@ -18,6 +18,7 @@ from agent.mavlink.search import Search
 from agent.mavlink.seat import Seat
 from agent.mavlink.work import Phase, Work
 from agent.vehicle import (
+    HandedOver,
     Held,
     Hold,
     Home,
@@ -252,6 +253,9 @@ class Duty:
     def _judge_target(self) -> None:
         outcome = None if self._work.target is None else self._work.target.outcome()
         if outcome is None:
+            return
+        if isinstance(outcome, HandedOver):
+            self._work.hand_over(outcome.reason)
             return
         self._work.target = None
         self._work.phase = Phase.HOVERING
