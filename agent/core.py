@@ -28,6 +28,7 @@ from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    Held,
     Hold,
     Home,
     NotReady,
@@ -53,7 +54,7 @@ from swarm.events import (
     Tick,
 )
 from swarm.pulse import Pulse
-from swarm.state.commands import words
+from swarm.state.commands import BEING_STOPPED, CANNOT_HOLD, words
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
@@ -243,6 +244,8 @@ class AgentCore:
             case ReturnAdvised(reason):
                 if self.phase is not StatusPhase.OUT:
                     self._go_home(reason, now_s, hurry=True)
+            case Held() if self._stage is StatusPhase.HOLDING:
+                self._speech.note = self._speech.note.removeprefix(BEING_STOPPED)
             case Home():
                 self._come_home(now_s)
 
@@ -271,7 +274,7 @@ class AgentCore:
         elif isinstance(order, Prepare) and self._flew_before:
             self._go_home(reason, now_s, status=1, hurry=True)  # it may be in the air
         elif isinstance(order, Hold) and self._stage is StatusPhase.HOLDING:
-            self._speech.note = f"cannot hold: {reason}"[:200]
+            self._speech.note = f"{CANNOT_HOLD}{reason}"[:200]
         elif isinstance(order, Prepare | Return):
             self._leave_vehicle(reason, now_s, handed_over=False)
 
@@ -288,7 +291,8 @@ class AgentCore:
             self._finish(1, now_s)
 
     def _come_home(self, now_s: float) -> None:
-        if self.phase is StatusPhase.RETURNING:
+        held = self._stage is StatusPhase.HOLDING and self._homebound
+        if held or self.phase is StatusPhase.RETURNING:
             self._enter(StatusPhase.HOME, self._speech.note)
             self._actions.append(Note("landed at home"))
             self._finish(self._exit_status, now_s)
@@ -418,7 +422,7 @@ class AgentCore:
         untouched = self._stage is StatusPhase.LEARNING and not self._flew_before
         if not self._homebound:
             self._actions += self._tasking.pause(now_s)
-        self._enter(StatusPhase.HOLDING, words(command))
+        self._enter(StatusPhase.HOLDING, ("" if untouched else BEING_STOPPED) + words(command))
         if not untouched:
             self._actions.append(Order(Hold(words(command))))
 

@@ -13,6 +13,7 @@ __all__ = [
     "Arrived",
     "GoTo",
     "HandedOver",
+    "Held",
     "Hold",
     "Home",
     "NotReady",
@@ -143,6 +144,11 @@ class ReturnAdvised:
 
 
 @dataclass(frozen=True, slots=True)
+class Held:
+    """The vehicle stands where it was told to by `Hold`: in the air, or on the ground."""
+
+
+@dataclass(frozen=True, slots=True)
 class ReturnBegun:
     """The vehicle was seen to return by itself: it lands at home whoever is there to see it."""
 
@@ -161,5 +167,6 @@ Report = (
     | HandedOver
     | ReturnAdvised
     | ReturnBegun
+    | Held
     | Home
 )

@@ -11,7 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from agent.vehicle import Arrived, GoTo, Hold, Home, Orders, Prepare, Report, Return, Telemetry
+from agent.vehicle import (
+    Arrived,
+    GoTo,
+    Held,
+    Hold,
+    Home,
+    Orders,
+    Prepare,
+    Report,
+    Return,
+    Telemetry,
+)
 from sim.event_queue import EventQueue
 from sim.kinematics import IdealMotion
 
@@ -67,8 +78,10 @@ class VirtualVehicle:
                 arrives_s = self._motion.arrives_s
                 if arrives_s is not None:
                     self._later(arrives_s, Arrived(leg))
-            case Hold() if self._motion is not None:
-                self._motion.stop(self._queue.now_s())
+            case Hold():
+                if self._motion is not None:
+                    self._motion.stop(self._queue.now_s())
+                self._later(self._queue.now_s(), Held())
             case Return():
                 self._motion = None
                 self._later(self._queue.now_s(), Home())

@@ -12,6 +12,7 @@ from agent.mavlink.events import Event, LinkUp, Received, Send, Tick
 from agent.mavlink.signing import Signing, SigningKey
 from agent.vehicle import (
     GoTo,
+    Held,
     NotReady,
     Orders,
     Prepare,
@@ -86,8 +87,8 @@ class BridgeFlight:
             else:
                 reports.append(action)
         self.telemetry += [r for r in reports if isinstance(r, Telemetry)]
-        self.seen += [r for r in reports if isinstance(r, ReturnBegun)]
-        self.reports += [r for r in reports if not isinstance(r, Telemetry | ReturnBegun)]
+        self.seen += [r for r in reports if isinstance(r, Held | ReturnBegun)]
+        self.reports += [r for r in reports if not isinstance(r, Telemetry | Held | ReturnBegun)]
         self._carry(answers)
         return reports
 

@@ -17,7 +17,17 @@ from agent.mavlink.preparation import Preparation
 from agent.mavlink.search import Search
 from agent.mavlink.seat import Seat
 from agent.mavlink.work import Phase, Work
-from agent.vehicle import Hold, Home, Refused, Return, ReturnAdvised, ReturnBegun, VehicleReady
+from agent.vehicle import (
+    HandedOver,
+    Held,
+    Hold,
+    Home,
+    Refused,
+    Return,
+    ReturnAdvised,
+    ReturnBegun,
+    VehicleReady,
+)
 
 __all__ = ["Duty"]
 
@@ -219,6 +229,10 @@ class Duty:
                 self._seat.say(*returning.go_straight(self._seat.now_s))
         elif prepare is not None:
             self._orders.begin_preparation(prepare)
+        elif returning is not None and not holding.aloft:
+            self._seat.report(Home())  # it landed before it could be stopped
+        else:
+            self._seat.report(Held())
 
     def _advance_return(self) -> None:
         returning, heartbeat = self._work.returning, self._seat.vehicle.heartbeat
@@ -240,6 +254,9 @@ class Duty:
     def _judge_target(self) -> None:
         outcome = None if self._work.target is None else self._work.target.outcome()
         if outcome is None:
+            return
+        if isinstance(outcome, HandedOver):
+            self._work.hand_over(outcome.reason)
             return
         self._work.target = None
         self._work.phase = Phase.HOVERING

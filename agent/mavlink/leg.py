@@ -38,6 +38,11 @@ class Leg(Protocol):
         """Why the target could not be put in force or reached; None while it may."""
         ...
 
+    @property
+    def stopped(self) -> str | None:
+        """Why somebody else seems to have stopped the vehicle; None if nobody has."""
+        ...
+
     def start(self, now_s: float) -> Sequence[Outbound]:
         """Tell the vehicle, in place of whatever it was told before."""
         ...
@@ -75,12 +80,15 @@ class Approach:
         self._tellings = 0
         self.distance_m = math.inf
         """As last seen."""
+        self.moved = False
+        """Whether the vehicle was seen to move since it was told."""
 
     def judge(self, position_enu_m: Point, velocity_enu_m_s: Point, now_s: float) -> Nearness:
         """Take one position and speed."""
         self.distance_m = math.dist(position_enu_m, self._target_enu_m)
         if math.hypot(*velocity_enu_m_s) > self._config.arrival_speed_m_s:
             self._still_since_s = None
+            self.moved = True
             return Nearness.UNDERWAY
         if self.distance_m <= self._config.acceptance_radius_m:
             return Nearness.ARRIVED
@@ -106,11 +114,20 @@ class RepositionLeg:
         message: the command that says so in the autopilot's terms.
         config: radius, speed and patience.
         commands: carries it.
+        insists: the target is told again if the vehicle stands still elsewhere. If not, one
+            that stopped on its way is taken to be somebody else's.
     """
 
     def __init__(
-        self, target_enu_m: Point, message: CommandInt, config: BridgeConfig, commands: Commands
+        self,
+        target_enu_m: Point,
+        message: CommandInt,
+        config: BridgeConfig,
+        commands: Commands,
+        *,
+        insists: bool = True,
     ) -> None:
+        self._insists = insists
         self._message = message
         self._commands = commands
         self._approach = Approach(target_enu_m, config)
@@ -118,6 +135,7 @@ class RepositionLeg:
         """The vehicle acknowledged the target."""
         self.arrived = False
         self.failure: str | None = None
+        self.stopped: str | None = None
 
     def start(self, now_s: float) -> Sequence[Outbound]:
         """Tell the vehicle, in place of whatever it was told before."""
@@ -141,8 +159,15 @@ class RepositionLeg:
         match self._approach.judge(position_enu_m, velocity_enu_m_s, now_s):
             case Nearness.ARRIVED:
                 self.arrived = True
-            case Nearness.STALLED:
+            case Nearness.STALLED if self._insists:
                 return self._commands.send(TARGET_TAG, self._message, now_s)
+            case Nearness.STALLED if self._approach.moved:
+                short_m = self._approach.distance_m
+                self.stopped = (
+                    f"it stopped {short_m:.0f} m short of its target: paused by a ground station?"
+                )
+            case Nearness.STALLED:
+                self.failure = self._approach.complaint
             case Nearness.GIVEN_UP:
                 self.failure = self._approach.complaint
             case Nearness.UNDERWAY:

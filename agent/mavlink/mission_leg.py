@@ -58,6 +58,11 @@ class MissionLeg:
         """Why the target could not be put in force or reached; None while it may."""
         return self._given_up or self._mission.failure
 
+    @property
+    def stopped(self) -> str | None:
+        """None: who stops a vehicle changes its mode."""
+        return None
+
     def start(self, now_s: float) -> Sequence[Outbound]:
         """Put the target in force, in place of whatever stands on the vehicle."""
         return self._mission.fly_to(self._target_enu_m, self._stay_s, self._speed_m_s, now_s)

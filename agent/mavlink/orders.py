@@ -18,7 +18,7 @@ from agent.mavlink.search import Search
 from agent.mavlink.seat import Seat
 from agent.mavlink.target import Target
 from agent.mavlink.work import Phase, Work
-from agent.vehicle import GoTo, Hold, Home, Orders, Prepare, Refused, Return
+from agent.vehicle import GoTo, Held, Hold, Home, Orders, Prepare, Refused, Return
 
 __all__ = ["OrderTaker"]
 
@@ -239,6 +239,7 @@ class OrderTaker:
         flavour, heartbeat = self._seat.flavour, self._seat.vehicle.heartbeat
         aloft = self._seat.vehicle.landed is not Landed.ON_GROUND
         if flavour is None or heartbeat is None or not (heartbeat.armed and aloft):
+            self._seat.report(Held())
             return
         mode = heartbeat.custom_mode
         if self._seat.flies_for_us(mode) or flavour.is_taking_off(mode):

@@ -14,7 +14,7 @@ from agent.mavlink.leg import Leg, RepositionLeg
 from agent.mavlink.messages import Outbound
 from agent.mavlink.mission_leg import MissionLeg
 from agent.mavlink.seat import Seat
-from agent.vehicle import Arrived, GoTo, Refused
+from agent.vehicle import Arrived, GoTo, HandedOver, Refused
 from swarm.model.frames import wgs84_from_enu
 
 __all__ = ["Target"]
@@ -52,10 +52,12 @@ class Target:
         )
         self._seat.say(*out)
 
-    def outcome(self) -> Arrived | Refused | None:
+    def outcome(self) -> Arrived | HandedOver | Refused | None:
         """How the leg ended; None while it is under way."""
         if self._leg.arrived:
             return Arrived(self._order.leg)
+        if self._leg.stopped is not None:
+            return HandedOver(self._leg.stopped)
         failure = self._leg.failure
         if failure is None:
             return None
@@ -68,4 +70,6 @@ def _leg_to(order: GoTo, seat: Seat, flavour: Flavour, speed_m_s: float) -> Leg:
     if seat.mission is not None:
         return MissionLeg(target_enu_m, order.stay_s, speed_m_s, config, seat.mission)
     place = wgs84_from_enu(config.origin, target_enu_m)
-    return RepositionLeg(target_enu_m, flavour.reposition(*place, speed_m_s), config, seat.commands)
+    message = flavour.reposition(*place, speed_m_s)
+    insists = not flavour.pilots_stop_it_there
+    return RepositionLeg(target_enu_m, message, config, seat.commands, insists=insists)

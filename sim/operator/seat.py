@@ -16,6 +16,7 @@ from sim.status.onlooker import Onlooker
 from swarm.config import Timing
 from swarm.events import Ask, BusFact, Finish, Learned, Publish, Wish
 from swarm.model.ids import FLEET, OPERATOR
+from swarm.state.commands import BEING_STOPPED, CANNOT_HOLD
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
     Brief,
@@ -202,8 +203,12 @@ class OperatorSeat:
         """What a status tells that ``uav`` has said since."""
         phase, obeyed = status.phase, Verdict(Result.OBEYED, _told(uav, status))
         match self._kind:
+            case CommandKind.HOLD if phase is StatusPhase.HOLDING:
+                if status.note.startswith(CANNOT_HOLD):
+                    return Verdict(Result.NOT_OBEYED, _told(uav, status))
+                return None if status.note.startswith(BEING_STOPPED) else obeyed
             case CommandKind.HOLD:
-                return obeyed if phase is StatusPhase.HOLDING else None
+                return None
             case CommandKind.RETURN | CommandKind.ABORT:
                 return obeyed if phase in _ON_THE_WAY_HOME else None
             case CommandKind.RESUME if phase in (StatusPhase.HOLDING, StatusPhase.LEARNING):

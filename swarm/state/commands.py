@@ -12,7 +12,12 @@ from swarm.model.ids import FLEET
 from swarm.state.registers import Replica
 from swarm.wire.messages import Command, CommandKind, Stamp
 
-__all__ = ["aborted", "in_force", "newest", "words"]
+__all__ = ["BEING_STOPPED", "CANNOT_HOLD", "aborted", "in_force", "newest", "words"]
+
+BEING_STOPPED = "being stopped, "
+"""Begins the note of a held UAV whose vehicle has not been seen to stand yet."""
+CANNOT_HOLD = "cannot hold: "
+"""Begins the note of a held UAV whose vehicle goes on."""
 
 _WORDS = {
     CommandKind.HOLD: "held by the operator",

@@ -111,6 +111,11 @@ class ArduCopter:
         return frozenset()
 
     @property
+    def pilots_stop_it_there(self) -> bool:
+        """Pilots and ground stations pause in other modes."""
+        return False
+
+    @property
     def commanded_mode_name(self) -> str:
         """GUIDED."""
         return "GUIDED"

@@ -47,6 +47,11 @@ class Flavour(Protocol):
         ...
 
     @property
+    def pilots_stop_it_there(self) -> bool:
+        """Whether a pilot stops the vehicle in the mode that takes our targets."""
+        ...
+
+    @property
     def commanded_mode_name(self) -> str:
         """The mode in which the vehicle takes our targets, for people."""
         ...

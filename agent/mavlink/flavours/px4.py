@@ -102,6 +102,11 @@ class Px4Copter:
         return frozenset({_CMD_DO_SET_MODE})
 
     @property
+    def pilots_stop_it_there(self) -> bool:
+        """A ground station pauses it in AUTO.LOITER."""
+        return True
+
+    @property
     def commanded_mode_name(self) -> str:
         """Called Hold by ground stations."""
         return "AUTO.LOITER (Hold)"

@@ -8,6 +8,7 @@ from agent.events import Action
 from agent.vehicle import (
     GoTo,
     HandedOver,
+    Held,
     Hold,
     Home,
     NotReady,
@@ -58,7 +59,11 @@ def test_a_held_uav_gives_its_task_up_stops_and_says_why() -> None:
     assert agent.core.phase is StatusPhase.HOLDING
     assert Save() in actions
     (status,) = statuses(agent.run_until(3.0))[-1:]
-    assert (status.phase, status.note) == (StatusPhase.HOLDING, "held by the operator: helicopter")
+    note = "held by the operator: helicopter"
+    assert (status.phase, status.note) == (StatusPhase.HOLDING, f"being stopped, {note}")
+    agent.happen(Held())
+    (status,) = statuses(agent.run_until(5.0))[-1:]
+    assert (status.phase, status.note) == (StatusPhase.HOLDING, note)
 
 
 def test_a_held_uav_takes_no_task_whatever_happens() -> None:
@@ -153,6 +158,24 @@ def test_after_an_abort_one_uav_can_be_held_on_its_way_home_and_then_goes_on_hom
 
     assert [type(o) for o in orders(tell(agent, RESUME, 101.0))] == [Return]
     assert finishes(agent.happen(Home(), 110.0)) == [0]
+
+
+def test_a_uav_held_on_its_way_home_that_lands_all_the_same_is_home() -> None:
+    agent = on_its_way()
+    assert finishes(agent.happen(Home())) == []
+    tell(agent, ABORT, 2.0)
+    tell(agent, HOLD, 3.0)
+
+    assert finishes(agent.happen(Home(), 4.0)) == [0]
+    assert agent.core.phase is StatusPhase.HOME
+
+
+def test_landing_ends_no_hold_of_a_uav_that_takes_part() -> None:
+    agent = on_its_way()
+    tell(agent, HOLD, 3.0)
+
+    assert finishes(agent.happen(Home(), 4.0)) == []
+    assert agent.core.phase is StatusPhase.HOLDING
 
 
 def test_an_abort_moves_a_uav_that_was_held_before() -> None:

@@ -157,6 +157,17 @@ def test_target_that_is_refused_for_good_is_reported(
     flight.run_until(Arrived(2))
 
 
+def test_a_px4_that_is_paused_on_its_way_is_handed_over() -> None:
+    flight = BridgeFlight(FakePx4(ORIGIN)).flying()
+    flight.copter.heard.clear()
+    flight.copter.target_m = flight.copter.position_m
+    handed = flight.run_until(HandedOver)
+    assert isinstance(handed, HandedOver)
+    assert "short of its target: paused by a ground station?" in handed.reason
+    flight.run(20.0)
+    assert not flight.copter.commands(REPOSITION)
+
+
 def test_vehicle_that_stands_still_elsewhere_is_told_again_and_then_given_up(
     fake: type[FakeCopter],
 ) -> None:
@@ -167,11 +178,11 @@ def test_vehicle_that_stands_still_elsewhere_is_told_again_and_then_given_up(
     refused = flight.run_until(Refused)
     assert isinstance(refused, Refused)
     assert "stands still 40.0 m from the target" in refused.reason
-    assert len(flight.copter.commands(REPOSITION)) == 4
+    assert len(flight.copter.commands(REPOSITION)) == {FakeCopter: 4, FakePx4: 1}[fake]
 
 
-def test_vehicle_that_forgot_its_target_gets_there_after_all(fake: type[FakeCopter]) -> None:
-    flight = BridgeFlight(fake(ORIGIN)).prepared()
+def test_an_ardupilot_that_forgot_its_target_gets_there_after_all() -> None:
+    flight = BridgeFlight(FakeCopter(ORIGIN)).prepared()
     flight.order(GoTo(1, NORTH))
     flight.run(2.0)
     flight.copter.target_m = None

@@ -14,6 +14,7 @@ from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    Held,
     Hold,
     Home,
     Refused,
@@ -74,6 +75,7 @@ def test_flight_is_stopped_and_its_leg_given_up(flight: BridgeFlight) -> None:
     before_m = flight.copter.position_m
     flight.order(HOLD)
     flight.run(5.0)
+    assert flight.seen == [Held()]
     assert math.dist(before_m, flight.copter.position_m) < 5.0
     assert hovers(flight)
     assert flight.bridge.phase is Phase.HOVERING
@@ -188,6 +190,7 @@ def test_vehicle_on_the_ground_needs_no_stop(flight: BridgeFlight) -> None:
     flight.order(HOLD)
     flight.run(20.0)
     assert set(flight.copter.count()) <= {INTERVAL}
+    assert flight.seen == [Held()]
     assert not any(isinstance(r, Refused) for r in flight.reports)
 
 
@@ -199,7 +202,18 @@ def test_hold_after_the_landing_lets_the_vehicle_come_home(flight: BridgeFlight)
     flight.order(HOLD)
     flight.run(5.0)
     assert not flight.copter.armed
-    assert not any(isinstance(r, Refused | HandedOver) for r in flight.reports)
+    assert flight.reports == [Home()]
+
+
+def test_vehicle_that_lands_before_it_is_stopped_is_home(flight: BridgeFlight) -> None:
+    under_way(flight)
+    flight.order(Return("mission ended"))
+    while flight.copter.position_m[2] > 0.5 or flight.copter.velocity_m_s[2] >= 0.0:
+        flight.step()
+    flight.copter.verdicts[SET_MODE] = [None] * 9
+    flight.order(HOLD)
+    flight.run_until(Home())
+    assert not flight.copter.armed
 
 
 # -- a new life -------------------------------------------------------------------------
@@ -267,6 +281,7 @@ def test_vehicle_that_goes_on_is_reported(flight: BridgeFlight) -> None:
     assert isinstance(refused, Refused)
     assert refused.order == HOLD
     assert "goes on" in refused.reason
+    assert flight.seen == []
     flight.run(5.0)
     assert len(flight.reports) == 1
     flight.copter.verdicts.clear()

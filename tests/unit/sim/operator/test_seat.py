@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -135,6 +136,23 @@ def test_it_repeats_itself_until_it_is_obeyed_and_then_ends() -> None:
     assert seat.result is Result.OBEYED
     assert Finish(0) in seat.wishes
     assert seat.core.next_deadline_s() is None
+
+
+def test_a_hold_is_obeyed_once_the_vehicle_stands() -> None:
+    seat = Seat(HOLD)
+    seat.learn()
+    seat.hear("u0", replace(status(StatusPhase.HOLDING), note="being stopped, held"))
+    assert seat.result is None
+    seat.hear("u0", replace(status(StatusPhase.HOLDING), note="held"))
+    assert seat.result is Result.OBEYED
+
+
+def test_a_vehicle_that_cannot_be_stopped_does_not_obey() -> None:
+    seat = Seat(HOLD)
+    seat.learn()
+    seat.hear("u0", replace(status(StatusPhase.HOLDING), note="cannot hold: it goes on"))
+    assert seat.result is Result.NOT_OBEYED
+    assert Finish(1) in seat.wishes
 
 
 def test_what_a_uav_said_before_the_command_proves_nothing() -> None:
