@@ -53,11 +53,11 @@ def drain(flight: BridgeFlight) -> None:
 
 
 def drift_off(flight: BridgeFlight) -> None:
-    flight.copter.target_m = (80.0, 0.0, 10.0)
+    flight.copter.target_m = (400.0, 0.0, 10.0)
 
 
 def climb_away(flight: BridgeFlight) -> None:
-    flight.copter.target_m = (30.0, 0.0, 45.0)
+    flight.copter.target_m = (30.0, 0.0, 200.0)
 
 
 def lose_position_stream(flight: BridgeFlight) -> None:
@@ -214,7 +214,7 @@ def test_a_vehicle_in_trouble_is_advised_to_return_and_obeys(
     assert not {SET_MODE} & set(flight.copter.count()), "it only advises"
 
     flight.order(Return(advised.reason))
-    flight.run_until(Home())
+    flight.run_until(Home(), limit_s=180.0)
     assert not [r for r in flight.reports if isinstance(r, HandedOver)]
 
 
