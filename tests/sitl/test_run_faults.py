@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.sitl, pytest.mark.process, pytest.mark.timeout(240)]
 REASONS = {
     "pilot": " switched it to ",
     "reboot": "the autopilot rebooted",
-    "silent": "no heartbeat for ",
+    "silent": "nothing heard for ",
     "failsafe-rtl": "a failsafe switched it to RTL",
     "battery-low": "battery at 10%",
 }
