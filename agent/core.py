@@ -126,6 +126,8 @@ class AgentCore:
         self._stage = StatusPhase.LEARNING
         self._flew_before = False
         """Whether the vehicle may be in the air though this life has not brought it there."""
+        self._left_in_air = False
+        """Whether an earlier life was last heard to have it in the air."""
         self._homebound = False
         """Whether it takes no further part, so that home is all that is left to fly to."""
         self._on_detour = False
@@ -338,6 +340,8 @@ class AgentCore:
             self._actions.append(Note("remembers", {"confirmed": brief is not None}))
         claim = self.replica.claims.get(self.uav)
         self._flew_before = claim is not None
+        aloft = (ClaimPhase.IDLE, ClaimPhase.PROPOSED, ClaimPhase.HELD)
+        self._left_in_air = claim is not None and claim.phase in aloft and not self._rejoin
         if self._recall.forlorn:
             self._go_home("nobody knows of a mission", now_s, status=1)
         elif claim is not None and claim.phase is ClaimPhase.OUT and not self._rejoin:
@@ -368,7 +372,8 @@ class AgentCore:
     def _prepare(self, me: Fleet) -> None:
         self._enter(StatusPhase.PREPARING, "")
         place_enu_m, ground_up_m = self._picture.in_layer(me.position_enu_m), me.position_enu_m[2]
-        order = Prepare(place_enu_m, me.speed_m_s, self._mission_runs, ground_up_m)
+        resume = self._mission_runs or self._left_in_air
+        order = Prepare(place_enu_m, me.speed_m_s, resume, ground_up_m, self._left_in_air)
         self._actions.append(Order(order))
 
     @property

@@ -41,6 +41,9 @@ class Prepare:
     """A vehicle that flies already is ready where it is, and flies on meanwhile."""
     ground_up_m: float | None = None
     """Height of the ground on which the vehicle stands [m; mission origin]; None if not known."""
+    left_in_air: bool = False
+    """An earlier life of this agent had it in the air: one that stands on the ground now came
+    down with nobody watching, and is not started."""
 
 
 @dataclass(frozen=True, slots=True)

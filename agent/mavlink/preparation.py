@@ -37,6 +37,10 @@ _CLIMB_TOLERANCE_M = 1.0
 """Autopilots end a takeoff that much too low, and go on from there."""
 _PREARM_TEXT_AGE_S = 35.0
 """ArduPilot repeats what fails before arming every 30 s."""
+_CAME_DOWN = (
+    "it was left in the air and stands on the ground now: look after it, "
+    "and start its agent with --rejoin"
+)
 _CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
 _ARMED_BY_OTHERS = "somebody else armed it and disarmed it again; prepare it again to take off"
 _NULL_ISLAND = ", near 0° N 0° E: a PX4 before 1.16 starts its own simulator there"
@@ -211,6 +215,8 @@ class Preparation:
     def _start_motors(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
         if self._flew:
             return self._fail("the vehicle disarmed after takeoff")
+        if self._order.left_in_air and not self._arm.count:
+            return self._fail(_CAME_DOWN)
         unready = self._flavour.unready(vehicle)
         if unready is None and (grounds := self._guards.grounds(vehicle, now_s)):
             return self._wait(grounds)

@@ -13,7 +13,7 @@ from sim.autopilot.flavours import FlavourName
 from sim.operator.seat import Result
 from sim.world import Recall
 from swarm.wire.messages import CommandKind, StatusPhase
-from tests.bridged_fleet import KINDS, BridgedFleet, Logbook
+from tests.bridged_fleet import KINDS, LIMIT_S, BridgedFleet, Logbook
 from tests.fake_copter import ARM, TAKEOFF
 
 pytestmark = pytest.mark.parametrize(
@@ -49,6 +49,21 @@ def test_an_agent_that_starts_anew_takes_its_vehicle_on_in_the_air(
     assert book.reasons(HandedOver) == []
     assert fleet.phase("u0") is StatusPhase.HOME
     assert not fleet.vehicles["u0"].pilot().armed
+
+
+def test_a_vehicle_that_fell_while_its_agent_was_down_is_not_started_again(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    fleet = BridgedFleet(flavour, style, faults={"u0": "reboot@11"})
+    fleet.at(14.0, partial(fleet.world.crash, "u0"))
+    fleet.at(20.0, partial(fleet.world.restart, "u0", Recall.DISK))
+    assert fleet.world.run(LIMIT_S)
+
+    assert fleet.books["u0"].lives == 2
+    assert not {ARM, TAKEOFF} & commands(fleet.books["u0"], life=2)
+    assert fleet.note("u0").startswith("it was left in the air and stands on the ground now")
+    assert fleet.world.observer.result().open == ()
+    assert fleet.done_by("u0") == ()
 
 
 def test_a_vehicle_whose_agent_stays_away_comes_home_if_a_mission_stands_on_it(

@@ -36,6 +36,8 @@ from tests.lone_agent import (
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
 PREPARE = Prepare((0.0, 0.0, 10.0), 1.0, ground_up_m=0.0)
 RESUME = replace(PREPARE, resume=True)
+LEFT = replace(RESUME, left_in_air=True)
+"""What is ordered of a vehicle that an earlier life had in the air."""
 HELD = held("near", 0.0, 0, 10.0)
 AT_ONCE = Timing(announce_s=2.0, silence_s=5.0, pause_s=1e6)
 """Timers as they are, but for a process that never hangs."""
@@ -73,7 +75,7 @@ def test_it_stands_by_its_claim_at_once_and_flies_on_to_its_task(from_peers: boo
     else:
         actions = agent.learn(agent.statement(COORDINATOR, agent.brief), mission_s=6.0)
 
-    assert orders(actions) == [RESUME]
+    assert orders(actions) == [LEFT]
     assert set(claims(actions)) == {HELD}
     assert agent.core.phase is StatusPhase.FLYING
     actions = agent.happen(VehicleReady())
@@ -100,7 +102,7 @@ def test_with_nobody_there_it_trusts_a_young_memory() -> None:
     agent = crashed().reborn(remembers=True, down_s=20.0)
     actions = agent.learn_from_nobody()
 
-    assert orders(actions) == [RESUME]
+    assert orders(actions) == [LEFT]
     assert set(claims(actions)) == {HELD}
     assert agent.core.snapshot(agent.now_s).mission_s == 24.0
     agent.happen(VehicleReady())
@@ -133,7 +135,7 @@ def test_a_claim_that_counts_no_more_is_given_up_at_once(news: Body, reason: str
     assert {claim.phase for claim in claims(actions)} == {ClaimPhase.IDLE}
     assert "released" in notes(actions)
     assert reason in str(actions)
-    assert orders(actions) == [RESUME]
+    assert orders(actions) == [LEFT]
     actions = agent.happen(VehicleReady())
     assert agent.task == "far"
 
@@ -197,18 +199,18 @@ def test_one_that_was_idle_says_so_again_once_the_vehicle_is_ready() -> None:
     earlier.arrive(10.0)
     assert earlier.phase is ClaimPhase.IDLE
     agent = earlier.reborn()
-    assert orders(agent.learn_what_was_known_to(earlier)) == [RESUME]
+    assert orders(agent.learn_what_was_known_to(earlier)) == [LEFT]
 
     assert [claim.phase for claim in claims(agent.happen(VehicleReady()))] == [ClaimPhase.IDLE]
 
 
-def test_before_the_mission_runs_it_is_prepared_as_usual() -> None:
+def test_before_the_mission_runs_it_goes_on_from_where_it_hovers() -> None:
     earlier = LoneAgent(uav("u0"))
     earlier.fly_to(NEAR)
     agent = earlier.reborn()
     actions = agent.learn_what_was_known_to(earlier)
 
-    assert orders(actions) == [PREPARE]
+    assert orders(actions) == [LEFT]
     agent.happen(VehicleReady())
     agent.start_mission()
     assert agent.task == "near"
@@ -244,7 +246,7 @@ def test_a_brief_heard_before_any_answer_is_no_answer_yet() -> None:
     heard = agent.hear(COORDINATOR, agent.brief)
     assert (orders(heard), heard.count(Ask())) == ([], 1)
 
-    assert orders(agent.learn_what_was_known_to(earlier)) == [RESUME]
+    assert orders(agent.learn_what_was_known_to(earlier)) == [LEFT]
     assert agent.task == "near"
 
 
@@ -260,7 +262,7 @@ def test_whoever_is_there_and_has_not_answered_is_asked_once_more() -> None:
 
     own = message("u0", done("near", 3.0), counter=99, incarnation=5)
     agent.happen(Learned((Snapshot(MISSION, "u1", 1, 6.0, (own,)),)))
-    assert orders(agent.log) == [RESUME]
+    assert orders(agent.log) == [LEFT]
     assert claims(agent.log) != [HELD]
 
 
@@ -273,7 +275,7 @@ def test_one_who_never_answers_is_waited_for_no_longer() -> None:
     for _ in range(2):
         agent.happen(Learned((Snapshot(MISSION, COORDINATOR, 1, 6.0, known),)))
 
-    assert orders(agent.log) == [RESUME]
+    assert orders(agent.log) == [LEFT]
 
 
 def test_with_nobody_there_an_old_memory_is_not_trusted_but_the_vehicle_is_brought_home() -> None:
@@ -299,7 +301,7 @@ def test_an_old_memory_is_confirmed_by_whoever_comes_in_time() -> None:
     agent.see(COORDINATOR)
     actions = agent.learn(*agent.coordinators(agent.brief, NEAR, epoch("u0")), mission_s=99.0)
 
-    assert orders(actions) == [RESUME]
+    assert orders(actions) == [LEFT]
     assert agent.task == "near"
 
 

@@ -204,3 +204,17 @@ def test_a_vehicle_that_is_never_heard_is_reported_and_not_taken_for_home(
     assert refused == Refused(RETURN, "waiting for a heartbeat of system id 1")
     assert any(isinstance(r, NotReady) for r in flight.reports)
     assert flight.now_s - 100.0 == pytest.approx(3 * flight.bridge.config.silence_timeout_s, abs=1)
+
+
+def test_a_vehicle_left_in_the_air_and_found_on_the_ground_is_not_started(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
+    order = replace(RESUME, left_in_air=True)
+    flight.order(order)
+    refused = flight.run_until(Refused)
+
+    assert isinstance(refused, Refused)
+    assert refused.reason.startswith("it was left in the air and stands on the ground now")
+    flight.run(20.0)
+    assert not {ARM, TAKEOFF} & flight.copter.count().keys()
