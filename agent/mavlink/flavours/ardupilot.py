@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 from agent.mavlink.flavours.base import SpeedParameter
+from agent.mavlink.flavours.copter import COPTER_TYPES, UNCHANGED, Copter, set_mode
 from agent.mavlink.messages import (
     AltitudeFrame,
     Battery,
@@ -30,8 +31,6 @@ from agent.mavlink.state import VehicleState
 __all__ = ["ArduCopter"]
 
 _AUTOPILOT_ARDUPILOT = 3
-_COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
-"""MAV_TYPE of quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca- and decacopter."""
 
 _AUTO = 3
 _GUIDED = 4
@@ -72,16 +71,10 @@ _STATE_STANDBY = 3
 _STATE_ACTIVE = 4
 
 _CMD_NAV_TAKEOFF = 22
-_CMD_DO_SET_MODE = 176
-_CMD_DO_CHANGE_SPEED = 178
 _CMD_DO_REPOSITION = 192
-_CMD_COMPONENT_ARM_DISARM = 400
-_CUSTOM_MODE_ENABLED = 1.0
-_GROUND_SPEED = 1.0
-_UNCHANGED = -1.0
 
 
-class ArduCopter:
+class ArduCopter(Copter):
     """The flavour of ArduPilot's copters."""
 
     @property
@@ -128,7 +121,7 @@ class ArduCopter:
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether it is an ArduPilot copter."""
         return (
-            heartbeat.autopilot == _AUTOPILOT_ARDUPILOT and heartbeat.vehicle_type in _COPTER_TYPES
+            heartbeat.autopilot == _AUTOPILOT_ARDUPILOT and heartbeat.vehicle_type in COPTER_TYPES
         )
 
     def mode_name(self, custom_mode: int) -> str:
@@ -191,23 +184,15 @@ class ArduCopter:
 
     def set_commanded_mode(self) -> CommandLong:
         """GUIDED."""
-        return _set_mode(_GUIDED)
+        return set_mode(_GUIDED)
 
     def set_mission_mode(self) -> CommandLong:
         """AUTO; refused on the ground unless the mission begins with a takeoff."""
-        return _set_mode(_AUTO)
+        return set_mode(_AUTO)
 
     def set_return_mode(self) -> CommandLong:
         """RTL, which climbs, returns, lands and disarms."""
-        return _set_mode(_RTL)
-
-    def arm(self) -> CommandLong:
-        """Start the motors; in GUIDED refused without a position."""
-        return CommandLong(_CMD_COMPONENT_ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-
-    def disarm(self) -> CommandLong:
-        """Stop the motors; refused in the air."""
-        return CommandLong(_CMD_COMPONENT_ARM_DISARM, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        return set_mode(_RTL)
 
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
         """ArduCopter reads the height as above home."""
@@ -226,7 +211,7 @@ class ArduCopter:
         return CommandInt(
             _CMD_DO_REPOSITION,
             AltitudeFrame.MEAN_SEA_LEVEL,
-            (_UNCHANGED, 0.0, 0.0, math.nan),
+            (UNCHANGED, 0.0, 0.0, math.nan),
             lat_deg,
             lon_deg,
             alt_m,
@@ -244,17 +229,3 @@ class ArduCopter:
     def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
         """Copters keep the hold time only; their radius is WPNAV_RADIUS."""
         return (hold_s, 0.0, 0.0, 0.0)
-
-    def change_speed(self, speed_m_s: float) -> CommandLong:
-        """Ground speed; forgotten when GUIDED is entered or takeoff ends, so set it after."""
-        return CommandLong(
-            _CMD_DO_CHANGE_SPEED,
-            (_GROUND_SPEED, speed_m_s, _UNCHANGED, 0.0, 0.0, 0.0, 0.0),
-        )
-
-
-def _set_mode(custom_mode: int) -> CommandLong:
-    return CommandLong(
-        _CMD_DO_SET_MODE,
-        (_CUSTOM_MODE_ENABLED, float(custom_mode), 0.0, 0.0, 0.0, 0.0, 0.0),
-    )

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 from agent.mavlink.flavours.base import SpeedParameter
+from agent.mavlink.flavours.copter import COPTER_TYPES, UNCHANGED, Copter, set_mode
 from agent.mavlink.messages import (
     AltitudeFrame,
     CommandInt,
@@ -28,8 +29,6 @@ from agent.mavlink.state import VehicleState
 __all__ = ["Px4Copter"]
 
 _AUTOPILOT_PX4 = 12
-_COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
-"""MAV_TYPE of quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca- and decacopter."""
 
 _AUTO = 4
 _TAKEOFF = (_AUTO, 2)
@@ -62,19 +61,14 @@ _MODE_NAMES = {
 _STATE_STANDBY, _STATE_CRITICAL, _STATE_EMERGENCY = 3, 5, 6
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_SET_MODE = 176
-_CMD_DO_CHANGE_SPEED = 178
 _CMD_DO_REPOSITION = 192
-_CMD_COMPONENT_ARM_DISARM = 400
-_CUSTOM_MODE_ENABLED = 1.0
-_GROUND_SPEED = 1.0
-_UNCHANGED = -1.0
 _CHANGE_MODE = 1.0
 """MAV_DO_REPOSITION_FLAGS_CHANGE_MODE."""
 _WAYPOINT_RADIUS_M = 2.0
 """As ArduCopter's, within which a vehicle is as good as at its waypoint."""
 
 
-class Px4Copter:
+class Px4Copter(Copter):
     """The flavour of PX4's multicopters."""
 
     @property
@@ -118,7 +112,7 @@ class Px4Copter:
 
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether it is a PX4 multicopter."""
-        return heartbeat.autopilot == _AUTOPILOT_PX4 and heartbeat.vehicle_type in _COPTER_TYPES
+        return heartbeat.autopilot == _AUTOPILOT_PX4 and heartbeat.vehicle_type in COPTER_TYPES
 
     def mode_name(self, custom_mode: int) -> str:
         """The mode's name, for people."""
@@ -179,23 +173,15 @@ class Px4Copter:
 
     def set_commanded_mode(self) -> CommandLong:
         """AUTO.LOITER."""
-        return _set_mode(_LOITER)
+        return set_mode(*_LOITER)
 
     def set_mission_mode(self) -> CommandLong:
         """AUTO.MISSION; acknowledged even if there is no mission to fly."""
-        return _set_mode(_MISSION)
+        return set_mode(*_MISSION)
 
     def set_return_mode(self) -> CommandLong:
         """AUTO.RTL, which climbs, returns, lands and disarms."""
-        return _set_mode(_RTL)
-
-    def arm(self) -> CommandLong:
-        """Start the motors."""
-        return CommandLong(_CMD_COMPONENT_ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-
-    def disarm(self) -> CommandLong:
-        """Stop the motors; refused in the air."""
-        return CommandLong(_CMD_COMPONENT_ARM_DISARM, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        return set_mode(*_RTL)
 
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
         """PX4 reads the height as above sea level; NaN is its own yaw and place."""
@@ -229,27 +215,12 @@ class Px4Copter:
         QGroundControl's pause is the same. A position that we heard wrongly plays no part.
         """
         nowhere = (math.nan, math.nan, math.nan, math.nan)
-        return CommandLong(_CMD_DO_REPOSITION, (_UNCHANGED, _CHANGE_MODE, 0.0, *nowhere))
+        return CommandLong(_CMD_DO_REPOSITION, (UNCHANGED, _CHANGE_MODE, 0.0, *nowhere))
 
     def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
         """The hold begins within a radius of 10 m (NAV_ACC_RAD) unless told another."""
         return (hold_s, _WAYPOINT_RADIUS_M, 0.0, math.nan)
 
-    def change_speed(self, speed_m_s: float) -> CommandLong:
-        """Cruise speed of what is flown now; targets bring their own."""
-        return CommandLong(
-            _CMD_DO_CHANGE_SPEED,
-            (_GROUND_SPEED, speed_m_s, _UNCHANGED, 0.0, 0.0, 0.0, 0.0),
-        )
-
 
 def _main_and_sub(custom_mode: int) -> tuple[int, int]:
     return custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
-
-
-def _set_mode(mode: tuple[int, int]) -> CommandLong:
-    main, sub = mode
-    return CommandLong(
-        _CMD_DO_SET_MODE,
-        (_CUSTOM_MODE_ENABLED, float(main), float(sub), 0.0, 0.0, 0.0, 0.0),
-    )
