@@ -11,7 +11,8 @@
    pause, only told to stop a vehicle.
 5. After a hand-over it says nothing but heartbeats and requests for messages, until it is
    given a new order.
-6. What goes home, or is not known to be ours, is given no mission.
+6. What goes home, or is not known to be ours, is given no mission; one that was being given to
+   a vehicle on the ground is given whole, or cleared.
 7. It reports what was asked for: the leg under way, once; numbers that are numbers.
 8. It wants to be called again within a heartbeat's interval, and not at once for ever.
 9. It remembers no more for hearing more.
@@ -144,6 +145,8 @@ class BridgeWatch:
         """As it was before this step."""
         self._ordered: object = None
         """In this step."""
+        self._gave_mission = False
+        """Whether the vehicle has been given a mission since the last return."""
         self._prepared = False
         """Whether `Prepare` has been ordered and not been answered."""
         self._silent = False
@@ -158,6 +161,7 @@ class BridgeWatch:
         self._task_before, self._ordered = self._task, event
         if isinstance(event, Prepare | GoTo | Hold | Return):
             self._note(event)
+        self._gave_mission &= not isinstance(event, Return)
         actions = self.bridge.step(event, now_s)
         self.fake = _FAKES.get(type(self.bridge._seat.flavour), self.fake)
         after = self.bridge.phase
@@ -215,7 +219,8 @@ class BridgeWatch:
             hold(message.param_id in self.fake.speed_names, f"{name} of {message.param_id}")
         elif name in _MISSION_MESSAGES:
             hold(missions, f"{name}, though commanded by targets")
-            hold(name in _MISSION_READING or not self._gives_no_mission(phases), f"{name} {phases}")
+            if name not in _MISSION_READING:
+                self._see_giving(name, phases)
             if name == "MISSION_ITEM_INT":
                 hold(message.command in _MISSION_ITEMS, f"mission item {message.command}")
                 if message.command == _WAYPOINT:
@@ -225,8 +230,13 @@ class BridgeWatch:
         else:
             hold(False, f"sends {name}")
 
-    def _gives_no_mission(self, phases: set[Phase]) -> bool:
-        return phases <= _WITHOUT_MISSION or isinstance(self._ordered, Return)
+    def _see_giving(self, name: str, phases: set[Phase]) -> None:
+        """What a vehicle that is no longer prepared was being given is given whole, or cleared."""
+        hold(not isinstance(self._ordered, Return), f"{name} in the step of a return")
+        if phases <= _WITHOUT_MISSION:
+            ends = self._gave_mission and name != "MISSION_SET_CURRENT"
+            hold(phases == {Phase.IDLE} and ends, f"{name} {phases}")
+        self._gave_mission = True
 
     def _see_command(self, message: Any, phases: set[Phase], *, missions: bool) -> None:
         allowed = set[int]().union(*(_COMMANDS[phase] for phase in phases))

@@ -159,6 +159,7 @@ class Bridge:
             if flavour is not None:
                 seat.commands.acknowledged_twice = flavour.acknowledged_twice
             seat.forget_mission()
+            self._work.forget_preparation()
         self._check_authority(heartbeat)
         self._check_guards()
 
@@ -216,11 +217,11 @@ class Bridge:
         )
         fault = seat.flavour.position_fault(seat.vehicle) if seat.flavour else None
         seat.guards.on_position(place_enu_m, fault, seat.now_s)
-        if fault is None:
-            seat.whereabouts.on_position(place_enu_m, seat.now_s)
         velocity, battery_frac = position.velocity_enu_m_s, seat.vehicle.battery_frac
         seat.report(Telemetry(place_enu_m, velocity, battery_frac))
-        self._duty.on_position(position, place_enu_m)
+        if fault is None:  # nothing is judged by a place that the vehicle itself distrusts
+            seat.whereabouts.on_position(place_enu_m, seat.now_s)
+            self._duty.on_position(position, place_enu_m)
 
     def _on_reboot(self) -> None:
         """Forget what is no longer true of an autopilot that began anew."""

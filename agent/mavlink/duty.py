@@ -155,6 +155,8 @@ class Duty:
                 self._seat.report(ReturnAdvised(preparation.failure))
             else:
                 self._work.phase = Phase.IDLE
+                if self._seat.mission is not None:
+                    self._seat.mission.stand_down()  # an upload is still ended, never left half
                 self._seat.report(Refused(order, preparation.failure))
         elif preparation.done:
             self._work.drop()

@@ -97,6 +97,11 @@ class Work:
         self.returning = self.holding = None
         self._seat.commands.cancel_all()
 
+    def forget_preparation(self) -> None:
+        """It is another kind of vehicle: what was begun in the terms of the last one ends."""
+        self.preparation = None
+        self._seat.commands.cancel_all()
+
     def hand_over(self, reason: str) -> None:
         """Command nothing any more."""
         self.drop()

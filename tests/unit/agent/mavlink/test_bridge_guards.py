@@ -395,3 +395,12 @@ def test_lost_heartbeats_are_no_silence_while_other_messages_come(fake: type[Fak
     handed_over = flight.run_until(HandedOver, limit_s=5.0)
     assert isinstance(handed_over, HandedOver)
     assert handed_over.reason.startswith("no heartbeat for 15 s, though other messages come")
+
+
+def test_nobody_arrives_at_a_place_that_the_vehicle_itself_distrusts(fake: Fake) -> None:
+    flight = flying(fake)
+    flight.copter.ekf_flags = 167
+    flight.run(1.0)
+    flight.copter.position_m = (50.0, 0.0, 10.0)
+    flight.run(3.0)
+    assert not [r for r in flight.reports if isinstance(r, Arrived)]

@@ -579,3 +579,15 @@ def test_climb_that_stops_ends_the_preparation(fake: type[FakeCopter]) -> None:
 
     flight.order(Return("it failed"))
     flight.run_until(Home())
+
+
+def test_another_firmware_under_the_same_ids_is_spoken_to_in_its_own_terms() -> None:
+    flight = BridgeFlight(FakeCopter(ORIGIN, boot_s=30.0))
+    flight.order(START)
+    flight.run(2.0)
+    flight.copter.autopilot, flight.copter.boot_s = 12, 0.0
+    flight.run(5.0)
+
+    modes = [(m.param2, m.param3) for m in flight.copter.commands(SET_MODE)]
+    assert modes
+    assert set(modes) == {(4.0, 3.0)}, "AUTO.LOITER of PX4"
