@@ -24,7 +24,7 @@ demo: $(VENV)/.installed
 
 test: lint
 	$(BIN)/python -m pytest -n 2 tests/unit tests/contract tests/faults
-	$(BIN)/python -m pytest -n 2 tests/process tests/sitl
+	$(BIN)/python -m pytest -n 3 --dist worksteal tests/process tests/sitl
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
