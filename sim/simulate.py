@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from coordinator.planner.plan import make_plan
 from sim.uncertainty import Uncertainty
-from sim.world import World
+from sim.world import Faults, World
 from swarm.clock import SystemClock
 from swarm.model import Mission, Plan
 
@@ -42,7 +42,10 @@ def simulate_mission(
         return plan
 
     span_s = max(planner(mission, method, seed).completion_s.values(), default=0.0)
-    drawn, faults = uncertainty.draw(mission, span_s, seed)
-    world = World(drawn, planner, method=method, seed=seed, faults=faults, latency_s=latency_s)
+    fate = uncertainty.draw(mission, span_s, seed)
+    faults = Faults(fate.lost_at_s)
+    world = World(
+        fate.mission, planner, method=method, seed=seed, faults=faults, latency_s=latency_s
+    )
     world.run()
     return world

@@ -1,20 +1,27 @@
-"""Random losses and pop-ups for a mission, each from a stream of its own.
+"""What is uncertain about a mission, and one drawn future of it.
 
-Streams are spawned from one seed, so that asking for losses does not change which
-tasks pop up: policies can be compared in the same world. Leaves out: random
-outcomes, speeds and messages.
+Everything follows from one seed by streams of their own, each named after what it decides and
+for whom. So asking for losses does not change which tasks pop up, another UAV changes nobody's
+speed, and policies that decide differently meet the same world (common random numbers). Leaves
+out: what a drawn future does to a fleet (sim.simulate, sim.study).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from sim.world import Faults
-from swarm.model import Mission
+from sim.fate import Fate, Partition, bounding_box, lognormal
+from sim.streams import stream
+from sim.wind import Wind
+from swarm.model import Mission, Task, TaskId, Uav, UavId
 
 __all__ = ["Uncertainty"]
+
+_SHARES = ("loss", "popup", "message_loss")
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,26 +29,70 @@ class Uncertainty:
     """How uncertain a mission is.
 
     Raises:
-        ValueError: a probability is outside 0..1.
+        ValueError: a probability is outside 0..1, or another number is negative or not finite.
     """
 
     loss: float = 0.0
     """Probability that a UAV is lost, at a random moment of the mission."""
     popup: float = 0.0
     """Probability that a task known at the start appears during the mission instead."""
+    popups_per_min: float = 0.0
+    """Rate of tasks that appear besides: each like a random one of the mission, elsewhere."""
+    withdrawals_per_min: float = 0.0
+    """Rate at which a random task is taken off the board."""
+    outcomes: bool = False
+    """Whether attempts succeed or fail by chance; otherwise each is worth its p."""
+    survival: bool = False
+    """Whether tasks cost UAVs by chance; otherwise later tasks are worth their S."""
+    speed_sd_frac: float = 0.0
+    """Standard deviation of a UAV's speed, as a share of its cruise speed."""
+    leg_sd_frac: float = 0.0
+    """The same for each leg by itself."""
+    wind_m_s: float = 0.0
+    """Speed of a steady wind from a random direction [m/s]."""
+    position_error_m: float = 0.0
+    """Standard deviation, east and north each, of where a UAV stops for a task [m]."""
+    message_loss: float = 0.0
+    """Share of messages that never arrive."""
+    delay_s: float = 0.0
+    """Least delay of a message [s]."""
+    jitter_s: float = 0.0
+    """Mean of what comes on top of it [s]."""
+    partitions_per_min: float = 0.0
+    """Rate at which half of the fleet is cut off from the rest and the coordinator."""
+    partition_s: float = 30.0
+    """How long such a partition lasts [s]."""
+    lost_at_s: Mapping[UavId, float] = field(default_factory=dict)
+    """UAVs that are lost in any case, and when [s mission time]."""
+    withdrawn_at_s: Mapping[TaskId, float] = field(default_factory=dict)
+    """Tasks that are withdrawn in any case, and when [s mission time]."""
 
     def __post_init__(self) -> None:
-        for name in ("loss", "popup"):
+        for name in _SHARES:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} must be within 0..1, not {getattr(self, name)}")
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, float) and not 0.0 <= value < math.inf:
+                raise ValueError(f"{item.name} must be >= 0 and finite, not {value}")
+        for times_s in (self.lost_at_s, self.withdrawn_at_s):
+            if not all(0.0 <= time_s < math.inf for time_s in times_s.values()):
+                raise ValueError(f"what is listed happens at mission times >= 0, not {times_s}")
 
-    def draw(self, mission: Mission, span_s: float, seed: int) -> tuple[Mission, Faults]:
-        """One world: the mission with its pop-ups, and what gets lost when.
+    @property
+    def ideal_communication(self) -> bool:
+        """Whether everyone hears everything at once."""
+        troubles = (self.message_loss, self.delay_s, self.jitter_s, self.partitions_per_min)
+        return not any(troubles)
+
+    def draw(self, mission: Mission, span_s: float, seed: int) -> Fate:
+        """One future of ``mission``.
 
         Args:
             mission: as the scenario says.
-            span_s: losses happen within this mission time, pop-ups within its first half [s].
-            seed: of all streams.
+            span_s: what happens by chance happens within this mission time [s]; tasks known at
+                the start that pop up instead do so within its first half.
+            seed: of all streams; >= 0.
         """
         losses, popups = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
         lost = losses.random(len(mission.uavs)) < self.loss
@@ -52,11 +103,100 @@ class Uncertainty:
             replace(task, appears_s=float(when_s)) if pops and task.appears_s == 0.0 else task
             for task, pops, when_s in zip(mission.tasks, late, appears_s, strict=True)
         )
-        faults = Faults(
-            {
-                uav.id: float(when_s)
-                for uav, gone, when_s in zip(mission.uavs, lost, lost_at_s, strict=True)
-                if gone
-            }
+        drawn = self._with_more_tasks(replace(mission, tasks=tasks), span_s, seed)
+        gone_at_s = {
+            uav.id: float(when_s)
+            for uav, gone, when_s in zip(mission.uavs, lost, lost_at_s, strict=True)
+            if gone
+        }
+        for uav, when_s in self.lost_at_s.items():
+            gone_at_s[uav] = min(when_s, gone_at_s.get(uav, math.inf))
+        return Fate(
+            mission=drawn,
+            seed=seed,
+            span_s=span_s,
+            lost_at_s=gone_at_s,
+            withdrawn_at_s=self._withdrawals(drawn, span_s, seed),
+            partitions=self._partitions(mission, span_s, seed),
+            speed_frac={uav.id: self._speed_frac(uav, seed) for uav in mission.uavs},
+            wind=self._wind(seed),
+            uncertainty=self,
         )
-        return replace(mission, tasks=tasks), faults
+
+    def _with_more_tasks(self, mission: Mission, span_s: float, seed: int) -> Mission:
+        """Poisson pop-ups: each is like a random task, at a random place among them."""
+        rng = stream(seed, "more-tasks")
+        times_s = _poisson_s(rng, self.popups_per_min, span_s)
+        if not times_s or not mission.tasks:
+            return mission
+        low, high = bounding_box(mission.tasks)
+        tasks, like = list(mission.tasks), dict[str, Task]()
+        for number, when_s in enumerate(times_s, start=1):
+            model = mission.tasks[int(rng.integers(len(mission.tasks)))]
+            place = rng.uniform(low, high)
+            name = TaskId(f"popup{number}")
+            like[name] = model
+            tasks.append(
+                replace(
+                    model,
+                    id=name,
+                    position_enu_m=(float(place[0]), float(place[1]), model.position_enu_m[2]),
+                    appears_s=when_s,
+                )
+            )
+        uavs = tuple(
+            replace(
+                uav,
+                success=_as_of(uav.success, like),
+                survival=_as_of(uav.survival, like),
+            )
+            for uav in mission.uavs
+        )
+        return replace(mission, uavs=uavs, tasks=tuple(tasks))
+
+    def _withdrawals(self, mission: Mission, span_s: float, seed: int) -> dict[TaskId, float]:
+        """Poisson withdrawals of any task that has appeared by then, done or not."""
+        rng = stream(seed, "withdrawals")
+        withdrawn_at_s = dict(self.withdrawn_at_s)
+        for when_s in _poisson_s(rng, self.withdrawals_per_min, span_s):
+            place = float(rng.random())
+            there = [
+                task.id
+                for task in mission.tasks
+                if task.appears_s <= when_s and withdrawn_at_s.get(task.id, math.inf) > when_s
+            ]
+            if there:
+                withdrawn_at_s[there[int(place * len(there))]] = when_s
+        return withdrawn_at_s
+
+    def _partitions(self, mission: Mission, span_s: float, seed: int) -> tuple[Partition, ...]:
+        rng = stream(seed, "partitions")
+        ids = [uav.id for uav in mission.uavs]
+        return tuple(
+            Partition(when_s, self.partition_s, frozenset(rng.permutation(ids)[: len(ids) // 2]))
+            for when_s in _poisson_s(rng, self.partitions_per_min, span_s)
+        )
+
+    def _speed_frac(self, uav: Uav, seed: int) -> float:
+        return lognormal(float(stream(seed, "speed", uav.id).standard_normal()), self.speed_sd_frac)
+
+    def _wind(self, seed: int) -> Wind:
+        way_rad = float(stream(seed, "wind").uniform(0.0, math.tau))
+        return Wind((self.wind_m_s * math.cos(way_rad), self.wind_m_s * math.sin(way_rad)))
+
+
+def _poisson_s(rng: np.random.Generator, rate_per_min: float, span_s: float) -> list[float]:
+    """Times of a Poisson process within 0..span [s]."""
+    times_s: list[float] = []
+    if rate_per_min > 0.0:
+        time_s = float(rng.exponential(60.0 / rate_per_min))
+        while time_s < span_s:
+            times_s.append(time_s)
+            time_s += float(rng.exponential(60.0 / rate_per_min))
+    return times_s
+
+
+def _as_of(table: Mapping[str, float], like: Mapping[str, Task]) -> Mapping[str, float]:
+    """``table`` with the new tasks as what they are like."""
+    more = {name: table[model.id] for name, model in like.items() if model.id in table}
+    return {**table, **more} if more else table

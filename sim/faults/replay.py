@@ -41,17 +41,15 @@ def fly_with_faults(
         return make_plan(what.known_at_start(), how, clock=SystemClock(), seed=with_seed)
 
     span_s = max(plan(mission, method, seed).completion_s.values(), default=0.0)
-    drawn, losses = uncertainty.draw(mission, span_s, seed)
-    lost = tuple(
-        Disturbance(at_s, Kind.LOSE, (str(uav),)) for uav, at_s in losses.lost_at_s.items()
-    )
+    fate = uncertainty.draw(mission, span_s, seed)
+    lost = tuple(Disturbance(at_s, Kind.LOSE, (str(uav),)) for uav, at_s in fate.lost_at_s.items())
     case = Case(
         seed=seed,
         uavs=len(mission.uavs),
         tasks=len(mission.tasks),
         method=method,
-        schedule=(*lost, *_schedule(faults, seed, drawn, span_s)),
-        mission=drawn,
+        schedule=(*lost, *_schedule(faults, seed, fate.mission, span_s)),
+        mission=fate.mission,
     )
     return play(case, plan)
 

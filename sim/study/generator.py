@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from swarm.allocation.problem import Problem
-from swarm.model import TaskId, UavId
+from swarm.model import Mission, Task, TaskId, Uav, UavId
 
-__all__ = ["random_mission", "random_table_problem"]
+__all__ = ["mission_of", "random_mission", "random_table_problem"]
 
 _TABLE_SIDE_M = 10.0
 """Of the paper's square of targets."""
@@ -59,6 +59,36 @@ def random_mission(
         success=rng.uniform(0.6, 1.0, (n_uav, n_task)),
         survival=rng.uniform(lowest_survival, 1.0, (n_uav, n_task)),
         horizon_s=float(horizon_s),
+    )
+
+
+def mission_of(problem: Problem, name: str) -> Mission:
+    """``problem`` as a mission of that name, all of whose tasks are known at the start."""
+    east_north_up = [tuple(map(float, place)) for place in problem.task_enu_m]
+    starts = [tuple(map(float, place)) for place in problem.start_enu_m]
+    ids = problem.task_ids
+    return Mission(
+        name=name,
+        horizon_s=problem.horizon_s,
+        uavs=tuple(
+            Uav(
+                id=uav,
+                position_enu_m=(starts[row][0], starts[row][1], starts[row][2]),
+                speed_m_s=float(problem.speed_m_s[row]),
+                success=dict(zip(ids, problem.success[row].tolist(), strict=True)),
+                survival=dict(zip(ids, problem.survival[row].tolist(), strict=True)),
+            )
+            for row, uav in enumerate(problem.uav_ids)
+        ),
+        tasks=tuple(
+            Task(
+                id=task,
+                position_enu_m=(place[0], place[1], place[2]),
+                value=float(problem.value[column]),
+                service_s=float(problem.service_s[column]),
+            )
+            for column, (task, place) in enumerate(zip(ids, east_north_up, strict=True))
+        ),
     )
 
 

@@ -19,32 +19,34 @@ def valley() -> Mission:
 
 
 def test_certain_mission_is_left_as_it_is(valley: Mission) -> None:
-    drawn, faults = Uncertainty().draw(valley, 100.0, seed=3)
+    fate = Uncertainty().draw(valley, 100.0, seed=3)
 
-    assert drawn == valley
-    assert faults.lost_at_s == {}
+    assert fate.mission == valley
+    assert fate.lost_at_s == {}
 
 
 def test_same_seed_draws_the_same_world(valley: Mission) -> None:
     uncertainty = Uncertainty(loss=0.5, popup=0.5)
 
-    assert uncertainty.draw(valley, 100.0, 7) == uncertainty.draw(valley, 100.0, 7)
-    assert uncertainty.draw(valley, 100.0, 7) != uncertainty.draw(valley, 100.0, 8)
+    one, same, other = (uncertainty.draw(valley, 100.0, seed) for seed in (7, 7, 8))
+
+    assert (one.mission, one.lost_at_s) == (same.mission, same.lost_at_s)
+    assert (one.mission, one.lost_at_s) != (other.mission, other.lost_at_s)
 
 
 def test_losses_do_not_change_which_tasks_pop_up(valley: Mission) -> None:
-    calm, _ = Uncertainty(popup=0.3).draw(valley, 100.0, 11)
-    rough, faults = Uncertainty(loss=1.0, popup=0.3).draw(valley, 100.0, 11)
+    calm = Uncertainty(popup=0.3).draw(valley, 100.0, 11)
+    rough = Uncertainty(loss=1.0, popup=0.3).draw(valley, 100.0, 11)
 
-    assert rough.tasks == calm.tasks
-    assert set(faults.lost_at_s) == {uav.id for uav in valley.uavs}
+    assert rough.mission.tasks == calm.mission.tasks
+    assert set(rough.lost_at_s) == {uav.id for uav in valley.uavs}
 
 
 def test_moments_lie_within_the_mission(valley: Mission) -> None:
-    drawn, faults = Uncertainty(loss=1.0, popup=1.0).draw(valley, 100.0, 5)
+    fate = Uncertainty(loss=1.0, popup=1.0).draw(valley, 100.0, 5)
 
-    assert all(0.0 <= lost_s <= 100.0 for lost_s in faults.lost_at_s.values())
-    assert all(0.0 <= task.appears_s <= 50.0 for task in drawn.tasks)
+    assert all(0.0 <= lost_s <= 100.0 for lost_s in fate.lost_at_s.values())
+    assert all(0.0 <= task.appears_s <= 50.0 for task in fate.mission.tasks)
 
 
 def test_probabilities_outside_their_range_are_refused() -> None:
