@@ -40,6 +40,12 @@ _OPERATOR_SITS_DOWN_S = 1.0
 """After the loss of a coordinator; until then everyone has noticed it."""
 _START_S = 60.0
 """Until a mission starts whose UAVs do not all get airborne."""
+_TAKEOFF_S = 20.0
+"""While the vehicles take off, the processes of a real fleet find each other."""
+_WIRED = replace(
+    PRESETS[Link.CLEAN], timing=replace(PRESETS[Link.CLEAN].timing, announce_s=20.0, silence_s=60.0)
+)
+"""Where nothing is lost nothing need be said twice: who was cut off asks when it is back."""
 _STATUS_S = 60.0
 """Nobody looks on while a mission is flown in virtual time."""
 
@@ -191,7 +197,7 @@ class FatedWorld:
         """Timers that fit the network, and a fleet that stays out while tasks may yet appear."""
         timing = QUIET
         if not uncertainty.ideal_communication:
-            timing = replace(_preset(uncertainty).timing, status_s=_STATUS_S)
+            timing = _preset(uncertainty).timing
         if self._coordinator_lost_s is None:
             return timing
         last_s = max((task.appears_s for task in self._mission.tasks), default=0.0)
@@ -217,9 +223,10 @@ def _vehicle(
     """An ideal one where nothing can happen to it."""
     what = fate.uncertainty
     troubles = what.speed_sd_frac, what.leg_sd_frac, what.wind_m_s, what.position_error_m
+    takeoff_s = 0.0 if what.ideal_communication else _TAKEOFF_S
     if not (what.outcomes or any(troubles)):
-        return VirtualVehicle(queue, report)
-    return FatedVehicle(queue, uav, report, fate)
+        return VirtualVehicle(queue, report, takeoff_s)
+    return FatedVehicle(queue, uav, report, fate, takeoff_s)
 
 
 def _preset(uncertainty: Uncertainty) -> LinkPreset:
@@ -229,12 +236,15 @@ def _preset(uncertainty: Uncertainty) -> LinkPreset:
     """
     delay_s = uncertainty.delay_s + uncertainty.jitter_s
     lost = uncertainty.message_loss
+    longer = 1.0
     if lost == 0.0 and delay_s <= 0.01:
-        return PRESETS[Link.CLEAN]
-    if lost <= 0.05 and delay_s <= 0.03:
-        return PRESETS[Link.NORMAL]
-    bad, longer = PRESETS[Link.BAD], max(1.0, delay_s / 0.1)
-    return LinkPreset(longer * bad.lease_s, longer * bad.answer_s, bad.timing.scaled(longer))
+        chosen = _WIRED
+    elif lost <= 0.05 and delay_s <= 0.03:
+        chosen = PRESETS[Link.NORMAL]
+    else:
+        chosen, longer = PRESETS[Link.BAD], max(1.0, delay_s / 0.1)
+    timing = replace(chosen.timing.scaled(longer), status_s=_STATUS_S)
+    return LinkPreset(longer * chosen.lease_s, longer * chosen.answer_s, timing)
 
 
 def _network(fate: Fate, queue: EventQueue) -> Network:

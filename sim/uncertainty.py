@@ -172,10 +172,13 @@ class Uncertainty:
     def _partitions(self, mission: Mission, span_s: float, seed: int) -> tuple[Partition, ...]:
         rng = stream(seed, "partitions")
         ids = [uav.id for uav in mission.uavs]
-        return tuple(
-            Partition(when_s, self.partition_s, frozenset(rng.permutation(ids)[: len(ids) // 2]))
-            for when_s in _poisson_s(rng, self.partitions_per_min, span_s)
-        )
+
+        def half() -> frozenset[str]:
+            order = rng.permutation(len(ids)).tolist()
+            return frozenset(ids[place] for place in order[: len(ids) // 2])
+
+        times_s = _poisson_s(rng, self.partitions_per_min, span_s)
+        return tuple(Partition(when_s, self.partition_s, half()) for when_s in times_s)
 
     def _speed_frac(self, uav: Uav, seed: int) -> float:
         return lognormal(float(stream(seed, "speed", uav.id).standard_normal()), self.speed_sd_frac)
