@@ -75,8 +75,8 @@ class FatedWorld:
         make_agent: Callable[..., AgentCore] = AgentCore,
     ) -> None:
         self.fate = fate
-        self.lost: list[UavId] = []
-        """UAVs lost on their mission, in that order."""
+        self.lost: dict[UavId, str] = {}
+        """UAVs lost on their mission, in that order, and why."""
         self._coordinator_lost_s = coordinator_lost_s
         self._uavs: dict[str, Uav] = {str(uav.id): uav for uav in fate.mission.uavs}
         self._tasks: dict[str, Task] = {str(task.id): task for task in fate.mission.tasks}
@@ -150,7 +150,7 @@ class FatedWorld:
         """Mission time has begun: schedule all that happens whatever anybody does."""
         world, fate = self.world, self.fate
         for uav, lost_s in fate.lost_at_s.items():
-            world.queue.at(zero_s + lost_s, partial(self._lose, uav))
+            world.queue.at(zero_s + lost_s, partial(self._lose, uav, f"lost at {lost_s:.4g} s"))
         for task, withdrawn_s in fate.withdrawn_at_s.items():
             world.queue.at(zero_s + withdrawn_s, partial(world.withdraw, task))
         for partition in fate.partitions:
@@ -161,9 +161,9 @@ class FatedWorld:
             if _last_change_s(self._mission, fate) > self._coordinator_lost_s:
                 world.queue.at(zero_s + sits_s, self._seat_operator)
 
-    def _lose(self, uav: UavId) -> None:
+    def _lose(self, uav: UavId, why: str) -> None:
         if not self.world.processes[uav].over:
-            self.lost.append(uav)
+            self.lost[uav] = why
             self.world.lose(uav)
 
     def _cut(self, partition: Partition) -> None:
@@ -189,7 +189,8 @@ class FatedWorld:
             return  # said again
         self._outcomes.add(attempt)
         if not self.fate.survives(uav, task, outcome.attempt):
-            self._lose(uav.id)
+            at_s = outcome.completed_s
+            self._lose(uav.id, f"did not survive {outcome.task} at {at_s:.4g} s")
 
     # -- what the runtime is set to -----------------------------------------------------
 
@@ -249,8 +250,8 @@ def _preset(uncertainty: Uncertainty) -> LinkPreset:
 
 def _network(fate: Fate, queue: EventQueue) -> Network:
     what = fate.uncertainty
-    if what.ideal_communication:
-        return IdealNetwork(queue, 0.0)
+    if not (what.message_loss or what.jitter_s or what.partitions_per_min):
+        return IdealNetwork(queue, what.delay_s)
     preset = _preset(what)
     conditions = Conditions(
         topology=Topology.ROUTERS,  # so that each side of a partition goes on by itself

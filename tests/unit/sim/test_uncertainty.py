@@ -56,10 +56,8 @@ def test_probabilities_outside_their_range_are_refused() -> None:
 
 def test_simulated_mission_survives_losses_and_pop_ups(valley: Mission) -> None:
     small = replace(valley, tasks=valley.tasks[:12], uavs=valley.uavs[:4])
-    world = simulate_mission(
-        small, method="greedy", seed=2, uncertainty=Uncertainty(0.5, 0.5), latency_s=0.01
-    )
-    result = world.observer.result()
+    uncertainty = Uncertainty(0.5, 0.5, delay_s=0.01)
+    result = simulate_mission(small, method="greedy", seed=2, uncertainty=uncertainty).result
 
     assert len(result.lost_uavs) in (1, 2, 3)
     assert len(result.done) == 12
