@@ -61,7 +61,7 @@ _LOOKS = {
     "frozen": Look("#E69F00", "p"),
     "nearest": Look("#0072B2", "<", filled=False),
     "value-per-time": Look("#D55E00", ">", filled=False),
-    BOUND: Look("#000000", "", filled=False),
+    BOUND: Look("#000000", "_"),
 }
 _MORE_LOOKS = tuple(
     Look(colour, marker, filled=False)

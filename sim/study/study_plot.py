@@ -88,7 +88,7 @@ def comparison_figure(summary: Summary, setting: Setting) -> Figure:
             place,
             xerr=error_lengths([ratio]),
             color=look.colour,
-            marker=look.marker or "|",
+            marker="|" if name == BOUND else look.marker,
             markerfacecolor=look.face,
             markersize=7.0,
             capsize=4.0,
@@ -294,20 +294,25 @@ def _intervals(
 
 
 def _keep_close(axes: Axes, summary: Summary, settings: Sequence[Setting]) -> None:
-    """Cut off what lies far from the reference, and tell of whom."""
-    values = {
+    """Show what lies close to the reference, and tell of whom there is more."""
+    low, high = _CLOSE
+    ratios = {
         name: [
-            each.ratio.value
+            each.ratio
             for _, each in _shown(settings, name)
             if each.ratio is not None and not math.isnan(each.ratio.value)
         ]
         for name in summary.policies
     }
-    low, high = _CLOSE
-    below = [name for name, them in values.items() if any(value < low for value in them)]
-    above = [name for name, them in values.items() if any(value > high for value in them)]
-    bottom, top = axes.get_ylim()
-    axes.set_ylim(min(1.0, max(low, bottom)), max(1.0, min(high, top)))
+    below = [name for name, them in ratios.items() if any(each.value < low for each in them)]
+    above = [name for name, them in ratios.items() if any(each.value > high for each in them)]
+    every = [each for them in ratios.values() for each in them]
+    lengths = zip(every, *error_lengths(every), strict=True)
+    ends = [(each.value - down, each.value + up) for each, down, up in lengths]
+    low = max(low, min((end for end, _ in ends), default=low))
+    high = min(high, max((end for _, end in ends), default=high))
+    pad = 0.04 * (high - low) or 0.01
+    axes.set_ylim(low - pad, high + pad)
     for side, height, names in (("below", 0.01, below), ("above", 0.99, above)):
         if names:
             axes.text(
