@@ -288,8 +288,10 @@ class _Flying:
 
     def _is_over(self) -> bool:
         situation = self._situation
-        all_known = situation.problem.n_task == len(self._tasks)
-        return all_known and not situation.legs and not situation.state.open.any()
+        if situation.legs or situation.problem.n_task < len(self._tasks):
+            return False
+        state = situation.state
+        return not situation.problem.capable[state.active][:, state.open].any()
 
     def _appear(self, n_known: int) -> Collection[News]:
         situation = self._situation
