@@ -1,0 +1,290 @@
+"""What a study says, as tables: Markdown for documents, rich ones for terminals of 100 columns.
+
+Leaves out: working it out (sim.study.summary).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from rich.console import Group, JustifyMethod, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from sim.study.quantities import QUANTITIES, uncertainty_words
+from sim.study.rows import BOUND
+from sim.study.statistics import Estimate
+from sim.study.summary import Measured, Setting, Summary, Wall
+
+__all__ = ["as_markdown", "as_rich", "interval_text"]
+
+_NONE = "–"
+_WIDTH = 100
+"""Columns of a terminal."""
+_GAP = 2
+_IDEAL = "†"
+_DECIMALS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A table as text; the first column names policies, the others are numbers."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+def as_markdown(summary: Summary, *, every_setting: bool = False) -> str:
+    """Tables for a document, with what they are of above them."""
+    parts = ["\n".join(_about(summary))]
+    for grid in _grids(summary, every_setting=every_setting):
+        rows = [grid.headings, ("---", *("---:",) * (len(grid.headings) - 1)), *grid.rows]
+        cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+        parts.append(f"**{grid.title}**")
+        parts.append("\n".join(f"| {' | '.join(row)} |" for row in cells))
+        parts += [grid.note] if grid.note else []
+    what = summary.about.what
+    said = [f"- `{name}`: {what[name]}" for name in summary.policies if name in what]
+    parts += ["\n".join(said)] if said else []
+    return "\n\n".join(parts) + "\n"
+
+
+def as_rich(summary: Summary) -> RenderableType:
+    """The study's own setting and what is varied, for a terminal."""
+    parts: list[RenderableType] = [Text(line.replace("`", "")) for line in _about(summary)]
+    for grid in _grids(summary, every_setting=False):
+        for part in _fitting(grid):
+            table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+            for place, heading in enumerate(part.headings):
+                justify: JustifyMethod = "right" if place else "left"
+                table.add_column(Text(heading), justify=justify, no_wrap=True)
+            for row in part.rows:
+                table.add_row(*(Text(cell) for cell in row))
+            parts += [Text(), Text(part.title, style="bold"), table]
+        parts += [Text(grid.note)] if grid.note else []
+    return Group(*parts)
+
+
+def interval_text(estimate: Estimate | None) -> str:
+    """A ratio as ``0.981 [0.977, 0.985]``; a dash for none."""
+    if estimate is None or math.isnan(estimate.value):
+        return _NONE
+    digits = _digits(estimate)
+    if estimate.low == estimate.high:
+        return f"{estimate.value:.{digits}f}"
+    return (
+        f"{estimate.value:.{digits}f} [{_end(estimate.low, digits)}, {_end(estimate.high, digits)}]"
+    )
+
+
+# -- tables -----------------------------------------------------------------------------
+
+
+def _grids(summary: Summary, *, every_setting: bool) -> Iterator[Grid]:
+    own = summary.own
+    if own is not None:
+        yield from _of_setting(summary, own)
+        times = _times(summary, own)
+        if times is not None:
+            yield times
+    for vary, settings in summary.varied.items():
+        yield _against(summary, vary, settings)
+    if every_setting:
+        for each in summary.settings:
+            if each is not own:
+                yield from _of_setting(summary, each)
+
+
+def _of_setting(summary: Summary, setting: Setting) -> Iterator[Grid]:
+    """Two tables: values, and what happened."""
+    where = _where(summary, setting)
+    found = [setting.policies[name] for name in summary.policies if name in setting.policies]
+    reference = summary.reference
+    columns: list[tuple[str, Callable[[Measured], str]]] = [
+        ("J [value·s]", lambda each: _number(each.value.value)),
+        (f"J / {reference}'s", lambda each: _ratio(summary, each)),
+        ("better in", lambda each: _share(None if each.policy == reference else each.better)),
+        ("J / bound", lambda each: "1" if each.policy == BOUND else interval_text(each.of_bound)),
+        ("all done in", lambda each: _share(each.complete)),
+    ]
+    if BOUND not in setting.policies:
+        del columns[3]
+    if any(each.trials != setting.trials for each in found):
+        columns.append(("trials", lambda each: str(each.trials)))
+    yield _grid(summary, f"Value{where} ({_trials([setting])})", found, columns)
+    yield _grid(
+        summary,
+        f"Per mission{where}",
+        [each for each in found if each.means],
+        [
+            ("done", _mean("done")),
+            ("failed", _mean("failed")),
+            ("missed", _mean("missed")),
+            ("done twice", _mean("duplicate_visits")),
+            ("moved", _mean("moved")),
+            ("released", _mean("released")),
+            ("epochs", _mean("epochs")),
+            ("messages", _mean("messages")),
+            ("makespan [s]", _mean("makespan_s")),
+        ],
+    )
+
+
+def _times(summary: Summary, setting: Setting) -> Grid | None:
+    found = [setting.policies[name] for name in summary.policies if name in setting.policies]
+    timed = [each for each in found if each.wall is not None]
+    if not timed:
+        return None
+    on = f", on {summary.about.machine}" if summary.about.machine else ""
+    return _grid(
+        summary,
+        f"Wall time of a decision or plan{_where(summary, setting)}",
+        timed,
+        [
+            ("per mission", _mean("decisions")),
+            ("median [ms]", _wall_ms(lambda wall: wall.median_s)),
+            ("p99 [ms]", _wall_ms(lambda wall: wall.p99_s)),
+            ("longest [ms]", _wall_ms(lambda wall: wall.max_s)),
+        ],
+        f"Median and p99: the median over trials of each trial's{on}.",
+    )
+
+
+def _against(summary: Summary, vary: str, settings: Sequence[Setting]) -> Grid:
+    """Ratios against the values of one quantity."""
+    quantity = QUANTITIES[vary]
+    rows = [
+        (
+            _named(summary, name),
+            *(_short_ratio(summary, each.policies.get(name)) for each in settings),
+        )
+        for name in summary.policies
+    ]
+    reference = [each.policies.get(summary.reference) for each in settings]
+    values = [_NONE if each is None else _number(each.value.value) for each in reference]
+    return Grid(
+        title=f"J / {summary.reference}'s against {quantity.name} ({_trials(settings)})",
+        headings=("policy", *(quantity.text(each.at or 0.0) for each in settings)),
+        rows=(*rows, (f"J of {summary.reference} [value·s]", *values)),
+    )
+
+
+def _grid(
+    summary: Summary,
+    title: str,
+    found: Sequence[Measured],
+    columns: Sequence[tuple[str, Callable[[Measured], str]]],
+    note: str = "",
+) -> Grid:
+    return Grid(
+        title=title,
+        headings=("policy", *(heading for heading, _ in columns)),
+        rows=tuple((_named(summary, m.policy), *(of(m) for _, of in columns)) for m in found),
+        note=note,
+    )
+
+
+def _fitting(grid: Grid) -> Iterator[Grid]:
+    """The same in parts that fit the terminal, each with the first column."""
+    table = [grid.headings, *grid.rows]
+    name, *widths = (max(map(len, column)) for column in zip(*table, strict=True))
+    fit = max(1, (_WIDTH - name) // (max(widths, default=0) + _GAP))
+    if name + sum(widths) + _GAP * len(widths) <= _WIDTH:
+        fit = len(widths)
+    parts = -(-len(widths) // max(1, fit))
+    size = -(-len(widths) // max(1, parts))
+    for first in range(1, len(grid.headings), max(1, size)):
+        cut = [(row[0], *row[first : first + size]) for row in table]
+        title = grid.title if first == 1 else f"{grid.title}, continued"
+        yield Grid(title, cut[0], tuple(cut[1:]))
+
+
+# -- words ------------------------------------------------------------------------------
+
+
+def _where(summary: Summary, setting: Setting) -> str:
+    """Which setting it is, for a title."""
+    if setting.at is None:
+        return ", the study's own setting" if summary.varied else ""
+    quantity = QUANTITIES[setting.vary]
+    return f", {quantity.name}: {quantity.text(setting.at)}"
+
+
+def _about(summary: Summary) -> list[str]:
+    about = summary.about
+    told = [about.missions] if about.missions else []
+    told += [uncertainty_words(about.uncertainty)] if about.uncertainty is not None else []
+    run = [_trials(summary.settings)] if summary.settings else ["no trials yet"]
+    run += [f"seed {about.seed}"] if about.seed is not None else []
+    text = f"{'; '.join([*told, ', '.join(run)])}."
+    compared = (
+        f"Ratios are of mean J to `{summary.reference}`'s, over the trials that both flew, with "
+        "their paired 95 % interval (Fieller's)."
+    )
+    lines = [text[0].upper() + text[1:], compared]
+    if about.ideal:
+        lines.append(f"{_IDEAL} modelled with ideal communication only.")
+    return lines
+
+
+def _trials(settings: Sequence[Setting]) -> str:
+    counts = [each.trials for each in settings]
+    least, most = min(counts), max(counts)
+    noun = "trial" if most == 1 else "trials"
+    return f"{most} {noun}" if least == most else f"{least} to {most} {noun}"
+
+
+def _named(summary: Summary, policy: str) -> str:
+    if policy == BOUND:
+        return f"{policy} (bound)"
+    return f"{policy} {_IDEAL}" if policy in summary.about.ideal else policy
+
+
+def _ratio(summary: Summary, each: Measured) -> str:
+    return "1" if each.policy == summary.reference else interval_text(each.ratio)
+
+
+def _short_ratio(summary: Summary, each: Measured | None) -> str:
+    """As ``0.981 ± 0.004``: the further end of the interval on both sides."""
+    if each is None or each.ratio is None or math.isnan(each.ratio.value):
+        return _NONE
+    if each.policy == summary.reference:
+        return "1"
+    digits, half = _digits(each.ratio), each.ratio.half_width
+    spread = "0" if half == 0.0 else _end(half, digits)
+    return f"{each.ratio.value:.{digits}f} ± {spread}"
+
+
+def _digits(estimate: Estimate) -> int:
+    """Decimals that suit an interval."""
+    return 4 if 0.0 < estimate.half_width < 0.001 else 3
+
+
+def _end(value: float, digits: int) -> str:
+    if math.isinf(value):
+        return "∞" if value > 0.0 else "−∞"
+    return f"{value:.{digits}f}"
+
+
+def _share(estimate: Estimate | None) -> str:
+    return _NONE if estimate is None else f"{100.0 * estimate.value:.0f} %"
+
+
+def _mean(name: str) -> Callable[[Measured], str]:
+    return lambda each: _number(each.means[name].value) if name in each.means else _NONE
+
+
+def _wall_ms(of: Callable[[Wall], float]) -> Callable[[Measured], str]:
+    return lambda each: _NONE if each.wall is None else _number(1e3 * of(each.wall), decimals=6)
+
+
+def _number(value: float, decimals: int = _DECIMALS) -> str:
+    """With three digits or all before the point, and at most so many decimals."""
+    if value == 0.0 or (value.is_integer() and decimals == _DECIMALS):
+        return f"{value:,.0f}"
+    digits = min(decimals, max(0, 2 - math.floor(math.log10(abs(value)))))
+    return f"{value:,.{digits}f}"
