@@ -6,7 +6,7 @@ Each is imported when a study asks for it, and not before. Leaves out: what they
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import import_module
@@ -23,10 +23,13 @@ class Entry:
     """Where a policy or a bound is made."""
 
     module: str
-    maker: str
-    """Of that module; called with the number behind the colon of the policy's name, if any."""
+    what: str
+    """In that module: the policy, or a class of policies, which is called without arguments or
+    with the number behind the colon."""
     parameter: str = ""
     """What that number is, with its unit; empty for a policy without."""
+    ideal: bool = False
+    """Whether it is modelled with ideal communication only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,10 @@ class Roster:
         policy: Policy = _made(self.policies[stem], *(() if value is None else (value,)))
         return policy
 
+    def ideal(self, name: str) -> bool:
+        """Whether the policy of that name is modelled with ideal communication only."""
+        return self.policies[name.partition(":")[0]].ideal
+
     def make_bound(self) -> Bound:
         """The bound."""
         bound: Bound = _made(self.bound)
@@ -83,24 +90,28 @@ def _positive(text: str) -> float | None:
 
 
 def _made(entry: Entry, *arguments: float) -> Any:
-    maker: Callable[..., Any] = getattr(import_module(entry.module), entry.maker)
-    return maker(*arguments)
+    what = getattr(import_module(entry.module), entry.what)
+    return what(*arguments) if isinstance(what, type) else what
 
 
 _PACKAGE = "sim.study.policies"
+_AGENTS = f"{_PACKAGE}.agents"
 ROSTER = Roster(
     policies={
-        "greedy": Entry(f"{_PACKAGE}.agents", "greedy"),
-        "lookahead": Entry(f"{_PACKAGE}.agents", "lookahead"),
-        "guided-alone": Entry(f"{_PACKAGE}.agents", "guided_alone"),
-        "guided": Entry(f"{_PACKAGE}.agents", "guided"),
-        "frozen": Entry(f"{_PACKAGE}.team", "frozen"),
-        "central": Entry(f"{_PACKAGE}.team", "central"),
-        "interval": Entry(f"{_PACKAGE}.team", "interval", "an interval [s]"),
-        "cbba": Entry(f"{_PACKAGE}.team", "cbba"),
-        "nearest": Entry(f"{_PACKAGE}.team", "nearest"),
-        "value-per-time": Entry(f"{_PACKAGE}.team", "value_per_time"),
+        "guided": Entry(_AGENTS, "GUIDED"),
+        "guided-alone": Entry(_AGENTS, "GUIDED_ALONE"),
+        "greedy": Entry(_AGENTS, "GREEDY"),
+        "lookahead": Entry(_AGENTS, "LOOKAHEAD"),
+        "central": Entry(f"{_PACKAGE}.central", "Central", ideal=True),
+        "central-divert": Entry(f"{_PACKAGE}.central", "CentralDivert", ideal=True),
+        "interval": Entry(
+            f"{_PACKAGE}.central", "Interval", parameter="an interval [s]", ideal=True
+        ),
+        "frozen": Entry(f"{_PACKAGE}.lists", "Frozen", ideal=True),
+        "cbba": Entry(f"{_PACKAGE}.auction", "Cbba", ideal=True),
+        "nearest": Entry(f"{_PACKAGE}.rules", "NEAREST_FIRST", ideal=True),
+        "value-per-time": Entry(f"{_PACKAGE}.rules", "VALUE_PER_TIME_ONLINE", ideal=True),
     },
-    bound=Entry(f"{_PACKAGE}.clairvoyant", "clairvoyant"),
+    bound=Entry(f"{_PACKAGE}.clairvoyant", "Clairvoyant"),
 )
 """Those of the project."""
