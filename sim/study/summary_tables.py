@@ -5,7 +5,6 @@ Leaves out: working it out (sim.study.summary).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -17,15 +16,21 @@ from sim.study.quantities import QUANTITIES, uncertainty_words
 from sim.study.rows import BOUND
 from sim.study.statistics import Estimate
 from sim.study.summary import Measured, Setting, Summary, Wall
+from sim.study.summary_words import (
+    IDEAL,
+    NONE,
+    interval_text,
+    number_text,
+    policy_label,
+    spread_text,
+    trials_text,
+)
 
-__all__ = ["as_markdown", "as_rich", "interval_text"]
+__all__ = ["as_markdown", "as_rich"]
 
-_NONE = "–"
 _WIDTH = 100
 """Columns of a terminal."""
 _GAP = 2
-_IDEAL = "†"
-_DECIMALS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,18 +74,6 @@ def as_rich(summary: Summary) -> RenderableType:
     return Group(*parts)
 
 
-def interval_text(estimate: Estimate | None) -> str:
-    """A ratio as ``0.981 [0.977, 0.985]``; a dash for none."""
-    if estimate is None or math.isnan(estimate.value):
-        return _NONE
-    digits = _digits(estimate)
-    if estimate.low == estimate.high:
-        return f"{estimate.value:.{digits}f}"
-    return (
-        f"{estimate.value:.{digits}f} [{_end(estimate.low, digits)}, {_end(estimate.high, digits)}]"
-    )
-
-
 # -- tables -----------------------------------------------------------------------------
 
 
@@ -105,7 +98,7 @@ def _of_setting(summary: Summary, setting: Setting) -> Iterator[Grid]:
     found = [setting.policies[name] for name in summary.policies if name in setting.policies]
     reference = summary.reference
     columns: list[tuple[str, Callable[[Measured], str]]] = [
-        ("J [value·s]", lambda each: _number(each.value.value)),
+        ("J [value·s]", lambda each: number_text(each.value.value)),
         (f"J / {reference}'s", lambda each: _ratio(summary, each)),
         ("better in", lambda each: _share(None if each.policy == reference else each.better)),
         ("J / bound", lambda each: "1" if each.policy == BOUND else interval_text(each.of_bound)),
@@ -115,7 +108,7 @@ def _of_setting(summary: Summary, setting: Setting) -> Iterator[Grid]:
         del columns[3]
     if any(each.trials != setting.trials for each in found):
         columns.append(("trials", lambda each: str(each.trials)))
-    yield _grid(summary, f"Value{where} ({_trials([setting])})", found, columns)
+    yield _grid(summary, f"Value{where} ({trials_text([setting])})", found, columns)
     yield _grid(
         summary,
         f"Per mission{where}",
@@ -159,15 +152,15 @@ def _against(summary: Summary, vary: str, settings: Sequence[Setting]) -> Grid:
     quantity = QUANTITIES[vary]
     rows = [
         (
-            _named(summary, name),
-            *(_short_ratio(summary, each.policies.get(name)) for each in settings),
+            policy_label(summary, name),
+            *(_spread(summary, each.policies.get(name)) for each in settings),
         )
         for name in summary.policies
     ]
     reference = [each.policies.get(summary.reference) for each in settings]
-    values = [_NONE if each is None else _number(each.value.value) for each in reference]
+    values = [NONE if each is None else number_text(each.value.value) for each in reference]
     return Grid(
-        title=f"J / {summary.reference}'s against {quantity.name} ({_trials(settings)})",
+        title=f"J / {summary.reference}'s against {quantity.name} ({trials_text(settings)})",
         headings=("policy", *(quantity.text(each.at or 0.0) for each in settings)),
         rows=(*rows, (f"J of {summary.reference} [value·s]", *values)),
     )
@@ -183,7 +176,7 @@ def _grid(
     return Grid(
         title=title,
         headings=("policy", *(heading for heading, _ in columns)),
-        rows=tuple((_named(summary, m.policy), *(of(m) for _, of in columns)) for m in found),
+        rows=tuple((policy_label(summary, m.policy), *(of(m) for _, of in columns)) for m in found),
         note=note,
     )
 
@@ -218,7 +211,7 @@ def _about(summary: Summary) -> list[str]:
     about = summary.about
     told = [about.missions] if about.missions else []
     told += [uncertainty_words(about.uncertainty)] if about.uncertainty is not None else []
-    run = [_trials(summary.settings)] if summary.settings else ["no trials yet"]
+    run = [trials_text(summary.settings)] if summary.settings else ["no trials yet"]
     run += [f"seed {about.seed}"] if about.seed is not None else []
     text = f"{'; '.join([*told, ', '.join(run)])}."
     compared = (
@@ -227,64 +220,27 @@ def _about(summary: Summary) -> list[str]:
     )
     lines = [text[0].upper() + text[1:], compared]
     if about.ideal:
-        lines.append(f"{_IDEAL} modelled with ideal communication only.")
+        lines.append(f"{IDEAL} modelled with ideal communication only.")
     return lines
-
-
-def _trials(settings: Sequence[Setting]) -> str:
-    counts = [each.trials for each in settings]
-    least, most = min(counts), max(counts)
-    noun = "trial" if most == 1 else "trials"
-    return f"{most} {noun}" if least == most else f"{least} to {most} {noun}"
-
-
-def _named(summary: Summary, policy: str) -> str:
-    if policy == BOUND:
-        return f"{policy} (bound)"
-    return f"{policy} {_IDEAL}" if policy in summary.about.ideal else policy
 
 
 def _ratio(summary: Summary, each: Measured) -> str:
     return "1" if each.policy == summary.reference else interval_text(each.ratio)
 
 
-def _short_ratio(summary: Summary, each: Measured | None) -> str:
-    """As ``0.981 ± 0.004``: the further end of the interval on both sides."""
-    if each is None or each.ratio is None or math.isnan(each.ratio.value):
-        return _NONE
-    if each.policy == summary.reference:
-        return "1"
-    digits, half = _digits(each.ratio), each.ratio.half_width
-    spread = "0" if half == 0.0 else _end(half, digits)
-    return f"{each.ratio.value:.{digits}f} ± {spread}"
-
-
-def _digits(estimate: Estimate) -> int:
-    """Decimals that suit an interval."""
-    return 4 if 0.0 < estimate.half_width < 0.001 else 3
-
-
-def _end(value: float, digits: int) -> str:
-    if math.isinf(value):
-        return "∞" if value > 0.0 else "−∞"
-    return f"{value:.{digits}f}"
+def _spread(summary: Summary, each: Measured | None) -> str:
+    if each is None or each.policy != summary.reference:
+        return spread_text(None if each is None else each.ratio)
+    return "1"
 
 
 def _share(estimate: Estimate | None) -> str:
-    return _NONE if estimate is None else f"{100.0 * estimate.value:.0f} %"
+    return NONE if estimate is None else f"{100.0 * estimate.value:.0f} %"
 
 
 def _mean(name: str) -> Callable[[Measured], str]:
-    return lambda each: _number(each.means[name].value) if name in each.means else _NONE
+    return lambda each: number_text(each.means[name].value) if name in each.means else NONE
 
 
 def _wall_ms(of: Callable[[Wall], float]) -> Callable[[Measured], str]:
-    return lambda each: _NONE if each.wall is None else _number(1e3 * of(each.wall), decimals=6)
-
-
-def _number(value: float, decimals: int = _DECIMALS) -> str:
-    """With three digits or all before the point, and at most so many decimals."""
-    if value == 0.0 or (value.is_integer() and decimals == _DECIMALS):
-        return f"{value:,.0f}"
-    digits = min(decimals, max(0, 2 - math.floor(math.log10(abs(value)))))
-    return f"{value:,.{digits}f}"
+    return lambda each: NONE if each.wall is None else number_text(1e3 * of(each.wall), decimals=6)
