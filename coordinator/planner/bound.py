@@ -163,7 +163,9 @@ def lagrangian_bound(
             slope[(price <= 0.0) & (slope > 0.0)] = 0.0
             square = float(slope @ slope)
             if made == 0 and square > 0.0:
-                stride = _FIRST_STRIDE * (bound - (known if expected is None else expected)) / square
+                stride = (
+                    _FIRST_STRIDE * (bound - (known if expected is None else expected)) / square
+                )
             if made == cycles or square == 0.0 or bound <= known or should_stop(made):
                 break
         for group in groups:
