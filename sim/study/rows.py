@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.study.config import Point
 from sim.study.flight import Flight, Score
 
 __all__ = ["BOUND", "COLUMNS", "WALL_COLUMNS", "Row", "row_of", "without_wall_times"]
@@ -65,23 +66,14 @@ WALL_COLUMNS = tuple(name for name in COLUMNS if name.endswith("_wall_s"))
 """Differ from run to run; all others are the same for the same seed."""
 
 
-def row_of(
-    *,
-    point: int,
-    vary: str,
-    at: float | None,
-    trial: int,
-    policy: str,
-    scored: Score,
-    flight: Flight,
-) -> Row:
+def row_of(point: Point, trial: int, policy: str, scored: Score, flight: Flight) -> Row:
     """The row of a flight."""
     wall_s = np.asarray(flight.decision_s, dtype=float)
     some = wall_s.size > 0
     return Row(
-        point=point,
-        vary=vary,
-        at=at,
+        point=point.index,
+        vary=point.vary,
+        at=point.at,
         trial=trial,
         policy=policy,
         value=scored.value,
