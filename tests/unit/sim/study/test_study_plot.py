@@ -100,10 +100,10 @@ def test_value_is_drawn_against_what_is_varied(summary: Summary) -> None:
 def test_what_lies_far_from_the_reference_is_told_instead_of_drawn() -> None:
     rows = study_rows((*POLICIES, "poor"), {"loss": (0.1,)}, trials=3)
     rows = [replace(row, value=0.2 * row.value) if row.policy == "poor" else row for row in rows]
-    right = value_figure(summarise(rows, "central"), "loss").axes[1]
+    figure = value_figure(summarise(rows, "central"), "loss")
 
-    assert right.get_ylim()[0] > 0.7
-    assert [text.get_text() for text in right.texts] == ["also below this panel: poor"]
+    assert figure.axes[1].get_ylim()[0] > 0.7
+    assert figure.get_supxlabel() == "below the right panel too: poor"
 
 
 def test_duplicates_and_churn_are_bars_or_lines(summary: Summary, own: Setting) -> None:
@@ -135,7 +135,11 @@ def test_bound_alone_decides_nothing_that_could_be_timed() -> None:
 
 
 def test_policies_of_ones_own_get_looks_of_their_own() -> None:
-    mine = tuple("abcdef")
+    mine = (*"abcd", "interval:30", "interval:60")
     looks = [look_of(name, (*POLICIES, *mine)) for name in (*POLICIES, *mine)]
 
     assert len(set(looks)) == len(looks)
+
+
+def test_number_of_a_policy_leaves_its_look() -> None:
+    assert look_of("interval:60", ("central", "interval:60")) == look_of("interval", ("interval",))

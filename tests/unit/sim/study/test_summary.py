@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from io import StringIO
 from itertools import pairwise
 
@@ -25,8 +26,8 @@ ABOUT = About(
 )
 
 
-def terminal(summary: Summary) -> str:
-    console = Console(file=StringIO(), width=100)
+def terminal(summary: Summary, width: int = 100) -> str:
+    console = Console(file=StringIO(), width=width)
     console.print(summary.table())
     assert isinstance(console.file, StringIO)
     return console.file.getvalue()
@@ -188,16 +189,29 @@ def test_document_shows_what_is_varied_in_columns_and_other_settings_on_request(
     assert "**Per mission, UAVs lost: 40 %**" in summary.markdown(every_setting=True)
 
 
-def test_terminal_shows_all_policies_and_values_within_100_columns() -> None:
+@pytest.mark.parametrize("width", [60, 80, 100])
+def test_terminal_shows_all_policies_and_values_in_parts_that_fit(width: int) -> None:
     values = tuple(0.1 * i for i in range(8))
     rows = study_rows(("central", "greedy", "value-per-time"), {"loss": values}, trials=3)
-    text = terminal(summarise(rows, "central", ABOUT))
+    text = terminal(summarise(rows, "central", ABOUT), width)
 
-    assert max(len(line) for line in text.splitlines()) <= 100
+    assert max(len(line) for line in text.splitlines()) <= width
     assert "…" not in text
     for value in values:
         assert f"{100.0 * value:g} %" in text
     assert text.count("value-per-time") >= 4
+
+
+def test_rounding_makes_nobody_better() -> None:
+    rows = study_rows(("central",), trials=8)
+    same = [
+        replace(row, policy="same", value=row.value * (1.0 + 1e-14))
+        for row in rows
+        if row.policy == "central"
+    ]
+    found = summarise([*rows, *same], "central").settings[0].policies["same"]
+
+    assert found.better == share_of(0, 8)
 
 
 def test_study_without_rows_says_so() -> None:
