@@ -82,11 +82,10 @@ def in_processes(count: int) -> Fly:
                 "less; with --out what is done is kept, and the same command goes on"
             ) from error
         finally:
-            executor.shutdown(wait=False, cancel_futures=True)
             for child in multiprocessing.active_children():
                 if child.pid not in before:
                     child.terminate()
-            executor.shutdown(wait=True)
+            executor.shutdown(cancel_futures=True)
 
     return fly
 

@@ -259,6 +259,9 @@ def study(
     if file_format == "parquet":
         require_parquet()
     errors = Console(stderr=True)
+    if found.certain:
+        line = "nothing is uncertain, so all trials are alike: try --loss 0.3 --popup 0.3"
+        errors.print(line, highlight=False, soft_wrap=True)
     with ExitStack() as stack:
         store: Store
         if out is None:
