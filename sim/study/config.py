@@ -119,6 +119,12 @@ class Study:
         """The reference policy."""
         return self.policies[0] if self.reference is None else self.reference
 
+    @property
+    def certain(self) -> bool:
+        """Whether all trials are alike."""
+        plain = self.uncertainty == Uncertainty() and not self.varied
+        return plain and isinstance(self.missions, SameMission)
+
     def points(self) -> tuple[Point, ...]:
         """All settings: the study's own, then every value of every number that is varied."""
         points: list[Point] = []

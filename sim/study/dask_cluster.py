@@ -105,7 +105,7 @@ def _flown_by(
             for chunk in islice(waiting, count)
         ]
 
-    flying = as_completed(submit(_AHEAD * threads))
+    flying = as_completed(submit(_AHEAD * threads), loop=client.loop)
     try:
         for future in flying:
             flown: list[list[Row]] = future.result()

@@ -6,7 +6,7 @@ Leaves out: results.
 from __future__ import annotations
 
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from swarm.clock import Clock
 
@@ -37,7 +37,7 @@ class StudyProgress:
         self._began_s = self._told_s = clock.now_s()
         self.done = self.total = 0
 
-    def __enter__(self) -> StudyProgress:
+    def __enter__(self) -> Self:
         """Begin."""
         if self._console.is_terminal:
             from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn

@@ -6,7 +6,9 @@ Leaves out: other machines (sim.study.dask_cluster).
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -80,11 +82,10 @@ def in_processes(count: int) -> Fly:
                 "less; with --out what is done is kept, and the same command goes on"
             ) from error
         finally:
-            executor.shutdown(wait=False, cancel_futures=True)
             for child in multiprocessing.active_children():
                 if child.pid not in before:
                     child.terminate()
-            executor.shutdown(wait=True)
+            executor.shutdown(cancel_futures=True)
 
     return fly
 
@@ -128,6 +129,7 @@ _runner: TrialRunner | None = None
 
 def _begin_worker(briefing: Briefing) -> None:
     global _runner
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _runner = TrialRunner(briefing, SystemClock())
 
 
@@ -135,3 +137,11 @@ def _fly_in_worker(job: Job) -> list[Row]:
     if _runner is None:
         raise RuntimeError("the worker has not begun")
     return _runner.fly(job)
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed would wait for jobs for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

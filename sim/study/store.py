@@ -12,7 +12,7 @@ import fcntl
 import io
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -165,21 +165,28 @@ def _missing(study: Study, rows: Iterable[Row]) -> list[Job]:
     return [job for job, keys in rows_due(study).items() if not keys <= there]
 
 
+_IDENTITY = {
+    "name": "another name",
+    "seed": "another seed",
+    "missions": "other missions",
+    "policies": "other policies",
+    "bound": "another choice of the bound",
+    "uncertainty": "another uncertainty",
+    "reattempt": "another choice of reattempts",
+}
+"""Fields of a study that decide its rows, besides trials and what is varied."""
+
+
 def _difference(kept: Study, asked: Study) -> str | None:
     """Why the rows of ``kept`` are not some of ``asked``; None if they are."""
-    for item in fields(Study):
-        if item.name in ("trials", "reference", "varied"):
-            continue
-        was, now = getattr(kept, item.name), getattr(asked, item.name)
-        if was != now:
-            what = "other missions" if item.name == "missions" else f"another {item.name}"
+    for name, what in _IDENTITY.items():
+        if getattr(kept, name) != getattr(asked, name):
             return f"holds a study with {what}"
-    without = [replace(varied, trials=None) for varied in kept.varied]
-    if without != [replace(varied, trials=None) for varied in asked.varied]:
-        return "holds a study that varies something else"
     before, after = kept.points(), asked.points()
+    if [(p.vary, p.at) for p in before] != [(p.vary, p.at) for p in after]:
+        return "holds a study that varies something else"
     if any(was.trials > now.trials for was, now in zip(before, after, strict=True)):
-        return "holds more trials than are asked for"
+        return "holds a study with more trials"
     return None
 
 
@@ -211,7 +218,7 @@ def read_rows(path: Path) -> list[Row]:
         try:
             if number == 1:
                 if tuple(cells) != COLUMNS:
-                    raise ValueError("are not the columns of a study")
+                    raise ValueError("has not the columns of a study")
             else:
                 rows.append(_row(cells))
         except ValueError as error:

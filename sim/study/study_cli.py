@@ -44,6 +44,8 @@ __all__ = ["study"]
 
 _INTERRUPTED = 130
 _SUMMARY_FILE = "summary.md"
+_WIDTH = 100
+"""Columns where standard output is no terminal."""
 
 
 def study(
@@ -257,6 +259,9 @@ def study(
     if file_format == "parquet":
         require_parquet()
     errors = Console(stderr=True)
+    if found.certain:
+        line = "nothing is uncertain, so all trials are alike: try --loss 0.3 --popup 0.3"
+        errors.print(line, highlight=False, soft_wrap=True)
     with ExitStack() as stack:
         store: Store
         if out is None:
@@ -274,7 +279,7 @@ def study(
             line = f"interrupted after {progress.done} of {progress.total} trials: {kept}"
             errors.print(line, highlight=False, soft_wrap=True)
             return _INTERRUPTED
-    summary = _summary(found, rows)
+    summary = _summary(found, rows, here=scheduler is None)
     files = [] if out is None else _write(out, summary, rows, file_format, plots=plots)
     if marked is not None:
         marked.replace(summary.markdown())
@@ -307,11 +312,12 @@ def _fly(jobs: int | None, scheduler: str | None) -> Fly:
     return in_processes(default_threads() if jobs is None else jobs)
 
 
-def _summary(found: Study, rows: list[Row]) -> Summary:
-    import platform
-
+def _summary(found: Study, rows: list[Row], *, here: bool) -> Summary:
+    """What the rows say; ``here`` if they were flown on this machine."""
+    from sim.bench.machine import this_machine
     from sim.study.config import RandomMissions
     from sim.study.policies import ROSTER
+    from sim.study.rows import BOUND
     from sim.study.summary import About, summarise
 
     match found.missions:
@@ -319,13 +325,17 @@ def _summary(found: Study, rows: list[Row]) -> Summary:
             missions = f"random missions of {uavs} UAVs and {tasks} tasks"
         case same:
             missions = f"mission {same.mission.name}"
+    machine = this_machine()
+    what = {name: ROSTER.policy(name).what for name in found.policies}
+    if found.bound:
+        what[BOUND] = ROSTER.make_bound().what
     about = About(
         missions=missions,
         uncertainty=found.uncertainty,
         seed=found.seed,
-        machine=platform.machine(),
+        machine=f"{machine.cpu}, {machine.cores} cores" if here else "",
         ideal=frozenset(name for name in found.policies if ROSTER.ideal(name)),
-        what={name: ROSTER.policy(name).what for name in found.policies},
+        what=what,
     )
     return summarise(rows, found.compared_to, about)
 
@@ -364,6 +374,8 @@ def _tell(found: Study, summary: Summary, files: list[Path], *, json: bool) -> N
         typer.echo(dumps(told, allow_nan=False))
         return
     console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = _WIDTH
     console.print(summary.table())
     if files:
         console.print(f"\nWritten: {', '.join(map(str, files))}", soft_wrap=True)

@@ -26,10 +26,13 @@ def format_study(study: Study, scenario: str) -> str:
         f"name = {toml_string(study.name)}",
         f"trials = {study.trials}",
         f"seed = {study.seed}",
-        f"policies = [{', '.join(toml_string(name) for name in study.policies)}]",
-        f"reference = {toml_string(study.compared_to)}",
+        "policies = [",
+        *(f"    {toml_string(name)}," for name in study.policies),
+        "]",
         f"bound = {_truth(study.bound)}",
     ]
+    if study.reference is not None:
+        head.insert(-1, f"reference = {toml_string(study.reference)}")
     match study.missions:
         case RandomMissions(uavs, tasks):
             mission = f"random = {{ uavs = {uavs}, tasks = {tasks} }}"
@@ -53,7 +56,7 @@ def _uncertainty_lines(study: Study) -> Iterator[str]:
     for key in LISTED:
         times: Mapping[str, float] = getattr(study.uncertainty, key)
         inner = ", ".join(f"{toml_string(name)} = {toml_float(at)}" for name, at in times.items())
-        yield f"{key} = {{ {inner} }}"
+        yield f"{key} = {{ {inner} }}" if inner else f"{key} = {{}}"
     if study.reattempt is not None:
         yield f"reattempt = {_truth(study.reattempt)}"
 
