@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.fate import Fate
-from sim.study.baselines.index_rule import Routes
 from sim.study.flight import Flight
-from sim.study.policies.lists import PLANNED_BY, ListFollower, moved_between
+from sim.study.policies.lists import PLANNED_BY, ListFollower
 from sim.study.policies.team import Account, News, Situation, fly_team
 from sim.study.policy import Planner
 from swarm.allocation import Problem, TeamState, evaluate
@@ -70,12 +69,12 @@ class Optimiser(ListFollower):
         if not self._upon & frozenset(news):
             return ()
         if not self._diverts:
-            self._improve(situation.problem, situation.state, self._lists)
+            self._improve(situation.problem, situation.state)
             return ()
         legs, in_flight = situation.legs, situation.in_flight()
         for uav in in_flight:
             self._lists[uav].insert(0, legs[uav].task)
-        self._improve(situation.problem, situation.if_stopped(), self._lists)
+        self._improve(situation.problem, situation.if_stopped())
         stopped = []
         for uav in in_flight:
             if self._lists[uav][:1] == [legs[uav].task]:
@@ -84,13 +83,13 @@ class Optimiser(ListFollower):
                 stopped.append(uav)
         return stopped
 
-    def _improve(self, problem: Problem, state: TeamState, lists: Routes) -> None:
+    def _improve(self, problem: Problem, state: TeamState) -> None:
         """Put better lists into force, if any are found."""
         takers = problem.capable[state.active].any(axis=0)
         n_open = int(np.count_nonzero(state.open & takers))
         going_on = [
             [task for task in route if state.open[task]] if state.active[uav] else []
-            for uav, route in enumerate(lists)
+            for uav, route in enumerate(self._lists)
         ]
         if not n_open:
             return
@@ -108,9 +107,7 @@ class Optimiser(ListFollower):
                 before, _ = evaluate(problem, going_on, state)
                 if worth <= before + _LEAST_GAIN * abs(before):
                     return
-        self._account.epochs += 1
-        self._account.moved += moved_between(lists, routes)
-        self._lists = routes
+        self.put_into_force(routes)
 
     def _arrays_of(self, problem: Problem) -> RouteArrays:
         if self._arrays is None or self._arrays[0] is not problem:
