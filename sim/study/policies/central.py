@@ -16,7 +16,8 @@ import numpy as np
 from sim.fate import Fate
 from sim.study.flight import Flight
 from sim.study.policies.lists import PLANNED_BY, ListFollower
-from sim.study.policies.team import Account, News, Situation, fly_team
+from sim.study.policies.situation import Account, News, Situation
+from sim.study.policies.team import fly_team
 from sim.study.policy import Planner
 from swarm.allocation import Problem, TeamState, evaluate
 from swarm.allocation.guided import route_arrays, team_arrays

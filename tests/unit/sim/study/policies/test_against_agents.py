@@ -11,7 +11,8 @@ from sim.study.flight import Flight
 from sim.study.generator import mission_of, random_mission
 from sim.study.policies.agents import GREEDY, LOOKAHEAD, AgentsPolicy
 from sim.study.policies.rules import RuleChooser
-from sim.study.policies.team import Account, fly_team
+from sim.study.policies.situation import Account
+from sim.study.policies.team import fly_team
 from sim.uncertainty import Uncertainty
 from swarm.allocation import rule_by_name
 from swarm.model import Mission, Plan
@@ -26,7 +27,7 @@ def visits(flight: Flight) -> list[tuple[str, str, bool]]:
     return [(visit.uav, visit.task, visit.done) for visit in flight.visits]
 
 
-@pytest.mark.parametrize("seed", range(1, 5))
+@pytest.mark.parametrize("seed", range(1, 3))
 @pytest.mark.parametrize("policy", [GREEDY, LOOKAHEAD], ids=lambda policy: policy.name)
 @pytest.mark.parametrize(
     ("uncertainty", "reattempt_failed"),
