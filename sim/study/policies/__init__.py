@@ -1,1 +1,1 @@
-"""Ways to run a fleet that studies compare."""
+"""Policies that studies compare, each behind `sim.study.policy.Policy`."""
