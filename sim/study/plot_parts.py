@@ -5,7 +5,7 @@ Leaves out: what is drawn (sim.study.study_plot).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from textwrap import fill
@@ -56,6 +56,7 @@ _LOOKS = {
     "greedy": Look("#0072B2", "o"),
     "lookahead": Look("#D55E00", "^"),
     "central": Look("#000000", "P"),
+    "central-divert": Look("#000000", "D", filled=False),
     "interval": Look("#777777", "X"),
     "cbba": Look("#CC79A7", "v"),
     "frozen": Look("#E69F00", "p"),
@@ -71,12 +72,25 @@ _MORE_LOOKS = tuple(
 )
 
 
-def look_of(policy: str, among: Iterable[str]) -> Look:
-    """Its own, or one of those left, by its place among the policies of the study."""
-    if policy in _LOOKS:
-        return _LOOKS[policy]
-    others = sorted(set(among) - set(_LOOKS))
+def look_of(policy: str, among: Collection[str]) -> Look:
+    """Its own, or one of those left, by its place among the policies of the study.
+
+    A number behind a colon changes nothing, unless the policy is there with several numbers.
+    """
+    if _known(policy, among):
+        return _LOOKS[_stem(policy)]
+    others = sorted(name for name in among if not _known(name, among))
     return _MORE_LOOKS[others.index(policy) % len(_MORE_LOOKS)]
+
+
+def _known(policy: str, among: Collection[str]) -> bool:
+    stem = _stem(policy)
+    alone = [_stem(name) for name in among].count(stem) == 1
+    return stem in _LOOKS and (alone or stem == policy)
+
+
+def _stem(policy: str) -> str:
+    return policy.partition(":")[0]
 
 
 def two_panels() -> tuple[Figure, tuple[Axes, Axes]]:

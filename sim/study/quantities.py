@@ -21,7 +21,7 @@ class Quantity:
     unit: str
     """``%`` is shown for shares of 1."""
     words: str
-    """A clause that says the number at its place ``{}``, unit included."""
+    """A clause with the number, in that unit, in place of ``{}``."""
 
     @property
     def label(self) -> str:
@@ -38,27 +38,29 @@ class Quantity:
 
 
 QUANTITIES = {
-    "loss": Quantity("UAVs lost", "%", "each UAV is lost with probability {}"),
+    "loss": Quantity("UAVs lost", "%", "each UAV is lost with probability {} %"),
     "popup": Quantity(
-        "tasks that pop up", "%", "each task appears only during the mission with probability {}"
+        "tasks that pop up", "%", "each task appears only during the mission with probability {} %"
     ),
-    "popups_per_min": Quantity("further pop-ups", "per min", "{} further tasks pop up"),
-    "withdrawals_per_min": Quantity("withdrawals", "per min", "{} tasks are withdrawn"),
+    "popups_per_min": Quantity("further pop-ups", "per min", "{} further tasks pop up per minute"),
+    "withdrawals_per_min": Quantity("withdrawals", "per min", "{} tasks are withdrawn per minute"),
     "speed_sd_frac": Quantity(
-        "spread of UAVs' speeds", "% of cruise speed", "UAVs' speeds spread by {}"
+        "spread of UAVs' speeds", "% of cruise speed", "UAVs' speeds spread by {} %"
     ),
     "leg_sd_frac": Quantity(
-        "spread of speeds from leg to leg", "% of cruise speed", "speeds of legs spread by {}"
+        "spread of speeds from leg to leg", "% of cruise speed", "speeds of legs spread by {} %"
     ),
-    "wind_m_s": Quantity("wind", "m/s", "wind of {} from a random direction"),
-    "position_error_m": Quantity("position error", "m", "UAVs stop {} (1 σ) beside their places"),
-    "message_loss": Quantity("messages lost", "%", "{} of all messages are lost"),
-    "delay_s": Quantity("least delay of messages", "s", "messages take {} or longer"),
-    "jitter_s": Quantity("mean further delay of messages", "s", "and {} more on average"),
+    "wind_m_s": Quantity("wind", "m/s", "wind of {} m/s blows from a random direction"),
+    "position_error_m": Quantity("position error", "m", "UAVs stop {} m (1 σ) beside their places"),
+    "message_loss": Quantity("messages lost", "%", "{} % of all messages are lost"),
+    "delay_s": Quantity("least delay of messages", "s", "messages take {} s or longer"),
+    "jitter_s": Quantity(
+        "mean further delay of messages", "s", "messages take another {} s on average"
+    ),
     "partitions_per_min": Quantity(
-        "partitions", "per min", "{} times half of the fleet is cut off"
+        "partitions", "per min", "half of the fleet is cut off {} times per minute"
     ),
-    "partition_s": Quantity("length of a partition", "s", "for {} each"),
+    "partition_s": Quantity("length of a partition", "s", "for {} s each"),
 }
 """By field of `Uncertainty`."""
 
@@ -71,7 +73,7 @@ def uncertainty_words(uncertainty: Uncertainty) -> str:
         if name == "partition_s" and uncertainty.partitions_per_min == 0.0:
             continue  # a default without effect
         if value > 0.0:
-            clauses.append(quantity.words.format(quantity.text(value)))
+            clauses.append(quantity.words.format(f"{quantity.shown(value):g}"))
     if uncertainty.outcomes:
         clauses.append("attempts succeed and fail by chance")
     if uncertainty.survival:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from sim.study.plot_parts import (
     add_legend,
@@ -130,12 +130,11 @@ def value_figure(summary: Summary, vary: str) -> Figure:
     left.set_ylabel("mean J [value·s]")
     right.set_ylabel(f"J / {summary.reference}'s, with paired 95 % interval [–]")
     right.axhline(1.0, color="#555555", linewidth=0.8, zorder=1)
-    _keep_close(right, summary, settings)
+    beyond = _keep_close(right, summary, settings)
     add_legend(figure, left)
     name = QUANTITIES[vary].name
-    add_title(
-        figure, f"Value against {name}, {trials_text(settings)}", _ideal_note(summary, "dashed:")
-    )
+    note = "; ".join(filter(None, [_ideal_note(summary, "dashed:"), *beyond]))
+    add_title(figure, f"Value against {name}, {trials_text(settings)}", note)
     return figure
 
 
@@ -150,7 +149,7 @@ def churn_figure(summary: Summary, vary: str) -> Figure:
             if shown:
                 points = [_x(setting) for setting, _ in shown], [mean.value for _, mean in shown]
                 _line(axes, summary, name, *points)
-        axes.set_ylim(bottom=0.0)
+        _from_zero(axes, "y")
         axes.set_ylabel(label)
     add_legend(figure, panels[0])
     name = QUANTITIES[vary].name
@@ -182,7 +181,7 @@ def churn_bars_figure(summary: Summary, setting: Setting) -> Figure:
                 height=0.62,
                 zorder=2,
             )
-        axes.set_xlim(left=0.0)
+        _from_zero(axes, "x")
         axes.set_xlabel(f"{label}, with 95 % interval")
     name_rows(panels[0], [policy_label(summary, each.policy) for each in found])
     add_title(
@@ -244,6 +243,13 @@ def _against(axes: Axes, vary: str, settings: Sequence[Setting]) -> None:
     axes.set_xlabel(QUANTITIES[vary].label)
 
 
+def _from_zero(axes: Axes, along: Literal["x", "y"]) -> None:
+    """For counts: as far as they reach, and to 1 where there are none."""
+    limits = axes.dataLim.intervalx if along == "x" else axes.dataLim.intervaly
+    top = 1.05 * float(limits[1]) or 1.0
+    axes.set(**{f"{along}lim": (0.0, top)})
+
+
 def _line(
     axes: Axes, summary: Summary, name: str, xs: Sequence[float], ys: Sequence[float]
 ) -> None:
@@ -293,8 +299,8 @@ def _intervals(
     )
 
 
-def _keep_close(axes: Axes, summary: Summary, settings: Sequence[Setting]) -> None:
-    """Show what lies close to the reference, and tell of whom there is more."""
+def _keep_close(axes: Axes, summary: Summary, settings: Sequence[Setting]) -> list[str]:
+    """Show what lies close to the reference; of whom there is more."""
     low, high = _CLOSE
     ratios = {
         name: [
@@ -313,20 +319,8 @@ def _keep_close(axes: Axes, summary: Summary, settings: Sequence[Setting]) -> No
     high = min(high, max((end for _, end in ends), default=high))
     pad = 0.04 * (high - low) or 0.01
     axes.set_ylim(low - pad, high + pad)
-    for side, height, names in (("below", 0.01, below), ("above", 0.99, above)):
-        if names:
-            axes.text(
-                0.99,
-                height,
-                f"also {side} this panel: {', '.join(names)}",
-                transform=axes.transAxes,
-                ha="right",
-                va="bottom" if side == "below" else "top",
-                fontsize=8.0,
-                color="#444444",
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
-                zorder=5,
-            )
+    told = (("below", below), ("above", above))
+    return [f"{side} the right panel too: {', '.join(names)}" for side, names in told if names]
 
 
 # -- words and looks --------------------------------------------------------------------

@@ -40,6 +40,8 @@ _COUNTED = (
     "decisions",
 )
 """Columns of rows of which means are taken."""
+_ROUNDING = 1e-9
+"""Of values summed in different orders, relative to them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,10 +176,10 @@ class Summary:
         return as_markdown(self, every_setting=every_setting)
 
     def table(self) -> RenderableType:
-        """Tables for a terminal of 100 columns."""
-        from sim.study.summary_tables import as_rich
+        """Tables for a terminal."""
+        from sim.study.summary_tables import TerminalTables
 
-        return as_rich(self)
+        return TerminalTables(self)
 
     def as_json(self) -> dict[str, object]:
         """Ready for `json.dumps`.
@@ -254,14 +256,17 @@ def _measured(policy: str, flights: Flights, reference: Flights, bound: Flights)
         value=mean_of([row.value for row in rows]),
         ratio=ratio_of(ours, theirs) if ours else None,
         difference=difference_of(ours, theirs) if ours else None,
-        better=share_of(sum(a > b for a, b in zip(ours, theirs, strict=True)), len(ours))
-        if ours
-        else None,
+        better=_better(ours, theirs),
         of_bound=ratio_of(under, above) if under else None,
         complete=_complete(rows),
         means=_means(rows),
         wall=_wall(rows),
     )
+
+
+def _better(ours: Sequence[float], theirs: Sequence[float]) -> Estimate | None:
+    won = [a - b > _ROUNDING * abs(b) for a, b in zip(ours, theirs, strict=True)]
+    return share_of(sum(won), len(won)) if won else None
 
 
 def _paired(flights: Flights, others: Flights) -> tuple[list[float], list[float]]:

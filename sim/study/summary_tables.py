@@ -1,4 +1,4 @@
-"""What a study says, as tables: Markdown for documents, rich ones for terminals of 100 columns.
+"""What a study says, as tables: Markdown for documents, rich ones for terminals of any width.
 
 Leaves out: working it out (sim.study.summary).
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from rich.console import Group, JustifyMethod, RenderableType
+from rich.console import Console, ConsoleOptions, JustifyMethod, RenderResult
 from rich.table import Table
 from rich.text import Text
 
@@ -26,10 +26,8 @@ from sim.study.summary_words import (
     trials_text,
 )
 
-__all__ = ["as_markdown", "as_rich"]
+__all__ = ["TerminalTables", "as_markdown"]
 
-_WIDTH = 100
-"""Columns of a terminal."""
 _GAP = 2
 
 
@@ -58,20 +56,29 @@ def as_markdown(summary: Summary, *, every_setting: bool = False) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def as_rich(summary: Summary) -> RenderableType:
-    """The study's own setting and what is varied, for a terminal."""
-    parts: list[RenderableType] = [Text(line.replace("`", "")) for line in _about(summary)]
-    for grid in _grids(summary, every_setting=False):
-        for part in _fitting(grid):
-            table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
-            for place, heading in enumerate(part.headings):
-                justify: JustifyMethod = "right" if place else "left"
-                table.add_column(Text(heading), justify=justify, no_wrap=True)
-            for row in part.rows:
-                table.add_row(*(Text(cell) for cell in row))
-            parts += [Text(), Text(part.title, style="bold"), table]
-        parts += [Text(grid.note)] if grid.note else []
-    return Group(*parts)
+@dataclass(frozen=True, slots=True)
+class TerminalTables:
+    """The study's own setting and what is varied, in parts as wide as the terminal is."""
+
+    summary: Summary
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """As rich asks."""
+        for line in _about(self.summary):
+            yield Text(line.replace("`", ""))
+        for grid in _grids(self.summary, every_setting=False):
+            for part in _fitting(grid, options.max_width):
+                table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+                for place, heading in enumerate(part.headings):
+                    justify: JustifyMethod = "right" if place else "left"
+                    table.add_column(Text(heading), justify=justify, no_wrap=True)
+                for row in part.rows:
+                    table.add_row(*(Text(cell) for cell in row))
+                yield Text()
+                yield Text(part.title, style="bold")
+                yield table
+            if grid.note:
+                yield Text(grid.note)
 
 
 # -- tables -----------------------------------------------------------------------------
@@ -181,19 +188,31 @@ def _grid(
     )
 
 
-def _fitting(grid: Grid) -> Iterator[Grid]:
-    """The same in parts that fit the terminal, each with the first column."""
+def _fitting(grid: Grid, width: int) -> Iterator[Grid]:
+    """The same in as few parts as fit, each with the policies, and about as wide as each other."""
     table = [grid.headings, *grid.rows]
-    name, *widths = (max(map(len, column)) for column in zip(*table, strict=True))
-    fit = max(1, (_WIDTH - name) // (max(widths, default=0) + _GAP))
-    if name + sum(widths) + _GAP * len(widths) <= _WIDTH:
-        fit = len(widths)
-    parts = -(-len(widths) // max(1, fit))
-    size = -(-len(widths) // max(1, parts))
-    for first in range(1, len(grid.headings), max(1, size)):
-        cut = [(row[0], *row[first : first + size]) for row in table]
-        title = grid.title if first == 1 else f"{grid.title}, continued"
+    name, *widths = (max(map(len, column)) + _GAP for column in zip(*table, strict=True))
+    room = max(0, width - name + _GAP)
+    fewest = len(_filled(widths, room))
+    parts = next(p for most in range(room + 1) if len(p := _filled(widths, most)) == fewest)
+    for part in parts:
+        cut = [(row[0], *(row[1 + place] for place in part)) for row in table]
+        title = grid.title if part is parts[0] else f"{grid.title}, continued"
         yield Grid(title, cut[0], tuple(cut[1:]))
+
+
+def _filled(widths: Sequence[int], room: int) -> list[list[int]]:
+    """Places in order, in parts whose widths together are at most ``room`` or that have one."""
+    parts: list[list[int]] = []
+    left = 0
+    for place, width in enumerate(widths):
+        if parts and width <= left:
+            parts[-1].append(place)
+        else:
+            parts.append([place])
+            left = room
+        left -= width
+    return parts
 
 
 # -- words ------------------------------------------------------------------------------

@@ -70,7 +70,7 @@ def trials_text(settings: Sequence[Setting]) -> str:
 
 def _digits(estimate: Estimate) -> int:
     """Decimals that suit an interval."""
-    return 4 if 0.0 < estimate.half_width < 0.001 else 3
+    return 4 if 0.00005 <= estimate.half_width < 0.001 else 3
 
 
 def _end(value: float, digits: int) -> str:

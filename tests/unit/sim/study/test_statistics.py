@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
@@ -50,6 +50,7 @@ def correlated(n: int, seed: int, *, sd: float = 1.0) -> tuple[Array, Array]:
 # -- against other implementations ------------------------------------------------------
 
 
+@settings(max_examples=50)
 @given(rows)
 def test_mean_has_scipys_t_interval(xs: Array) -> None:
     found = mean_of(xs)
@@ -61,6 +62,7 @@ def test_mean_has_scipys_t_interval(xs: Array) -> None:
     )
 
 
+@settings(max_examples=50)
 @given(pairs)
 def test_difference_has_the_interval_of_scipys_paired_t_test(both: Array) -> None:
     ours, theirs = both
@@ -82,6 +84,7 @@ def test_ratio_holds_what_the_paired_t_test_does_not_reject() -> None:
     assert stats.ttest_rel(ours[0], inside * theirs[0]).pvalue > 0.05
 
 
+@settings(max_examples=50)
 @given(st.integers(1, 60).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
 def test_share_has_scipys_wilson_interval(counts: tuple[int, int]) -> None:
     expected = stats.binomtest(*counts).proportion_ci(method="wilson")
@@ -160,12 +163,14 @@ def test_known_parameters_are_recovered() -> None:
 # -- exactness and odd cases ------------------------------------------------------------
 
 
+@settings(max_examples=50)
 @given(rows)
 def test_policy_compared_with_itself_differs_by_exactly_nothing(xs: Array) -> None:
     assert difference_of(xs, xs) == Estimate(0.0, 0.0, 0.0, len(xs))
     assert ratio_of(xs, xs) == Estimate(1.0, 1.0, 1.0, len(xs))
 
 
+@settings(max_examples=50)
 @given(pairs, st.integers(0, 1000))
 def test_order_of_trials_changes_nothing_at_all(both: Array, seed: int) -> None:
     order = np.random.default_rng(seed).permutation(both.shape[1])
@@ -176,6 +181,7 @@ def test_order_of_trials_changes_nothing_at_all(both: Array, seed: int) -> None:
     assert str(ratio_of(ours[order], theirs[order])) == str(ratio_of(ours, theirs))  # NaN is NaN
 
 
+@settings(max_examples=50)
 @given(pairs, st.sampled_from((2.0**-20, 0.25, 8.0, 2.0**30)))
 def test_unit_of_values_scales_means_and_differences_and_leaves_ratios(
     both: Array, unit: float
@@ -189,6 +195,7 @@ def test_unit_of_values_scales_means_and_differences_and_leaves_ratios(
     assert str(ratio_of(unit * ours, unit * theirs)) == str(ratio_of(ours, theirs))
 
 
+@settings(max_examples=50)
 @given(pairs)
 def test_interval_holds_its_value(both: Array) -> None:
     ours, theirs = both
