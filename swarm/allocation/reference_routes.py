@@ -47,24 +47,23 @@ def team_worth(problem: Problem, state: TeamState, lists: Sequence[Sequence[int]
 def timed_list_worth(
     problem: Problem, timetable: Timetable, uav: int, route: Sequence[int]
 ) -> float | None:
-    """Σ p·m·(D − t)⁺ over one list flown from mission time 0 by a timetable [value·s].
+    """Σ p·S·m·(D − t)⁺ over one list flown from mission time 0 by a timetable [value·s].
 
-    None if a task could only be completed too late, or follows one that ends the list.
+    None if a task could only be completed too late.
     """
-    first_s, leg_s, earliest_s, latest_s, ends = (
+    first_s, leg_s, earliest_s, latest_s = (
         np.asarray(getattr(timetable, name))
-        for name in ("first_s", "leg_s", "earliest_s", "latest_s", "ends")
+        for name in ("first_s", "leg_s", "earliest_s", "latest_s")
     )
-    done_s, worth, before = 0.0, 0.0, -1
+    done_s, survived, worth, before = 0.0, 1.0, 0.0, -1
     for task in route:
-        if before >= 0 and ends[uav, before]:
-            return None
         done_s += float(leg_s[uav, before, task] if before >= 0 else first_s[uav, task])
         done_s = max(done_s, float(earliest_s[uav, task]))
         if done_s > latest_s[uav, task]:
             return None
         weight = float(problem.success[uav, task]) * float(problem.value[task])
-        worth += weight * max(0.0, problem.horizon_s - done_s)
+        worth += survived * weight * max(0.0, problem.horizon_s - done_s)
+        survived *= float(problem.survival[uav, task])
         before = task
     return worth
 

@@ -347,9 +347,6 @@ class Timetable:
             NDArray[numpy.float64],
             dict(shape=(None, None), order="C", device="cpu", writable=False),
         ],
-        ends: Annotated[
-            NDArray[numpy.bool_], dict(shape=(None, None), order="C", device="cpu", writable=False)
-        ],
     ) -> None: ...
 
 def priced_lists(

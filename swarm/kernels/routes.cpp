@@ -19,7 +19,6 @@ namespace peckorder {
 namespace {
 
 using Table = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
-using Masks = nb::ndarray<const bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 template <class Array>
 std::vector<double> copied(const Array& array) {
@@ -135,13 +134,11 @@ void bind_routes(nb::module_& module) {
       .def(
           "__init__",
           [](Timetable* self, const Matrix& first_s, const Table& leg_s, const Matrix& earliest_s,
-             const Matrix& latest_s, const Masks& ends) {
+             const Matrix& latest_s) {
             new (self) Timetable{static_cast<int>(first_s.shape(1)), copied(first_s),
-                                 copied(leg_s),    copied(earliest_s),
-                                 copied(latest_s), {ends.data(), ends.data() + ends.size()}};
+                                 copied(leg_s), copied(earliest_s), copied(latest_s)};
           },
-          nb::arg("first_s"), nb::arg("leg_s"), nb::arg("earliest_s"), nb::arg("latest_s"),
-          nb::arg("ends"));
+          nb::arg("first_s"), nb::arg("leg_s"), nb::arg("earliest_s"), nb::arg("latest_s"));
 
   module.def(
       "priced_lists",

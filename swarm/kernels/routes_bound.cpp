@@ -23,8 +23,7 @@ constexpr double kNear = 1e-5;         // of a value: as good as reached by the 
 struct Offer {
   double left_s;                 // until the horizon
   std::vector<int> tasks;
-  std::vector<double> weight, price, first_s, leg_s, earliest_s, latest_s;
-  std::vector<std::uint8_t> ends;
+  std::vector<double> weight, survival, price, first_s, leg_s, earliest_s, latest_s;
 
   Offer(const Instance& instance, const Start& start, int uav, const Pricing& pricing)
       : left_s(instance.horizon_s() - start.free_s[uav]) {
@@ -35,13 +34,13 @@ struct Offer {
     leg_s.reserve(tasks.size() * tasks.size());
     for (const int task : tasks) {
       weight.push_back(start.survived[uav] * instance.weight(uav, task));
+      survival.push_back(pricing.expansions > 0 ? instance.survival(uav, task) : 1.0);
       price.push_back(pricing.prices[task]);
       first_s.push_back(table ? table->first_s[table->at(uav, task)]
                               : start.first_m(uav, task) * instance.pace(uav) +
                                     instance.service_s(task));
       earliest_s.push_back(table ? table->earliest_s[table->at(uav, task)] - free_s : 0.0);
       latest_s.push_back(table ? table->latest_s[table->at(uav, task)] - free_s : kInfinite);
-      ends.push_back(table ? table->ends[table->at(uav, task)] : 0);
       for (const int to : tasks)
         leg_s.push_back(table ? table->leg_s[table->at(uav, task) * table->n_task + to]
                               : instance.leg_s(uav, task, to));
@@ -54,10 +53,13 @@ struct Offer {
     return leg_s[static_cast<std::size_t>(from) * n() + to];
   }
 
-  // What completing task `l` gains, at that time or when it opens.
-  double gain(int l, double time_s) const {
-    return weight[l] * std::max(0.0, left_s - time_s) - price[l];
+  // What completing task `l` at that time gains.
+  double gain(int l, double time_s, double survived = 1.0) const {
+    return survived * weight[l] * std::max(0.0, left_s - time_s) - price[l];
   }
+
+  // Nothing that follows is worth anything.
+  bool ends(int l) const { return survival[l] == 0.0; }
 };
 
 // Backward dynamic programme over (task, bucket). rest(i, τ): best of what follows after
@@ -101,7 +103,7 @@ class RelaxedLists {
       double most = 0.0;
       next = -1;
       int then = at;
-      for (int l = 0; l < n_ && !offer_.ends[here]; ++l) {
+      for (int l = 0; l < n_ && !offer_.ends(here); ++l) {
         const int shift = shift_[static_cast<std::size_t>(here) * n_ + l];
         if (l == here || shift == 0 || at + shift > last_) continue;
         if (from_[l * row_ + at + shift] > most) {
@@ -151,7 +153,7 @@ class RelaxedLists {
     std::vector<int> latest(n_, -1);
     for (int begin = last_ / kBlock * kBlock; begin >= 0; begin -= kBlock) {
       for (int i = 0; i < n_; ++i) {
-        if (offer_.ends[i]) continue;
+        if (offer_.ends(i)) continue;
         const int* shift = &shift_[static_cast<std::size_t>(i) * n_];
         double best[kBlock] = {};
         for (int l = 0; l < n_; ++l) {
@@ -165,7 +167,7 @@ class RelaxedLists {
         const int bucket = begin + r;
         if (bucket > last_) continue;
         for (const Short& leg : short_legs) {
-          if (bucket + leg.shift > last_ || offer_.ends[leg.from]) continue;
+          if (bucket + leg.shift > last_ || offer_.ends(leg.from)) continue;
           double& best = rest_[leg.from * row_ + bucket];
           best = std::max(best, from_[leg.to * row_ + bucket + leg.shift]);
         }
@@ -209,7 +211,7 @@ class RelaxedLists {
       leave = std::max(leave, rest_[k * row_ + bucket]);
     }
     for (const int k : knot)
-      if (!offer_.ends[k]) rest_[k * row_ + bucket] = all - own(k) + leave;
+      if (!offer_.ends(k)) rest_[k * row_ + bucket] = all - own(k) + leave;
   }
 
   const Offer& offer_;
@@ -221,63 +223,67 @@ class RelaxedLists {
   std::vector<double> from_, rest_;
 };
 
-// Best-first among real lists. Whatever follows a beginning adds at most the relaxed rest, so the
-// greatest such sum of all beginnings not yet continued bounds every list not yet seen.
+// Best-first among real lists. Whatever follows a beginning adds at most the relaxed rest, as
+// survival only lowers it; so the greatest such sum of all beginnings that are not yet continued
+// bounds every list not yet seen.
 class RealLists {
  public:
   RealLists(const Offer& offer, const RelaxedLists& relaxed) : offer_(offer), relaxed_(relaxed) {}
 
   double best(long expansions, std::vector<int>& list) {
-    std::vector<std::uint8_t> on_it(offer_.n(), 0);
-    for (int l = 0; l < offer_.n(); ++l) reach(-1, l, offer_.first_s[l]);
-    int found = best_;
+    std::vector<char> on_it(offer_.n(), 0);
+    const auto mark = [&](int at, char is) {
+      for (int k = at; k >= 0; k = nodes_[k].before) on_it[nodes_[k].task] = is;
+    };
+    for (int l = 0; l < offer_.n(); ++l) reach({-1, l, offer_.first_s[l], 1.0, 0.0});
     double bound = value_;
     for (long made = 0; !open_.empty(); ++made) {
       const auto [most, at] = open_.top();
-      if (most <= value_ * (1.0 + kNear)) {
-        found = best_;
-        bound = std::max(most, value_);
-        break;
-      }
+      bound = std::max(value_, most);
+      if (most <= value_ * (1.0 + kNear)) break;
       if (made == expansions) {
         relaxed_.best(list);
-        return most;
+        return bound;
       }
       open_.pop();
-      for (int k = at; k >= 0; k = nodes_[k].before) on_it[nodes_[k].task] = 1;
+      const Node node = nodes_[at];
+      const double survived = node.survived * offer_.survival[node.task];
+      mark(at, 1);
       for (int l = 0; l < offer_.n(); ++l)
-        if (!on_it[l]) reach(at, l, nodes_[at].time_s + offer_.leg(nodes_[at].task, l));
-      for (int k = at; k >= 0; k = nodes_[k].before) on_it[nodes_[k].task] = 0;
-      found = best_;
+        if (!on_it[l])
+          reach({at, l, node.time_s + offer_.leg(node.task, l), survived, node.value});
+      mark(at, 0);
       bound = value_;
     }
-    for (int k = found; k >= 0; k = nodes_[k].before)
-      list.push_back(offer_.tasks[nodes_[k].task]);
-    std::reverse(list.begin(), list.end());
+    for (int k = best_; k >= 0; k = nodes_[k].before) list.push_back(offer_.tasks[nodes_[k].task]);
     return bound;
   }
 
  private:
   struct Node {
     int before, task;
-    double time_s, value;
+    double time_s;    // of completing the task
+    double survived;  // until then
+    double value;     // of all so far
   };
 
-  void reach(int before, int l, double time_s) {
-    time_s = std::max(time_s, offer_.earliest_s[l]);
-    if (time_s > offer_.latest_s[l] || time_s >= offer_.left_s) return;
-    const double value = (before < 0 ? 0.0 : nodes_[before].value) + offer_.gain(l, time_s);
-    const int bucket = relaxed_.bucket(time_s);
-    const double most =
-        offer_.ends[l] || bucket > relaxed_.last() ? value : value + relaxed_.rest(l, bucket);
+  // `node` as it is on arrival, without the task's own value.
+  void reach(Node node) {
+    const int l = node.task;
+    node.time_s = std::max(node.time_s, offer_.earliest_s[l]);
+    if (node.time_s > offer_.latest_s[l] || node.time_s >= offer_.left_s) return;
+    node.value += offer_.gain(l, node.time_s, node.survived);
+    const int bucket = relaxed_.bucket(node.time_s);
+    const bool over = offer_.ends(l) || bucket > relaxed_.last();
+    const double most = over ? node.value : node.value + relaxed_.rest(l, bucket);
     if (most <= value_) return;
-    nodes_.push_back({before, l, time_s, value});
+    nodes_.push_back(node);
     const int at = static_cast<int>(nodes_.size()) - 1;
-    if (value > value_) {
-      value_ = value;
+    if (node.value > value_) {
+      value_ = node.value;
       best_ = at;
     }
-    if (most > value) open_.emplace(most, at);
+    if (most > node.value) open_.emplace(most, at);
   }
 
   const Offer& offer_;
@@ -285,7 +291,7 @@ class RealLists {
   std::vector<Node> nodes_;
   std::priority_queue<std::pair<double, int>> open_;
   double value_ = 0.0;  // of the best list seen
-  int best_ = -1;
+  int best_ = -1;       // its last task
 };
 
 double priced_list(const Instance& instance, const Start& start, int uav, const Pricing& pricing,

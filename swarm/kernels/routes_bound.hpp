@@ -2,10 +2,10 @@
 //
 // Times are counted in whole buckets, each leg rounded down, and a task may be visited again; so
 // the value found is never below that of any real list. A search among real lists, which that
-// value guides, may then bring it down. See coordinator/planner/bound.py.
+// value guides and to which survival matters, may then bring it down. See coordinator/planner/bound.py.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <vector>
 
 #include "routes_instance.hpp"
@@ -21,7 +21,6 @@ struct Timetable {
   std::vector<double> leg_s;           // (n_uav, n_task, n_task) from completing one to another
   std::vector<double> earliest_s;      // a UAV that would complete it sooner waits
   std::vector<double> latest_s;        // later it is worth nothing, nor is what follows
-  std::vector<std::uint8_t> ends;      // nothing follows this task on a list
 
   std::size_t at(int uav, int task) const {
     return static_cast<std::size_t>(uav) * n_task + task;

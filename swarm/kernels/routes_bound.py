@@ -2,9 +2,10 @@
 
 For one UAV and a price per task, the best list of Σ p·S₀·m·(D − t)⁺ − price, with times in whole
 buckets, each leg rounded down, S taken as that of the start, and tasks allowed more than once.
-From that relaxation a search among real lists may go on, with exact times and every task once:
-best-first, by what a list is worth so far and what the relaxation can still add. Where it is cut
-short, the most that is left counts, so what is found is never below the best list's worth.
+From that relaxation a search among real lists may go on, with exact times, S as eq. 1 has it, and
+every task once: best-first, by what a list is worth so far and what the relaxation can still add.
+Where it is cut short, the most that is left counts, so what is found is never below the best
+list's worth.
 Leaves out: how prices are found.
 """
 
@@ -42,22 +43,19 @@ class Timetable:
     """(n_uav, n_task) a UAV that could complete the task sooner waits [s]; >= 0."""
     latest_s: npt.ArrayLike
     """(n_uav, n_task) what is not complete by then never will be [s]; >= 0, may be infinite."""
-    ends: npt.ArrayLike
-    """(n_uav, n_task) whether the UAV takes no other task after this one."""
     shape: tuple[int, int] = field(init=False)
     kernel: _kernels.Timetable = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        ends = np.array(self.ends, dtype=np.bool_, order="C")
-        if ends.ndim != 2:
-            raise ValueError(f"ends must have 2 axes, not {ends.ndim}")
-        n_uav, n_task = shape = ends.shape
+        if np.ndim(self.first_s) != 2:
+            raise ValueError(f"first_s must have 2 axes, not {np.ndim(self.first_s)}")
+        n_uav, n_task = shape = np.shape(self.first_s)
         first_s = _times("first_s", self.first_s, shape)
         leg_s = _times("leg_s", self.leg_s, (n_uav, n_task, n_task))
         earliest_s = _times("earliest_s", self.earliest_s, shape)
         latest_s = _times("latest_s", self.latest_s, shape, endless=True)
         object.__setattr__(self, "shape", shape)
-        kernel = _kernels.Timetable(first_s, leg_s, earliest_s, latest_s, ends)
+        kernel = _kernels.Timetable(first_s, leg_s, earliest_s, latest_s)
         object.__setattr__(self, "kernel", kernel)
 
 
@@ -78,7 +76,7 @@ def priced_lists(
     expansions: int = 0,
     threads: int | None = None,
 ) -> tuple[float, npt.NDArray[np.int64]]:
-    """Best relaxed lists of all active UAVs, each for itself, over the open tasks.
+    """Best lists of all active UAVs, each for itself, over the open tasks; relaxed ones at first.
 
     Time grows with active UAVs · tasks² · buckets, memory per thread with tasks ·
     (tasks + buckets). Legs shorter than a bucket make the relaxation weaker, not wrong.

@@ -16,7 +16,7 @@ from distributed import LocalCluster
 
 from sim.study.config import RandomMissions, Study, Varied
 from sim.study.dask_cluster import on_dask
-from sim.study.policies import ROSTER
+from sim.study.policies import ROSTER, Roster
 from sim.study.rows import Row, without_wall_times
 from sim.study.runner import Fly, fly_here, in_processes, run_study
 from sim.study.store import MemoryStore, read_rows
@@ -38,8 +38,8 @@ STUDY = Study(
 )
 
 
-def flown(fly: Fly, briefing: Briefing = Briefing(STUDY, ROSTER)) -> list[Row]:
-    rows = run_study(briefing, MemoryStore(briefing.study), fly, lambda done, total: None)
+def flown(fly: Fly, study: Study = STUDY, roster: Roster = ROSTER) -> list[Row]:
+    rows = run_study(Briefing(study, roster), MemoryStore(study), fly, lambda *_: None)
     return [without_wall_times(row) for row in rows]
 
 
@@ -52,7 +52,7 @@ def test_death_of_a_process_is_told_and_ends_the_others() -> None:
     study = Study("test", RandomMissions(2, 3), ("deadly",), trials=4)
 
     with pytest.raises(SwarmError, match="a process that flew trials died"):
-        flown(in_processes(2), Briefing(study, FAKES))
+        flown(in_processes(2), study, FAKES)
 
     assert not multiprocessing.active_children()
 
@@ -156,8 +156,7 @@ def test_address_without_a_scheduler_is_one_clear_line() -> None:
 
 
 def test_cluster_without_workers_is_one_clear_line() -> None:
-    with dask_cluster(0) as empty:
-        with pytest.raises(InputError) as caught:
-            flown(on_dask(empty.scheduler_address, timeout_s=0.5))
+    with dask_cluster(0) as empty, pytest.raises(InputError) as caught:
+        flown(on_dask(empty.scheduler_address, timeout_s=0.5))
 
     assert str(caught.value).endswith("the cluster has no workers; start a 'dask worker' there")

@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from sim.fate import Fate
 from sim.study.baselines.cbba import cbba
 from sim.study.flight import Flight
-from sim.study.policies.lists import ListFollower, moved_between
-from sim.study.policies.team import Account, News, Situation, fly_team
+from sim.study.policies.lists import ListFollower
+from sim.study.policies.situation import Account, News, Situation
+from sim.study.policies.team import fly_team
 from sim.study.policy import Planner
 from swarm.clock import Clock
 
 __all__ = ["Auction", "Cbba"]
 
-_UPON = frozenset({News.BEGUN, News.APPEARED, News.WITHDRAWN, News.LOST, News.REOPENED})
+_UPON = frozenset({News.APPEARED, News.WITHDRAWN, News.LOST, News.REOPENED})
 
 
 class Auction(ListFollower):
@@ -35,15 +36,11 @@ class Auction(ListFollower):
 
     def hear(self, situation: Situation, news: Collection[News]) -> Collection[int]:
         """Hold the auction anew if the news are worth it."""
-        super().hear(situation, news)
-        if _UPON.isdisjoint(news):
-            return ()
-        if situation.state.open.any():
+        begun = News.BEGUN in news
+        if begun or (situation.state.open.any() and not _UPON.isdisjoint(news)):
             with self._account.timed():
                 routes = cbba(situation.problem, state=situation.state).routes
-            self._account.epochs += News.BEGUN not in news
-            self._account.moved += moved_between(self._lists, routes)
-            self._lists = routes
+            self.put_into_force(routes)
         return ()
 
 

@@ -2,8 +2,8 @@
 
 The lists of all open tasks are searched anew from where the team stands, from the lists in force
 on, by the same optimiser and with the same effort as a live coordinator's re-planning
-(`coordinator.planner.live`); what is found comes into force if it is worth more than going on.
-Leaves out: messages, and the time that planning takes.
+(`coordinator.planner.live`), less when a task was merely done; what is found comes into force if
+it is worth more than going on. Leaves out: messages, and the time that planning takes.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.fate import Fate
-from sim.study.baselines.index_rule import Routes
 from sim.study.flight import Flight
-from sim.study.policies.lists import PLANNED_BY, ListFollower, moved_between
-from sim.study.policies.team import Account, News, Situation, fly_team
+from sim.study.policies.lists import PLANNED_BY, ListFollower
+from sim.study.policies.situation import Account, News, Situation
+from sim.study.policies.team import fly_team
 from sim.study.policy import Planner
 from swarm.allocation import Problem, TeamState, evaluate
 from swarm.allocation.guided import route_arrays, team_arrays
@@ -29,9 +29,13 @@ __all__ = ["Central", "CentralDivert", "Interval", "Optimiser"]
 
 _ITERATIONS_PER_TASK = 400
 """As in `coordinator.planner.live`."""
+_ITERATIONS_WITHOUT_NEWS = 100
+"""The same when an attempt has ended and nothing else happened: the lists in force answer to that,
+and more work was measured to bring no more value."""
 _LEAST_GAIN = 1e-9
 """Of the value still to be won: less is rounding."""
 _EVENTS = frozenset(News) - {News.BEGUN, News.TIME}
+_NO_NEWS = frozenset({News.ENDED})
 
 
 class Optimiser(ListFollower):
@@ -43,7 +47,6 @@ class Optimiser(ListFollower):
         seed: of the search; >= 0.
         upon: news upon which it plans anew.
         diverts: whether UAVs in flight may be sent elsewhere.
-        iterations_per_task: of the search, for every open task.
     """
 
     def __init__(
@@ -54,28 +57,28 @@ class Optimiser(ListFollower):
         seed: int,
         upon: Collection[News] = _EVENTS,
         diverts: bool = False,
-        iterations_per_task: int = _ITERATIONS_PER_TASK,
     ) -> None:
         super().__init__(lists, account)
         self._seed = seed
         self._upon = frozenset(upon)
         self._diverts = diverts
-        self._iterations_per_task = iterations_per_task
         self._plans = 0
         self._arrays: tuple[Problem, RouteArrays] | None = None
 
     def hear(self, situation: Situation, news: Collection[News]) -> Collection[int]:
         """Plan anew if the news are worth it."""
         super().hear(situation, news)
-        if not self._upon & frozenset(news):
+        if self._upon.isdisjoint(news):
             return ()
+        quiet = _NO_NEWS.issuperset(news)
+        per_task = _ITERATIONS_WITHOUT_NEWS if quiet else _ITERATIONS_PER_TASK
         if not self._diverts:
-            self._improve(situation.problem, situation.state, self._lists)
+            self._improve(situation.problem, situation.state, per_task)
             return ()
         legs, in_flight = situation.legs, situation.in_flight()
         for uav in in_flight:
             self._lists[uav].insert(0, legs[uav].task)
-        self._improve(situation.problem, situation.if_stopped(), self._lists)
+        self._improve(situation.problem, situation.if_stopped(), per_task)
         stopped = []
         for uav in in_flight:
             if self._lists[uav][:1] == [legs[uav].task]:
@@ -84,13 +87,13 @@ class Optimiser(ListFollower):
                 stopped.append(uav)
         return stopped
 
-    def _improve(self, problem: Problem, state: TeamState, lists: Routes) -> None:
+    def _improve(self, problem: Problem, state: TeamState, iterations_per_task: int) -> None:
         """Put better lists into force, if any are found."""
         takers = problem.capable[state.active].any(axis=0)
         n_open = int(np.count_nonzero(state.open & takers))
         going_on = [
             [task for task in route if state.open[task]] if state.active[uav] else []
-            for uav, route in enumerate(lists)
+            for uav, route in enumerate(self._lists)
         ]
         if not n_open:
             return
@@ -99,7 +102,7 @@ class Optimiser(ListFollower):
             routes, worth = optimise_routes(
                 team,
                 seed=self._seed + self._plans,
-                iterations=self._iterations_per_task * n_open,
+                iterations=iterations_per_task * n_open,
                 lists=going_on,
                 threads=1,
             )
@@ -108,9 +111,7 @@ class Optimiser(ListFollower):
                 before, _ = evaluate(problem, going_on, state)
                 if worth <= before + _LEAST_GAIN * abs(before):
                     return
-        self._account.epochs += 1
-        self._account.moved += moved_between(lists, routes)
-        self._lists = routes
+        self.put_into_force(routes)
 
     def _arrays_of(self, problem: Problem) -> RouteArrays:
         if self._arrays is None or self._arrays[0] is not problem:

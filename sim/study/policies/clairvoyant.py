@@ -1,15 +1,17 @@
 """A value that nobody can exceed who meets the same fate, not even one who knows all of it.
 
 **What counts.** Whoever decides, every task adds to `sim.study.flight.value_of` at one visit at
-most, and what it adds there is at most m·(D − t)⁺ times p, or times 1 where outcomes are drawn;
-S <= 1 is dropped. Let j be the UAV that makes this visit, at the end of its k-th attempt, of which
-the fate lets the last succeed: k is 1 where outcomes are not drawn, follows from the fate where
-the mission reattempts, and else must be 1, as nobody attempts twice. So
+most. Let j be the UAV that makes it, at time t, at the end of its k-th attempt. What the visit adds
+is at most S·m·(D − t)⁺ times p, or times 1 where outcomes are drawn. Then k is 1, or the number
+of the attempt that the fate lets succeed; that must be 1 as well unless the mission reattempts, as
+no UAV tries again what is not open again. So
 
 - t is not before the task appears and k services are over, nor after the task is withdrawn or j
   is lost;
-- where survival is drawn j survives its attempts before the k-th, and if it does not survive that
-  one, then this task is j's last.
+- S is 1 where survival is drawn, and j survives its attempts before the k-th; if it does not
+  survive that one either, this task is its last, which is S = 0 for all that follow;
+- elsewhere S is at most the product of j's survival probabilities over its counted visits so far,
+  each with the power of its number of attempts.
 
 **Flights.** Between two of its counted visits j moves from true stop to true stop and then serves.
 It may turn off on the way, towards other tasks, and however it turns its velocity stays within
@@ -18,14 +20,15 @@ these velocities form a convex set around 0 (two balls' common part), so by the 
 no detour is faster than the straight leg at that speed. Without variation from leg to leg that is
 the leg as it is really flown; with it the bound is that much too generous.
 
-**The bound.** So no value exceeds the largest sum of worths over disjoint lists, one per UAV, of
-tasks so timed, UAVs waiting where they like. `coordinator.planner.bound` tells how prices of tasks
-bound that from above; here each UAV's best list at given prices is searched for among real lists
-with exact times, which leaves little but the duality gap. The other bound is trivial: every task
-reached straight from its best UAV's start, no sooner than it appears.
+**The bound.** So no value exceeds the largest sum of worths over disjoint lists of tasks, one list
+per UAV, so timed and worth so much, where UAVs wait as they like. How prices of tasks bound that
+from above is told in `coordinator.planner.bound`; here each UAV's best list at given prices is
+searched for among real lists with exact times, which leaves little but the duality gap. Where it is
+lower the trivial bound counts: every task reached straight from its best UAV's start, as soon as
+that may be.
 
-Leaves out: a flight that reaches the bound, which need not exist; the advantage over the policies
-that lies in waiting for a task before it appears; S where survival is not drawn.
+Leaves out: a flight that reaches the bound, which need not exist. Who waits at a place before the
+task there appears knew of it, so part of what policies miss is beyond them.
 """
 
 from __future__ import annotations
@@ -131,10 +134,16 @@ class _Hindsight:
         """All that the fate says of every UAV and task."""
         mission = fate.mission
         problem = Problem.from_mission(mission)
-        attempts, ends = _attempts(fate)
-        can = (attempts > 0) & problem.capable
-        success = np.where(can, 1.0 if fate.uncertainty.outcomes else problem.success, 0.0)
-        service_s = np.maximum(attempts, 1) * problem.service_s
+        attempts, survives = _attempts(fate)
+        tries = np.maximum(attempts, 1)
+        success = np.ones_like(problem.success) if fate.uncertainty.outcomes else problem.success
+        success = np.where(problem.capable & (attempts > 0), success, 0.0)
+        if fate.uncertainty.survival:
+            survival = survives.astype(float)
+        else:
+            success = success * problem.survival ** (tries - 1)
+            survival = problem.survival**tries
+        service_s = tries * problem.service_s
         appears_s = np.array([task.appears_s for task in mission.tasks], float)
         lost_s = np.array([fate.lost_at_s.get(uav.id, math.inf) for uav in mission.uavs], float)
         gone_s = np.array([fate.withdrawn_at_s.get(t.id, math.inf) for t in mission.tasks], float)
@@ -145,7 +154,7 @@ class _Hindsight:
             problem.value,
             problem.service_s,
             success,
-            np.ones_like(success),
+            survival,
             problem.horizon_s,
         )
         earliest_s = appears_s + service_s
@@ -158,9 +167,7 @@ class _Hindsight:
             earliest_s=earliest_s,
             latest_s=latest_s,
             first_s=first_s,
-            timetable=Timetable(
-                first_s, between_s + service_s[:, None, :], earliest_s, latest_s, ends
-            ),
+            timetable=Timetable(first_s, between_s + service_s[:, None, :], earliest_s, latest_s),
         )
 
     def direct_worth(self) -> FloatArray:
@@ -172,15 +179,15 @@ class _Hindsight:
 
 
 def _attempts(fate: Fate) -> tuple[IntArray, BoolArray]:
-    """(n_uav, n_task) attempts until one succeeds, 0 for never; whether it costs the UAV."""
+    """(n_uav, n_task) attempts until one succeeds, 0 for never; whether the UAV survives them."""
     mission = fate.mission
     shape = (len(mission.uavs), len(mission.tasks))
-    attempts, ends = np.ones(shape, dtype=np.int64), np.zeros(shape, dtype=np.bool_)
+    attempts, survives = np.ones(shape, dtype=np.int64), np.ones(shape, dtype=np.bool_)
     if fate.uncertainty.outcomes or fate.uncertainty.survival:
         for row, uav in enumerate(mission.uavs):
             for column, task in enumerate(mission.tasks):
-                attempts[row, column], ends[row, column] = _attempts_of(fate, uav, task)
-    return attempts, ends
+                attempts[row, column], survives[row, column] = _attempts_of(fate, uav, task)
+    return attempts, survives
 
 
 def _attempts_of(fate: Fate, uav: Uav, task: Task) -> tuple[int, bool]:
@@ -188,10 +195,10 @@ def _attempts_of(fate: Fate, uav: Uav, task: Task) -> tuple[int, bool]:
     for attempt in range(1, most + 1):
         survives = fate.survives(uav, task, attempt)
         if fate.succeeds(uav, task, attempt):
-            return attempt, not survives
+            return attempt, survives
         if not survives:
-            return 0, True
-    return (most + 1, False) if fate.mission.reattempt_failed else (0, False)
+            return 0, False
+    return (most + 1, True) if fate.mission.reattempt_failed else (0, True)
 
 
 def _flights_s(fate: Fate) -> tuple[FloatArray, FloatArray]:

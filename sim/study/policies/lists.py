@@ -14,13 +14,14 @@ from sim.fate import Fate
 from sim.study.baselines.index_rule import Routes
 from sim.study.baselines.value_per_time import VALUE_PER_TIME
 from sim.study.flight import Flight
-from sim.study.policies.team import Account, News, Situation, fly_team
+from sim.study.policies.situation import Account, News, Situation
+from sim.study.policies.team import fly_team
 from sim.study.policy import Planner
 from swarm.allocation import Problem
 from swarm.clock import Clock
 from swarm.model import TaskId, UavId
 
-__all__ = ["Frozen", "ListFollower", "by_index", "moved_between"]
+__all__ = ["PLANNED_BY", "Frozen", "ListFollower", "by_index"]
 
 PLANNED_BY = "guided"
 """Method of the offline plan from which the policies of this package begin."""
@@ -38,6 +39,8 @@ class ListFollower:
         self._planned = lists
         self._account = account
         self._lists: Routes = []
+        self._planned_for: dict[int, int] = {}
+        """By task: on whose list it stood in the latest plan that had it on one."""
 
     @property
     def account(self) -> Account:
@@ -47,14 +50,22 @@ class ListFollower:
     def hear(self, situation: Situation, news: Collection[News]) -> Collection[int]:
         """Put the plan into force when the mission begins."""
         if News.BEGUN in news:
-            self._lists = by_index(situation.problem, self._planned)
-            self._account.epochs = 1
+            self.put_into_force(by_index(situation.problem, self._planned))
         return ()
 
     def choose(self, situation: Situation, uav: int) -> int | None:
         """The next task on the list, which is no decision, or one that is on none."""
         task = self._next(situation, uav)
         return self._unlisted(situation, uav) if task is None else task
+
+    def put_into_force(self, lists: Routes) -> None:
+        """From now on these lists are followed."""
+        owner = {task: uav for uav, route in enumerate(lists) for task in route}
+        before = self._planned_for
+        self._account.moved += sum(before.get(task, uav) != uav for task, uav in owner.items())
+        self._account.epochs += 1
+        self._planned_for.update(owner)
+        self._lists = lists
 
     def _next(self, situation: Situation, uav: int) -> int | None:
         route = self._lists[uav]
@@ -96,9 +107,3 @@ def by_index(problem: Problem, lists: Mapping[UavId, Sequence[TaskId]]) -> Route
     return [
         [columns[task] for task in lists.get(uav, ()) if task in columns] for uav in problem.uav_ids
     ]
-
-
-def moved_between(old: Sequence[Sequence[int]], new: Sequence[Sequence[int]]) -> int:
-    """Tasks that are on one UAV's list before and on another's after."""
-    owner = {task: uav for uav, route in enumerate(old) for task in route}
-    return sum(owner.get(task, uav) != uav for uav, route in enumerate(new) for task in route)

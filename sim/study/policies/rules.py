@@ -12,7 +12,8 @@ from sim.fate import Fate
 from sim.study.baselines.nearest import NEAREST
 from sim.study.baselines.value_per_time import VALUE_PER_TIME
 from sim.study.flight import Flight
-from sim.study.policies.team import Account, News, Situation, fly_team
+from sim.study.policies.situation import Account, News, Situation
+from sim.study.policies.team import fly_team
 from sim.study.policy import Planner
 from swarm.allocation import Rule
 from swarm.clock import Clock

@@ -14,152 +14,19 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from enum import Enum, auto
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
 from sim.fate import Fate
 from sim.kinematics import Point
 from sim.study.flight import Flight, Visit
+from sim.study.policies.situation import Chooser, Leg, News, Situation, as_point, between
 from swarm.allocation import Problem, TeamState, rank_of
-from swarm.allocation.problem import FloatArray, IntArray
-from swarm.clock import Clock
 from swarm.model import UavId
 
-__all__ = ["Account", "Chooser", "Leg", "News", "Situation", "fly_team"]
-
-
-class News(Enum):
-    """What may have happened since choices were last made."""
-
-    BEGUN = auto()
-    """The mission."""
-    ENDED = auto()
-    """An attempt, for good."""
-    REOPENED = auto()
-    """A task, as an attempt at it failed."""
-    APPEARED = auto()
-    """A task."""
-    WITHDRAWN = auto()
-    """A task that was open or being done."""
-    LOST = auto()
-    """A UAV; the task it was doing is open again."""
-    TIME = auto()
-    """The interval has passed after which a chooser wants to be asked."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Leg:
-    """One UAV's way to a task, and its service there."""
-
-    task: int
-    start_enu_m: Point
-    """Where the UAV believes it began [m]."""
-    left_s: float
-    """Mission time [s], as all below."""
-    due_s: float
-    """When it should have ended the task by its cruise speed."""
-    true_start_enu_m: Point
-    true_stop_enu_m: Point
-    arrives_s: float
-    """When it is really there."""
-    ends_s: float
-    """When it has really ended the task."""
-
-    def flown_frac(self, now_s: float) -> float:
-        """Share of the way that is behind it; 1 while it serves."""
-        if now_s >= self.arrives_s:
-            return 1.0
-        return max(0.0, now_s - self.left_s) / (self.arrives_s - self.left_s)
-
-
-@dataclass(slots=True, eq=False)
-class Situation:
-    """Where the mission stands; choosers read it and change nothing."""
-
-    problem: Problem
-    """All UAVs, and the tasks that have appeared so far: new ones come last."""
-    state: TeamState
-    """A UAV under way is free when it should have ended its task, at the task's place, or now if
-    it is late; any other one is free now. Open is what nobody has ended or is doing; active is who
-    lives. Where survival is drawn, S of eq. 1 is that of the task under way alone: what came
-    before has been survived."""
-    rank: IntArray
-    """(n_uav,) place in the priority sequence; 0 decides first."""
-    now_s: float = 0.0
-    """Mission time [s]."""
-    legs: dict[int, Leg] = field(default_factory=dict)
-    """By UAV index: what it is doing."""
-    survived_before: FloatArray = field(default_factory=lambda: np.ones(0))
-    """(n_uav,) S of eq. 1 without the tasks under way."""
-
-    def in_flight(self) -> list[int]:
-        """UAVs that have not arrived at their tasks."""
-        return [uav for uav, leg in self.legs.items() if leg.arrives_s > self.now_s]
-
-    def place_enu_m(self, uav: int) -> Point:
-        """Where ``uav`` believes to be now [m]."""
-        leg = self.legs.get(uav)
-        if leg is None:
-            return _point(self.state.place_enu_m[uav])
-        there = _point(self.problem.task_enu_m[leg.task])
-        return _between(leg.start_enu_m, there, leg.flown_frac(self.now_s))
-
-    def if_stopped(self) -> TeamState:
-        """The state if all that are in flight gave up their tasks now."""
-        state = self.state.copy()
-        for uav in self.in_flight():
-            state.free_s[uav] = self.now_s
-            state.place_enu_m[uav] = self.place_enu_m(uav)
-            state.survived[uav] = self.survived_before[uav]
-            state.open[self.legs[uav].task] = True
-        return state
-
-
-@dataclass(slots=True)
-class Account:
-    """What a chooser tells of its work."""
-
-    clock: Clock
-    epochs: int = 0
-    """Plans that came into force."""
-    moved: int = 0
-    """Tasks that stood on one UAV's list in a plan and on another's in the next."""
-    decision_s: list[float] = field(default_factory=list)
-    """Wall time of each decision or plan [s]."""
-
-    @contextmanager
-    def timed(self) -> Iterator[None]:
-        """Note how long a decision or plan takes."""
-        begin_s = self.clock.now_s()
-        yield
-        self.decision_s.append(self.clock.now_s() - begin_s)
-
-
-class Chooser(Protocol):
-    """Who decides for all."""
-
-    @property
-    def account(self) -> Account:
-        """Of its work so far."""
-        ...
-
-    def hear(self, situation: Situation, news: Collection[News]) -> Collection[int]:
-        """Something has happened, all of it at the same moment.
-
-        Returns:
-            UAVs in flight that are to give up their tasks; they are asked what to do instead.
-        """
-        ...
-
-    def choose(self, situation: Situation, uav: int) -> int | None:
-        """The open task that ``uav``, which is free, shall do now; None: it waits for news."""
-        ...
+__all__ = ["fly_team"]
 
 
 def fly_team(
@@ -279,9 +146,8 @@ class _Flying:
         for task, gone_at_s in self._fate.withdrawn_at_s.items():
             if task in self._columns:
                 self._at(gone_at_s, partial(self._withdraw, self._columns[task]))
-        for number, late in enumerate(self._tasks, start=1):
-            if late.appears_s > 0.0:
-                self._at(late.appears_s, partial(self._appear, number))
+        for late_s in sorted({task.appears_s for task in self._tasks} - {0.0}):
+            self._at(late_s, self._appear)
 
     def _at(self, time_s: float, happen: Callable[[], Collection[News]]) -> None:
         heapq.heappush(self._heap, (time_s, next(self._numbers), happen))
@@ -293,13 +159,9 @@ class _Flying:
         state = situation.state
         return not situation.problem.capable[state.active][:, state.open].any()
 
-    def _appear(self, n_known: int) -> Collection[News]:
+    def _appear(self) -> Collection[News]:
         situation = self._situation
-        if n_known <= situation.problem.n_task:
-            return ()  # with others at the same moment
-        when_s = self._tasks[n_known - 1].appears_s
-        while n_known < len(self._tasks) and self._tasks[n_known].appears_s == when_s:
-            n_known += 1
+        n_known = sum(task.appears_s <= situation.now_s for task in self._tasks)
         new = np.ones(n_known - situation.problem.n_task, dtype=np.bool_)
         situation.problem = self._problem_of(n_known)
         situation.state.open = np.concatenate((situation.state.open, new))
@@ -354,9 +216,8 @@ class _Flying:
         """Let the chooser hear of it; who is to be asked now, in their order."""
         situation = self._situation
         np.maximum(self._due_s, situation.now_s, out=situation.state.free_s)
-        in_flight = situation.in_flight
         for uav in sorted(self._chooser.hear(situation, news)):
-            if uav not in in_flight():
+            if uav not in situation.in_flight():
                 raise ValueError(f"UAV {self._uavs[uav].id} is not in flight and cannot give up")
             task = situation.legs[uav].task
             self._stop(uav)
@@ -369,7 +230,7 @@ class _Flying:
         situation = self._situation
         place_enu_m = situation.place_enu_m(uav)
         leg = situation.legs.pop(uav)
-        self._true_enu_m[uav] = _between(
+        self._true_enu_m[uav] = between(
             leg.true_start_enu_m, leg.true_stop_enu_m, leg.flown_frac(situation.now_s)
         )
         situation.state.place_enu_m[uav] = place_enu_m
@@ -382,7 +243,7 @@ class _Flying:
         problem, state, now_s = situation.problem, situation.state, situation.now_s
         if not state.open[task] or not problem.capable[uav, task]:
             raise ValueError(f"UAV {who.id} cannot take task {what.id}")
-        start, true_start = _point(state.place_enu_m[uav]), self._true_enu_m[uav]
+        start, true_start = as_point(state.place_enu_m[uav]), self._true_enu_m[uav]
         stop = self._fate.stop_enu_m(who.id, what)
         speed_m_s = self._fate.speed_m_s(who, what.id, true_start, stop)
         arrives_s = now_s + _distance_m(true_start, stop) / speed_m_s
@@ -395,14 +256,13 @@ class _Flying:
             true_start_enu_m=true_start,
             true_stop_enu_m=stop,
             arrives_s=arrives_s,
-            ends_s=arrives_s + what.service_s,
         )
         situation.legs[uav] = leg
         self._due_s[uav] = state.free_s[uav] = leg.due_s
         state.place_enu_m[uav] = problem.task_enu_m[task]
         state.survived[uav] *= problem.survival[uav, task]
         state.open[task] = False
-        self._at(leg.ends_s, partial(self._end, uav, leg))
+        self._at(arrives_s + what.service_s, partial(self._end, uav, leg))
 
     def _problem_of(self, n_known: int) -> Problem:
         """The mission as far as its first tasks."""
@@ -419,19 +279,6 @@ class _Flying:
             survival=known.survival[:, :n_known],
             horizon_s=known.horizon_s,
         )
-
-
-def _point(place_enu_m: FloatArray) -> Point:
-    east_m, north_m, up_m = place_enu_m.tolist()
-    return east_m, north_m, up_m
-
-
-def _between(start: Point, stop: Point, frac: float) -> Point:
-    """The place that share of the way from start to stop; exactly the stop at 1."""
-    if frac >= 1.0:
-        return stop
-    east_m, north_m, up_m = (a + (b - a) * frac for a, b in zip(start, stop, strict=True))
-    return east_m, north_m, up_m
 
 
 def _distance_m(start: Point, stop: Point) -> float:

@@ -1,4 +1,4 @@
-"""Studies as they are flown: common random numbers, rows, and what goes on after an interruption."""
+"""Studies as they are flown: common random numbers, rows, and going on where they stopped."""
 
 from __future__ import annotations
 
@@ -293,7 +293,7 @@ def test_folder_in_use_is_refused(tmp_path: Path) -> None:
 def test_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
 
-    with pytest.raises(InputError, match="cannot be written: .*; name a folder that can be wr"):
+    with pytest.raises(InputError, match=r"cannot be written: .*; name a folder that can be"):
         FolderStore(tmp_path / "file", STUDY, FAKES)
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, permutations
 
 import numpy as np
@@ -57,7 +58,7 @@ def test_with_fine_buckets_one_visit_is_worth_nearly_what_it_is() -> None:
 
 
 def random_timetable(rng: np.random.Generator, n_uav: int, n_task: int) -> Timetable:
-    """Deadlines, release times, last tasks, and legs of any length, down to none at all."""
+    """Deadlines, release times, and legs of any length, down to none at all."""
     shape = (n_uav, n_task)
     leg_s = rng.uniform(0.0, 3.0, (n_uav, n_task, n_task))
     leg_s *= rng.integers(0, 2, leg_s.shape)
@@ -66,7 +67,6 @@ def random_timetable(rng: np.random.Generator, n_uav: int, n_task: int) -> Timet
         leg_s=leg_s,
         earliest_s=rng.uniform(0.0, 6.0, shape) * rng.integers(0, 2, shape),
         latest_s=np.where(rng.random(shape) < 0.5, np.inf, rng.uniform(0.0, 9.0, shape)),
-        ends=rng.random(shape) < 0.2,
     )
 
 
@@ -86,6 +86,8 @@ def test_timed_lists_are_bounded_and_searched_as_the_plain_definition_says(
 ) -> None:
     rng = np.random.default_rng(seed)
     problem = any_problem(seed, 2, n_task)
+    deadly = rng.random(problem.survival.shape) < 0.2
+    problem = replace(problem, survival=np.where(deadly, 0.0, problem.survival))
     timetable = random_timetable(rng, 2, n_task)
     team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
     price = rng.uniform(0.0, 10.0, n_task)
@@ -128,7 +130,6 @@ def test_search_among_real_lists_only_lowers_the_bound() -> None:
         ("leg_s", np.zeros((2, 3))),
         ("earliest_s", np.full((2, 3), np.inf)),
         ("latest_s", np.full((2, 3), np.nan)),
-        ("ends", np.zeros(3)),
     ],
 )
 def test_wrong_timetables_are_refused_by_name(name: str, wrong: npt.NDArray[np.float64]) -> None:
@@ -138,7 +139,6 @@ def test_wrong_timetables_are_refused_by_name(name: str, wrong: npt.NDArray[np.f
         "leg_s": np.zeros((2, 3, 3)),
         "earliest_s": times,
         "latest_s": times,
-        "ends": times,
     }
 
     with pytest.raises(ValueError, match=name):

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from sim.fate import Fate
 from sim.study.flight import Flight
 from sim.study.generator import mission_of
-from sim.study.policies.team import Account, News, Situation
+from sim.study.policies.situation import Account, News, Situation
 from sim.study.policy import Planner
 from sim.uncertainty import Uncertainty
 from swarm.allocation import Problem, evaluate

@@ -20,7 +20,8 @@ from sim.study.policies.auction import Cbba
 from sim.study.policies.central import Central, CentralDivert, Interval, Optimiser
 from sim.study.policies.lists import Frozen
 from sim.study.policies.rules import NEAREST_FIRST, VALUE_PER_TIME_ONLINE, RuleChooser
-from sim.study.policies.team import Account, News, Situation, fly_team
+from sim.study.policies.situation import Account, News, Situation
+from sim.study.policies.team import fly_team
 from sim.study.policy import Policy
 from sim.uncertainty import Uncertainty
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run

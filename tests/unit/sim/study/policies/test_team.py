@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from sim.fate import Fate
 from sim.study.generator import mission_of
-from sim.study.policies.team import News, Situation, fly_team
+from sim.study.policies.situation import News, Situation
+from sim.study.policies.team import fly_team
 from sim.uncertainty import Uncertainty
 from sim.wind import Wind
 from swarm.allocation import evaluate
