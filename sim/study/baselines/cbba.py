@@ -47,6 +47,7 @@ class CbbaResult:
 def cbba(
     problem: Problem,
     *,
+    state: TeamState | None = None,
     capacity: int | None = None,
     neighbours: BoolArray | None = None,
     should_stop: ShouldStop = never,
@@ -55,9 +56,12 @@ def cbba(
 
     Args:
         problem: the mission.
+        state: where the team stands: open tasks are auctioned among active UAVs; at its start when
+            None.
         capacity: most tasks in a bundle (L_t); >= 1. None means no limit: bundles are bounded at
             first, to save work, and the bound is raised for as long as it holds anyone back.
-        neighbours: (n_uav, n_uav) symmetric, connected: who hears whom; everybody when None.
+        neighbours: (n_uav, n_uav) symmetric, connecting all active UAVs: who hears whom;
+            everybody when None.
         should_stop: given the rounds so far, whether to stop.
 
     Raises:
@@ -65,30 +69,34 @@ def cbba(
     """
     if capacity is not None and capacity < 1:
         raise ValueError(f"capacity must be >= 1, not {capacity}")
-    auction = _Auction(problem, _network(problem.n_uav, neighbours))
-    bound = capacity or 2 * -(-problem.n_task // max(1, problem.n_uav)) + 2
+    state = TeamState.at_start(problem) if state is None else state
+    auction = _Auction(problem, state, _network(state.active, neighbours))
+    n_open, n_active = int(state.open.sum()), int(state.active.sum())
+    bound = capacity or 2 * -(-n_open // max(1, n_active)) + 2
     converged = auction.settle(bound, should_stop)
     while capacity is None and converged and auction.holds_back(bound):
         bound *= 2
         converged = auction.settle(bound, should_stop)
-    routes, completed = _complete(problem, auction.paths_won())
+    routes, completed = _complete(problem, state, auction.paths_won())
     return CbbaResult(routes, auction.rounds, converged, completed)
 
 
 class _Auction:
     """Beliefs, bundles and paths of all UAVs."""
 
-    def __init__(self, problem: Problem, neighbours: BoolArray) -> None:
+    def __init__(self, problem: Problem, state: TeamState, neighbours: BoolArray) -> None:
         self.rounds = 0
         self._problem = problem
-        self._insertion = Insertion(problem)
+        self._eligible: BoolArray = problem.capable & state.open & state.active[:, None]
+        self._insertion = Insertion(problem, state)
         self._beliefs = Beliefs.blank(problem.n_uav, problem.n_task)
         self._bundles: Routes = [[] for _ in range(problem.n_uav)]
         self._paths: Routes = [[] for _ in range(problem.n_uav)]
         self._receivers: list[IntArray] = [np.flatnonzero(row) for row in neighbours]
-        complete = int(neighbours.sum()) == problem.n_uav * (problem.n_uav - 1)
+        n_active = int(state.active.sum())
+        complete = int(neighbours.sum()) == n_active * (n_active - 1)
         # elsewhere news travel one neighbour a round
-        self._quiet_rounds = 1 if complete else problem.n_uav
+        self._quiet_rounds = 1 if complete else n_active
 
     def settle(self, capacity: int, should_stop: ShouldStop) -> bool:
         """Alternate the phases until nothing changes; whether it came to that."""
@@ -113,8 +121,8 @@ class _Auction:
     def holds_back(self, capacity: int) -> bool:
         """Whether the capacity keeps any UAV from bidding on."""
         return any(
-            len(bundle) >= capacity and len(bundle) < int(capable.sum())
-            for bundle, capable in zip(self._bundles, self._problem.capable, strict=True)
+            len(bundle) >= capacity and len(bundle) < int(eligible.sum())
+            for bundle, eligible in zip(self._bundles, self._eligible, strict=True)
         )
 
     def paths_won(self) -> Routes:
@@ -134,7 +142,7 @@ class _Auction:
         """Phase 1, Algorithm 3: add tasks for as long as some can be won; False if stopped."""
         bundle, path = self._bundles[uav], self._paths[uav]
         winner, bid = self._beliefs.winner[uav], self._beliefs.bid[uav]
-        eligible = self._problem.capable[uav].copy()
+        eligible = self._eligible[uav].copy()
         eligible[bundle] = False
         while len(bundle) < capacity and eligible.any():
             if should_stop(self.rounds):
@@ -171,34 +179,35 @@ class _Auction:
         self._paths[uav] = [task for task in self._paths[uav] if task not in dropped]
 
 
-def _network(n_uav: int, neighbours: BoolArray | None) -> BoolArray:
-    if neighbours is None:
-        network: BoolArray = ~np.eye(n_uav, dtype=np.bool_)
-        return network
-    network = np.array(neighbours, dtype=np.bool_)
-    if network.shape != (n_uav, n_uav) or (network != network.T).any():
-        raise ValueError(f"neighbours must be symmetric, of shape {(n_uav, n_uav)}")
-    np.fill_diagonal(network, False)
+def _network(active: BoolArray, neighbours: BoolArray | None) -> BoolArray:
+    n_uav = len(active)
+    network: BoolArray = ~np.eye(n_uav, dtype=np.bool_)
+    if neighbours is not None:
+        given = np.array(neighbours, dtype=np.bool_)
+        if given.shape != (n_uav, n_uav) or (given != given.T).any():
+            raise ValueError(f"neighbours must be symmetric, of shape {(n_uav, n_uav)}")
+        network &= given
+    network &= active & active[:, None]
     reached = np.zeros(n_uav, dtype=np.bool_)
-    reached[:1] = True
+    reached[np.flatnonzero(active)[:1]] = True
     for _ in range(n_uav):
         reached |= network[reached].any(axis=0)
-    if not reached.all():
-        raise ValueError("neighbours must connect all UAVs")
+    if (reached != active).any():
+        raise ValueError("neighbours must connect all active UAVs")
     return network
 
 
-def _complete(problem: Problem, routes: Routes) -> tuple[Routes, int]:
+def _complete(problem: Problem, state: TeamState, routes: Routes) -> tuple[Routes, int]:
     """The lists with all tasks on them that some UAV is capable of, and how many were missing."""
-    state = TeamState.at_start(problem)
-    _, completion_s = evaluate(problem, routes)
+    _, completion_s = evaluate(problem, routes, state)
+    after = state.copy()
     for uav, route in enumerate(routes):
         for task in route:
-            state.survived[uav] *= problem.survival[uav, task]
+            after.survived[uav] *= problem.survival[uav, task]
         if route:
-            state.free_s[uav] = completion_s[route[-1]]
-            state.place_enu_m[uav] = problem.task_enu_m[route[-1]]
-        state.open[route] = False
-    rest, _ = run(problem, state, rank_of(range(problem.n_uav)), VALUE_PER_TIME)
+            after.free_s[uav] = completion_s[route[-1]]
+            after.place_enu_m[uav] = problem.task_enu_m[route[-1]]
+        after.open[route] = False
+    rest, _ = run(problem, after, rank_of(range(problem.n_uav)), VALUE_PER_TIME)
     longer = [route + more for route, more in zip(routes, rest, strict=True)]
     return longer, sum(map(len, rest))

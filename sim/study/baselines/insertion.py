@@ -10,22 +10,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import FloatArray, IntArray, Problem
 
 __all__ = ["Insertion"]
 
 
 class Insertion:
-    """Gains of insertion into paths that begin at the UAVs' starts at mission time 0.
+    """Gains of insertion into paths that begin where the team stands.
+
+    Args:
+        problem: the mission.
+        state: when and where each UAV is free, and what it has survived; at its start when None.
 
     Keeps (n_task,) distances for every task that has been on a path: at most n_task² floats.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, state: TeamState | None = None) -> None:
         self._problem = problem
+        self._state = TeamState.at_start(problem) if state is None else state
         self._from_task_m: dict[int, FloatArray] = {}
         self._columns_m = np.ascontiguousarray(problem.task_enu_m.T)
-        self._from_start_m = [self._distances_m(place) for place in problem.start_enu_m]
+        self._from_start_m = [self._distances_m(place) for place in self._state.place_enu_m]
 
     def gains(self, uav: int, path: Sequence[int]) -> tuple[FloatArray, IntArray]:
         """The best insertion of each task into ``path``.
@@ -40,8 +46,12 @@ class Insertion:
         go_s = np.array(rows_m) / problem.speed_m_s[uav]
         nodes = np.array(path, dtype=np.int64)
         legs_s = go_s[np.arange(len(path)), nodes]
-        free_s = np.concatenate(([0.0], np.cumsum(legs_s + problem.service_s[nodes])))
-        survived = np.concatenate(([1.0], np.cumprod(problem.survival[uav, nodes])))
+        free_s = np.concatenate(
+            ([self._state.free_s[uav]], legs_s + problem.service_s[nodes])
+        ).cumsum()
+        survived = np.concatenate(
+            ([self._state.survived[uav]], problem.survival[uav, nodes])
+        ).cumprod()
         weight = survived[:-1] * problem.weight[uav, nodes]
         later_weight = _from_the_end(weight)
         later_worth = _from_the_end(weight * (problem.horizon_s - free_s[1:]))

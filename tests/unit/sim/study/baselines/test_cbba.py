@@ -11,7 +11,7 @@ from coordinator.planner.exact import optimum
 from coordinator.planner.stop import after_evaluations
 from sim.study.baselines.cbba import cbba
 from sim.study.baselines.insertion import Insertion
-from swarm.allocation import Problem, evaluate
+from swarm.allocation import Problem, TeamState, evaluate
 from swarm.model import TaskId, UavId
 from tests.problems import random_problem, table_1
 
@@ -119,6 +119,49 @@ def test_a_sparse_network_agrees_too_if_later(seed: int) -> None:
     assert sparse.completed == 0
     assert sorted(task for route in sparse.routes for task in route) == list(range(9))
     assert sparse.rounds >= full.rounds
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=SEEDS)
+def test_what_is_open_is_auctioned_among_the_living_from_where_they_stand(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    problem = random_problem(rng, 4, 9, incapable_frac=0.2)
+    state = TeamState.at_start(problem)
+    state.open[rng.choice(9, size=int(rng.integers(0, 9)), replace=False)] = False
+    state.active[rng.choice(4, size=int(rng.integers(0, 4)), replace=False)] = False
+    state.place_enu_m += rng.uniform(-3.0, 3.0, (4, 3))
+    uavs, tasks = np.flatnonzero(state.active), np.flatnonzero(state.open)
+    alone = Problem(
+        uav_ids=tuple(problem.uav_ids[u] for u in uavs),
+        task_ids=tuple(problem.task_ids[t] for t in tasks),
+        start_enu_m=state.place_enu_m[uavs],
+        task_enu_m=problem.task_enu_m[tasks],
+        speed_m_s=problem.speed_m_s[uavs],
+        value=problem.value[tasks],
+        service_s=problem.service_s[tasks],
+        success=problem.success[np.ix_(uavs, tasks)],
+        survival=problem.survival[np.ix_(uavs, tasks)],
+        horizon_s=problem.horizon_s,
+    )
+    expected: list[list[int]] = [[] for _ in range(4)]
+    for row, route in zip(uavs.tolist(), cbba(alone).routes, strict=True):
+        expected[row] = tasks[route].tolist()
+    assert cbba(problem, state=state).routes == expected
+
+
+def test_who_is_free_later_bids_less() -> None:
+    problem = random_problem(np.random.default_rng(2), 2, 1)
+    state = TeamState.at_start(problem)
+    winner = next(u for u, route in enumerate(cbba(problem).routes) if route)
+    state.free_s[winner] += 1e3
+    assert cbba(problem, state=state).routes[1 - winner] == [0]
+
+
+def test_nobody_alive_wins_nothing() -> None:
+    problem = table_1()
+    state = TeamState.at_start(problem)
+    state.active[:] = False
+    assert cbba(problem, state=state).routes == [[], [], []]
 
 
 def test_capacity_bounds_bundles_and_the_rest_is_handed_out() -> None:
