@@ -79,8 +79,10 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decisi
             state.place_enu_m[index] = turn.place_enu_m
         elif claim is not None and claim.task in columns:
             finish_claim(problem, state, index, columns[claim.task], claim)
-            # Who is a little late is about to decide, or its word is on its way.
-            state.active[index] = turn.now_s < claim.completion_s + turn.patience_s
+            # Who is a little late is about to decide, or its word is on its way; who is later may
+            # come any moment, and nobody waits for it.
+            if turn.now_s >= claim.completion_s + turn.patience_s:
+                state.free_s[index] = math.nextafter(turn.now_s, math.inf)
         elif uav in turn.awaited or uav in weaker:
             # Who has claimed after this UAV became free decides again, but after it.
             after_s = math.nextafter(turn.now_s, math.inf)
