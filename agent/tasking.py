@@ -303,10 +303,14 @@ class Tasking:
         self._idled = True
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         self._awaits_peers = patience_ends_s is not None
-        # Look again by and by while anything is open, lest a lost message strand it.
-        again_s = now_s + self._timing.announce_s if self._picture.unfinished else None
+        again_s = self._look_again_s(now_s) if self._picture.unfinished else None
         self._retry_at_s = patience_ends_s if patience_ends_s is not None else again_s
         return actions
+
+    def _look_again_s(self, now_s: float) -> float:
+        """By and by, lest a lost message strand a task; at once when one is left alone no longer."""
+        paused_s = (until_s for _, until_s in self._refusals.values() if until_s > now_s)
+        return min([now_s + self._timing.announce_s, *paused_s])
 
     def _give_up_claim(self) -> list[Action]:
         """Say that the UAV is free, unless it has."""
