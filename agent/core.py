@@ -313,13 +313,20 @@ class AgentCore:
         if self._is_beginning:
             self._begin(now_s)
         if self._tasking.phase is not None and self._picture.running:
-            self._actions += self._tasking.advance(now_s, informed=self._learning.current)
+            self._go_on(now_s)
         if not self._finished:
             lacking = self._stage is StatusPhase.LEARNING
             self._actions += self._learning.questions(now_s, lacking=lacking)
             self._actions += self._speech.repeat(
                 lambda: self._status(now_s), now_s, learned=self._hearing.at_work
             )
+
+    def _go_on(self, now_s: float) -> None:
+        """Do what the tasks ask for; whoever is alone then is woken by nobody but itself."""
+        before = self.phase, self._tasking.undecided
+        self._actions += self._tasking.advance(now_s, informed=self._learning.current)
+        if before != (self.phase, self._tasking.undecided):
+            self._go_home_if_over(now_s)
 
     @property
     def _knows_enough(self) -> bool:

@@ -308,7 +308,7 @@ class Tasking:
         return actions
 
     def _look_again_s(self, now_s: float) -> float:
-        """By and by, lest a lost message strand a task; at once when one is left alone no longer."""
+        """By and by, lest a lost message strand a task; or when a refused one may be taken."""
         paused_s = (until_s for _, until_s in self._refusals.values() if until_s > now_s)
         return min([now_s + self._timing.announce_s, *paused_s])
 
