@@ -26,6 +26,7 @@ from agent.speech import Speech
 from agent.tasking import Tasking
 from agent.vehicle import (
     Arrived,
+    AttemptFailed,
     GoTo,
     HandedOver,
     Held,
@@ -237,6 +238,8 @@ class AgentCore:
                 self._actions.append(Note("vehicle not ready", {"reason": reason}))
             case Arrived(leg):
                 self._tasking.arrive(leg, now_s)
+            case AttemptFailed(leg):
+                self._tasking.fail(leg)
             case Telemetry() as telemetry:
                 self._picture.move(telemetry)
             case Refused(order, reason):

@@ -21,7 +21,7 @@ from swarm.events import Note
 from swarm.state.board import TaskState
 from swarm.state.registers import Replica
 from swarm.state.team import ranks, rule_of
-from swarm.wire.messages import Board, Claim, ClaimPhase, Epoch, Outcome, Point, Result, StatusPhase
+from swarm.wire.messages import Board, Claim, ClaimPhase, Epoch, Outcome, Result, StatusPhase
 
 __all__ = ["Tasking"]
 
@@ -69,6 +69,8 @@ class Tasking:
         self._awaits_peers = False
         self._held_at_s: float | None = None
         self._served_at_s: float | None = None
+        self._fails = False
+        """Whether the attempt at the claimed task is known to fail."""
         self._retry_at_s: float | None = None
         self._ready_by_s: float | None = None
 
@@ -105,7 +107,7 @@ class Tasking:
         self.airborne, self._ready_by_s = True, None
         task = self._task()
         if task is not None:
-            return [self._order_to(self._picture.in_layer(task.position_enu_m), task.service_s)]
+            return [self._order_to(task)]
         self._become_free(self._picture.mission_s(now_s))
         return [self._say_idle()]
 
@@ -148,6 +150,10 @@ class Tasking:
         self._picture.place_enu_m = task.position_enu_m
         self._served_at_s = now_s + task.service_s
 
+    def fail(self, leg: int) -> None:
+        """The attempt at the task of that leg fails; its service takes its time all the same."""
+        self._fails |= leg == self._leg and self._task() is not None
+
     def refuse(self, leg: int, reason: str, now_s: float) -> list[Action]:
         """The vehicle will not fly that leg: leave its task alone for a while."""
         task = self._task()
@@ -187,14 +193,13 @@ class Tasking:
             return []
         self._served_at_s = None
         mission_s = self._picture.mission_s(now_s)
-        earlier = self._replica.outcomes.get((self._uav, task.task))
-        attempt = 1 if earlier is None else earlier.attempt + 1
-        outcome = Outcome(task.task, Result.DONE, attempt, mission_s)
+        result = Result.FAILED if self._fails else Result.DONE
+        outcome = Outcome(task.task, result, self._attempt_at(task.task), mission_s)
         # The next claim, made in this same step, replaces the old one on the bus.
         self._become_free(mission_s)
         return [
             self._speech.say(outcome),
-            Note("task done", {"task": task.task, "mission_s": mission_s}),
+            Note(f"task {result}", {"task": task.task, "mission_s": mission_s}),
         ]
 
     def _keep_or_lose_claim(self, now_s: float) -> list[Action]:
@@ -231,6 +236,7 @@ class Tasking:
 
     def _become_free(self, free_since_s: float) -> None:
         self.phase, self._to_decide, self._idled = StatusPhase.IDLE, True, False
+        self._fails = False
         self._free_since_s = free_since_s
         self._held_at_s = self._served_at_s = self._retry_at_s = self._ready_by_s = None
 
@@ -287,9 +293,7 @@ class Tasking:
             "completion_s": decision.completion_s,
         }
         return [
-            self._order_to(
-                self._picture.in_layer(task.position_enu_m), task.service_s, idled=self._idled
-            ),
+            self._order_to(task, idled=self._idled),
             self._speech.say(claim),
             Note("decided", why),
         ]
@@ -298,7 +302,8 @@ class Tasking:
         actions, telemetry = self._give_up_claim(), self._picture.telemetry
         if self._adrift and telemetry is not None:
             # Nothing to fly to any more: stop here rather than at a lost target.
-            actions.append(self._order_to(telemetry.position_enu_m, 0.0))
+            self._leg += 1
+            actions.append(Order(GoTo(self._leg, telemetry.position_enu_m)))
         self._adrift = self._to_decide = False
         self._idled = True
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
@@ -329,9 +334,18 @@ class Tasking:
         claim = self.claim
         return None if claim is None or claim.task is None else self._replica.board.get(claim.task)
 
-    def _order_to(self, place_enu_m: Point, stay_s: float, *, idled: bool = False) -> Action:
+    def _attempt_at(self, task: str) -> int:
+        """How many times this UAV will have tried that task after its next attempt."""
+        earlier = self._replica.outcomes.get((self._uav, task))
+        return 1 if earlier is None else earlier.attempt + 1
+
+    def _order_to(self, task: Board, *, idled: bool = False) -> Action:
         self._leg += 1
-        return Order(GoTo(self._leg, place_enu_m, stay_s, idled))
+        place_enu_m, attempt = (
+            self._picture.in_layer(task.position_enu_m),
+            self._attempt_at(task.task),
+        )
+        return Order(GoTo(self._leg, place_enu_m, task.service_s, idled, task.task, attempt))
 
     def _say_idle(self) -> Action:
         since_s = self._free_since_s

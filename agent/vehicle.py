@@ -7,10 +7,11 @@ done.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 __all__ = [
     "Arrived",
+    "AttemptFailed",
     "GoTo",
     "HandedOver",
     "Held",
@@ -59,6 +60,10 @@ class GoTo:
     waits at least that long."""
     idled: bool = False
     """Whether the UAV had found nothing to fly to before; no vehicle minds."""
+    task: str | None = field(default=None, compare=False)
+    """Id of the task there, for a payload; None for any other place."""
+    attempt: int = field(default=1, compare=False)
+    """How many times this UAV will then have tried that task."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +110,17 @@ class NotReady:
 @dataclass(frozen=True, slots=True)
 class Arrived:
     """The vehicle is at the target of that leg and has stopped there."""
+
+    leg: int
+
+
+@dataclass(frozen=True, slots=True)
+class AttemptFailed:
+    """The attempt at the task of that leg fails, said before the UAV's stay there is over.
+
+    It stays to the end of it all the same. Simulated vehicles say so; the MAVLink bridge does
+    not, since it knows no payload that could tell.
+    """
 
     leg: int
 
@@ -165,6 +181,7 @@ Report = (
     VehicleReady
     | NotReady
     | Arrived
+    | AttemptFailed
     | Telemetry
     | Refused
     | HandedOver

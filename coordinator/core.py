@@ -20,7 +20,7 @@ from dataclasses import replace
 from coordinator.beginning import Beginning, Verdict
 from coordinator.briefing import FlightLayers, brief_of, differences
 from coordinator.ending import Ending
-from coordinator.events import Action, Event, PlanFailed, PlanMade, Replanned
+from coordinator.events import Action, Event, PlanFailed, PlanMade, Replanned, Withdraw
 from coordinator.heritage import Heritage, inherit, statements
 from coordinator.inquiry import Inquiry
 from coordinator.planner.live import Situation
@@ -221,6 +221,9 @@ class CoordinatorCore:
                 self._end(f"no plan: {reason}", now_s)
             case Replanned() as replanned:
                 self._judge(replanned, now_s)
+            case Withdraw(task) if (entry := self.replica.board.get(task)) is not None:
+                if not entry.withdrawn:
+                    self._say(replace(entry, withdrawn=True))
             case Stop(reason):
                 self._end(reason, now_s)
             case _:

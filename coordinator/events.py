@@ -17,6 +17,7 @@ __all__ = [
     "Replan",
     "Replanned",
     "TakeSeat",
+    "Withdraw",
 ]
 
 
@@ -69,9 +70,16 @@ class Replanned:
 
 
 @dataclass(frozen=True, slots=True)
+class Withdraw:
+    """Take a task off the board: nobody need visit it any more."""
+
+    task: str
+
+
+@dataclass(frozen=True, slots=True)
 class TakeSeat:
     """Show that the coordinator is there, and answer for it."""
 
 
-Event = BusFact | PlanMade | PlanFailed | Replanned
+Event = BusFact | PlanMade | PlanFailed | Replanned | Withdraw
 Action = Wish | MakePlan | Replan | TakeSeat

@@ -54,6 +54,8 @@ class Conditions:
     """A transport that could be there again is so within this time."""
     weather_delay_s: float = 1.0
     """In the worst weather, what may come on top of the delay."""
+    loss_frac: float = 0.0
+    """Share of messages that are lost in any weather; those that arrive do so in order."""
 
 
 @dataclass(slots=True)
@@ -272,6 +274,8 @@ class RoughNetwork:
         link = self._link(sender, receiver)
         draw, weather = link.draws, self.weather
         copies = 1
+        if self._conditions.loss_frac and next(draw) < self._conditions.loss_frac:
+            return
         if weather:
             copies = int(next(draw) >= weather) + int(next(draw) < weather / 2.0)
 
@@ -314,7 +318,9 @@ class RoughNetwork:
             self._queue.after(self._delay_s(there), reach)
 
     def _is_lost(self, link: _Link) -> bool:
-        return self.weather > 0.0 and next(link.draws) < self.weather
+        """Whether a question or an answer is."""
+        lost_frac = max(self.weather, self._conditions.loss_frac)
+        return lost_frac > 0.0 and next(link.draws) < lost_frac
 
     def _take(self, question: _Question, seat: Seat, answer: Snapshot) -> None:
         if not question.over and self.joined(question.asker, seat):

@@ -72,12 +72,8 @@ class VirtualVehicle:
         match order:
             case Prepare():
                 self._prepare(order, ready)
-            case GoTo(leg=leg, position_enu_m=target) if self._motion is not None:
-                speed_m_s = self._speed_m_s * self.speed_frac
-                self._motion.fly_to(target, speed_m_s, self._queue.now_s())
-                arrives_s = self._motion.arrives_s
-                if arrives_s is not None:
-                    self._later(arrives_s, Arrived(leg))
+            case GoTo() if self._motion is not None:
+                self._fly(self._motion, order)
             case Hold():
                 if self._motion is not None:
                     self._motion.stop(self._queue.now_s())
@@ -87,6 +83,12 @@ class VirtualVehicle:
                 self._later(self._queue.now_s(), Home())
             case _:
                 pass
+
+    def _fly(self, motion: IdealMotion, order: GoTo) -> None:
+        speed_m_s = self._speed_m_s * self.speed_frac
+        motion.fly_to(order.position_enu_m, speed_m_s, self._queue.now_s())
+        if motion.arrives_s is not None:
+            self._later(motion.arrives_s, Arrived(order.leg))
 
     def _prepare(self, order: Prepare, ready: Report) -> None:
         now_s, motion = self._queue.now_s(), self._motion

@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 from agent.core import AgentCore
 from agent.events import Action as AgentAction
@@ -22,7 +22,7 @@ from agent.events import Order
 from agent.vehicle import GoTo, Orders, Refused, Report, Telemetry, VehicleReady
 from coordinator.core import CoordinatorCore, FlightLayers
 from coordinator.events import Action as CoordinatorAction
-from coordinator.events import MakePlan, PlanMade, Replan, Replanned, TakeSeat
+from coordinator.events import MakePlan, PlanMade, Replan, Replanned, TakeSeat, Withdraw
 from coordinator.observer import Observer
 from coordinator.planner.live import NewPlan, replan
 from coordinator.standby import StandbyCore
@@ -32,9 +32,10 @@ from sim.operator.seat import OperatorSeat
 from sim.processes import LocalClock, Process
 from sim.virtual_vehicle import SimulatedVehicle, VehicleFactory, VirtualVehicle
 from swarm.config import Timing
-from swarm.events import Ask, Finish, Note, Publish, Save, Tick
+from swarm.events import Ask, Finish, Note, Publish, Save
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
+from swarm.shell import Core
 from swarm.wire.messages import CommandKind, Epoch, EpochPhase, Message, Snapshot
 
 __all__ = [
@@ -159,6 +160,8 @@ class Setting:
     """Agents without their link for that long go home [s]; None: they fly on."""
     vehicle: VehicleFactory = ideal_vehicle
     """Makes the vehicle of a UAV."""
+    agent: Callable[..., AgentCore] = AgentCore
+    """Makes the core of an agent, from the arguments of `AgentCore`."""
 
 
 class World:
@@ -198,7 +201,7 @@ class World:
         """Virtual time at which the mission began."""
         self.steps = 0
         """Of all processes so far."""
-        self.refuses: set[tuple[str, str]] = set()
+        self.refuses: set[tuple[str, str | None]] = set()
         """UAV and task, where the vehicle will not go."""
         self._make_plan = make_plan
         self._method = method
@@ -274,14 +277,10 @@ class World:
 
     def withdraw(self, task: str) -> None:
         """Take a task off the board, as an operator would ask every coordinator there is."""
-        for process in list(self.processes.values()):
-            core = process.core.coordinator if process.name == STANDBY else process.core  # type: ignore[attr-defined]  # a StandbyCore
-            if isinstance(core, CoordinatorCore) and not (process.over or process.held):
-                entry = core.replica.board.get(task)
-                if entry is not None:
-                    # Operators have no way yet to say so.
-                    core._say(replace(entry, withdrawn=True))  # noqa: SLF001
-                    process.step(Tick())
+        for name in (COORDINATOR, STANDBY):
+            process = self.processes.get(name)
+            if process is not None and not process.held:
+                process.step(Withdraw(task))
 
     def command(self, kind: CommandKind, uav: str = FLEET, reason: str = "") -> OperatorSeat:
         """Let an operator take a seat and give a command; gives that seat.
@@ -299,11 +298,14 @@ class World:
             patience_s=OPERATOR_PATIENCE_S,
         )
         self.operators.append(seat)
-        name = f"{OPERATOR}-{len(self.operators)}"
-        process = Process(name, None, seat, self.queue, self, clock=LocalClock())
+        self.admit(f"{OPERATOR}-{len(self.operators)}", seat)
+        return seat
+
+    def admit(self, name: str, core: Core[Any, Any]) -> None:
+        """Let somebody take a seat on the bus who flies nothing and shows no token."""
+        process = Process(name, None, core, self.queue, self, clock=LocalClock())
         self.network.join(process)
         process.start()
-        return seat
 
     def skew(self, name: str, by_s: float) -> None:
         """Let the clock of a process jump forward."""
@@ -312,7 +314,9 @@ class World:
     # -- what processes want ----------------------------------------------------------
 
     def execute(self, process: Process, action: AgentAction | CoordinatorAction) -> None:
-        """Carry out an action of a core."""
+        """Carry out an action of a core; one whose life has just ended wants nothing more."""
+        if process.over:
+            return
         match action:
             case Publish(message):
                 self._publish(process, message)
@@ -368,14 +372,13 @@ class World:
         if running and self.zero_s is None:
             self.zero_s = self.queue.now_s()
             self._schedule_faults(self.zero_s)
+        self.network.publish(process, message)
         if self._watch is not None:
             self._watch.said(process, message)
-        self.network.publish(process, message)
 
     def _order(self, process: Process, order: Orders) -> None:
         vehicle = self._vehicles[process.name]
-        task = self._refused_task(process.name, order)
-        if isinstance(order, GoTo) and task is not None:
+        if isinstance(order, GoTo) and (process.name, order.task) in self.refuses:
             if self._watch is not None:
                 self._watch.refused(process, order)
             refused = Refused(order, "will not go there")
@@ -383,14 +386,6 @@ class World:
             return
         self._commanders[process.name] = process
         vehicle.order(order, VehicleReady())
-
-    def _refused_task(self, uav: str, order: Orders) -> str | None:
-        """The task that ``order`` flies to and the vehicle will not."""
-        if not self.refuses or not isinstance(order, GoTo):
-            return None
-        target = order.position_enu_m[:2]
-        tasks = (task.id for task in self.mission.tasks if task.position_enu_m[:2] == target)
-        return next((task for task in tasks if (uav, task) in self.refuses), None)
 
     def _vehicle(self, uav: str) -> SimulatedVehicle:
         def report(news: Report) -> None:
@@ -429,7 +424,7 @@ class World:
 
             core = StandbyCore(self.mission, make_coordinator, self._timing, known, age_s)
             return new(None, core, snapshot=core.snapshot)
-        agent = AgentCore(
+        agent = self._setting.agent(
             self.mission.name,
             name,
             incarnation,

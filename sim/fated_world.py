@@ -1,0 +1,266 @@
+"""A world in which a fate comes true: who is lost, what appears, how far messages get.
+
+The agents and the coordinator are the real ones and know nothing of the fate; they meet it when
+it happens. When the coordinator is lost, an operator keeps the task board from then on, so tasks
+still appear and are withdrawn in time; the fleet stays out for as long as tasks may yet appear.
+A task that is withdrawn before it appears never does. Leaves out: drawing fates
+(sim.uncertainty) and counting what came of them (sim.study.tally).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from agent.core import AgentCore
+from agent.vehicle import GoTo, Report
+from sim.event_queue import EventQueue
+from sim.fate import Fate, Partition
+from sim.fated_vehicle import FatedVehicle
+from sim.network import IdealNetwork, Network
+from sim.operator.task_seat import TaskSeat
+from sim.processes import Process
+from sim.rough_network import Conditions, RoughNetwork, Topology
+from sim.uncertainty import Uncertainty
+from sim.virtual_vehicle import SimulatedVehicle, VirtualVehicle
+from sim.world import OPERATOR_PATIENCE_S, QUIET, Faults, Planner, Setting, Watch, World
+from swarm.config import PRESETS, Link, LinkPreset, Timing
+from swarm.events import Note
+from swarm.model import Mission, Task, Uav, UavId
+from swarm.model.ids import OPERATOR
+from swarm.wire.messages import Epoch, EpochPhase, Message, Outcome
+
+__all__ = ["FatedWorld"]
+
+_OPERATOR_SITS_DOWN_S = 1.0
+"""After the loss of a coordinator; until then everyone has noticed it."""
+_START_S = 60.0
+"""Until a mission starts whose UAVs do not all get airborne."""
+_STATUS_S = 60.0
+"""Nobody looks on while a mission is flown in virtual time."""
+
+
+class FatedWorld:
+    """One mission in virtual time, and all that befalls it.
+
+    Args:
+        fate: what happens.
+        make_plan: plans a mission by method and seed.
+        method: planning method.
+        seed: of the planner.
+        coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
+        watch: is told all that happens.
+        make_agent: makes the core of an agent.
+    """
+
+    def __init__(
+        self,
+        fate: Fate,
+        make_plan: Planner,
+        *,
+        method: str,
+        seed: int,
+        coordinator_lost_s: float | None = None,
+        watch: Watch | None = None,
+        make_agent: Callable[..., AgentCore] = AgentCore,
+    ) -> None:
+        self.fate = fate
+        self.lost: list[UavId] = []
+        """UAVs lost on their mission, in that order."""
+        self._coordinator_lost_s = coordinator_lost_s
+        self._uavs: dict[str, Uav] = {str(uav.id): uav for uav in fate.mission.uavs}
+        self._tasks: dict[str, Task] = {str(task.id): task for task in fate.mission.tasks}
+        self._mission = _without_never_seen(fate)
+        self._timing = self._timing_of(fate.uncertainty)
+        self._next: Watch | None = watch
+        self._outcomes: set[tuple[str, str, int]] = set()
+        self._begun = False
+        self.world = World(
+            self._mission,
+            make_plan,
+            method=method,
+            seed=seed,
+            faults=Faults(coordinator_lost_at_s=coordinator_lost_s),
+            timing=self._timing,
+            setting=Setting(
+                network=partial(_network, fate),
+                vehicle=partial(_vehicle, fate),
+                agent=make_agent,
+            ),
+            watch=self,
+        )
+
+    def run(self) -> bool:
+        """Fly the mission; False if it had to be broken off, since somebody waits for ever."""
+        return self.world.run(_limit_s(self.fate, self._timing))
+
+    # -- what the world tells -----------------------------------------------------------
+
+    def said(self, process: Process, message: Message) -> None:
+        """A mission may have begun, or an attempt ended that its UAV does not survive."""
+        if self._next is not None:
+            self._next.said(process, message)
+        match message.body:
+            case Outcome() as outcome:
+                self._survive(process, outcome)
+            case Epoch(phase=EpochPhase.RUNNING) if not self._begun:
+                self._begun = True
+                self._begin(self.world.queue.now_s())
+            case _:
+                pass
+
+    def stepped(self, process: Process) -> None:
+        """Nothing follows from a step."""
+        if self._next is not None:
+            self._next.stepped(process)
+
+    def raised(self, process: Process, fault: Exception) -> None:
+        """A core has raised.
+
+        Raises:
+            Exception: ``fault``, when nobody watches.
+        """
+        if self._next is None:
+            raise fault
+        self._next.raised(process, fault)
+
+    def refused(self, process: Process, order: GoTo) -> None:
+        """Nothing follows from a refusal."""
+        if self._next is not None:
+            self._next.refused(process, order)
+
+    def noted(self, process: Process, note: Note) -> None:
+        """Nothing follows from a note."""
+        if self._next is not None:
+            self._next.noted(process, note)
+
+    # -- what happens -------------------------------------------------------------------
+
+    def _begin(self, zero_s: float) -> None:
+        """Mission time has begun: schedule all that happens whatever anybody does."""
+        world, fate = self.world, self.fate
+        for uav, lost_s in fate.lost_at_s.items():
+            world.queue.at(zero_s + lost_s, partial(self._lose, uav))
+        for task, withdrawn_s in fate.withdrawn_at_s.items():
+            world.queue.at(zero_s + withdrawn_s, partial(world.withdraw, task))
+        for partition in fate.partitions:
+            if partition.group:
+                world.queue.at(zero_s + partition.at_s, partial(self._cut, partition))
+        if self._coordinator_lost_s is not None:
+            sits_s = self._coordinator_lost_s + _OPERATOR_SITS_DOWN_S
+            if _last_change_s(self._mission, fate) > self._coordinator_lost_s:
+                world.queue.at(zero_s + sits_s, self._seat_operator)
+
+    def _lose(self, uav: UavId) -> None:
+        if not self.world.processes[uav].over:
+            self.lost.append(uav)
+            self.world.lose(uav)
+
+    def _cut(self, partition: Partition) -> None:
+        network = self.world.network
+        if isinstance(network, RoughNetwork):
+            network.cut(partition.group)
+            self.world.queue.after(partition.for_s, partial(network.heal, partition.group))
+
+    def _seat_operator(self) -> None:
+        seat = TaskSeat(
+            self._mission,
+            self.fate.withdrawn_at_s,
+            incarnation=2_000_000 + round(1e3 * self.world.queue.now_s()),
+            timing=self._timing,
+            patience_s=OPERATOR_PATIENCE_S,
+        )
+        self.world.admit(OPERATOR, seat)
+
+    def _survive(self, process: Process, outcome: Outcome) -> None:
+        attempt = process.name, outcome.task, outcome.attempt
+        uav, task = self._uavs.get(process.name), self._tasks.get(outcome.task)
+        if uav is None or task is None or attempt in self._outcomes:
+            return  # said again
+        self._outcomes.add(attempt)
+        if not self.fate.survives(uav, task, outcome.attempt):
+            self._lose(uav.id)
+
+    # -- what the runtime is set to -----------------------------------------------------
+
+    def _timing_of(self, uncertainty: Uncertainty) -> Timing:
+        """Timers that fit the network, and a fleet that stays out while tasks may yet appear."""
+        timing = QUIET
+        if not uncertainty.ideal_communication:
+            timing = replace(_preset(uncertainty).timing, status_s=_STATUS_S)
+        if self._coordinator_lost_s is None:
+            return timing
+        last_s = max((task.appears_s for task in self._mission.tasks), default=0.0)
+        return replace(timing, linger_s=max(timing.linger_s, last_s))
+
+
+def _without_never_seen(fate: Fate) -> Mission:
+    gone_s = fate.withdrawn_at_s
+    tasks = fate.mission.tasks
+    seen = tuple(t for t in tasks if t.appears_s <= gone_s.get(t.id, math.inf))
+    return fate.mission if len(seen) == len(tasks) else replace(fate.mission, tasks=seen)
+
+
+def _last_change_s(mission: Mission, fate: Fate) -> float:
+    """When the last task appears or is withdrawn [s mission time]; -1 if none ever is."""
+    appear_s = [task.appears_s for task in mission.tasks if task.appears_s > 0.0]
+    return max([*appear_s, *fate.withdrawn_at_s.values()], default=-1.0)
+
+
+def _vehicle(
+    fate: Fate, queue: EventQueue, uav: str, report: Callable[[Report], None]
+) -> SimulatedVehicle:
+    """An ideal one where nothing can happen to it."""
+    what = fate.uncertainty
+    troubles = what.speed_sd_frac, what.leg_sd_frac, what.wind_m_s, what.position_error_m
+    if not (what.outcomes or any(troubles)):
+        return VirtualVehicle(queue, report)
+    return FatedVehicle(queue, uav, report, fate)
+
+
+def _preset(uncertainty: Uncertainty) -> LinkPreset:
+    """Settings for a network that loses and delays so much, as a user would choose them.
+
+    Delays beyond those that any preset is for lengthen its timers in proportion.
+    """
+    delay_s = uncertainty.delay_s + uncertainty.jitter_s
+    lost = uncertainty.message_loss
+    if lost == 0.0 and delay_s <= 0.01:
+        return PRESETS[Link.CLEAN]
+    if lost <= 0.05 and delay_s <= 0.03:
+        return PRESETS[Link.NORMAL]
+    bad, longer = PRESETS[Link.BAD], max(1.0, delay_s / 0.1)
+    return LinkPreset(longer * bad.lease_s, longer * bad.answer_s, bad.timing.scaled(longer))
+
+
+def _network(fate: Fate, queue: EventQueue) -> Network:
+    what = fate.uncertainty
+    if what.ideal_communication:
+        return IdealNetwork(queue, 0.0)
+    preset = _preset(what)
+    conditions = Conditions(
+        topology=Topology.ROUTERS,  # so that each side of a partition goes on by itself
+        latency_s=what.delay_s,
+        spread_s=what.jitter_s,
+        lease_s=preset.lease_s,
+        answer_s=preset.answer_s,
+        loss_frac=what.message_loss,
+    )
+    return RoughNetwork(queue, conditions, fate.seed)
+
+
+def _limit_s(fate: Fate, timing: Timing) -> float:
+    """Virtual time by which the slowest UAV alone would have done everything, and waited."""
+    mission = fate.mission
+    places = [uav.position_enu_m for uav in mission.uavs]
+    places += [task.position_enu_m for task in mission.tasks]
+    across_m = float(np.linalg.norm(np.ptp(np.array(places), axis=0))) if places else 0.0
+    slowest_m_s = min((uav.speed_m_s for uav in mission.uavs), default=1.0)
+    work_s = sum(task.service_s + across_m / slowest_m_s for task in mission.tasks)
+    appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
+    waits_s = timing.abandon_s + timing.stalemate_s + timing.linger_s + 2.0 * timing.silence_s
+    return _START_S + appears_s + 4.0 * work_s + 10.0 * waits_s

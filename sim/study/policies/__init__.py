@@ -1,0 +1,1 @@
+"""Policies that studies compare, each behind `sim.study.policy.Policy`."""

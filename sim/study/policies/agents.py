@@ -1,0 +1,98 @@
+"""Policies in which the real agents decide for themselves, each by its rule, in virtual time.
+
+The coordinator plans once, before the mission; under `guided` it lives on and plans anew, under
+the others it dies as the mission begins, and tasks that appear or are withdrawn come from an
+operator's seat. A UAV that has set out for a task is diverted by nobody's plan. Decisions are
+timed as whole steps of an agent in which it decided. Leaves out: the world they fly in
+(sim.fated_world) and policies that know of everything at once (other modules here).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from agent.core import AgentCore
+from agent.events import Action, Event
+from sim.fate import Fate
+from sim.fated_world import FatedWorld
+from sim.study.flight import Flight
+from sim.study.policy import Planner
+from sim.study.tally import Tally
+from swarm.clock import Clock
+from swarm.events import Note
+from swarm.model import Mission, Plan
+
+__all__ = ["GREEDY", "GUIDED", "GUIDED_ALONE", "LOOKAHEAD", "AgentsPolicy"]
+
+
+class _TimedAgent(AgentCore):
+    """An agent that notes how long it takes to decide."""
+
+    def __init__(self, *args: Any, clock: Clock, taken_s: list[float], **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self._clock = clock
+        self._taken_s = taken_s
+
+    def step(self, event: Event, now_s: float) -> list[Action]:
+        """React to one event."""
+        began_s = self._clock.now_s()
+        actions = super().step(event, now_s)
+        if any(isinstance(action, Note) and action.text == "decided" for action in actions):
+            self._taken_s.append(self._clock.now_s() - began_s)
+        return actions
+
+
+@dataclass(frozen=True, slots=True)
+class AgentsPolicy:
+    """Agents that decide by one rule, with or without a coordinator."""
+
+    name: str
+    what: str
+    method: str
+    """Planning method, whose rule the agents decide by."""
+    coordinator_lost_s: float | None = 0.0
+    """Mission time at which the coordinator dies [s]; None if it lives."""
+
+    def fly(self, fate: Fate, plan: Planner, clock: Clock) -> Flight:
+        """Fly a mission to its end.
+
+        Args:
+            fate: what happens.
+            plan: offline planner.
+            clock: times decisions, and decides nothing.
+        """
+
+        def make_plan(mission: Mission, method: str, seed: int) -> Plan:
+            del seed  # the planner has its own
+            return plan(mission, method)
+
+        tally, taken_s = Tally(), list[float]()
+        flown = FatedWorld(
+            fate,
+            make_plan,
+            method=self.method,
+            seed=fate.seed,
+            coordinator_lost_s=self.coordinator_lost_s,
+            watch=tally,
+            make_agent=partial(_TimedAgent, clock=clock, taken_s=taken_s),
+        )
+        flown.run()
+        return Flight(
+            visits=tuple(tally.visits),
+            lost_uavs=tuple(flown.lost),
+            epochs=tally.epochs,
+            moved=tally.moved,
+            released=tally.released,
+            messages=tally.messages,
+            decision_s=tuple(taken_s),
+        )
+
+
+GREEDY = AgentsPolicy("greedy", "the paper's greedy rule, best sequence, no coordinator", "greedy")
+LOOKAHEAD = AgentsPolicy(
+    "lookahead", "the paper's lookahead rule, best sequence, no coordinator", "lookahead"
+)
+GUIDED_ALONE = AgentsPolicy("guided-alone", "guided agents, coordinator dead", "guided")
+GUIDED = AgentsPolicy("guided", "guided agents, coordinator plans anew", "guided", None)
