@@ -17,6 +17,7 @@ from agent.speech import Speech
 from agent.vehicle import GoTo
 from swarm.allocation.lower_level import Decision, Rule
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import Note
 from swarm.state.board import TaskState
 from swarm.state.registers import Replica
@@ -182,14 +183,15 @@ class Tasking:
 
     def next_deadline_s(self) -> float | None:
         """When `advance` will next have something to do."""
-        times_s = (self._held_at_s, self._served_at_s, self._retry_at_s, self._ready_by_s)
-        return min((time_s for time_s in times_s if time_s is not None), default=None)
+        return earliest(self._held_at_s, self._served_at_s, self._retry_at_s, self._ready_by_s)
 
     # -- with a task ----------------------------------------------------------------
 
     def _serve(self, now_s: float) -> list[Action]:
+        if self._served_at_s is None or self._served_at_s > now_s:
+            return []
         task = self._task()
-        if self._served_at_s is None or task is None or self._served_at_s > now_s:
+        if task is None:
             return []
         self._served_at_s = None
         mission_s = self._picture.mission_s(now_s)

@@ -15,6 +15,7 @@ from swarm.allocation.objective import executed_objective
 from swarm.allocation.problem import Problem
 from swarm.asking import Asking
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import Ask, BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Wish
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.model.ids import COORDINATOR
@@ -184,12 +185,11 @@ class Observer:
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
-        deadlines = (
+        return earliest(
             self._membership.next_deadline_s(),
             self._asking.next_deadline_s(),
             self._ask_at_s if self.replica.brief is None else None,
         )
-        return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
     def mission_s(self, now_s: float) -> float | None:
         """Mission time; None before the start."""
