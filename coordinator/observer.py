@@ -305,7 +305,7 @@ class Observer:
             before.update(self.statuses[uav].dropped)
             self._left.discard(uav)
         self._stamps[uav], self.statuses[uav] = stamp, status
-        unfinished = TaskState.OPEN in self.board.states.values()
+        unfinished = self.board.unfinished
         if status.phase in _LEAVING and status.note and unfinished and uav not in self._left:
             self._left.add(uav)
             self._tell(f"{uav} {_LEAVING[status.phase]}: {status.note}", now_s)
@@ -364,7 +364,7 @@ class Observer:
             self._tell(f"mission ends: {epoch.reason}", now_s)
 
     def _hear_claim(self, uav: str, claim: Claim, before: Claim | None, now_s: float) -> None:
-        unfinished = TaskState.OPEN in self.board.states.values()
+        unfinished = self.board.unfinished
         if claim.phase is ClaimPhase.OUT and self.phase is EpochPhase.RUNNING and unfinished:
             self._tell(f"{uav} takes no further part", now_s)
         if claim.task is None or (before is not None and before.task == claim.task):

@@ -62,6 +62,8 @@ class Replica:
             return False
         key = key_of(message)
         known = self._registers.get(key)
+        if known is message:
+            return False
         if known is not None and not _beats(message, known):
             self.stale += message.stamp < known.stamp
             return False
