@@ -10,6 +10,27 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sim.uncertainty_options import (
+    CoordinatorLostOption,
+    DelayOption,
+    JitterOption,
+    LegSdOption,
+    LossOption,
+    MessageLossOption,
+    OutcomesOption,
+    PartitionLengthOption,
+    PartitionRateOption,
+    PopupOption,
+    PopupRateOption,
+    PositionErrorOption,
+    ReattemptOption,
+    SpeedSdOption,
+    SurvivalOption,
+    WindOption,
+    WithdrawRateOption,
+    asked_for,
+    with_reattempts,
+)
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, LinkOption, ScenarioArgument, SeedOption, SpeedupOption
@@ -312,36 +333,23 @@ def simulate(
     scenario: ScenarioArgument,
     method: MethodOption = "greedy",
     seed: SeedOption = 0,
-    loss: Annotated[
-        float,
-        typer.Option(
-            "--loss",
-            min=0.0,
-            max=1.0,
-            metavar="P",
-            help="Probability that a UAV is lost, at a random moment.",
-        ),
-    ] = 0.0,
-    popup: Annotated[
-        float,
-        typer.Option(
-            "--popup",
-            min=0.0,
-            max=1.0,
-            metavar="P",
-            help="Probability that a task appears only during the mission.",
-        ),
-    ] = 0.0,
-    latency_s: Annotated[
-        float,
-        typer.Option(
-            "--latency-s",
-            min=0.0,
-            max=60.0,
-            metavar="S",
-            help="Delay of every message.",
-        ),
-    ] = 0.0,
+    loss: LossOption = None,
+    popup: PopupOption = None,
+    popup_rate: PopupRateOption = None,
+    withdraw_rate: WithdrawRateOption = None,
+    outcomes: OutcomesOption = None,
+    reattempt: ReattemptOption = None,
+    survival: SurvivalOption = None,
+    speed_sd: SpeedSdOption = None,
+    leg_sd: LegSdOption = None,
+    wind: WindOption = None,
+    position_error_m: PositionErrorOption = None,
+    message_loss: MessageLossOption = None,
+    delay_s: DelayOption = None,
+    jitter_s: JitterOption = None,
+    partition_rate: PartitionRateOption = None,
+    partition_s: PartitionLengthOption = None,
+    coordinator_lost_s: CoordinatorLostOption = None,
     faults: Annotated[
         str | None,
         typer.Option(
@@ -357,14 +365,20 @@ def simulate(
 ) -> int:
     """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
 
-    Vehicles are ideal. Without losses, pop-ups and delays the lists flown are exactly those
-    planned. With --faults the network and the clocks are like real ones, what goes wrong is told
+    Unless told otherwise nothing is uncertain: vehicles and network are ideal, and the lists flown
+    are exactly those planned. Each kind of uncertainty is drawn from the seed by itself, so asking
+    for one leaves what the others draw as it was.
+    With --faults the network and the clocks are like real ones, what goes wrong is told
     on standard error in lines that a file may hold, and the invariants of a fleet are watched.
     Exit status 0: every task was done, and no invariant broken.
 
     Examples:
         swarm simulate table-1
         swarm simulate valley-survey --loss 0.3 --popup 0.3 --seed 7
+        swarm simulate valley-survey --method guided --loss 0.3 --coordinator-lost-s 0
+        swarm simulate table-1 --outcomes --reattempt --seed 1
+        swarm simulate valley-survey --speed-sd 0.1 --leg-sd 0.1 --wind 5
+        swarm simulate valley-survey --message-loss 0.2 --delay-s 0.05 --jitter-s 0.05
         swarm simulate valley-survey --faults cut,crash --seed 7
     """
     import sys
@@ -380,23 +394,54 @@ def simulate(
     check_online_method(method)
     if report is not None:
         check_report_path(report)
-    mission = load_scenario(scenario)
-    uncertainty, broken = Uncertainty(loss, popup), None
+    uncertainty = asked_for(Uncertainty(), loss=loss, popup=popup, popups_per_min=popup_rate)
+    beside_faults = uncertainty
+    uncertainty = asked_for(
+        uncertainty,
+        withdrawals_per_min=withdraw_rate,
+        outcomes=outcomes,
+        survival=survival,
+        speed_sd_frac=speed_sd,
+        leg_sd_frac=leg_sd,
+        wind_m_s=wind,
+        position_error_m=position_error_m,
+        message_loss=message_loss,
+        delay_s=delay_s,
+        jitter_s=jitter_s,
+        partitions_per_min=partition_rate,
+        partition_s=partition_s,
+    )
+    mission = with_reattempts(load_scenario(scenario), reattempt=reattempt)
     if faults is None:
-        world = simulate_mission(
-            mission, method=method, seed=seed, uncertainty=uncertainty, latency_s=latency_s
+        flown = simulate_mission(
+            mission,
+            method=method,
+            seed=seed,
+            uncertainty=uncertainty,
+            coordinator_lost_s=coordinator_lost_s,
         )
-    else:
-        if latency_s:
-            remedy = "leave it out, or ask for --faults weather"
-            raise InputError(Fault("--latency-s", "", "does not go with --faults", remedy))
-        verdict = fly_with_faults(
-            mission, method=method, seed=seed, uncertainty=uncertainty, faults=faults
+        if not flown.in_time:
+            print("broken off: somebody would have waited for ever", file=sys.stderr)
+        told = MissionReport(
+            mission=flown.world.mission,
+            plan=flown.world.observer.plan,
+            result=flown.result,
+            story=tuple(flown.world.observer.story),
+            lost_because=flown.lost_because,
+            value=flown.value,
         )
-        world, broken = verdict.world, verdict.broken
-        print(format_schedule(verdict.case.schedule), end="", file=sys.stderr)
-        if broken is not None:
-            print(f"broken: {broken}", file=sys.stderr)
+        return _tell(told, json=json, report=report)
+    if uncertainty != beside_faults or coordinator_lost_s is not None:
+        problem = "goes with --loss, --popup and --popup-rate only"
+        remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"
+        raise InputError(Fault("--faults", faults, problem, remedy))
+    verdict = fly_with_faults(
+        mission, method=method, seed=seed, uncertainty=uncertainty, faults=faults
+    )
+    print(format_schedule(verdict.case.schedule), end="", file=sys.stderr)
+    if verdict.broken is not None:
+        print(f"broken: {verdict.broken}", file=sys.stderr)
+    world = verdict.world
     told = MissionReport(
         mission=world.mission,
         plan=world.observer.plan,
@@ -404,7 +449,7 @@ def simulate(
         story=tuple(world.observer.story),
     )
     status = _tell(told, json=json, report=report)
-    return status if broken is None else 1
+    return status if verdict.broken is None else 1
 
 
 def _bus_kind(text: str) -> BusKind:

@@ -30,12 +30,18 @@ class FatedVehicle(VirtualVehicle):
         uav: whose vehicle it is.
         report: called with everything the vehicle says, at the time it says it.
         fate: what happens to it.
+        takeoff_s: until it is airborne once it is told to.
     """
 
     def __init__(
-        self, queue: EventQueue, uav: str, report: Callable[[Report], None], fate: Fate
+        self,
+        queue: EventQueue,
+        uav: str,
+        report: Callable[[Report], None],
+        fate: Fate,
+        takeoff_s: float = 0.0,
     ) -> None:
-        super().__init__(queue, report)
+        super().__init__(queue, report, takeoff_s)
         self._fate = fate
         self._uav = next(each for each in fate.mission.uavs if each.id == UavId(uav))
         self._tasks = {str(task.id): task for task in fate.mission.tasks}

@@ -40,6 +40,12 @@ _OPERATOR_SITS_DOWN_S = 1.0
 """After the loss of a coordinator; until then everyone has noticed it."""
 _START_S = 60.0
 """Until a mission starts whose UAVs do not all get airborne."""
+_TAKEOFF_S = 20.0
+"""While the vehicles take off, the processes of a real fleet find each other."""
+_WIRED = replace(
+    PRESETS[Link.CLEAN], timing=replace(PRESETS[Link.CLEAN].timing, announce_s=20.0, silence_s=60.0)
+)
+"""Where nothing is lost nothing need be said twice: who was cut off asks when it is back."""
 _STATUS_S = 60.0
 """Nobody looks on while a mission is flown in virtual time."""
 
@@ -69,8 +75,8 @@ class FatedWorld:
         make_agent: Callable[..., AgentCore] = AgentCore,
     ) -> None:
         self.fate = fate
-        self.lost: list[UavId] = []
-        """UAVs lost on their mission, in that order."""
+        self.lost: dict[UavId, str] = {}
+        """UAVs lost on their mission, in that order, and why."""
         self._coordinator_lost_s = coordinator_lost_s
         self._uavs: dict[str, Uav] = {str(uav.id): uav for uav in fate.mission.uavs}
         self._tasks: dict[str, Task] = {str(task.id): task for task in fate.mission.tasks}
@@ -144,7 +150,7 @@ class FatedWorld:
         """Mission time has begun: schedule all that happens whatever anybody does."""
         world, fate = self.world, self.fate
         for uav, lost_s in fate.lost_at_s.items():
-            world.queue.at(zero_s + lost_s, partial(self._lose, uav))
+            world.queue.at(zero_s + lost_s, partial(self._lose, uav, f"lost at {lost_s:.4g} s"))
         for task, withdrawn_s in fate.withdrawn_at_s.items():
             world.queue.at(zero_s + withdrawn_s, partial(world.withdraw, task))
         for partition in fate.partitions:
@@ -155,9 +161,9 @@ class FatedWorld:
             if _last_change_s(self._mission, fate) > self._coordinator_lost_s:
                 world.queue.at(zero_s + sits_s, self._seat_operator)
 
-    def _lose(self, uav: UavId) -> None:
+    def _lose(self, uav: UavId, why: str) -> None:
         if not self.world.processes[uav].over:
-            self.lost.append(uav)
+            self.lost[uav] = why
             self.world.lose(uav)
 
     def _cut(self, partition: Partition) -> None:
@@ -183,7 +189,8 @@ class FatedWorld:
             return  # said again
         self._outcomes.add(attempt)
         if not self.fate.survives(uav, task, outcome.attempt):
-            self._lose(uav.id)
+            at_s = outcome.completed_s
+            self._lose(uav.id, f"did not survive {outcome.task} at {at_s:.4g} s")
 
     # -- what the runtime is set to -----------------------------------------------------
 
@@ -191,7 +198,7 @@ class FatedWorld:
         """Timers that fit the network, and a fleet that stays out while tasks may yet appear."""
         timing = QUIET
         if not uncertainty.ideal_communication:
-            timing = replace(_preset(uncertainty).timing, status_s=_STATUS_S)
+            timing = _preset(uncertainty).timing
         if self._coordinator_lost_s is None:
             return timing
         last_s = max((task.appears_s for task in self._mission.tasks), default=0.0)
@@ -217,9 +224,10 @@ def _vehicle(
     """An ideal one where nothing can happen to it."""
     what = fate.uncertainty
     troubles = what.speed_sd_frac, what.leg_sd_frac, what.wind_m_s, what.position_error_m
+    takeoff_s = 0.0 if what.ideal_communication else _TAKEOFF_S
     if not (what.outcomes or any(troubles)):
-        return VirtualVehicle(queue, report)
-    return FatedVehicle(queue, uav, report, fate)
+        return VirtualVehicle(queue, report, takeoff_s)
+    return FatedVehicle(queue, uav, report, fate, takeoff_s)
 
 
 def _preset(uncertainty: Uncertainty) -> LinkPreset:
@@ -229,18 +237,21 @@ def _preset(uncertainty: Uncertainty) -> LinkPreset:
     """
     delay_s = uncertainty.delay_s + uncertainty.jitter_s
     lost = uncertainty.message_loss
+    longer = 1.0
     if lost == 0.0 and delay_s <= 0.01:
-        return PRESETS[Link.CLEAN]
-    if lost <= 0.05 and delay_s <= 0.03:
-        return PRESETS[Link.NORMAL]
-    bad, longer = PRESETS[Link.BAD], max(1.0, delay_s / 0.1)
-    return LinkPreset(longer * bad.lease_s, longer * bad.answer_s, bad.timing.scaled(longer))
+        chosen = _WIRED
+    elif lost <= 0.05 and delay_s <= 0.03:
+        chosen = PRESETS[Link.NORMAL]
+    else:
+        chosen, longer = PRESETS[Link.BAD], max(1.0, delay_s / 0.1)
+    timing = replace(chosen.timing.scaled(longer), status_s=_STATUS_S)
+    return LinkPreset(longer * chosen.lease_s, longer * chosen.answer_s, timing)
 
 
 def _network(fate: Fate, queue: EventQueue) -> Network:
     what = fate.uncertainty
-    if what.ideal_communication:
-        return IdealNetwork(queue, 0.0)
+    if not (what.message_loss or what.jitter_s or what.partitions_per_min):
+        return IdealNetwork(queue, what.delay_s)
     preset = _preset(what)
     conditions = Conditions(
         topology=Topology.ROUTERS,  # so that each side of a partition goes on by itself

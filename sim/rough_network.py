@@ -134,7 +134,7 @@ class RoughNetwork:
             elif self._is_cut(seat, other):
                 self._review(seat, other)
             else:
-                self._change(seat, other, 0.0, opens=True)
+                self._change(seat, other, None, opens=True)
 
     def leave(self, seat: Seat) -> None:
         """A process has ended: its transports go as soon as what it said has arrived."""
@@ -382,7 +382,8 @@ class RoughNetwork:
         elif not blocked or viewer not in self._stopped:
             self._changes[viewer, other] += 1  # nothing to change any more
 
-    def _change(self, viewer: Seat, other: Seat, after_s: float, *, opens: bool) -> None:
+    def _change(self, viewer: Seat, other: Seat, after_s: float | None, *, opens: bool) -> None:
+        """Let the transport come or go after that time, and all that happens by then; None: now."""
         pair = viewer, other
         self._changes[pair] += 1
         change = self._changes[pair]
@@ -394,10 +395,10 @@ class RoughNetwork:
                 else:
                     self._go_down(viewer, other)
 
-        if after_s > 0.0:
-            self._queue.after(after_s, happen)
-        else:
+        if after_s is None:
             happen()
+        else:
+            self._queue.after(after_s, happen)
 
     def _come_up(self, viewer: Seat, other: Seat) -> None:
         was_linked = self._is_linked(viewer)

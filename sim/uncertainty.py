@@ -95,19 +95,20 @@ class Uncertainty:
             seed: of all streams; >= 0.
         """
         losses, popups = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
-        lost = losses.random(len(mission.uavs)) < self.loss
-        lost_at_s = losses.uniform(0.0, span_s, len(mission.uavs))
-        late = popups.random(len(mission.tasks)) < self.popup
-        appears_s = popups.uniform(0.0, 0.5 * span_s, len(mission.tasks))
+        # Whether and when, one row each, so that more of them change nothing for the first ones.
+        late = popups.random((len(mission.tasks), 2)).tolist()
         tasks = tuple(
-            replace(task, appears_s=float(when_s)) if pops and task.appears_s == 0.0 else task
-            for task, pops, when_s in zip(mission.tasks, late, appears_s, strict=True)
+            replace(task, appears_s=0.5 * span_s * when)
+            if draw < self.popup and task.appears_s == 0.0
+            else task
+            for task, (draw, when) in zip(mission.tasks, late, strict=True)
         )
         drawn = self._with_more_tasks(replace(mission, tasks=tasks), span_s, seed)
+        lost = losses.random((len(mission.uavs), 2)).tolist()
         gone_at_s = {
-            uav.id: float(when_s)
-            for uav, gone, when_s in zip(mission.uavs, lost, lost_at_s, strict=True)
-            if gone
+            uav.id: span_s * when
+            for uav, (draw, when) in zip(mission.uavs, lost, strict=True)
+            if draw < self.loss
         }
         for uav, when_s in self.lost_at_s.items():
             gone_at_s[uav] = min(when_s, gone_at_s.get(uav, math.inf))
@@ -172,10 +173,13 @@ class Uncertainty:
     def _partitions(self, mission: Mission, span_s: float, seed: int) -> tuple[Partition, ...]:
         rng = stream(seed, "partitions")
         ids = [uav.id for uav in mission.uavs]
-        return tuple(
-            Partition(when_s, self.partition_s, frozenset(rng.permutation(ids)[: len(ids) // 2]))
-            for when_s in _poisson_s(rng, self.partitions_per_min, span_s)
-        )
+
+        def half() -> frozenset[str]:
+            order = rng.permutation(len(ids)).tolist()
+            return frozenset(ids[place] for place in order[: len(ids) // 2])
+
+        times_s = _poisson_s(rng, self.partitions_per_min, span_s)
+        return tuple(Partition(when_s, self.partition_s, half()) for when_s in times_s)
 
     def _speed_frac(self, uav: Uav, seed: int) -> float:
         return lognormal(float(stream(seed, "speed", uav.id).standard_normal()), self.speed_sd_frac)

@@ -1,7 +1,8 @@
 """A vehicle of the virtual-time world: flies ideally, reports like a real one.
 
 Speaks agent.vehicle, so the agent's core cannot tell it from a MAVLink autopilot.
-It is airborne at its start at once: take-off is no part of mission time. Like a real one
+It is airborne at its start at once, or after a given time: take-off is no part of mission
+time. Like a real one
 it outlives its agent: resumed by the next, it flies on to where it was sent.
 Leaves out: the autopilot's protocol (sim.autopilot).
 """
@@ -55,13 +56,17 @@ class VirtualVehicle:
     Args:
         queue: virtual time.
         report: called with everything the vehicle says, at the time it says it.
+        takeoff_s: until it is airborne once it is told to.
     """
 
-    def __init__(self, queue: EventQueue, report: Callable[[Report], None]) -> None:
+    def __init__(
+        self, queue: EventQueue, report: Callable[[Report], None], takeoff_s: float = 0.0
+    ) -> None:
         self.speed_frac = 1.0
         """Share of the ordered speed at which it flies from its next order on."""
         self._queue = queue
         self._report = report
+        self._takeoff_s = takeoff_s
         self._motion: IdealMotion | None = None
         self._speed_m_s = 1.0
         self._orders = 0
@@ -95,7 +100,7 @@ class VirtualVehicle:
         self._speed_m_s = order.speed_m_s
         if motion is None:
             self._motion = IdealMotion(order.position_enu_m)
-            self._later(now_s, ready)
+            self._later(now_s + self._takeoff_s, ready)
         elif order.resume:
             self._later(now_s, self._telemetry(motion))
             self._later(now_s, ready)

@@ -9,6 +9,7 @@ agreeing with a coordinator that lives or comes back.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
@@ -54,9 +55,10 @@ class TaskSeat:
         self._zero_s: float | None = None
         self._said: list[tuple[float, Message]] = []
         """What to repeat, and until when."""
-        self._again_at_s = 0.0
+        self._again_at_s = math.inf
         """When to ask again; once the mission is known, when to repeat."""
-        self._leave_at_s = 0.0
+        self._leave_at_s = math.inf
+        """When to give up on a mission that nobody tells of."""
         self._finished = False
 
     def start(self, now_s: float) -> list[Wish]:
@@ -92,13 +94,14 @@ class TaskSeat:
         if self._finished:
             return None
         if self._zero_s is None:
-            return min(self._again_at_s, self._leave_at_s)
+            at_s = min(self._again_at_s, self._leave_at_s)
+            return None if at_s == math.inf else at_s
         times_s = [self._zero_s + at_s for at_s in self._to_withdraw.values()]
         if (posts_s := self._postings.next_deadline_s(self._zero_s)) is not None:
             times_s.append(posts_s)
         if self._said:
             times_s.append(self._again_at_s)
-        return min(times_s, default=self._leave_at_s)
+        return min(times_s, default=None)
 
     def _take_in(self, messages: Iterable[Message], now_s: float) -> None:
         for message in messages:
@@ -130,8 +133,7 @@ class TaskSeat:
     def _say(self, entry: Board, now_s: float) -> Message:
         message = self._voice.say(entry)
         self._replica.join(message)
-        self._leave_at_s = now_s + self._patience_s
-        self._said.append((self._leave_at_s, message))
+        self._said.append((now_s + self._patience_s, message))
         return message
 
     def _repeat(self, now_s: float) -> list[Wish]:

@@ -73,7 +73,7 @@ class Fact:
         ids = self.ids if at_most is None else self.ids[:at_most]
         more = len(self.ids) - len(ids)
         listed = ", ".join(ids) + (f" and {more} more" if more else "")
-        return f"{self.text}: {listed}" if listed else self.text
+        return ": ".join(part for part in (self.text, listed) if part)
 
 
 def compare_lists(mission: Mission, plan: Plan | None, result: MissionResult) -> list[Compared]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from sim.view.report_text import report_text
 from sim.view.signs import signs_for
 from sim.view.story import clean, shown_s, shown_value, told_at
 from swarm.errors import Fault, InputError
-from swarm.model import Mission, Plan
+from swarm.model import Mission, Plan, UavId
 
 __all__ = ["REPORT_SUFFIXES", "MissionReport", "check_report_path", "mission_ok", "write_report"]
 
@@ -57,6 +58,10 @@ class MissionReport:
     """Mission seconds per wall second; None in virtual time."""
     fates: tuple[str, ...] = ()
     """How processes ended that should not have, a line each."""
+    lost_because: Mapping[UavId, str] = field(default_factory=dict)
+    """When and why UAVs were lost, as far as that is known: in a simulation."""
+    value: float | None = None
+    """What was flown is worth by what was drawn in a simulation [value·s]; None if unknown."""
     hint: str = _HINT
     """How to get more; the last line of `render`."""
 
@@ -88,6 +93,8 @@ class MissionReport:
             "speedup": self.speedup,
             "processes": list(self.fates),
             "story": [{"mission_s": line.mission_s, "text": line.text} for line in self.story],
+            "lost_because": dict(self.lost_because),
+            "value": self.value,
         }
         planned = _no_plan(self.mission) if self.plan is None else plan_as_json(self.plan)
         found: dict[str, object] = _finite({**planned, **flown})
@@ -125,6 +132,12 @@ class MissionReport:
     def notes(self) -> list[Fact]:
         """What went otherwise than planned, how long it took, and what became of processes."""
         found = facts(self.mission, self.result)
+        if self.lost_because:
+            why = tuple(f"{uav} {what}" for uav, what in self.lost_because.items())
+            found.insert(1, Fact("because", "", why))
+        if self.value is not None and not math.isclose(self.value, self.result.executed_objective):
+            text = f"{shown_value(self.value)} value·s: m·(D − t) of each success, failures nothing"
+            found.append(Fact("by outcomes", text))
         spent = []
         if self.takeoff_s is not None:
             spent.append(f"take-off {shown_s(self.takeoff_s)} s")

@@ -6,6 +6,7 @@ import pytest
 
 from agent.vehicle import (
     Arrived,
+    AttemptFailed,
     GoTo,
     HandedOver,
     Home,
@@ -17,8 +18,8 @@ from agent.vehicle import (
 )
 from swarm.events import Heard, Stop
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Board, ClaimPhase, EpochPhase, StatusPhase
-from tests.builders import IDLE, OUT, done, entry, epoch, held, proposed, uav
+from swarm.wire.messages import Board, ClaimPhase, EpochPhase, Result, StatusPhase
+from tests.builders import IDLE, OUT, done, entry, epoch, failed, held, proposed, uav
 from tests.lone_agent import ABOVE_START, LoneAgent, claims, finishes, orders, outcomes, statuses
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
@@ -342,3 +343,51 @@ def test_the_agent_of_a_handed_over_vehicle_ends_without_a_coordinator_too() -> 
     agent.hear("u1", OUT)
 
     assert finishes(agent.run_until(10.0)) == [0]
+
+
+# -- attempts that fail -----------------------------------------------------------------
+
+
+def test_an_attempt_that_fails_ends_when_its_service_does() -> None:
+    agent = flying(entry("near", east_m=10.0, service_s=4.0), FAR)
+    agent.arrive(10.0)
+    agent.happen(AttemptFailed(agent.leg), 11.0)
+    assert outcomes(agent.run_until(13.75)) == []
+
+    actions = agent.run_until(14.25)
+    assert outcomes(actions) == [failed("near", 14.0)]
+    assert agent.task == "far"
+    assert outcomes(agent.arrive(30.0)) == [done("far", 30.0)]
+
+
+def test_a_failure_told_before_the_arrival_counts_for_a_task_without_service() -> None:
+    agent = flying(NEAR)
+    agent.happen(AttemptFailed(agent.leg), 10.0)
+
+    assert outcomes(agent.arrive(10.0)) == [failed("near", 10.0)]
+    assert agent.task is None
+
+
+def test_a_failed_task_is_tried_again_where_the_scenario_says_so() -> None:
+    agent = LoneAgent(uav("u0"), reattempt_failed=True)
+    agent.fly_to(NEAR)
+    agent.start_mission()
+    agent.happen(AttemptFailed(agent.leg), 10.0)
+    agent.arrive(10.0)
+
+    assert agent.task == "near"
+    order = orders(agent.log)[-1]
+    assert isinstance(order, GoTo)
+    assert (order.task, order.attempt) == ("near", 2)
+    assert [(each.result, each.attempt) for each in outcomes(agent.arrive(11.0))] == [
+        (Result.DONE, 2)
+    ]
+
+
+def test_a_failure_of_an_older_leg_is_ignored() -> None:
+    agent = flying(NEAR, FAR, others=1)
+    first_leg = agent.leg
+    agent.hear("u1", done("near"), 1.0)
+    agent.happen(AttemptFailed(first_leg), 2.0)
+
+    assert outcomes(agent.arrive(20.0)) == [done("far", 20.0)]

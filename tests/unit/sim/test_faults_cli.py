@@ -92,4 +92,4 @@ def test_the_same_seed_plays_the_same_faults(capsys: pytest.CaptureFixture[str])
 
 def test_a_delay_does_not_go_with_faults(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "table-1", "--faults", "cut", "--latency-s", "0.1"]) == 2
-    assert "does not go with --faults" in capsys.readouterr().err
+    assert "goes with --loss, --popup and --popup-rate only" in capsys.readouterr().err

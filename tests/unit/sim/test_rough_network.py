@@ -55,9 +55,14 @@ class Listener:
 class Net:
     """Seats a, b, c, … on one network, with a watch."""
 
-    def __init__(self, topology: Topology = Topology.ROUTER, names: str = "abc") -> None:
+    def __init__(
+        self,
+        topology: Topology = Topology.ROUTER,
+        names: str = "abc",
+        conditions: Conditions | None = None,
+    ) -> None:
         self.queue = EventQueue()
-        self.network = RoughNetwork(self.queue, Conditions(topology), seed=3)
+        self.network = RoughNetwork(self.queue, conditions or Conditions(topology), seed=3)
         self.seats = {name: self.seat(name) for name in names}
         self.after(UP_S)
 
@@ -122,6 +127,27 @@ def test_in_bad_weather_messages_are_lost_doubled_and_out_of_order() -> None:
     net.say("a", 3)
     net.after(1.0)
     assert net.heard("b")[-3:] == [0, 1, 2]
+
+
+def test_messages_are_lost_at_the_share_asked_for_and_the_others_stay_in_order() -> None:
+    net = Net(conditions=Conditions(loss_frac=0.2))
+    net.say("a", 5000)
+    net.after(1.0)
+
+    for name in "bc":
+        heard = net.heard(name)
+        assert len(heard) == pytest.approx(4000, abs=4 * (5000 * 0.2 * 0.8) ** 0.5)
+        assert heard == sorted(set(heard))
+    assert net.heard("b") != net.heard("c")
+
+
+def test_what_was_said_at_the_last_moment_arrives_even_without_a_delay() -> None:
+    net = Net(conditions=Conditions(latency_s=0.0, spread_s=0.0))
+    net.say("a")
+    net.network.leave(net.seats["a"])
+    net.after(0.0)
+
+    assert net.heard("b") == [0]
 
 
 def test_status_goes_to_onlookers_only() -> None:
