@@ -50,6 +50,8 @@ _NEIGHBOURS = 32
 """Neighbours looked at together; the best of them is moved to if it is better."""
 _CHUNK_LOOKS = 10_000_000
 """Tasks looked at between two questions whether to stop: some 50 ms."""
+_THREAD_LOOKS = 100_000
+"""Tasks looked at in about the time that starting threads takes."""
 _LOOKAHEAD_LOOKS = 1_000_000
 """A decision by lookahead over more tasks than it can solve exactly, in the same currency."""
 
@@ -169,6 +171,7 @@ class _Search:
         self._preferred: dict[int, list[int]] = {}
         """By UAV, the tasks it likes best, as far as was asked for; at their end `_NO_TASK`."""
         self._twins = twins(problem, state, self.uavs)
+        self._any_twins = any(len(equals) > 1 for equals in self._twins.values())
         self._rank = rank_of(self.uavs + self._inactive)
         self._values: dict[bytes, float] = {}
         self._best: tuple[float, Sequence] = (-np.inf, self.uavs)
@@ -302,8 +305,10 @@ class _Search:
         if not self.plain:
             return [row.tobytes() for row in ranks]
         self._looked_up += len(sequences) * min(len(self.uavs), self._problem.n_task)
+        looks = len(ranks) * len(self.uavs) * self._looks_per_decision()
+        threads = self._threads if looks > _THREAD_LOOKS else 1
         tasks = kernel.first_rounds(
-            self._problem.kernel, self._state, ranks, self._rule.code, self._threads
+            self._problem.kernel, self._state, ranks, self._rule.code, threads
         )
         return [row.tobytes() for row in tasks]
 
@@ -352,6 +357,11 @@ class _Search:
             looks += n_open * _LOOKAHEAD_LOOKS
         return int(min(max(_CHUNK_LOOKS / looks, 1.0), 512.0)) * self._threads
 
+    def _looks_per_decision(self) -> int:
+        n_open = int(np.count_nonzero(self._state.open))
+        long = self._rule.code == kernel.LOOKAHEAD and n_open > EXACT_TASKS
+        return _LOOKAHEAD_LOOKS if long else n_open
+
     def _allowed(self, count: int) -> int:
         """How many of the next ``count`` evaluations may be spent; the first one always."""
         least = 0 if self.evaluations else 1
@@ -377,6 +387,8 @@ class _Search:
 
     def _in_twin_order(self, sequence: Sequence) -> Sequence:
         """The same sequence with equal UAVs in ascending order on their places."""
+        if not self._any_twins:
+            return sequence
         waiting = {equals: iter(equals) for equals in self._twins.values()}
         return tuple(next(waiting[self._twins[uav]]) for uav in sequence)
 
