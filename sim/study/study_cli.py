@@ -84,6 +84,7 @@ def study(
         typer.Option(
             "--seed",
             min=0,
+            max=2**63 - 1,
             metavar="N",
             help="Seed of everything random. Default: as the study says, or 0.",
             show_default=False,
@@ -219,8 +220,9 @@ def study(
     from sim.study.policies import ROSTER
     from sim.study.progress import StudyProgress
     from sim.study.readme_table import MarkedFile
+    from sim.study.row_files import require_parquet
     from sim.study.runner import run_study
-    from sim.study.store import FolderStore, MemoryStore, require_parquet
+    from sim.study.store import FolderStore, MemoryStore
     from sim.study.trial import Briefing
     from swarm.clock import SystemClock
 
@@ -344,7 +346,8 @@ def _write(
     out: Path, summary: Summary, rows: list[Row], file_format: str, *, plots: bool
 ) -> list[Path]:
     """Everything but the trials themselves; the files that ``out`` has then got."""
-    from sim.study.store import ROWS_FILE, STUDY_FILE, write_parquet
+    from sim.study.row_files import write_parquet
+    from sim.study.store import ROWS_FILE, STUDY_FILE
 
     files = [out / STUDY_FILE, out / ROWS_FILE]
     if file_format == "parquet":

@@ -184,6 +184,31 @@ def test_wrong_usage_is_one_clear_line_and_status_2(
     assert err.count("\n") == 1
 
 
+def test_listed_losses_want_missions_that_have_these_uavs(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    study = tmp_path / "mine.toml"
+    study.write_text(
+        'schema = 1\nname = "mine"\n[mission]\nrandom = { uavs = 3, tasks = 4 }\n'
+        "[uncertainty]\nlost_at_s = { uav3 = 5.0 }\n"
+    )
+
+    status, _, err = run(capsys, "study", str(study), "--random", "2,4")
+
+    assert status == 2
+    assert err == (
+        "--random: 2,4: has no uav3, of which the study lists lost_at_s; ask for larger missions\n"
+    )
+
+
+def test_help_names_every_policy(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = run(capsys, "study", "--help")
+
+    assert status == 0
+    words = out.replace(",", " ").replace(":", " ").replace(".", " ").split()
+    assert set(policies.ROSTER.policies) <= set(words)
+
+
 def test_file_without_markers_is_refused_before_anything_is_flown(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
