@@ -16,7 +16,8 @@ legs are rounded down to whole buckets (completions only become earlier, terms o
 task may be visited again (more lists than there are); `swarm.kernels.routes_bound`. The prices
 begin as what each task adds to known lists and follow subgradients, a group of UAVs at a time
 (incremental subgradients: Nedić and Bertsekas 2001, doi:10.1137/S1052623499362111) with Polyak's
-step at first, which then shrinks. Any prices yield a bound, and the least one seen is kept.
+step at first, which then shrinks. Any prices yield a bound, and the least one seen is kept. Who
+bounds those maxima otherwise passes that in.
 
 Leaves out: proofs of optimality (`coordinator.planner.exact`).
 """

@@ -6,8 +6,9 @@ is at most S·m·(D − t)⁺ times p, or times 1 where outcomes are drawn. Then
 of the attempt that the fate lets succeed; that must be 1 as well unless the mission reattempts, as
 no UAV tries again what is not open again. So
 
-- t is not before the task appears and k services are over, nor after the task is withdrawn or j
-  is lost;
+- t is not before the task has appeared, j could be there and k services are over, nor after the
+  task is withdrawn or j is lost; earlier attempts may have been made long before, so after its
+  previous counted visit j has to fly there and to serve once;
 - S is 1 where survival is drawn, and j survives its attempts before the k-th; if it does not
   survive that one either, this task is its last, which is S = 0 for all that follow;
 - elsewhere S is at most the product of j's survival probabilities over its counted visits so far,
@@ -143,7 +144,6 @@ class _Hindsight:
         else:
             success = success * problem.survival ** (tries - 1)
             survival = problem.survival**tries
-        service_s = tries * problem.service_s
         appears_s = np.array([task.appears_s for task in mission.tasks], float)
         lost_s = np.array([fate.lost_at_s.get(uav.id, math.inf) for uav in mission.uavs], float)
         gone_s = np.array([fate.withdrawn_at_s.get(t.id, math.inf) for t in mission.tasks], float)
@@ -157,9 +157,9 @@ class _Hindsight:
             survival,
             problem.horizon_s,
         )
-        earliest_s = appears_s + service_s
+        earliest_s = np.maximum(appears_s, start_s) + tries * problem.service_s
         latest_s = np.minimum(lost_s[:, None], gone_s) + _SLACK_S
-        first_s = start_s + service_s
+        first_s = start_s + problem.service_s
         return cls(
             team=TeamArrays.at_start(routes, problem.start_enu_m),
             worth=success * problem.value,
@@ -167,7 +167,7 @@ class _Hindsight:
             earliest_s=earliest_s,
             latest_s=latest_s,
             first_s=first_s,
-            timetable=Timetable(first_s, between_s + service_s[:, None, :], earliest_s, latest_s),
+            timetable=Timetable(first_s, between_s + problem.service_s, earliest_s, latest_s),
         )
 
     def direct_worth(self) -> FloatArray:
