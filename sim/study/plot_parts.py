@@ -64,11 +64,13 @@ _LOOKS = {
     "value-per-time": Look("#D55E00", ">", filled=False),
     BOUND: Look("#000000", "_"),
 }
-_MORE_LOOKS = tuple(
-    Look(colour, marker, filled=False)
-    for colour, marker in zip(
-        ("#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#777777", "#000000"), "os^Dvp", strict=True
-    )
+_MORE_LOOKS = (
+    Look("#777777", "o", filled=False),
+    Look("#E69F00", "s", filled=False),
+    Look("#56B4E9", "^", filled=False),
+    Look("#CC79A7", "D", filled=False),
+    Look("#009E73", "v", filled=False),
+    Look("#000000", "p", filled=False),
 )
 
 

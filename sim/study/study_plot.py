@@ -48,6 +48,8 @@ _CHURN = {
     "duplicate_visits": "tasks done twice, per mission",
     "churn": "tasks moved or released, per mission",
 }
+_TICK_S = 1e-9
+"""A clock may have seen no time pass, which a logarithmic axis cannot show."""
 _TIME_MARKS = {"median": ("o", 6.0), "99 % quantile": ("|", 11.0), "longest": (">", 6.0)}
 
 
@@ -199,7 +201,8 @@ def time_figure(summary: Summary, setting: Setting) -> Figure | None:
     figure, (axes,) = rows_figure(len(walls))
     for place, (name, wall) in enumerate(walls):
         look = look_of(name, summary.policies)
-        times_ms = [1e3 * time_s for time_s in (wall.median_s, wall.p99_s, wall.max_s)]
+        times_s = (wall.median_s, wall.p99_s, wall.max_s)
+        times_ms = [1e3 * max(_TICK_S, time_s) for time_s in times_s]
         axes.plot(times_ms, [place] * 3, color=look.colour, linewidth=1.6, zorder=2)
         for time_ms, (marker, size) in zip(times_ms, _TIME_MARKS.values(), strict=True):
             axes.plot(time_ms, place, marker=marker, color=look.colour, markersize=size, zorder=3)
@@ -246,8 +249,8 @@ def _against(axes: Axes, vary: str, settings: Sequence[Setting]) -> None:
 def _from_zero(axes: Axes, along: Literal["x", "y"]) -> None:
     """For counts: as far as they reach, and to 1 where there are none."""
     limits = axes.dataLim.intervalx if along == "x" else axes.dataLim.intervaly
-    top = 1.05 * float(limits[1]) or 1.0
-    axes.set(**{f"{along}lim": (0.0, top)})
+    most = float(limits[1])  # minus infinity where nothing is drawn
+    axes.set(**{f"{along}lim": (0.0, 1.05 * most if most > 0.0 else 1.0)})
 
 
 def _line(

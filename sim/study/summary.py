@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from math import isfinite
 from statistics import median
 from typing import TYPE_CHECKING
 
@@ -81,7 +80,7 @@ class Measured:
     value: Estimate
     """Mean over its trials [value·s]."""
     ratio: Estimate | None
-    """Of its mean value to the reference's."""
+    """Of its mean value to the reference's; of negative ones the greater is worth less."""
     difference: Estimate | None
     """Of its value from the reference's [value·s]."""
     better: Estimate | None
@@ -159,15 +158,15 @@ class Summary:
 
     @property
     def policies(self) -> list[str]:
-        """Best first, by their ratios in the first setting that has one; the bound last."""
-        ratios: dict[str, float] = {}
+        """Best first, by the first setting in which they can be compared; the bound last."""
+        better_by: dict[str, float] = {}
         names: dict[str, None] = {}
         for setting in self.settings:
             for name, each in setting.policies.items():
                 names[name] = None
-                if each.ratio is not None and isfinite(each.ratio.value):
-                    ratios.setdefault(name, each.ratio.value)
-        return sorted(names, key=lambda name: (name == BOUND, -ratios.get(name, 0.0), name))
+                if each.difference is not None:
+                    better_by.setdefault(name, each.difference.value)
+        return sorted(names, key=lambda name: (name == BOUND, -better_by.get(name, 0.0), name))
 
     def markdown(self, *, every_setting: bool = False) -> str:
         """Tables for a document; those of ``every_setting`` beside the study's own on request."""

@@ -9,7 +9,6 @@ import pytest
 from matplotlib.figure import Figure
 
 from sim.study.plot_parts import look_of
-from sim.study.rows import BOUND
 from sim.study.study_plot import (
     churn_bars_figure,
     churn_figure,
@@ -39,10 +38,13 @@ def row_names(figure: Figure) -> list[str]:
     return [label.get_text() for label in figure.axes[0].get_yticklabels()]
 
 
-def test_every_figure_is_a_valid_png_and_svg(summary: Summary, tmp_path: Path) -> None:
-    drawn = draw_study(summary, tmp_path)
+@pytest.fixture(scope="module")
+def drawn(summary: Summary, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return draw_study(summary, tmp_path_factory.mktemp("figures"))
 
-    assert sorted(drawn) == sorted(tmp_path.iterdir())
+
+def test_every_figure_is_a_valid_png_and_svg(drawn: list[Path]) -> None:
+    assert sorted(drawn) == sorted(drawn[0].parent.iterdir())
     assert [path.stem for path in drawn[::2]] == [
         "policies",
         "duplicates-and-churn",
@@ -59,15 +61,15 @@ def test_every_figure_is_a_valid_png_and_svg(summary: Summary, tmp_path: Path) -
             assert width >= 1000
 
 
-def test_same_rows_give_the_same_files(tmp_path: Path) -> None:
-    folders = tmp_path / "one", tmp_path / "other"
-    files = []
-    for folder in folders:
-        folder.mkdir()
-        files.append(draw_study(summarise(study_rows(("central",), trials=2), "central"), folder))
+def test_same_rows_give_the_same_files(
+    drawn: list[Path], summary: Summary, own: Setting, tmp_path: Path
+) -> None:
+    again = draw_study(replace(summary, settings=(own,)), tmp_path)
 
-    one, other = files
-    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
+    assert len(again) == 6
+    for one, other in zip(drawn, again, strict=False):
+        assert one.name == other.name
+        assert one.read_bytes() == other.read_bytes()
 
 
 def test_all_policies_are_listed_best_first_with_their_figures(
@@ -127,11 +129,15 @@ def test_decision_times_are_sorted_and_say_where_they_were_taken(
     assert figure.get_supxlabel().endswith("a machine")
 
 
-def test_bound_alone_decides_nothing_that_could_be_timed() -> None:
-    rows = [row for row in study_rows((), trials=2) if row.policy == BOUND]
-    summary = summarise(rows, "central")
+def test_bound_alone_is_drawn_without_times_or_counts() -> None:
+    summary = summarise(study_rows((), {"loss": (0.1,)}, trials=2), "central")
+    own = summary.settings[0]
 
-    assert time_figure(summary, summary.settings[0]) is None
+    assert time_figure(summary, own) is None
+    assert row_names(comparison_figure(summary, own)) == ["clairvoyant (bound)"]
+    assert row_names(churn_bars_figure(summary, own)) == []
+    assert [len(axes.lines) for axes in churn_figure(summary, "loss").axes] == [0, 0]
+    assert len(value_figure(summary, "loss").axes[0].lines) == 1
 
 
 def test_policies_of_ones_own_get_looks_of_their_own() -> None:

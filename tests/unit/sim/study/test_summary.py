@@ -97,6 +97,8 @@ def test_policies_are_listed_best_first_and_the_bound_last() -> None:
     rows = study_rows(("greedy", "central", "guided"), {"loss": (0.1,)}, trials=5)
 
     assert summarise(rows, "central").policies == ["guided", "central", "greedy", BOUND]
+    worthless = [replace(row, value=row.value - 1e6) for row in rows]
+    assert summarise(worthless, "central").policies == ["guided", "central", "greedy", BOUND]
 
 
 def test_wall_times_are_medians_over_trials_and_the_longest_of_all() -> None:
