@@ -58,7 +58,11 @@ class TaskBoard:
     def __init__(self, replica: Replica, mission: str) -> None:
         self.replica = replica
         self._mission = mission
+        self._entries: list[Board] = []
+        """In board order."""
+        self._entries_version = -1
         self._states: dict[str, TaskState] = {}
+        self._unfinished = False
         self._states_version = -1
         self._problem: Problem | None = None
         self._problem_version = -1
@@ -66,10 +70,14 @@ class TaskBoard:
     @property
     def states(self) -> dict[str, TaskState]:
         """State of every task on the board, in board order."""
-        if self._states_version != self.replica.task_version:
-            self._states = _task_states(self.replica)
-            self._states_version = self.replica.task_version
+        self._catch_up()
         return self._states
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether any task on the board is open."""
+        self._catch_up()
+        return self._unfinished
 
     @property
     def problem(self) -> Problem | None:
@@ -81,22 +89,30 @@ class TaskBoard:
             self._problem_version = self.replica.board_version
         return self._problem
 
+    def _catch_up(self) -> None:
+        if self._states_version != self.replica.task_version:
+            self._states = self._task_states()
+            self._unfinished = TaskState.OPEN in self._states.values()
+            self._states_version = self.replica.task_version
 
-def _task_states(replica: Replica) -> dict[str, TaskState]:
-    done = {task for (_, task), o in replica.outcomes.items() if o.result is Result.DONE}
-    tried = {task for (_, task), o in replica.outcomes.items() if o.result is Result.FAILED}
-    reattempt = replica.brief is not None and replica.brief.reattempt_failed
-    states = {}
-    for entry in sorted(replica.board.values(), key=_order):
-        if entry.task in done:
-            states[entry.task] = TaskState.DONE
-        elif entry.withdrawn:
-            states[entry.task] = TaskState.WITHDRAWN
-        elif entry.task in tried and not reattempt:
-            states[entry.task] = TaskState.FAILED
-        else:
-            states[entry.task] = TaskState.OPEN
-    return states
+    def _task_states(self) -> dict[str, TaskState]:
+        replica = self.replica
+        if self._entries_version != replica.board_version:
+            self._entries = sorted(replica.board.values(), key=_order)
+            self._entries_version = replica.board_version
+        states = {
+            entry.task: TaskState.WITHDRAWN if entry.withdrawn else TaskState.OPEN
+            for entry in self._entries
+        }
+        reattempt = replica.brief is not None and replica.brief.reattempt_failed
+        for (_, task), outcome in replica.outcomes.items():
+            if task not in states:
+                continue
+            if outcome.result is Result.DONE:
+                states[task] = TaskState.DONE
+            elif states[task] is TaskState.OPEN and not reattempt:
+                states[task] = TaskState.FAILED
+        return states
 
 
 def mission_of(replica: Replica, name: str, brief: Brief) -> Mission:
