@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.study.rows import COLUMNS, Row
-from swarm.errors import Fault, InputError, SwarmError
+from swarm.errors import Fault, InputError
 
 __all__ = [
     "read_rows",
@@ -75,7 +75,7 @@ def write_parquet(folder: Path, rows: Sequence[Row]) -> Path:
         The file.
 
     Raises:
-        SwarmError: it cannot be written.
+        OSError: it cannot be written.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -85,11 +85,8 @@ def write_parquet(folder: Path, rows: Sequence[Row]) -> Path:
     columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
     path = folder / _PARQUET_FILE
     draft = path.with_suffix(".next")
-    try:
-        pq.write_table(pa.table(columns, schema=schema), draft)
-        draft.replace(path)
-    except OSError as error:
-        raise SwarmError(f"{path} cannot be written: {error.strerror or error}") from error
+    pq.write_table(pa.table(columns, schema=schema), draft)
+    draft.replace(path)
     return path
 
 

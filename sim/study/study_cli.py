@@ -30,7 +30,7 @@ from sim.uncertainty_options import (
     WindOption,
     WithdrawRateOption,
 )
-from swarm.errors import Fault, InputError
+from swarm.errors import Fault, InputError, SwarmError
 from swarm.options import JsonOption
 
 if TYPE_CHECKING:
@@ -327,6 +327,9 @@ def _summary(found: Study, rows: list[Row], *, here: bool) -> Summary:
             missions = f"random missions of {uavs} UAVs and {tasks} tasks"
         case same:
             missions = f"mission {same.mission.name}"
+    if found.uncertainty.outcomes:
+        again = found.mission(0).reattempt_failed
+        missions += f", where failed tasks {'open again' if again else 'stay failed'}"
     machine = this_machine()
     what = {name: ROSTER.policy(name).what for name in found.policies}
     if found.bound:
@@ -350,14 +353,20 @@ def _write(
     from sim.study.store import ROWS_FILE, STUDY_FILE
 
     files = [out / STUDY_FILE, out / ROWS_FILE]
-    if file_format == "parquet":
-        files.append(write_parquet(out, rows))
-    files.append(out / _SUMMARY_FILE)
-    files[-1].write_text(summary.markdown(every_setting=True), encoding="utf-8")
-    if plots:
-        from sim.study.study_plot import draw_study
+    try:
+        if file_format == "parquet":
+            files.append(write_parquet(out, rows))
+        files.append(out / _SUMMARY_FILE)
+        files[-1].write_text(summary.markdown(every_setting=True), encoding="utf-8")
+        if plots:
+            from sim.study.study_plot import draw_study
 
-        files += draw_study(summary, out)
+            files += draw_study(summary, out)
+    except OSError as error:
+        reason = error.strerror or error
+        raise SwarmError(
+            f"the trials are in {out}, and the rest cannot be written: {reason}"
+        ) from error
     return files
 
 

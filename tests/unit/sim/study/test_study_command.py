@@ -94,6 +94,27 @@ def test_study_of_a_folder_is_itself_a_study_and_goes_on(
     assert not list(tmp_path.glob("*.png"))
 
 
+def test_files_that_cannot_be_written_are_told_in_one_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "summary.md").mkdir()
+
+    status, out, err = run(capsys, *SMALL, *CHEAP, "--out", str(tmp_path))
+
+    assert (status, out) == (1, "")
+    assert err.splitlines()[1:] == [
+        f"swarm: the trials are in {tmp_path}, and the rest cannot be written: Is a directory"
+    ]
+
+
+def test_what_becomes_of_failed_tasks_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    _, stays, _ = run(capsys, *SMALL, *CHEAP, "--outcomes")
+    _, opens, _ = run(capsys, *SMALL, *CHEAP, "--outcomes", "--reattempt")
+
+    assert "where failed tasks stay failed" in stays
+    assert "where failed tasks open again" in opens
+
+
 def test_interruption_ends_with_130_and_says_what_is_kept(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
