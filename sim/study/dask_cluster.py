@@ -7,6 +7,7 @@ out: starting a cluster (``dask scheduler``, ``dask worker``).
 
 from __future__ import annotations
 
+import logging
 import platform
 import warnings
 from collections.abc import Generator, Iterator, Sequence
@@ -31,6 +32,8 @@ _AHEAD = 2
 """Chunks handed out per thread of the cluster, so that none waits for the next one."""
 _RETRIES = 3
 _OPTION = "--scheduler"
+_LOGGERS = ("distributed", "distributed.client")
+"""Those that Dask gives levels of their own."""
 
 
 def on_dask(address: str, timeout_s: float = CONNECT_TIMEOUT_S) -> Fly:
@@ -55,7 +58,7 @@ def _client(address: str, timeout_s: float) -> Iterator[Any]:
     except ImportError as error:
         remedy = "install it with: pip install 'peckorder[study]'"
         raise InputError(Fault(_OPTION, address, "needs Dask's distributed", remedy)) from error
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _silent(*_LOGGERS):
         # The versions that matter here are compared below.
         warnings.simplefilter("ignore", distributed.versions.VersionMismatchWarning)
         try:
@@ -68,6 +71,19 @@ def _client(address: str, timeout_s: float) -> Iterator[Any]:
             yield client
         finally:
             client.close(timeout=timeout_s)
+
+
+@contextmanager
+def _silent(*loggers: str) -> Iterator[None]:
+    """What goes wrong is told in one line, without the tracebacks that Dask logs besides."""
+    levels = {name: logging.getLogger(name).level for name in loggers}
+    for name in loggers:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
 
 
 def _threads_ready(client: Any, address: str, timeout_s: float) -> int:
