@@ -27,19 +27,23 @@ from sim.processes import Process
 from sim.rough_network import Conditions, RoughNetwork, Topology
 from sim.uncertainty import Uncertainty
 from sim.virtual_vehicle import SimulatedVehicle, VirtualVehicle
-from sim.world import OPERATOR_PATIENCE_S, QUIET, Faults, Planner, Setting, Watch, World
+from sim.world import QUIET, Planner, Setting, Watch, World
 from swarm.config import PRESETS, Link, LinkPreset, Timing
 from swarm.events import Note
 from swarm.model import Mission, Task, Uav, UavId
-from swarm.model.ids import OPERATOR
+from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.wire.messages import Epoch, EpochPhase, Message, Outcome
 
 __all__ = ["FatedWorld"]
 
+_HEARD_S = 0.1
+"""How often it is looked whether the start of the mission has been heard of."""
 _OPERATOR_SITS_DOWN_S = 1.0
 """After the loss of a coordinator; until then everyone has noticed it."""
-_START_S = 60.0
-"""Until a mission starts whose UAVs do not all get airborne."""
+_START_S = 600.0
+"""Until a mission starts whose UAVs do not all get airborne, be it because nobody tells them."""
+_REPEATS = 10
+"""How often an operator says each change of the board again."""
 _TAKEOFF_S = 20.0
 """While the vehicles take off, the processes of a real fleet find each other."""
 _WIRED = replace(
@@ -81,6 +85,8 @@ class FatedWorld:
         self._uavs: dict[str, Uav] = {str(uav.id): uav for uav in fate.mission.uavs}
         self._tasks: dict[str, Task] = {str(task.id): task for task in fate.mission.tasks}
         self._mission = _without_never_seen(fate)
+        self._told_s = 0.0
+        """How long an operator repeats what they say."""
         self._timing = self._timing_of(fate.uncertainty)
         self._next: Watch | None = watch
         self._outcomes: set[tuple[str, str, int]] = set()
@@ -90,10 +96,10 @@ class FatedWorld:
             make_plan,
             method=method,
             seed=seed,
-            faults=Faults(coordinator_lost_at_s=coordinator_lost_s),
             timing=self._timing,
             setting=Setting(
                 network=partial(_network, fate),
+                start_timeout_s=_START_S,
                 vehicle=partial(_vehicle, fate),
                 agent=make_agent,
             ),
@@ -157,14 +163,24 @@ class FatedWorld:
             if partition.group:
                 world.queue.at(zero_s + partition.at_s, partial(self._cut, partition))
         if self._coordinator_lost_s is not None:
-            sits_s = self._coordinator_lost_s + _OPERATOR_SITS_DOWN_S
-            if _last_change_s(self._mission, fate) > self._coordinator_lost_s:
-                world.queue.at(zero_s + sits_s, self._seat_operator)
+            world.queue.at(zero_s + self._coordinator_lost_s, self._lose_coordinator)
 
     def _lose(self, uav: UavId, why: str) -> None:
         if not self.world.processes[uav].over:
             self.lost[uav] = why
             self.world.lose(uav)
+
+    def _lose_coordinator(self) -> None:
+        """It dies, but not before anybody has heard that the mission has begun."""
+        world = self.world
+        epochs = [agent.replica.epoch for agent in world.agents.values()]
+        if not any(epoch is not None and epoch.phase is EpochPhase.RUNNING for epoch in epochs):
+            if not world.processes[COORDINATOR].over:
+                world.queue.after(_HEARD_S, self._lose_coordinator)
+            return
+        world.lose(COORDINATOR)
+        if _last_change_s(self._mission, self.fate) > (self._coordinator_lost_s or 0.0):
+            world.queue.after(_OPERATOR_SITS_DOWN_S, self._seat_operator)
 
     def _cut(self, partition: Partition) -> None:
         network = self.world.network
@@ -173,14 +189,18 @@ class FatedWorld:
             self.world.queue.after(partition.for_s, partial(network.heal, partition.group))
 
     def _seat_operator(self) -> None:
+        world, timing = self.world, self._timing
+        zero_s, now_s = world.zero_s or 0.0, world.queue.now_s()
         seat = TaskSeat(
             self._mission,
             self.fate.withdrawn_at_s,
-            incarnation=2_000_000 + round(1e3 * self.world.queue.now_s()),
-            timing=self._timing,
-            patience_s=OPERATOR_PATIENCE_S,
+            since_s=self._coordinator_lost_s or 0.0,
+            mission_s=now_s - zero_s,
+            incarnation=2_000_000 + round(1e3 * now_s),
+            timing=timing,
+            patience_s=self._told_s,
         )
-        self.world.admit(OPERATOR, seat)
+        world.admit(OPERATOR, seat)
 
     def _survive(self, process: Process, outcome: Outcome) -> None:
         attempt = process.name, outcome.task, outcome.attempt
@@ -199,10 +219,11 @@ class FatedWorld:
         timing = QUIET
         if not uncertainty.ideal_communication:
             timing = _preset(uncertainty).timing
-        if self._coordinator_lost_s is None:
-            return timing
+            self._told_s = _REPEATS * timing.announce_s
         last_s = max((task.appears_s for task in self._mission.tasks), default=0.0)
-        return replace(timing, linger_s=max(timing.linger_s, last_s))
+        if self._coordinator_lost_s is None or last_s == 0.0:
+            return timing
+        return replace(timing, linger_s=max(timing.linger_s, last_s + self._told_s))
 
 
 def _without_never_seen(fate: Fate) -> Mission:

@@ -154,6 +154,8 @@ class Setting:
     """Processes whose disks are needed later."""
     plan_s: float = 0.0
     """How long planning takes [s]."""
+    start_timeout_s: float = 60.0
+    """UAVs that are not airborne by then are given up [s]."""
     telemetry_gap_s: float = 0.0
     """Shortest interval at which vehicles tell where they are [s]."""
     without_bus_s: float | None = None
@@ -449,7 +451,7 @@ class World:
             seed=self._seed,
             incarnation=incarnation,
             timing=self._timing,
-            start_timeout_s=60.0,
+            start_timeout_s=self._setting.start_timeout_s,
             layers=FlightLayers(),
             memory=memory,
             memory_age_s=memory_age_s,

@@ -16,26 +16,31 @@ legs are rounded down to whole buckets (completions only become earlier, terms o
 task may be visited again (more lists than there are); `swarm.kernels.routes_bound`. The prices
 begin as what each task adds to known lists and follow subgradients, a group of UAVs at a time
 (incremental subgradients: Nedić and Bertsekas 2001, doi:10.1137/S1052623499362111) with Polyak's
-step at first, which then shrinks. Any prices yield a bound, and the least one seen is kept.
+step at first, which then shrinks. Any prices yield a bound, and the least one seen is kept. Who
+bounds those maxima otherwise passes that in.
 
 Leaves out: proofs of optimality (`coordinator.planner.exact`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from coordinator.planner.stop import ShouldStop, never
 from swarm.allocation.guided import route_arrays
 from swarm.allocation.objective import evaluate
-from swarm.allocation.problem import FloatArray, Problem
+from swarm.allocation.problem import FloatArray, IntArray, Problem
 from swarm.kernels.routes import TeamArrays
 from swarm.kernels.routes_bound import MOST_BUCKETS, priced_lists, shortest_leg_s
 
-__all__ = ["UpperBound", "trivial_bound", "upper_bound"]
+__all__ = ["Pricing", "UpperBound", "lagrangian_bound", "trivial_bound", "upper_bound"]
+
+Pricing = Callable[[TeamArrays, FloatArray], tuple[float, IntArray]]
+"""Of lists; see `swarm.kernels.routes_bound.priced_lists`."""
 
 _GROUPS = 10
 _FIRST_STRIDE = 2.0
@@ -107,35 +112,69 @@ def upper_bound(
     bucket_s, cycles = _affordable(problem, team)
     if cycles < _FEWEST_CYCLES:
         return UpperBound(trivial, "trivial", 0)
-    n_group = min(_GROUPS, problem.n_uav)
-    groups = [
-        replace(team, active=np.arange(problem.n_uav) % n_group == group)
-        for group in range(n_group)
-    ]
     known = max(0.0, evaluate(problem, lists)[0])
     price = _marginal_worth(problem, lists)
+    pricing = partial(priced_lists, bucket_s=bucket_s, threads=threads)
+    lowest, made = lagrangian_bound(
+        team, pricing, price, cycles, known=known, should_stop=should_stop
+    )
+    if lowest < trivial:
+        return UpperBound(lowest, "lagrangian", made)
+    return UpperBound(trivial, "trivial", made)
+
+
+def lagrangian_bound(
+    team: TeamArrays,
+    pricing: Pricing,
+    price: FloatArray,
+    cycles: int,
+    *,
+    known: float = 0.0,
+    expected: float | None = None,
+    should_stop: ShouldStop = never,
+) -> tuple[float, int]:
+    """The least Σ π + Σ of priced lists that is seen while prices follow subgradients.
+
+    Args:
+        team: mission and state.
+        pricing: bounds the best lists of the active UAVs from above, given prices, and tells how
+            often some such lists visit each task.
+        price: (n_task,) to begin with [value·s]; >= 0.
+        cycles: over all UAVs, at most.
+        known: worth of lists that are known; no bound is below it.
+        expected: guess of the optimum, which scales the first step; ``known`` when None.
+        should_stop: asked between cycles with the cycles made.
+
+    Returns:
+        The bound [value·s], and the cycles made.
+    """
+    n_uav = team.mission.n_uav
+    n_group = min(_GROUPS, n_uav)
+    groups = [
+        replace(team, active=np.asarray(team.active) & (np.arange(n_uav) % n_group == group))
+        for group in range(n_group)
+    ]
     lowest, made, stride = np.inf, 0, 0.0
     while True:
         if made % _BETWEEN_BOUNDS == 0 or made == cycles or should_stop(made):
-            worth, visits = priced_lists(team, price, bucket_s, threads=threads)
+            worth, visits = pricing(team, price)
             bound = float(price.sum()) + worth
             lowest = min(lowest, bound)
             slope = 1.0 - visits
             slope[(price <= 0.0) & (slope > 0.0)] = 0.0
             square = float(slope @ slope)
             if made == 0 and square > 0.0:
-                stride = _FIRST_STRIDE * (bound - known) / square
+                stride = (
+                    _FIRST_STRIDE * (bound - (known if expected is None else expected)) / square
+                )
             if made == cycles or square == 0.0 or bound <= known or should_stop(made):
                 break
         for group in groups:
-            _, visits = priced_lists(group, price, bucket_s, threads=threads)
+            _, visits = pricing(group, price)
             price = np.maximum(0.0, price - stride * (1.0 / n_group - visits))
         stride *= (_LAST_STRIDE / _FIRST_STRIDE) ** (1.0 / cycles)
         made += 1
-    lowest += _ROUNDING * abs(lowest)
-    if lowest < trivial:
-        return UpperBound(lowest, "lagrangian", made)
-    return UpperBound(trivial, "trivial", made)
+    return lowest + _ROUNDING * abs(lowest), made
 
 
 def _affordable(problem: Problem, team: TeamArrays) -> tuple[float, int]:

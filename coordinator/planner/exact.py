@@ -67,17 +67,18 @@ def estimated_s(problem: Problem) -> float:
     return problem.n_uav * (table_s + 3.0**n * 2e-9 + 1e-5)
 
 
-def optimum(problem: Problem, limit_s: float = _LIMIT_S) -> Optimum:
+def optimum(problem: Problem, limit_s: float = _LIMIT_S, *, threads: int | None = None) -> Optimum:
     """The best lists.
 
     Args:
         problem: the mission.
         limit_s: refuse when `estimated_s` is above this [s]; the run itself is not cut short.
+        threads: at most this many; does not change the result.
 
     Raises:
         ProblemTooLargeError: more than `MAX_TASKS` tasks, or the estimate is above ``limit_s``.
     """
-    return _solved(problem, limit_s, worst=False)
+    return _solved(problem, limit_s, worst=False, threads=threads)
 
 
 def worst_value(problem: Problem, limit_s: float = _LIMIT_S) -> float:
@@ -89,13 +90,15 @@ def worst_value(problem: Problem, limit_s: float = _LIMIT_S) -> float:
     return _solved(problem, limit_s, worst=True).objective
 
 
-def _solved(problem: Problem, limit_s: float, *, worst: bool) -> Optimum:
+def _solved(
+    problem: Problem, limit_s: float, *, worst: bool, threads: int | None = None
+) -> Optimum:
     estimate_s = estimated_s(problem)
     if estimate_s > limit_s:
         raise ProblemTooLargeError(
             problem.n_uav, problem.n_task, _most_tasks(problem), estimate_s, limit_s
         )
-    objective, routes = kernel.optimum(problem.kernel, worst=worst)
+    objective, routes = kernel.optimum(problem.kernel, worst=worst, threads=threads)
     return Optimum(objective, tuple(tuple(route) for route in routes))
 
 

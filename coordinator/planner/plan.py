@@ -46,6 +46,7 @@ def make_plan(
     stop: ShouldStop | None = None,
     progress: Progress | None = None,
     bound_s: float | None = None,
+    threads: int | None = None,
 ) -> Plan:
     """Plan a mission.
 
@@ -61,6 +62,8 @@ def make_plan(
         progress: told the evaluations or iterations and the best J so far, again and again.
         bound_s: work out an upper bound on J for about this long where the optimum is not proven
             [s]; not at all when None.
+        threads: at most this many; as many as there are processors when None. Changes nothing but
+            speed.
 
     Returns:
         The plan. Its sequence is None for ``exact``, which has none.
@@ -78,13 +81,13 @@ def make_plan(
     proven: float | None = None
     routes: Sequence[Sequence[int]]
     if method == "exact":
-        routes = optimum(problem).routes
+        routes = optimum(problem, threads=threads).routes
         proven = evaluate(problem, routes)[0]
     elif method == "guided":
-        guided = guided_plan(problem, seed=seed, stop=stop, progress=progress)
+        guided = guided_plan(problem, seed=seed, stop=stop, progress=progress, threads=threads)
         routes, sequence, evaluations = guided.routes, guided.sequence, guided.iterations
         if estimated_s(problem) <= _PROOF_S:
-            proven = evaluate(problem, optimum(problem).routes)[0]
+            proven = evaluate(problem, optimum(problem, threads=threads).routes)[0]
     else:
         search = best_sequence(
             problem,
@@ -93,17 +96,18 @@ def make_plan(
             never if stop is None else stop,
             limits=_limits(problem, method, stopped=isinstance(stop, Limit)),
             progress=progress,
+            threads=threads,
         )
         sequence, evaluations = search.sequence, search.evaluations
         routes, _ = run(problem, TeamState.at_start(problem), rank_of(sequence), rule)
         if estimated_s(problem) <= _PROOF_S:
-            proven = evaluate(problem, optimum(problem).routes)[0]
+            proven = evaluate(problem, optimum(problem, threads=threads).routes)[0]
     objective, completion_s = evaluate(problem, routes)
     if proven is not None:
         proven = max(proven, objective)  # the same lists summed in another order may be 1e-15 off
     bound: float | None = None
     if proven is None and bound_s is not None:
-        bound = upper_bound(problem, routes, after_time(clock, bound_s)).objective
+        bound = upper_bound(problem, routes, after_time(clock, bound_s), threads=threads).objective
     return Plan(
         scenario=mission.name,
         method=method,

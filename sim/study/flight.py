@@ -5,6 +5,7 @@ Leaves out: who decides (sim.study.policy) and statistics over many missions.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -70,7 +71,8 @@ def value_of(fate: Fate, visits: Iterable[Visit]) -> float:
 
     Where outcomes are drawn a task is worth m·(D − t) at the first visit that succeeds. Otherwise
     the first visit to it is worth p·S·m·(D − t), eq. 1; S is left out where survival is drawn,
-    since then UAVs that do not survive make no more visits.
+    since then UAVs that do not survive make no more visits. A task is worth nothing once it is
+    withdrawn, also to those who have not heard of it.
     """
     mission = fate.mission
     uavs = {uav.id: uav for uav in mission.uavs}
@@ -80,7 +82,8 @@ def value_of(fate: Fate, visits: Iterable[Visit]) -> float:
     value = 0.0
     for visit in visits:
         uav, task = uavs[visit.uav], tasks[visit.task]
-        if visit.done and visit.task not in counted:
+        wanted = visit.completed_s <= fate.withdrawn_at_s.get(visit.task, math.inf)
+        if visit.done and wanted and visit.task not in counted:
             counted.add(visit.task)
             weight = 1.0 if fate.uncertainty.outcomes else mission.success(uav, task)
             if not fate.uncertainty.survival:
@@ -103,7 +106,7 @@ def score(fate: Fate, flight: Flight) -> Score:
     there = {
         task.id
         for task in fate.mission.tasks
-        if fate.withdrawn_at_s.get(task.id, float("inf")) > task.appears_s
+        if fate.withdrawn_at_s.get(task.id, math.inf) > task.appears_s
     }
     return Score(
         value=value_of(fate, flight.visits),

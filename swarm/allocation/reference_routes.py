@@ -7,10 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import Problem
+from swarm.kernels.routes_bound import Timetable
 
-__all__ = ["best_of_neighbourhood", "list_worth", "neighbourhood", "team_worth"]
+__all__ = [
+    "best_of_neighbourhood",
+    "list_worth",
+    "neighbourhood",
+    "team_worth",
+    "timed_list_worth",
+]
 
 Lists = list[list[int]]
 
@@ -33,6 +42,30 @@ def list_worth(problem: Problem, state: TeamState, uav: int, route: Sequence[int
 def team_worth(problem: Problem, state: TeamState, lists: Sequence[Sequence[int]]) -> float:
     """The same summed over the team."""
     return sum(list_worth(problem, state, uav, route) for uav, route in enumerate(lists))
+
+
+def timed_list_worth(
+    problem: Problem, timetable: Timetable, uav: int, route: Sequence[int]
+) -> float | None:
+    """Σ p·S·m·(D − t)⁺ over one list flown from mission time 0 by a timetable [value·s].
+
+    None if a task could only be completed too late.
+    """
+    first_s, leg_s, earliest_s, latest_s = (
+        np.asarray(getattr(timetable, name))
+        for name in ("first_s", "leg_s", "earliest_s", "latest_s")
+    )
+    done_s, survived, worth, before = 0.0, 1.0, 0.0, -1
+    for task in route:
+        done_s += float(leg_s[uav, before, task] if before >= 0 else first_s[uav, task])
+        done_s = max(done_s, float(earliest_s[uav, task]))
+        if done_s > latest_s[uav, task]:
+            return None
+        weight = float(problem.success[uav, task]) * float(problem.value[task])
+        worth += survived * weight * max(0.0, problem.horizon_s - done_s)
+        survived *= float(problem.survival[uav, task])
+        before = task
+    return worth
 
 
 def neighbourhood(problem: Problem, lists: Lists) -> Iterator[Lists]:

@@ -327,6 +327,28 @@ def shortest_leg_s(
         NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
 ) -> float: ...
+
+class Timetable:
+    def __init__(
+        self,
+        first_s: Annotated[
+            NDArray[numpy.float64],
+            dict(shape=(None, None), order="C", device="cpu", writable=False),
+        ],
+        leg_s: Annotated[
+            NDArray[numpy.float64],
+            dict(shape=(None, None, None), order="C", device="cpu", writable=False),
+        ],
+        earliest_s: Annotated[
+            NDArray[numpy.float64],
+            dict(shape=(None, None), order="C", device="cpu", writable=False),
+        ],
+        latest_s: Annotated[
+            NDArray[numpy.float64],
+            dict(shape=(None, None), order="C", device="cpu", writable=False),
+        ],
+    ) -> None: ...
+
 def priced_lists(
     instance: RouteInstance,
     free_s: Annotated[
@@ -348,5 +370,7 @@ def priced_lists(
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
     bucket_s: float,
+    timetable: Timetable | None,
+    expansions: int,
     threads: int,
 ) -> tuple[float, Annotated[NDArray[numpy.int64], dict(shape=(None,))]]: ...

@@ -18,6 +18,13 @@ namespace peckorder {
 
 namespace {
 
+using Table = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+
+template <class Array>
+std::vector<double> copied(const Array& array) {
+  return {array.data(), array.data() + array.size()};
+}
+
 // A search with the start it refers to.
 class BoundSearch {
  public:
@@ -123,25 +130,36 @@ void bind_routes(nb::module_& module) {
       nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"));
 
+  nb::class_<Timetable>(module, "Timetable")
+      .def(
+          "__init__",
+          [](Timetable* self, const Matrix& first_s, const Table& leg_s, const Matrix& earliest_s,
+             const Matrix& latest_s) {
+            new (self) Timetable{static_cast<int>(first_s.shape(1)), copied(first_s),
+                                 copied(leg_s), copied(earliest_s), copied(latest_s)};
+          },
+          nb::arg("first_s"), nb::arg("leg_s"), nb::arg("earliest_s"), nb::arg("latest_s"));
+
   module.def(
       "priced_lists",
       [](const Instance& instance, const Vector& free_s, const Matrix& place_m,
          const Vector& survived, const Mask& active, const Mask& open, const Vector& prices,
-         double bucket_s, int threads) {
+         double bucket_s, const Timetable* timetable, long expansions, int threads) {
         const Start start = StartArrays{free_s, place_m, survived, active}.start(instance);
         const std::vector<int> tasks = open_tasks(open);
-        const std::vector<double> price(prices.data(), prices.data() + prices.shape(0));
+        const std::vector<double> price = copied(prices);
         std::vector<int> visits;
         double value;
         {
           const nb::gil_scoped_release released;
-          value = priced_lists(instance, start, tasks, price, bucket_s, threads, visits);
+          value = priced_lists(instance, start,
+                               {tasks, price, bucket_s, timetable, expansions, threads}, visits);
         }
         return std::make_pair(value, to_array({visits.begin(), visits.end()}));
       },
       nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("bucket_s"),
-      nb::arg("threads"));
+      nb::arg("timetable").none(), nb::arg("expansions"), nb::arg("threads"));
 }
 
 }  // namespace peckorder

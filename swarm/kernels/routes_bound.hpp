@@ -1,22 +1,48 @@
 // The best list of one UAV against prices of tasks, relaxed: what a Lagrangian bound is made of.
 //
 // Times are counted in whole buckets, each leg rounded down, and a task may be visited again; so
-// the value found is never below that of any real list. See coordinator/planner/bound.py.
+// the value found is never below that of any real list. A search among real lists, which that
+// value guides and to which survival matters, may then bring it down. See coordinator/planner/bound.py.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "routes_instance.hpp"
 
 namespace peckorder {
 
+// What each UAV can complete when, and how long it takes there, where the instance's places,
+// speeds and horizon do not say it all. Rows are UAVs, columns tasks; times count from the mission's
+// begin, whatever `Start` says.
+struct Timetable {
+  int n_task;
+  std::vector<double> first_s;         // from the UAV's start to completing the task
+  std::vector<double> leg_s;           // (n_uav, n_task, n_task) from completing one to another
+  std::vector<double> earliest_s;      // a UAV that would complete it sooner waits
+  std::vector<double> latest_s;        // later it is worth nothing, nor is what follows
+
+  std::size_t at(int uav, int task) const {
+    return static_cast<std::size_t>(uav) * n_task + task;
+  }
+};
+
+// What is asked of `priced_lists`.
+struct Pricing {
+  const std::vector<int>& open;        // tasks
+  const std::vector<double>& prices;   // (n_task,)
+  double bucket_s;                     // > 0
+  const Timetable* timetable;          // null: as the instance says
+  long expansions;                     // of the search among real lists, per UAV; 0: none
+  int threads;
+};
+
 // The shortest leg any active UAV can fly, service included, also from its start [s].
 double shortest_leg_s(const Instance& instance, const Start& start);
 
-// Σ over `uavs` of max(0, best relaxed list); visits[i] counts task i on the lists found.
-// `bucket_s` is positive and not above the shortest leg. The same for any number of threads.
-double priced_lists(const Instance& instance, const Start& start, const std::vector<int>& open,
-                    const std::vector<double>& prices, double bucket_s, int threads,
+// Σ over active UAVs of max(0, best relaxed list); visits[i] counts task i on the lists found.
+// The same for any number of threads.
+double priced_lists(const Instance& instance, const Start& start, const Pricing& pricing,
                     std::vector<int>& visits);
 
 }  // namespace peckorder

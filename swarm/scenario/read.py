@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from swarm.scenario.shapes import Scenario, TaskTable, UavTable
     from swarm.scenario.task_files import TaskFile
 
-__all__ = ["build_mission", "load_scenario", "parse_scenario"]
+__all__ = ["build_mission", "load_scenario", "parse_scenario", "parse_toml"]
 
 _WHAT = "scenario file"
 _WHERE = re.compile(r"(?P<problem>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end.*)\)")
@@ -67,7 +67,7 @@ def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
     Raises:
         InputError: with every fault of the file, in the order of the file.
     """
-    document = _document(data, source)
+    document = parse_toml(data, source, _WHAT)
     if "tasks_from" not in document:
         return build_mission(document, source)
     from swarm.scenario.task_files import read_task_file
@@ -130,12 +130,17 @@ def _from_file(finding: Finding, first: int) -> bool:
             return False
 
 
-def _document(data: bytes, source: str) -> Document:
-    text = decode(data, source, _WHAT)
+def parse_toml(data: bytes, source: str, what: str) -> Document:
+    """The document in the bytes of a ``what``, such as a scenario file.
+
+    Raises:
+        InputError: it is no TOML.
+    """
+    text = decode(data, source, what)
     try:
         return tomllib.loads(text)
     except RecursionError as error:
-        fault = Fault(source, "", "is nested too deeply", "give a scenario file in TOML")
+        fault = Fault(source, "", "is nested too deeply", f"give a {what} in TOML")
         raise InputError(fault) from error
     except ValueError as error:  # of which TOMLDecodeError is one, and huge integers are another
         raise InputError(_syntax_fault(str(error), text, source)) from error

@@ -78,7 +78,6 @@ def test_nothing_to_do_is_worth_nothing() -> None:
         ("price", [-1.0] * 8, 0.1, 1),
         ("bucket_s", [1.0] * 8, 0.0, 1),
         ("bucket_s", [1.0] * 8, float("nan"), 1),
-        ("bucket_s", [1.0] * 8, 3.0, 1),
         ("bucket_s", [1.0] * 8, 1e-9, 1),
         ("threads", [1.0] * 8, 0.1, 0),
     ],

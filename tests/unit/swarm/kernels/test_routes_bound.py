@@ -1,15 +1,20 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, permutations
 
 import numpy as np
+import numpy.typing as npt
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import TeamState
 from swarm.allocation.guided import route_arrays, team_arrays
-from swarm.allocation.reference_routes import list_worth
-from swarm.kernels.routes_bound import priced_lists, shortest_leg_s
+from swarm.allocation.reference_routes import list_worth, timed_list_worth
+from swarm.kernels.routes import TeamArrays
+from swarm.kernels.routes_bound import Timetable, priced_lists, shortest_leg_s
 from tests.problems import any_problem
 
 
@@ -50,3 +55,91 @@ def test_with_fine_buckets_one_visit_is_worth_nearly_what_it_is() -> None:
     real = max(0.0, list_worth(problem, state, 0, [task]))
     assert real <= worth <= real + problem.weight[0, task] * shortest_s / 1000.0 + 1e-9
     assert visits[task] == 1 or real == 0.0
+
+
+def random_timetable(rng: np.random.Generator, n_uav: int, n_task: int) -> Timetable:
+    """Deadlines, release times, and legs of any length, down to none at all."""
+    shape = (n_uav, n_task)
+    leg_s = rng.uniform(0.0, 3.0, (n_uav, n_task, n_task))
+    leg_s *= rng.integers(0, 2, leg_s.shape)
+    return Timetable(
+        first_s=rng.uniform(0.0, 3.0, shape),
+        leg_s=leg_s,
+        earliest_s=rng.uniform(0.0, 6.0, shape) * rng.integers(0, 2, shape),
+        latest_s=np.where(rng.random(shape) < 0.5, np.inf, rng.uniform(0.0, 9.0, shape)),
+    )
+
+
+def lists_of(tasks: list[int]) -> Iterator[tuple[int, ...]]:
+    return chain.from_iterable(permutations(tasks, k) for k in range(len(tasks) + 1))
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n_task=st.integers(1, 5),
+    bucket_s=st.floats(0.01, 5.0),
+    expansions=st.sampled_from([0, 1, 3, 10_000]),
+)
+def test_timed_lists_are_bounded_and_searched_as_the_plain_definition_says(
+    seed: int, n_task: int, bucket_s: float, expansions: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    problem = any_problem(seed, 2, n_task)
+    deadly = rng.random(problem.survival.shape) < 0.2
+    problem = replace(problem, survival=np.where(deadly, 0.0, problem.survival))
+    timetable = random_timetable(rng, 2, n_task)
+    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    price = rng.uniform(0.0, 10.0, n_task)
+
+    worth, visits = priced_lists(team, price, bucket_s, timetable=timetable, expansions=expansions)
+
+    best = 0.0
+    for uav in range(2):
+        paid = [0.0]
+        for route in lists_of(np.flatnonzero(problem.capable[uav]).tolist()):
+            value = timed_list_worth(problem, timetable, uav, route)
+            if value is not None:
+                paid.append(value - float(price[list(route)].sum()))
+        best += max(paid)
+    assert worth >= best - 1e-9 * (1.0 + best)
+    assert (visits >= 0).all()
+    if expansions == 10_000:
+        assert worth <= best * (1.0 + 1e-4) + 1e-9
+        assert visits.max() <= 2
+
+
+def test_search_among_real_lists_only_lowers_the_bound() -> None:
+    problem = any_problem(7, 3, 12)
+    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    price, bucket_s = np.full(12, 0.1), shortest_leg_s(team) / 2.0
+
+    worths = [
+        priced_lists(team, price, bucket_s, expansions=expansions)[0]
+        for expansions in (0, 10, 100, 10_000)
+    ]
+
+    assert worths == sorted(worths, reverse=True)
+    assert worths[-1] < worths[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("first_s", np.full((2, 3), -1.0)),
+        ("leg_s", np.zeros((2, 3))),
+        ("earliest_s", np.full((2, 3), np.inf)),
+        ("latest_s", np.full((2, 3), np.nan)),
+    ],
+)
+def test_wrong_timetables_are_refused_by_name(name: str, wrong: npt.NDArray[np.float64]) -> None:
+    times = np.zeros((2, 3))
+    right = {
+        "first_s": times,
+        "leg_s": np.zeros((2, 3, 3)),
+        "earliest_s": times,
+        "latest_s": times,
+    }
+
+    with pytest.raises(ValueError, match=name):
+        Timetable(**{**right, name: wrong})

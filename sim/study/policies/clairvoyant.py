@@ -1,0 +1,236 @@
+"""A value that nobody can exceed who meets the same fate, not even one who knows all of it.
+
+**What counts.** Whoever decides, every task adds to `sim.study.flight.value_of` at one visit at
+most. Let j be the UAV that makes it, at time t, at the end of its k-th attempt. What the visit adds
+is at most S·m·(D − t)⁺ times p, or times 1 where outcomes are drawn. Then k is 1, or the number
+of the attempt that the fate lets succeed; that must be 1 as well unless the mission reattempts, as
+no UAV tries again what is not open again. So
+
+- t is not before the task has appeared, j could be there and k services are over, nor after the
+  task is withdrawn or j is lost; earlier attempts may have been made long before, so after its
+  previous counted visit j has to fly there and to serve once;
+- S is 1 where survival is drawn, and j survives its attempts before the k-th; if it does not
+  survive that one either, this task is its last, which is S = 0 for all that follow;
+- elsewhere S is at most the product of j's survival probabilities over its counted visits so far,
+  each with the power of its number of attempts.
+
+**Flights.** Between two of its counted visits j moves from true stop to true stop and then serves.
+It may turn off on the way, towards other tasks, and however it turns its velocity stays within
+what the fate lets it fly in that direction at the greatest speed of all its legs. With a wind
+these velocities form a convex set around 0 (two balls' common part), so by the triangle inequality
+no detour is faster than the straight leg at that speed. Without variation from leg to leg that is
+the leg as it is really flown; with it the bound is that much too generous.
+
+**The bound.** So no value exceeds the largest sum of worths over disjoint lists of tasks, one list
+per UAV, so timed and worth so much, where UAVs wait as they like. How prices of tasks bound that
+from above is told in `coordinator.planner.bound`; here each UAV's best list at given prices is
+searched for among real lists with exact times, which leaves little but the duality gap. Where it is
+lower the trivial bound counts: every task reached straight from its best UAV's start, as soon as
+that may be.
+
+Leaves out: a flight that reaches the bound, which need not exist. Who waits at a place before the
+task there appears knew of it, so part of what policies miss is beyond them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from coordinator.planner.bound import lagrangian_bound
+from sim.fate import Fate
+from sim.kinematics import Point
+from sim.study.policy import Planner
+from swarm.allocation import Problem
+from swarm.allocation.problem import BoolArray, FloatArray, IntArray
+from swarm.kernels.routes import RouteArrays, TeamArrays
+from swarm.kernels.routes_bound import Timetable, priced_lists
+from swarm.model import Task, Uav
+
+__all__ = ["Clairvoyant", "clairvoyant_bound"]
+
+_CYCLES = 60
+_OPERATIONS = 1e10
+"""Of the dynamic programme in all: some ten seconds."""
+_FEWEST_CYCLES = 4
+_BUCKETS_PER_TASK = 30.0
+"""Up to the horizon, per task on a UAV's list."""
+_FEWEST_BUCKETS, _MOST_BUCKETS = 150, 400
+_EXPANSIONS = 2000
+"""Of the search among real lists, per list; with lists of some five tasks it seldom needs them."""
+_REACHED = 4e6
+"""Places at which all these searches of a cycle may look."""
+_FIRST_PRICE = 0.5
+"""Of a task, as a share of what it is worth when reached straight from the best start."""
+_EXPECTED = 0.9
+"""Guess of the optimum, as a share of the first bound; it scales the first step alone."""
+_MOST_ATTEMPTS = 64
+"""Looked at; after these the next is taken to succeed."""
+_SLACK_S = 1e-6
+"""By which a visit may miss a deadline through rounding."""
+
+
+class Clairvoyant:
+    """The bound of whoever knows the draws."""
+
+    name = "clairvoyant"
+    what = "no policy can be better: an upper bound that knows all draws"
+
+    def value(self, fate: Fate, plan: Planner) -> float:
+        """The bound for that fate [value·s]; it needs no plan."""
+        del plan
+        return clairvoyant_bound(fate)
+
+
+def clairvoyant_bound(fate: Fate) -> float:
+    """No flight in ``fate`` has a larger value [value·s].
+
+    A quarter of a second at 10 UAVs × 50 tasks. Where lists are long (more than ten tasks) the
+    search among real ones is cut short and the bound a few per cent above the best flight; with
+    thousands of tasks only the trivial one is given.
+    """
+    hindsight = _Hindsight.of(fate)
+    direct = hindsight.direct_worth()
+    trivial = float(direct.sum()) * (1.0 + 1e-9)
+    n_uav, n_task = hindsight.worth.shape
+    if trivial == 0.0:
+        return 0.0
+    buckets = _BUCKETS_PER_TASK * n_task / n_uav
+    buckets = min(max(buckets, _FEWEST_BUCKETS), _MOST_BUCKETS)
+    cycles = min(_CYCLES, int(_OPERATIONS / (n_uav * n_task**2 * buckets)))
+    if cycles < _FEWEST_CYCLES:
+        return trivial
+    pricing = partial(
+        priced_lists,
+        bucket_s=fate.mission.horizon_s / buckets,
+        timetable=hindsight.timetable,
+        expansions=min(_EXPANSIONS, int(_REACHED / (n_uav * n_task))),
+        threads=1,
+    )
+    price = _FIRST_PRICE * direct
+    first = float(price.sum()) + pricing(hindsight.team, price)[0]
+    expected = _EXPECTED * min(first, trivial)
+    lowest, _ = lagrangian_bound(hindsight.team, pricing, price, cycles, expected=expected)
+    return min(lowest, trivial)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Hindsight:
+    """The mission as it looks to one who knows the fate."""
+
+    team: TeamArrays
+    worth: FloatArray
+    """(n_uav, n_task) what a visit that counts is worth per second before D."""
+    horizon_s: float
+    earliest_s: FloatArray
+    latest_s: FloatArray
+    first_s: FloatArray
+    timetable: Timetable
+
+    @classmethod
+    def of(cls, fate: Fate) -> _Hindsight:
+        """All that the fate says of every UAV and task."""
+        mission = fate.mission
+        problem = Problem.from_mission(mission)
+        attempts, survives = _attempts(fate)
+        tries = np.maximum(attempts, 1)
+        success = np.ones_like(problem.success) if fate.uncertainty.outcomes else problem.success
+        success = np.where(problem.capable & (attempts > 0), success, 0.0)
+        if fate.uncertainty.survival:
+            survival = survives.astype(float)
+        else:
+            success = success * problem.survival ** (tries - 1)
+            survival = problem.survival**tries
+        appears_s = np.array([task.appears_s for task in mission.tasks], float)
+        lost_s = np.array([fate.lost_at_s.get(uav.id, math.inf) for uav in mission.uavs], float)
+        gone_s = np.array([fate.withdrawn_at_s.get(t.id, math.inf) for t in mission.tasks], float)
+        start_s, between_s = _flights_s(fate)
+        routes = RouteArrays(
+            problem.task_enu_m,
+            problem.speed_m_s,
+            problem.value,
+            problem.service_s,
+            success,
+            survival,
+            problem.horizon_s,
+        )
+        earliest_s = np.maximum(appears_s, start_s) + tries * problem.service_s
+        latest_s = np.minimum(lost_s[:, None], gone_s) + _SLACK_S
+        first_s = start_s + problem.service_s
+        return cls(
+            team=TeamArrays.at_start(routes, problem.start_enu_m),
+            worth=success * problem.value,
+            horizon_s=problem.horizon_s,
+            earliest_s=earliest_s,
+            latest_s=latest_s,
+            first_s=first_s,
+            timetable=Timetable(first_s, between_s + problem.service_s, earliest_s, latest_s),
+        )
+
+    def direct_worth(self) -> FloatArray:
+        """(n_task,) what each task is worth when its best UAV flies straight to it."""
+        done_s = np.maximum(self.first_s, self.earliest_s)
+        left_s = np.where(done_s <= self.latest_s, np.maximum(0.0, self.horizon_s - done_s), 0.0)
+        worth: FloatArray = (self.worth * left_s).max(axis=0, initial=0.0)
+        return worth
+
+
+def _attempts(fate: Fate) -> tuple[IntArray, BoolArray]:
+    """(n_uav, n_task) attempts until one succeeds, 0 for never; whether the UAV survives them."""
+    mission = fate.mission
+    shape = (len(mission.uavs), len(mission.tasks))
+    attempts, survives = np.ones(shape, dtype=np.int64), np.ones(shape, dtype=np.bool_)
+    if fate.uncertainty.outcomes or fate.uncertainty.survival:
+        for row, uav in enumerate(mission.uavs):
+            for column, task in enumerate(mission.tasks):
+                attempts[row, column], survives[row, column] = _attempts_of(fate, uav, task)
+    return attempts, survives
+
+
+def _attempts_of(fate: Fate, uav: Uav, task: Task) -> tuple[int, bool]:
+    most = _MOST_ATTEMPTS if fate.mission.reattempt_failed else 1
+    for attempt in range(1, most + 1):
+        survives = fate.survives(uav, task, attempt)
+        if fate.succeeds(uav, task, attempt):
+            return attempt, survives
+        if not survives:
+            return 0, False
+    return (most + 1, True) if fate.mission.reattempt_failed else (0, True)
+
+
+def _flights_s(fate: Fate) -> tuple[FloatArray, FloatArray]:
+    """Least flight times, from starts (n_uav, n_task) and between tasks (n_uav, n_task, n_task)."""
+    mission = fate.mission
+    n_uav, n_task = len(mission.uavs), len(mission.tasks)
+    start_s, between_s = np.zeros((n_uav, n_task)), np.zeros((n_uav, n_task, n_task))
+    for row, uav in enumerate(mission.uavs):
+        stops = [fate.stop_enu_m(uav.id, task) for task in mission.tasks]
+        fast = _at_its_fastest(fate, uav)
+        start_s[row] = _legs_s(fate, fast, [uav.position_enu_m], stops)
+        between_s[row] = _legs_s(fate, fast, stops, stops)
+    return start_s, between_s
+
+
+def _at_its_fastest(fate: Fate, uav: Uav) -> Uav:
+    """The UAV with the speed on its fastest leg as its cruise speed, as variation there goes."""
+    here = uav.position_enu_m
+    still_m_s = fate.speed_m_s(uav, None, here, here)
+    speeds_m_s = (fate.speed_m_s(uav, task.id, here, here) for task in fate.mission.tasks)
+    fastest_m_s = max(speeds_m_s, default=still_m_s)
+    return replace(uav, speed_m_s=uav.speed_m_s * max(1.0, fastest_m_s / still_m_s))
+
+
+def _legs_s(fate: Fate, uav: Uav, starts: list[Point], stops: list[Point]) -> FloatArray:
+    """(len(starts), len(stops)) straight flights."""
+    begin, end = np.array(starts, float).reshape(-1, 3), np.array(stops, float).reshape(-1, 3)
+    length_m = np.sqrt(((end[None] - begin[:, None]) ** 2).sum(axis=2))
+    here = uav.position_enu_m
+    speed_m_s = np.full(length_m.shape, fate.speed_m_s(uav, None, here, here))
+    if fate.wind.speed_m_s > 0.0:
+        for row, start in enumerate(starts):
+            speed_m_s[row] = [fate.speed_m_s(uav, None, start, stop) for stop in stops]
+    legs_s: FloatArray = length_m / speed_m_s
+    return legs_s

@@ -1,0 +1,265 @@
+"""What a study says, as tables: Markdown for documents, rich ones for terminals of any width.
+
+Leaves out: working it out (sim.study.summary).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from rich.console import Console, ConsoleOptions, JustifyMethod, RenderResult
+from rich.table import Table
+from rich.text import Text
+
+from sim.study.quantities import QUANTITIES, uncertainty_words
+from sim.study.rows import BOUND
+from sim.study.statistics import Estimate
+from sim.study.summary import Measured, Setting, Summary, Wall
+from sim.study.summary_words import (
+    IDEAL,
+    NONE,
+    interval_text,
+    number_text,
+    policy_label,
+    spread_text,
+    trials_text,
+)
+
+__all__ = ["TerminalTables", "as_markdown"]
+
+_GAP = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A table as text; the first column names policies, the others are numbers."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+def as_markdown(summary: Summary, *, every_setting: bool = False) -> str:
+    """Tables for a document, with what they are of above them."""
+    parts = ["\n".join(_about(summary))]
+    for grid in _grids(summary, every_setting=every_setting):
+        rows = [grid.headings, ("---", *("---:",) * (len(grid.headings) - 1)), *grid.rows]
+        cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+        parts.append(f"**{grid.title}**")
+        parts.append("\n".join(f"| {' | '.join(row)} |" for row in cells))
+        parts += [grid.note] if grid.note else []
+    what = summary.about.what
+    said = [f"- `{name}`: {what[name]}" for name in summary.policies if name in what]
+    parts += ["\n".join(said)] if said else []
+    return "\n\n".join(parts) + "\n"
+
+
+@dataclass(frozen=True, slots=True)
+class TerminalTables:
+    """The study's own setting and what is varied, in parts as wide as the terminal is."""
+
+    summary: Summary
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """As rich asks."""
+        for line in _about(self.summary):
+            yield Text(line.replace("`", ""))
+        for grid in _grids(self.summary, every_setting=False):
+            for part in _fitting(grid, options.max_width):
+                table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+                for place, heading in enumerate(part.headings):
+                    justify: JustifyMethod = "right" if place else "left"
+                    table.add_column(Text(heading), justify=justify, no_wrap=True)
+                for row in part.rows:
+                    table.add_row(*(Text(cell) for cell in row))
+                yield Text()
+                yield Text(part.title, style="bold")
+                yield table
+            if grid.note:
+                yield Text(grid.note)
+
+
+# -- tables -----------------------------------------------------------------------------
+
+
+def _grids(summary: Summary, *, every_setting: bool) -> Iterator[Grid]:
+    own = summary.own
+    if own is not None:
+        yield from _of_setting(summary, own)
+        times = _times(summary, own)
+        if times is not None:
+            yield times
+    for vary, settings in summary.varied.items():
+        yield _against(summary, vary, settings)
+    if every_setting:
+        for each in summary.settings:
+            if each is not own:
+                yield from _of_setting(summary, each)
+
+
+def _of_setting(summary: Summary, setting: Setting) -> Iterator[Grid]:
+    """Two tables: values, and what happened."""
+    where = _where(summary, setting)
+    found = [setting.policies[name] for name in summary.policies if name in setting.policies]
+    reference = summary.reference
+    columns: list[tuple[str, Callable[[Measured], str]]] = [
+        ("J [value·s]", lambda each: number_text(each.value.value)),
+        (f"J / {reference}'s", lambda each: _ratio(summary, each)),
+        ("better in", lambda each: _share(None if each.policy == reference else each.better)),
+        ("J / bound", lambda each: "1" if each.policy == BOUND else interval_text(each.of_bound)),
+        ("all done in", lambda each: _share(each.complete)),
+    ]
+    if BOUND not in setting.policies:
+        del columns[3]
+    if any(each.trials != setting.trials for each in found):
+        columns.append(("trials", lambda each: str(each.trials)))
+    yield _grid(summary, f"Value{where} ({trials_text([setting])})", found, columns)
+    yield _grid(
+        summary,
+        f"Per mission{where}",
+        [each for each in found if each.means],
+        [
+            ("done", _mean("done")),
+            ("failed", _mean("failed")),
+            ("missed", _mean("missed")),
+            ("done twice", _mean("duplicate_visits")),
+            ("moved", _mean("moved")),
+            ("released", _mean("released")),
+            ("epochs", _mean("epochs")),
+            ("messages", _mean("messages")),
+            ("makespan [s]", _mean("makespan_s")),
+        ],
+    )
+
+
+def _times(summary: Summary, setting: Setting) -> Grid | None:
+    found = [setting.policies[name] for name in summary.policies if name in setting.policies]
+    timed = [each for each in found if each.wall is not None]
+    if not timed:
+        return None
+    on = f", on {summary.about.machine}" if summary.about.machine else ""
+    return _grid(
+        summary,
+        f"Wall time of a decision or plan{_where(summary, setting)}",
+        timed,
+        [
+            ("per mission", _mean("decisions")),
+            ("median [ms]", _wall_ms(lambda wall: wall.median_s)),
+            ("p99 [ms]", _wall_ms(lambda wall: wall.p99_s)),
+            ("longest [ms]", _wall_ms(lambda wall: wall.max_s)),
+        ],
+        f"Median and p99: the median over trials of each trial's{on}.",
+    )
+
+
+def _against(summary: Summary, vary: str, settings: Sequence[Setting]) -> Grid:
+    """Ratios against the values of one quantity."""
+    quantity = QUANTITIES[vary]
+    rows = [
+        (
+            policy_label(summary, name),
+            *(_spread(summary, each.policies.get(name)) for each in settings),
+        )
+        for name in summary.policies
+    ]
+    reference = [each.policies.get(summary.reference) for each in settings]
+    values = [NONE if each is None else number_text(each.value.value) for each in reference]
+    return Grid(
+        title=f"J / {summary.reference}'s against {quantity.name} ({trials_text(settings)})",
+        headings=("policy", *(quantity.text(each.at or 0.0) for each in settings)),
+        rows=(*rows, (f"J of {summary.reference} [value·s]", *values)),
+    )
+
+
+def _grid(
+    summary: Summary,
+    title: str,
+    found: Sequence[Measured],
+    columns: Sequence[tuple[str, Callable[[Measured], str]]],
+    note: str = "",
+) -> Grid:
+    return Grid(
+        title=title,
+        headings=("policy", *(heading for heading, _ in columns)),
+        rows=tuple((policy_label(summary, m.policy), *(of(m) for _, of in columns)) for m in found),
+        note=note,
+    )
+
+
+def _fitting(grid: Grid, width: int) -> Iterator[Grid]:
+    """The same in as few parts as fit, each with the policies, and about as wide as each other."""
+    table = [grid.headings, *grid.rows]
+    name, *widths = (max(map(len, column)) + _GAP for column in zip(*table, strict=True))
+    room = max(0, width - name + _GAP)
+    fewest = len(_filled(widths, room))
+    parts = next(p for most in range(room + 1) if len(p := _filled(widths, most)) == fewest)
+    for part in parts:
+        cut = [(row[0], *(row[1 + place] for place in part)) for row in table]
+        title = grid.title if part is parts[0] else f"{grid.title}, continued"
+        yield Grid(title, cut[0], tuple(cut[1:]))
+
+
+def _filled(widths: Sequence[int], room: int) -> list[list[int]]:
+    """Places in order, in parts whose widths together are at most ``room`` or that have one."""
+    parts: list[list[int]] = []
+    left = 0
+    for place, width in enumerate(widths):
+        if parts and width <= left:
+            parts[-1].append(place)
+        else:
+            parts.append([place])
+            left = room
+        left -= width
+    return parts
+
+
+# -- words ------------------------------------------------------------------------------
+
+
+def _where(summary: Summary, setting: Setting) -> str:
+    """Which setting it is, for a title."""
+    if setting.at is None:
+        return ", the study's own setting" if summary.varied else ""
+    quantity = QUANTITIES[setting.vary]
+    return f", {quantity.name}: {quantity.text(setting.at)}"
+
+
+def _about(summary: Summary) -> list[str]:
+    about = summary.about
+    told = [about.missions] if about.missions else []
+    told += [uncertainty_words(about.uncertainty)] if about.uncertainty is not None else []
+    run = [trials_text(summary.settings)] if summary.settings else ["no trials yet"]
+    run += [f"seed {about.seed}"] if about.seed is not None else []
+    text = f"{'; '.join([*told, ', '.join(run)])}."
+    compared = (
+        f"Ratios are of mean J to `{summary.reference}`'s, over the trials that both flew, with "
+        "their paired 95 % interval (Fieller's)."
+    )
+    lines = [text[0].upper() + text[1:], compared]
+    if about.ideal:
+        lines.append(f"{IDEAL} modelled with ideal communication only.")
+    return lines
+
+
+def _ratio(summary: Summary, each: Measured) -> str:
+    return "1" if each.policy == summary.reference else interval_text(each.ratio)
+
+
+def _spread(summary: Summary, each: Measured | None) -> str:
+    if each is None or each.policy != summary.reference:
+        return spread_text(None if each is None else each.ratio)
+    return "1"
+
+
+def _share(estimate: Estimate | None) -> str:
+    return NONE if estimate is None else f"{100.0 * estimate.value:.0f} %"
+
+
+def _mean(name: str) -> Callable[[Measured], str]:
+    return lambda each: number_text(each.means[name].value) if name in each.means else NONE
+
+
+def _wall_ms(of: Callable[[Wall], float]) -> Callable[[Measured], str]:
+    return lambda each: NONE if each.wall is None else number_text(1e3 * of(each.wall), decimals=6)
