@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coordinator.core import FlightLayers
-from coordinator.events import PlanFailed, PlanMade
+from coordinator.events import PlanFailed, PlanMade, Withdraw
 from swarm.config import Timing
 from swarm.events import Ask, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Stop, Tick
 from swarm.model.ids import COORDINATOR
@@ -438,3 +438,17 @@ def test_what_it_learns_counts_like_what_it_hears() -> None:
 def test_layers_below_the_ground_are_refused(lowest_m: float, spacing_m: float) -> None:
     with pytest.raises(ValueError, match="layers"):
         FlightLayers(lowest_m, spacing_m)
+
+
+# -- withdrawals ------------------------------------------------------------------------
+
+
+def test_a_task_that_is_withdrawn_is_so_on_the_board_once_and_for_all() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.happen(Withdraw("t0"))
+    coordinator.happen(Withdraw("t0"))
+    coordinator.happen(Withdraw("unknown"))
+
+    posted = [entry for entry in said(coordinator.log, Board) if entry.withdrawn]
+    assert [entry.task for entry in posted] == ["t0"]
+    assert coordinator.core.replica.board["t0"].withdrawn
