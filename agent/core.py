@@ -41,6 +41,7 @@ from agent.vehicle import (
     VehicleReady,
 )
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import (
     Finish,
     Heard,
@@ -135,6 +136,7 @@ class AgentCore:
         """Whether the vehicle was told to fly to its start before it returns."""
         self._exit_status = 0
         self._finished = False
+        self._deadline_s: float | None = None
         self._kept: object = None
 
     # -- the one entry point ------------------------------------------------------
@@ -153,6 +155,9 @@ class AgentCore:
             event: what happened.
             now_s: now, on this process's own clock [s]; never decreases.
         """
+        if isinstance(event, Telemetry) and self._changes_nothing_else(now_s):
+            self._picture.move(event)
+            return []
         if not self._finished and self._pulse.late(now_s):
             self._actions += self._hearing.held_up(now_s)
         if not self._finished:
@@ -162,14 +167,18 @@ class AgentCore:
         return self._end_step()
 
     def next_deadline_s(self) -> float | None:
-        """When `step` wants a `Tick` at the latest; None when it has finished.
+        """When `step` wants a `Tick` at the latest; None when it has finished."""
+        return self._deadline_s
+
+    def _earliest_deadline_s(self) -> float | None:
+        """Of all parts.
 
         Each deadline is None from the moment on at which nobody would heed it any
         more: one that stayed would be past for ever.
         """
         if self._finished:
             return None
-        deadlines = (
+        return earliest(
             self._peers.membership.next_deadline_s(),
             self._speech.next_deadline_s(),
             self._tasking.next_deadline_s(),
@@ -178,7 +187,6 @@ class AgentCore:
             self._recall.next_deadline_s() if self._is_beginning else None,
             self._solitude.next_deadline_s() if self._minds_solitude else None,
         )
-        return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What this process answers for: its own registers, and those of who cannot.
@@ -302,6 +310,11 @@ class AgentCore:
             self._actions.append(Note("landed at home"))
             self._finish(self._exit_status, now_s)
 
+    def _changes_nothing_else(self, now_s: float) -> bool:
+        """Whether nothing follows from where the vehicle is: known before, and nothing is due."""
+        due = self._deadline_s is not None and self._deadline_s <= now_s
+        return self._picture.place_enu_m is not None and not (due or self._finished)
+
     # -- what follows from the state ------------------------------------------------
 
     def _advance(self, now_s: float) -> None:
@@ -316,13 +329,20 @@ class AgentCore:
         if self._is_beginning:
             self._begin(now_s)
         if self._tasking.phase is not None and self._picture.running:
-            self._actions += self._tasking.advance(now_s, informed=self._learning.current)
+            self._go_on(now_s)
         if not self._finished:
             lacking = self._stage is StatusPhase.LEARNING
             self._actions += self._learning.questions(now_s, lacking=lacking)
             self._actions += self._speech.repeat(
                 lambda: self._status(now_s), now_s, learned=self._hearing.at_work
             )
+
+    def _go_on(self, now_s: float) -> None:
+        """Do what the tasks ask for; whoever is alone then is woken by nobody but itself."""
+        before = self.phase, self._tasking.undecided
+        self._actions += self._tasking.advance(now_s, informed=self._learning.current)
+        if before != (self.phase, self._tasking.undecided):
+            self._go_home_if_over(now_s)
 
     @property
     def _knows_enough(self) -> bool:
@@ -495,7 +515,8 @@ class AgentCore:
             actions.insert(0, Save())
         # The vehicle first: it waits, while keeping and telling take their time.
         actions.sort(key=lambda action: not isinstance(action, Order))
-        self._pulse.promise(self.next_deadline_s())
+        self._deadline_s = self._earliest_deadline_s()
+        self._pulse.promise(self._deadline_s)
         return actions
 
     def _worth_keeping(self, actions: list[Action]) -> bool:

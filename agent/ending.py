@@ -61,10 +61,12 @@ class Ending:
 
     def _forsaken(self, phase: StatusPhase, now_s: float, *, undecided: bool) -> bool:
         """Whether there has been neither a coordinator nor anything to do for long enough."""
+        if COORDINATOR in self._peers.membership.present:
+            self._forsaken_at_s = None
+            return False
         running = self._picture.running
         waiting = phase is StatusPhase.IDLE and not running
-        finished = running and self._nothing_to_do(phase, undecided=undecided)
-        if COORDINATOR in self._peers.membership.present or not (waiting or finished):
+        if not (waiting or (running and self._nothing_to_do(phase, undecided=undecided))):
             self._forsaken_at_s = None
             return False
         if self._forsaken_at_s is None:

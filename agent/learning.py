@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from swarm.asking import Asking
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import Ask
 
 __all__ = ["Learning"]
@@ -71,5 +72,4 @@ class Learning:
 
     def next_deadline_s(self) -> float | None:
         """When `questions` will next have one."""
-        times_s = (self._asking.next_deadline_s(), self._again_at_s)
-        return min((time_s for time_s in times_s if time_s is not None), default=None)
+        return earliest(self._asking.next_deadline_s(), self._again_at_s)

@@ -39,11 +39,11 @@ class Peers:
         One that says less than is known of it does not remember what an earlier life, or
         another process in its place, has said: it cannot answer for that yet.
         """
-        writer, known = message.writer, replica.known(message)
-        anew = self.membership.heard(writer, now_s)
-        forgets = known is not None and message.stamp < known.stamp
-        if isinstance(message.body, Claim | Epoch) and not forgets:
-            self.membership.spoke(writer)
+        anew = self.membership.heard(message.writer, now_s)
+        if isinstance(message.body, Claim | Epoch):
+            known = replica.known(message)
+            if known is None or message.stamp >= known.stamp:
+                self.membership.spoke(message.writer)
         return anew
 
     def back(self, writer: str) -> bool:
@@ -55,6 +55,8 @@ class Peers:
     def lost(self, now_s: float) -> list[tuple[str, str]]:
         """Writers given up by now, each told once, and by what they were missed."""
         lost = self.membership.lost(now_s)
+        if not lost:
+            return []
         self._lost.update(lost)
         return [(w, "silent" if self.membership.mute(w) else "gone") for w in lost]
 
@@ -81,9 +83,12 @@ class Peers:
 
     def winner(self, replica: Replica, task: str) -> str | None:
         """Whose claim on ``task`` is the strongest that counts, the own among them."""
-        rivals = {*self.credible, self._uav}
         claims = replica.claims.items()
-        return winner((uav, c) for uav, c in claims if c.task == task and uav in rivals)
+        return winner(
+            (uav, claim)
+            for uav, claim in claims
+            if claim.task == task and (uav == self._uav or self.membership.is_credible(uav))
+        )
 
     def patience_ends_s(self, replica: Replica, now_s: float) -> float | None:
         """When the first of those awaited will be awaited no longer; None if nobody is."""

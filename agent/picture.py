@@ -79,7 +79,7 @@ class Picture:
     @property
     def unfinished(self) -> bool:
         """Whether any task is open."""
-        return TaskState.OPEN in self.board.states.values()
+        return self.board.unfinished
 
     @property
     def running(self) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import Publish
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
@@ -103,5 +104,4 @@ class Speech:
 
     def next_deadline_s(self) -> float | None:
         """When `repeat` will next have something to say."""
-        times_s = (self._announce_at_s, self._status_at_s)
-        return min((time_s for time_s in times_s if time_s is not None), default=None)
+        return earliest(self._announce_at_s, self._status_at_s)

@@ -17,6 +17,7 @@ from agent.speech import Speech
 from agent.vehicle import GoTo
 from swarm.allocation.lower_level import Decision, Rule
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import Note
 from swarm.state.board import TaskState
 from swarm.state.registers import Replica
@@ -182,14 +183,15 @@ class Tasking:
 
     def next_deadline_s(self) -> float | None:
         """When `advance` will next have something to do."""
-        times_s = (self._held_at_s, self._served_at_s, self._retry_at_s, self._ready_by_s)
-        return min((time_s for time_s in times_s if time_s is not None), default=None)
+        return earliest(self._held_at_s, self._served_at_s, self._retry_at_s, self._ready_by_s)
 
     # -- with a task ----------------------------------------------------------------
 
     def _serve(self, now_s: float) -> list[Action]:
+        if self._served_at_s is None or self._served_at_s > now_s:
+            return []
         task = self._task()
-        if self._served_at_s is None or task is None or self._served_at_s > now_s:
+        if task is None:
             return []
         self._served_at_s = None
         mission_s = self._picture.mission_s(now_s)
@@ -308,10 +310,14 @@ class Tasking:
         self._idled = True
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         self._awaits_peers = patience_ends_s is not None
-        # Look again by and by while anything is open, lest a lost message strand it.
-        again_s = now_s + self._timing.announce_s if self._picture.unfinished else None
+        again_s = self._look_again_s(now_s) if self._picture.unfinished else None
         self._retry_at_s = patience_ends_s if patience_ends_s is not None else again_s
         return actions
+
+    def _look_again_s(self, now_s: float) -> float:
+        """By and by, lest a lost message strand a task; or when a refused one may be taken."""
+        paused_s = (until_s for _, until_s in self._refusals.values() if until_s > now_s)
+        return min([now_s + self._timing.announce_s, *paused_s])
 
     def _give_up_claim(self) -> list[Action]:
         """Say that the UAV is free, unless it has."""

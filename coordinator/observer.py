@@ -15,6 +15,7 @@ from swarm.allocation.objective import executed_objective
 from swarm.allocation.problem import Problem
 from swarm.asking import Asking
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import Ask, BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Wish
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.model.ids import COORDINATOR
@@ -184,12 +185,11 @@ class Observer:
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
-        deadlines = (
+        return earliest(
             self._membership.next_deadline_s(),
             self._asking.next_deadline_s(),
             self._ask_at_s if self.replica.brief is None else None,
         )
-        return min((at_s for at_s in deadlines if at_s is not None), default=None)
 
     def mission_s(self, now_s: float) -> float | None:
         """Mission time; None before the start."""
@@ -305,7 +305,7 @@ class Observer:
             before.update(self.statuses[uav].dropped)
             self._left.discard(uav)
         self._stamps[uav], self.statuses[uav] = stamp, status
-        unfinished = TaskState.OPEN in self.board.states.values()
+        unfinished = self.board.unfinished
         if status.phase in _LEAVING and status.note and unfinished and uav not in self._left:
             self._left.add(uav)
             self._tell(f"{uav} {_LEAVING[status.phase]}: {status.note}", now_s)
@@ -364,7 +364,7 @@ class Observer:
             self._tell(f"mission ends: {epoch.reason}", now_s)
 
     def _hear_claim(self, uav: str, claim: Claim, before: Claim | None, now_s: float) -> None:
-        unfinished = TaskState.OPEN in self.board.states.values()
+        unfinished = self.board.unfinished
         if claim.phase is ClaimPhase.OUT and self.phase is EpochPhase.RUNNING and unfinished:
             self._tell(f"{uav} takes no further part", now_s)
         if claim.task is None or (before is not None and before.task == claim.task):

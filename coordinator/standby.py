@@ -15,6 +15,7 @@ from coordinator.events import Action, Event, TakeSeat
 from coordinator.inquiry import Inquiry
 from coordinator.postings import exit_status
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import (
     Ask,
     Finish,
@@ -116,7 +117,7 @@ class StandbyCore:
         deadlines = [self._inquiry.next_deadline_s(), self._membership.next_deadline_s()]
         if self._linked and not self._inquiry.unsure:
             deadlines.append(self._due_at_s)
-        return min((at_s for at_s in deadlines if at_s is not None), default=None)
+        return earliest(*deadlines)
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What this process answers, once it has taken the seat."""

@@ -33,6 +33,10 @@ _EXHAUSTIVE_DECISIONS = 3_000_000
 """Decisions all first rounds together may take to be tried one by one: some seconds."""
 _LOCAL_DECISIONS = 600_000
 """The same for the local search: a second or two."""
+_MODEST_ROUNDS = 60
+"""First rounds of some UAVs that modest planning holds at once: those of small fleets."""
+_MODEST_EVALUATIONS = 200
+"""Evaluations of a modest local search."""
 _LONG_LOOKAHEAD_WORK = 60_000
 """Evaluations × tasks² of lookahead where its tours are long: a few seconds."""
 
@@ -47,6 +51,7 @@ def make_plan(
     progress: Progress | None = None,
     bound_s: float | None = None,
     threads: int | None = None,
+    modest: bool = False,
 ) -> Plan:
     """Plan a mission.
 
@@ -64,6 +69,8 @@ def make_plan(
             [s]; not at all when None.
         threads: at most this many; as many as there are processors when None. Changes nothing but
             speed.
+        modest: spend little on the search for a sequence, for studies of many missions; costs
+            some 0.1 % of J at 10 × 50 and saves most of the time.
 
     Returns:
         The plan. Its sequence is None for ``exact``, which has none.
@@ -94,7 +101,7 @@ def make_plan(
             rule := rule_by_name(method),
             np.random.default_rng(seed),
             never if stop is None else stop,
-            limits=_limits(problem, method, stopped=isinstance(stop, Limit)),
+            limits=_limits(problem, method, stopped=isinstance(stop, Limit), modest=modest),
             progress=progress,
             threads=threads,
         )
@@ -140,8 +147,14 @@ def check_online_method(method: str) -> None:
         raise InputError(Fault("--method", method, problem, remedy))
 
 
-def _limits(problem: Problem, method: str, *, stopped: bool) -> SearchLimits:
+def _limits(problem: Problem, method: str, *, stopped: bool, modest: bool) -> SearchLimits:
     """What is cheap here; with ``stopped`` the caller's limit alone ends the local search."""
+    if modest:
+        usual = _limits(problem, method, stopped=False, modest=False).local_evaluations
+        return SearchLimits(
+            partial_rounds=_MODEST_ROUNDS,
+            local_evaluations=min(_MODEST_EVALUATIONS, usual or _MODEST_EVALUATIONS),
+        )
     n_task = max(1, problem.n_task)
     if method == "lookahead" and n_task > EXACT_TASKS:
         few = max(2, min(300, _LONG_LOOKAHEAD_WORK // n_task**2))

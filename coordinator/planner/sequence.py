@@ -38,6 +38,8 @@ EXHAUSTIVE_UAVS = 8
 
 FirstRound = tuple[int, ...]
 """Per active UAV in scenario order, the task it takes first, `_NO_TASK` or `_UNDECIDED`."""
+TaskSet = int
+"""Tasks, a bit for each."""
 Progress = Callable[[int, float], None]
 """Told the evaluations spent so far and the best J found by them [value·s]."""
 _NO_TASK = -1
@@ -48,6 +50,8 @@ _NEIGHBOURS = 32
 """Neighbours looked at together; the best of them is moved to if it is better."""
 _CHUNK_LOOKS = 10_000_000
 """Tasks looked at between two questions whether to stop: some 50 ms."""
+_THREAD_LOOKS = 100_000
+"""Tasks looked at in about the time that starting threads takes."""
 _LOOKAHEAD_LOOKS = 1_000_000
 """A decision by lookahead over more tasks than it can solve exactly, in the same currency."""
 
@@ -162,8 +166,12 @@ class _Search:
         self._inactive: Sequence = tuple(int(u) for u in np.flatnonzero(~state.active))
         self._most_evaluations = np.inf
         self._looked_up = 0
-        self._first_decisions: dict[tuple[int, int], int] = {}
+        self._is_greedy = rule.code == kernel.GREEDY
+        self._first_decisions: dict[tuple[int, TaskSet], int] = {}
+        self._preferred: dict[int, list[int]] = {}
+        """By UAV, the tasks it likes best, as far as was asked for; at their end `_NO_TASK`."""
         self._twins = twins(problem, state, self.uavs)
+        self._any_twins = any(len(equals) > 1 for equals in self._twins.values())
         self._rank = rank_of(self.uavs + self._inactive)
         self._values: dict[bytes, float] = {}
         self._best: tuple[float, Sequence] = (-np.inf, self.uavs)
@@ -190,21 +198,25 @@ class _Search:
         Grown UAV by UAV. Which order led to a partial round does not matter to the rest of it,
         so only the first order of each is carried on.
         """
-        rounds: dict[FirstRound, Sequence] = {(_UNDECIDED,) * len(self.uavs): ()}
+        rounds: dict[FirstRound, tuple[Sequence, TaskSet]]
+        rounds = {(_UNDECIDED,) * len(self.uavs): ((), 0)}
         for _ in self.uavs:
-            longer: dict[FirstRound, Sequence] = {}
-            for first_round, sequence in sorted(rounds.items(), key=lambda item: item[1]):
+            longer: dict[FirstRound, tuple[Sequence, TaskSet]] = {}
+            for first_round, (sequence, taken) in sorted(rounds.items(), key=lambda item: item[1]):
                 for place, uav in enumerate(self.uavs):
                     if first_round[place] == _UNDECIDED and not self._twin_waits(uav, sequence):
-                        task = self._first_task(uav, first_round)
+                        task = self._first_task(uav, taken)
                         extended = (*first_round[:place], task, *first_round[place + 1 :])
-                        longer.setdefault(extended, (*sequence, uav))
+                        if extended not in longer:
+                            longer[extended] = (*sequence, uav), taken | _only(task)
                 too_many = len(longer) > limits.partial_rounds
                 too_many |= len(self._first_decisions) > limits.decisions
                 if too_many or self._should_stop(self._work()):
                     return None
             rounds = longer
-        return rounds if len(rounds) <= most else None
+        if len(rounds) > most:
+            return None
+        return {first_round: sequence for first_round, (sequence, _) in rounds.items()}
 
     def try_first_rounds(self, rounds: dict[FirstRound, Sequence]) -> bool:
         """Evaluate each, and all its sequences where a later tie lets them differ."""
@@ -293,8 +305,10 @@ class _Search:
         if not self.plain:
             return [row.tobytes() for row in ranks]
         self._looked_up += len(sequences) * min(len(self.uavs), self._problem.n_task)
+        looks = len(ranks) * len(self.uavs) * self._looks_per_decision()
+        threads = self._threads if looks > _THREAD_LOOKS else 1
         tasks = kernel.first_rounds(
-            self._problem.kernel, self._state, ranks, self._rule.code, self._threads
+            self._problem.kernel, self._state, ranks, self._rule.code, threads
         )
         return [row.tobytes() for row in tasks]
 
@@ -343,6 +357,11 @@ class _Search:
             looks += n_open * _LOOKAHEAD_LOOKS
         return int(min(max(_CHUNK_LOOKS / looks, 1.0), 512.0)) * self._threads
 
+    def _looks_per_decision(self) -> int:
+        n_open = int(np.count_nonzero(self._state.open))
+        long = self._rule.code == kernel.LOOKAHEAD and n_open > EXACT_TASKS
+        return _LOOKAHEAD_LOOKS if long else n_open
+
     def _allowed(self, count: int) -> int:
         """How many of the next ``count`` evaluations may be spent; the first one always."""
         least = 0 if self.evaluations else 1
@@ -363,35 +382,56 @@ class _Search:
 
     def _twin_waits(self, uav: int, sequence: Sequence) -> bool:
         """Whether ``uav`` would pass an equal UAV of smaller index, which changes only names."""
-        return any(twin < uav and twin not in sequence for twin in self._twins[uav])
+        equals = self._twins[uav]
+        return uav != equals[0] and any(u < uav and u not in sequence for u in equals)
 
     def _in_twin_order(self, sequence: Sequence) -> Sequence:
         """The same sequence with equal UAVs in ascending order on their places."""
+        if not self._any_twins:
+            return sequence
         waiting = {equals: iter(equals) for equals in self._twins.values()}
         return tuple(next(waiting[self._twins[uav]]) for uav in sequence)
 
-    def _first_task(self, uav: int, first_round: FirstRound) -> int:
-        """What ``uav`` takes after the UAVs decided in ``first_round``; `_NO_TASK` if nothing."""
-        taken = [task for task in first_round if task >= 0]
-        key = (uav, sum(1 << task for task in taken))
-        if key not in self._first_decisions:
-            state = self._state.copy()
-            state.open[taken] = False
-            decision = next_decision(self._problem, state, self._rank, self._rule, uav)
-            self._first_decisions[key] = _NO_TASK if decision is None else decision.task
-        return self._first_decisions[key]
+    def _first_task(self, uav: int, taken: TaskSet) -> int:
+        """What ``uav`` takes when others have ``taken`` so much; `_NO_TASK` if nothing."""
+        task = self._first_decisions.get((uav, taken))
+        if task is None:
+            task = self._favourite(uav, taken) if self._is_greedy else self._decide(uav, taken)
+            self._first_decisions[uav, taken] = task
+        return task
+
+    def _favourite(self, uav: int, taken: TaskSet) -> int:
+        """The same by the greedy rule, whose order of preference does not depend on the others."""
+        preferred = self._preferred.setdefault(uav, [])
+        for task in preferred:
+            if not taken & _only(task):
+                return task
+        while True:
+            task = self._decide(uav, sum(map(_only, preferred)))
+            preferred.append(task)
+            if not taken & _only(task):
+                return task
+
+    def _decide(self, uav: int, taken: TaskSet) -> int:
+        state = self._state.copy()
+        state.open[[task for task in range(self._problem.n_task) if taken & _only(task)]] = False
+        decision = next_decision(self._problem, state, self._rank, self._rule, uav)
+        return _NO_TASK if decision is None else decision.task
 
     def _sequences_of(self, first_round: FirstRound, sequence: Sequence) -> Iterator[Sequence]:
         """All sequences that begin with ``sequence`` and lead to ``first_round``, in order."""
         if len(sequence) == len(self.uavs):
             yield sequence
             return
-        partial = tuple(
-            task if uav in sequence else _UNDECIDED
-            for uav, task in zip(self.uavs, first_round, strict=True)
-        )
+        decided = (t for u, t in zip(self.uavs, first_round, strict=True) if u in sequence)
+        taken = sum(map(_only, decided))
         for uav, task in zip(self.uavs, first_round, strict=True):
             if uav in sequence or self._twin_waits(uav, sequence):
                 continue
-            if self._first_task(uav, partial) == task:
+            if self._first_task(uav, taken) == task:
                 yield from self._sequences_of(first_round, (*sequence, uav))
+
+
+def _only(task: int) -> TaskSet:
+    """That task alone; nothing for `_NO_TASK`."""
+    return 1 << task if task >= 0 else 0

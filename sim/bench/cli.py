@@ -1,14 +1,13 @@
 """The commands of the family `swarm bench`.
 
 Leaves out: the commands about fleets that fly (`sim.bench.trouble_commands`,
-`sim.bench.turnaround_command`) and about simulated vehicles (`sim.bench.autopilot_commands`),
-what the others do (`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown
-(`sim.bench.plan_report`, `sim.bench.plan_plot`).
+`sim.bench.turnaround_command`, `sim.bench.missions_command`) and about simulated vehicles
+(`sim.bench.autopilot_commands`), what the others do (`sim.bench.plan_bench`, `sim.bench.decide`)
+and how it is shown (`sim.bench.plan_report`, `sim.bench.plan_plot`).
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,9 +15,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sim.bench.autopilot_commands import AUTOPILOT_HELP, autopilot
+from sim.bench.missions_command import MISSIONS_HELP, missions
 from sim.bench.trouble_commands import FAILOVER_HELP, FLOOD_HELP, failover, flood
 from sim.bench.turnaround_command import TURNAROUND_HELP, turnaround
-from sim.bench.words import each
+from sim.bench.words import each, size_of
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, SeedOption
 from swarm.scenario.shipped import resolve_scenario
@@ -30,7 +30,6 @@ __all__ = ["bench"]
 
 _DEFAULT_SIZES = "10x50,50x500"
 _SCALING_SIZES = "10x50,10x500,50x500,50x2000,100x1000,200x2000,200x5000"
-_SIZE = re.compile(r"([1-9]\d{0,3})[x×]([1-9]\d{0,4})")
 _LONGEST_S = 86_400.0
 _PLAN_HELP = """Compare planning methods side by side, each with the same time.
 
@@ -208,7 +207,7 @@ def decide(
     from sim.bench.decide import decide_as_json, decide_as_rich, measure_decisions
     from swarm.clock import SystemClock
 
-    n_uav, n_task = _size("--size", size)
+    n_uav, n_task = size_of("--size", size)
     done = measure_decisions(n_uav, n_task, seed, SystemClock())
     if json:
         print(dumps(decide_as_json(done), allow_nan=False))
@@ -220,6 +219,9 @@ def decide(
 bench.command("failover", help=FAILOVER_HELP, short_help="Measure fleets in trouble.")(failover)
 bench.command("flood", help=FLOOD_HELP, short_help="Fly while a hostile peer floods the bus.")(
     flood
+)
+bench.command("missions", help=MISSIONS_HELP, short_help="Fly many missions in virtual time.")(
+    missions
 )
 bench.command("autopilot", help=AUTOPILOT_HELP, short_help="Measure simulated vehicles.")(autopilot)
 bench.command(
@@ -237,16 +239,9 @@ def _sources(scenario: Path | None, sizes: str | None, default: str) -> list[tup
         name = load_scenario(scenario).name
         found.append((name, Source(scenario=str(scenario.resolve()))))
     if scenario is None or sizes is not None:
-        for n_uav, n_task in each("--sizes", sizes or default, _size):
+        for n_uav, n_task in each("--sizes", sizes or default, size_of):
             found.append((f"{n_uav}×{n_task}", Source(n_uav=n_uav, n_task=n_task)))
     return found
-
-
-def _size(flag: str, word: str) -> tuple[int, int]:
-    match = _SIZE.fullmatch(word)
-    if match is None:
-        raise InputError(Fault(flag, word, "no size", "write UAVs x tasks, such as 50x500"))
-    return int(match[1]), int(match[2])
 
 
 def _limit_s(flag: str, word: str) -> float:

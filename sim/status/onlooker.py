@@ -11,6 +11,7 @@ import asyncio
 from coordinator.observer import Observer
 from swarm.bus.port import Bus, TokenSeen
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.errors import Fault, InputError, SwarmError
 from swarm.events import BusFact, Finish, Learned, Wish
 from swarm.model import Mission
@@ -104,7 +105,7 @@ class Onlooker:
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
         deadlines = (self.observer.next_deadline_s(), self._leave_at_s)
-        return min((at_s for at_s in deadlines if at_s is not None), default=None)
+        return earliest(*deadlines)
 
     @property
     def known(self) -> bool:

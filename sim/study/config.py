@@ -33,6 +33,7 @@ __all__ = [
     "fate_seed",
     "right_number",
     "span_s",
+    "unlisted",
     "wrong_number",
     "wrong_values",
 ]
@@ -172,6 +173,23 @@ def wrong_number(name: str, value: object) -> str | None:
     if number < 0.0 or (name in PROBABILITIES and number > 1.0):
         return f"{shown(value)} is not {'within 0..1' if name in PROBABILITIES else '>= 0'}"
     return None
+
+
+def unlisted(
+    uncertainty: Uncertainty, missions: SameMission | RandomMissions
+) -> Iterator[tuple[str, str, list[str]]]:
+    """What happens at listed moments to what is not in the mission: where it is listed, its id,
+    and the ids that there are. Random missions all have the same ids.
+    """
+    mission = missions.of_trial(0, 0)
+    known: dict[str, list[str]] = {
+        "lost_at_s": [uav.id for uav in mission.uavs],
+        "withdrawn_at_s": [task.id for task in mission.tasks],
+    }
+    for key, ids in known.items():
+        for name in getattr(uncertainty, key):
+            if name not in ids:
+                yield key, name, ids
 
 
 def right_number(name: str) -> str:

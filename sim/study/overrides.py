@@ -16,6 +16,7 @@ from sim.study.config import (
     SameMission,
     Study,
     Varied,
+    unlisted,
     wrong_values,
 )
 from sim.study.policies import Roster
@@ -110,7 +111,13 @@ def _base(asked: Asked, roster: Roster) -> Study:
         mission = load_scenario(path)
         return _plain(mission.name, SameMission(mission), roster)
     study = load_study(path, roster)
-    return study if missions is None else replace(study, missions=missions)
+    if missions is None:
+        return study
+    for key, name, _ in unlisted(study.uncertainty, missions):
+        problem = f"has no {name}, of which the study lists {key}"
+        fault = Fault("--random", str(asked.random), problem, "ask for larger missions")
+        raise InputError(fault)
+    return replace(study, missions=missions)
 
 
 def _plain(name: str, missions: SameMission | RandomMissions, roster: Roster) -> Study:

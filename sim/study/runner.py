@@ -46,10 +46,11 @@ def run_study(
     """
     jobs = store.missing()
     progress(0, len(jobs))
-    with closing(fly(briefing, jobs)) as flown:
-        for done, rows in enumerate(flown, start=1):
-            store.add(rows)
-            progress(done, len(jobs))
+    if jobs:
+        with closing(fly(briefing, jobs)) as flown:
+            for done, rows in enumerate(flown, start=1):
+                store.add(rows)
+                progress(done, len(jobs))
     return store.finish()
 
 
@@ -64,7 +65,7 @@ def in_processes(count: int) -> Fly:
     """Flies jobs in ``count`` processes of this machine."""
 
     def fly(briefing: Briefing, jobs: Sequence[Job]) -> Generator[list[Row]]:
-        if count == 1 or len(jobs) <= 1:
+        if count == 1 or len(jobs) == 1:
             yield from fly_here(briefing, jobs)
             return
         before = {child.pid for child in multiprocessing.active_children()}

@@ -7,28 +7,25 @@ out: tables and plots made of the rows.
 
 from __future__ import annotations
 
-import csv
 import fcntl
-import io
-import os
 from collections.abc import Iterable, Sequence
-from dataclasses import fields
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from sim.study.config import SameMission, Study
 from sim.study.policies import Roster
-from sim.study.rows import COLUMNS, Row
+from sim.study.row_files import read_rows, replace_text, row_line, table_text
+from sim.study.rows import Row
 from sim.study.study_file import load_study
 from sim.study.study_text import format_study
 from sim.study.trial import Job, rows_due
-from swarm.errors import Fault, InputError, SwarmError
+from swarm.errors import Fault, InputError
 from swarm.scenario import format_scenario
 
-__all__ = ["FolderStore", "MemoryStore", "Store", "read_rows", "row_line"]
+__all__ = ["ROWS_FILE", "STUDY_FILE", "FolderStore", "MemoryStore", "Store"]
 
 STUDY_FILE, SCENARIO_FILE = "study.toml", "scenario.toml"
-ROWS_FILE, PARQUET_FILE = "trials.csv", "trials.parquet"
+ROWS_FILE = "trials.csv"
 _ANOTHER = "name another folder, or remove this one"
 
 
@@ -92,7 +89,7 @@ class FolderStore:
         try:
             self._take(roster)
             self._rows = self._kept_rows()
-            _replace_text(self._rows_path, _table(self._rows))
+            replace_text(self._rows_path, table_text(self._rows))
             self._file = self._rows_path.open("a", encoding="utf-8", newline="")
         except OSError as error:
             self._lock.close()
@@ -115,7 +112,7 @@ class FolderStore:
         """All rows, sorted by point, trial and policy, as the file has them then."""
         self._rows.sort(key=lambda row: row.key)
         self._file.close()
-        _replace_text(self._rows_path, _table(self._rows))
+        replace_text(self._rows_path, table_text(self._rows))
         self._file = self._rows_path.open("a", encoding="utf-8", newline="")
         return list(self._rows)
 
@@ -144,8 +141,8 @@ class FolderStore:
             raise InputError(Fault("--out", source, problem, _ANOTHER))
         if isinstance(self._study.missions, SameMission):
             text = format_scenario(self._study.missions.mission)
-            _replace_text(self._folder / SCENARIO_FILE, text)
-        _replace_text(path, format_study(self._study, SCENARIO_FILE))
+            replace_text(self._folder / SCENARIO_FILE, text)
+        replace_text(path, format_study(self._study, SCENARIO_FILE))
 
     def _kept_rows(self) -> list[Row]:
         """The rows of all jobs that are complete; what is left of others is flown again."""
@@ -188,113 +185,6 @@ def _difference(kept: Study, asked: Study) -> str | None:
     if any(was.trials > now.trials for was, now in zip(before, after, strict=True)):
         return "holds a study with more trials"
     return None
-
-
-# -- rows as text -------------------------------------------------------------------------
-
-
-def row_line(row: Row) -> str:
-    """A row as a line of CSV: numbers with all their digits, nothing for None."""
-    buffer = io.StringIO()
-    cells = ("" if value is None else value for value in (getattr(row, c) for c in COLUMNS))
-    csv.writer(buffer, lineterminator="\n").writerow(
-        [repr(cell) if isinstance(cell, float) else cell for cell in cells]
-    )
-    return buffer.getvalue()
-
-
-def read_rows(path: Path) -> list[Row]:
-    """The rows of a file; a last line that is not ended was being written, and is left out.
-
-    Raises:
-        InputError: it is no file of rows.
-    """
-    text = path.read_text(encoding="utf-8")
-    lines = text.splitlines(keepends=True)
-    if lines and not lines[-1].endswith("\n"):
-        del lines[-1]
-    rows: list[Row] = []
-    for number, cells in enumerate(csv.reader(lines), start=1):
-        try:
-            if number == 1:
-                if tuple(cells) != COLUMNS:
-                    raise ValueError("has not the columns of a study")
-            else:
-                rows.append(_row(cells))
-        except ValueError as error:
-            problem = f"is no row of a study: {error}" if number > 1 else str(error)
-            raise InputError(Fault(str(path), f"line {number}", problem, _ANOTHER)) from error
-    return rows
-
-
-def _row(cells: Sequence[str]) -> Row:
-    values: dict[str, Any] = {
-        name: _PARSERS[name](cell) for name, cell in zip(COLUMNS, cells, strict=True)
-    }
-    return Row(**values)
-
-
-def _integer(cell: str) -> int | None:
-    return int(cell) if cell else None
-
-
-def _float(cell: str) -> float | None:
-    return float(cell) if cell else None
-
-
-_PARSERS = {
-    item.name: str if item.type == "str" else _integer if "int" in str(item.type) else _float
-    for item in fields(Row)
-}
-
-
-def _table(rows: Iterable[Row]) -> str:
-    return ",".join(COLUMNS) + "\n" + "".join(row_line(row) for row in rows)
-
-
-def write_parquet(folder: Path, rows: Sequence[Row]) -> Path:
-    """Write all rows as ``trials.parquet``, too; check with `require_parquet` before flying.
-
-    Raises:
-        SwarmError: it cannot be written.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    kinds = {"s": pa.string(), "i": pa.int64(), "f": pa.float64()}
-    schema = pa.schema([(item.name, kinds[str(item.type)[0]]) for item in fields(Row)])
-    columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
-    path = folder / PARQUET_FILE
-    draft = path.with_suffix(".next")
-    try:
-        pq.write_table(pa.table(columns, schema=schema), draft)
-        draft.replace(path)
-    except OSError as error:
-        raise SwarmError(f"{path} cannot be written: {error.strerror or error}") from error
-    return path
-
-
-def require_parquet() -> None:
-    """Refuse before anything is flown where Parquet files cannot be written.
-
-    Raises:
-        InputError: pyarrow is not installed.
-    """
-    try:
-        import pyarrow.parquet  # noqa: F401 - whether there is one is the question
-    except ImportError as error:
-        remedy = "install it with: pip install 'peckorder[study]'"
-        raise InputError(Fault("--format", "parquet", "needs pyarrow", remedy)) from error
-
-
-def _replace_text(path: Path, text: str) -> None:
-    """Write a file whole: after a crash there is the old one or the new one."""
-    draft = path.with_suffix(".next")
-    with draft.open("w", encoding="utf-8", newline="") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    draft.replace(path)
 
 
 def _unwritable(folder: Path, error: OSError) -> InputError:

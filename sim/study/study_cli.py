@@ -30,7 +30,7 @@ from sim.uncertainty_options import (
     WindOption,
     WithdrawRateOption,
 )
-from swarm.errors import Fault, InputError
+from swarm.errors import Fault, InputError, SwarmError
 from swarm.options import JsonOption
 
 if TYPE_CHECKING:
@@ -84,6 +84,7 @@ def study(
         typer.Option(
             "--seed",
             min=0,
+            max=2**63 - 1,
             metavar="N",
             help="Seed of everything random. Default: as the study says, or 0.",
             show_default=False,
@@ -219,8 +220,9 @@ def study(
     from sim.study.policies import ROSTER
     from sim.study.progress import StudyProgress
     from sim.study.readme_table import MarkedFile
+    from sim.study.row_files import require_parquet
     from sim.study.runner import run_study
-    from sim.study.store import FolderStore, MemoryStore, require_parquet
+    from sim.study.store import FolderStore, MemoryStore
     from sim.study.trial import Briefing
     from swarm.clock import SystemClock
 
@@ -325,6 +327,9 @@ def _summary(found: Study, rows: list[Row], *, here: bool) -> Summary:
             missions = f"random missions of {uavs} UAVs and {tasks} tasks"
         case same:
             missions = f"mission {same.mission.name}"
+    if found.uncertainty.outcomes:
+        again = found.mission(0).reattempt_failed
+        missions += f", where failed tasks {'open again' if again else 'stay failed'}"
     machine = this_machine()
     what = {name: ROSTER.policy(name).what for name in found.policies}
     if found.bound:
@@ -344,17 +349,24 @@ def _write(
     out: Path, summary: Summary, rows: list[Row], file_format: str, *, plots: bool
 ) -> list[Path]:
     """Everything but the trials themselves; the files that ``out`` has then got."""
-    from sim.study.store import ROWS_FILE, STUDY_FILE, write_parquet
+    from sim.study.row_files import write_parquet
+    from sim.study.store import ROWS_FILE, STUDY_FILE
 
     files = [out / STUDY_FILE, out / ROWS_FILE]
-    if file_format == "parquet":
-        files.append(write_parquet(out, rows))
-    files.append(out / _SUMMARY_FILE)
-    files[-1].write_text(summary.markdown(every_setting=True), encoding="utf-8")
-    if plots:
-        from sim.study.study_plot import draw_study
+    try:
+        if file_format == "parquet":
+            files.append(write_parquet(out, rows))
+        files.append(out / _SUMMARY_FILE)
+        files[-1].write_text(summary.markdown(every_setting=True), encoding="utf-8")
+        if plots:
+            from sim.study.study_plot import draw_study
 
-        files += draw_study(summary, out)
+            files += draw_study(summary, out)
+    except OSError as error:
+        reason = error.strerror or error
+        raise SwarmError(
+            f"the trials are in {out}, and the rest cannot be written: {reason}"
+        ) from error
     return files
 
 

@@ -19,6 +19,7 @@ from sim.study.config import (
     Study,
     Varied,
     right_number,
+    unlisted,
     wrong_number,
     wrong_values,
 )
@@ -125,7 +126,10 @@ class _Reader(TableReader):
         uncertainty, reattempt = self._uncertainty(top)
         varied = tuple(self._varied(top))
         if missions is not None:
-            self._check_listed(uncertainty, missions)
+            for key, uav_or_task, ids in unlisted(uncertainty, missions):
+                close = close_match(uav_or_task, ids)
+                remedy = f"did you mean {close!r}?" if close else f"name one such as {ids[0]!r}"
+                self.add(("uncertainty", key, uav_or_task), "is not in the mission", remedy)
         if self.findings or name is None or missions is None:
             return None
         return Study(
@@ -199,22 +203,6 @@ class _Reader(TableReader):
                 given[key] = self.required(table, place, key, _kind_of(key))
         reattempt = given.pop("reattempt", None)
         return Uncertainty(**given) if len(self.findings) == before else Uncertainty(), reattempt
-
-    def _check_listed(
-        self, uncertainty: Uncertainty, missions: SameMission | RandomMissions
-    ) -> None:
-        """What is listed must be of the mission; random ones all have the same ids."""
-        mission = missions.of_trial(0, 0)
-        known: Mapping[str, list[str]] = {
-            "lost_at_s": [uav.id for uav in mission.uavs],
-            "withdrawn_at_s": [task.id for task in mission.tasks],
-        }
-        for key, ids in known.items():
-            for name in getattr(uncertainty, key):
-                if name not in ids:
-                    close = close_match(name, ids)
-                    remedy = f"did you mean {close!r}?" if close else f"name one such as {ids[0]!r}"
-                    self.add(("uncertainty", key, name), "is not in the mission", remedy)
 
     def _varied(self, top: Document) -> Iterator[Varied]:
         seen: set[str] = set()

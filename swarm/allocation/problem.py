@@ -6,7 +6,7 @@ happened so far (`swarm.allocation.lower_level.TeamState`) and every decision.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from swarm.kernels.problem import KernelProblem, prepare
 from swarm.model import Mission, Task, TaskId, Uav, UavId
+from swarm.model.mission import chances
 
 __all__ = ["BoolArray", "FloatArray", "IntArray", "Problem"]
 
@@ -125,8 +126,9 @@ class Problem:
         columns = tuple(mission.tasks if tasks is None else tasks)
         shape = (len(rows), len(columns))
 
-        def table(look_up: Callable[[Uav, Task], float]) -> FloatArray:
-            return np.array([[look_up(u, t) for t in columns] for u in rows], float).reshape(shape)
+        def table(by_uav: Iterable[Mapping[str, float]], default: float) -> FloatArray:
+            found = [chances(given, columns, default) for given in by_uav]
+            return np.array(found, float).reshape(shape)
 
         return cls(
             uav_ids=tuple(uav.id for uav in rows),
@@ -136,8 +138,8 @@ class Problem:
             speed_m_s=np.array([u.speed_m_s for u in rows], float),
             value=np.array([t.value for t in columns], float),
             service_s=np.array([t.service_s for t in columns], float),
-            success=table(mission.success),
-            survival=table(mission.survival),
+            success=table((uav.success for uav in rows), mission.success_default),
+            survival=table((uav.survival for uav in rows), mission.survival_default),
             horizon_s=mission.horizon_s,
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from swarm.model.frames import Origin
@@ -11,7 +11,7 @@ from swarm.model.ids import require_id
 from swarm.model.task import Task
 from swarm.model.uav import Uav
 
-__all__ = ["Mission"]
+__all__ = ["Mission", "chances"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +48,26 @@ class Mission:
 
     def success(self, uav: Uav, task: Task) -> float:
         """p: probability that ``uav`` succeeds at ``task``; 0 means it never tries."""
-        return _look_up(uav.success, task, self.success_default)
+        return chances(uav.success, [task], self.success_default)[0]
 
     def survival(self, uav: Uav, task: Task) -> float:
         """Probability that ``uav`` survives ``task``, a factor of S for all that follow."""
-        return _look_up(uav.survival, task, self.survival_default)
+        return chances(uav.survival, [task], self.survival_default)[0]
 
     def known_at_start(self) -> Mission:
         """The same mission without its pop-ups (tasks with ``appears_s > 0``)."""
         return replace(self, tasks=tuple(task for task in self.tasks if task.appears_s == 0.0))
 
 
-def _look_up(table: Mapping[str, float], task: Task, default: float) -> float:
-    by_kind = default if task.kind is None else table.get(task.kind, default)
-    return table.get(task.id, by_kind)
+def chances(table: Mapping[str, float], tasks: Iterable[Task], default: float) -> list[float]:
+    """One UAV's probability at each of ``tasks``.
+
+    Args:
+        table: its probabilities by task id or kind; the id wins.
+        tasks: which.
+        default: where the table says nothing.
+    """
+    return [
+        table.get(task.id, default if task.kind is None else table.get(task.kind, default))
+        for task in tasks
+    ]

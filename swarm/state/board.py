@@ -5,7 +5,7 @@ Leaves out: claims (swarm.state.claims).
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from enum import StrEnum
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from swarm.allocation.problem import BoolArray, Problem
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.state.registers import Replica
-from swarm.wire.messages import Board, Brief, ClaimPhase, Result
+from swarm.wire.messages import Board, Brief, ClaimPhase, Fleet, Result
 
 __all__ = ["TaskBoard", "TaskState", "doable", "mission_of"]
 
@@ -58,7 +58,18 @@ class TaskBoard:
     def __init__(self, replica: Replica, mission: str) -> None:
         self.replica = replica
         self._mission = mission
+        self._entries: list[Board] = []
+        """In board order."""
+        self._untried: dict[str, TaskState] = {}
+        """In board order, what each task would be if nobody had attempted any."""
+        self._entries_version = -1
+        self._brief: Brief | None = None
+        self._uavs: tuple[Uav, ...] = ()
+        """Of that brief."""
+        self._tasks: dict[str, tuple[Board, Task]] = {}
+        """By id, with the entry each was made from."""
         self._states: dict[str, TaskState] = {}
+        self._unfinished = False
         self._states_version = -1
         self._problem: Problem | None = None
         self._problem_version = -1
@@ -66,69 +77,105 @@ class TaskBoard:
     @property
     def states(self) -> dict[str, TaskState]:
         """State of every task on the board, in board order."""
-        if self._states_version != self.replica.task_version:
-            self._states = _task_states(self.replica)
-            self._states_version = self.replica.task_version
+        self._catch_up()
         return self._states
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether any task on the board is open."""
+        self._catch_up()
+        return self._unfinished
 
     @property
     def problem(self) -> Problem | None:
         """Every UAV of the brief and every task posted so far; None before the brief."""
         if self._problem_version != self.replica.board_version:
-            brief = self.replica.brief
-            mission = None if brief is None else mission_of(self.replica, self._mission, brief)
+            mission = self._mission_now()
             self._problem = None if mission is None else Problem.from_mission(mission)
             self._problem_version = self.replica.board_version
         return self._problem
 
+    def _mission_now(self) -> Mission | None:
+        """What `mission_of` gives; UAVs and tasks of which nothing new was said stay the same."""
+        brief = self.replica.brief
+        if brief is None:
+            return None
+        if brief is not self._brief:
+            self._brief, self._uavs = brief, tuple(map(_uav_of, brief.uavs))
+        self._sort()
+        for entry in self._entries:
+            if (known := self._tasks.get(entry.task)) is None or known[0] is not entry:
+                self._tasks[entry.task] = entry, _task_of(entry)
+        tasks = (self._tasks[entry.task][1] for entry in self._entries)
+        return _mission(self._mission, brief, self._uavs, tasks)
 
-def _task_states(replica: Replica) -> dict[str, TaskState]:
-    done = {task for (_, task), o in replica.outcomes.items() if o.result is Result.DONE}
-    tried = {task for (_, task), o in replica.outcomes.items() if o.result is Result.FAILED}
-    reattempt = replica.brief is not None and replica.brief.reattempt_failed
-    states = {}
-    for entry in sorted(replica.board.values(), key=_order):
-        if entry.task in done:
-            states[entry.task] = TaskState.DONE
-        elif entry.withdrawn:
-            states[entry.task] = TaskState.WITHDRAWN
-        elif entry.task in tried and not reattempt:
-            states[entry.task] = TaskState.FAILED
-        else:
-            states[entry.task] = TaskState.OPEN
-    return states
+    def _sort(self) -> None:
+        if self._entries_version != self.replica.board_version:
+            self._entries = sorted(self.replica.board.values(), key=_order)
+            self._untried = {
+                entry.task: TaskState.WITHDRAWN if entry.withdrawn else TaskState.OPEN
+                for entry in self._entries
+            }
+            self._entries_version = self.replica.board_version
+
+    def _catch_up(self) -> None:
+        if self._states_version != self.replica.task_version:
+            self._states = self._task_states()
+            self._unfinished = TaskState.OPEN in self._states.values()
+            self._states_version = self.replica.task_version
+
+    def _task_states(self) -> dict[str, TaskState]:
+        replica = self.replica
+        self._sort()
+        states = self._untried.copy()
+        reattempt = replica.brief is not None and replica.brief.reattempt_failed
+        for (_, task), outcome in replica.outcomes.items():
+            if task not in states:
+                continue
+            if outcome.result is Result.DONE:
+                states[task] = TaskState.DONE
+            elif states[task] is TaskState.OPEN and not reattempt:
+                states[task] = TaskState.FAILED
+        return states
 
 
 def mission_of(replica: Replica, name: str, brief: Brief) -> Mission:
     """The mission as the board shows it now: all posted tasks, in board order."""
+    entries = sorted(replica.board.values(), key=_order)
+    return _mission(name, brief, map(_uav_of, brief.uavs), map(_task_of, entries))
+
+
+def _mission(name: str, brief: Brief, uavs: Iterable[Uav], tasks: Iterable[Task]) -> Mission:
     return Mission(
         name=name,
         horizon_s=brief.horizon_s,
-        uavs=tuple(
-            Uav(
-                id=UavId(uav.id),
-                position_enu_m=uav.position_enu_m,
-                speed_m_s=uav.speed_m_s,
-                success=uav.success,
-                survival=uav.survival,
-                kind=uav.kind,
-            )
-            for uav in brief.uavs
-        ),
-        tasks=tuple(
-            Task(
-                id=TaskId(entry.task),
-                position_enu_m=entry.position_enu_m,
-                value=entry.value,
-                service_s=entry.service_s,
-                kind=entry.kind,
-            )
-            for entry in sorted(replica.board.values(), key=_order)
-        ),
+        uavs=tuple(uavs),
+        tasks=tuple(tasks),
         success_default=brief.success_default,
         survival_default=brief.survival_default,
         reattempt_failed=brief.reattempt_failed,
         origin=Origin(*brief.origin),
+    )
+
+
+def _uav_of(entry: Fleet) -> Uav:
+    return Uav(
+        id=UavId(entry.id),
+        position_enu_m=entry.position_enu_m,
+        speed_m_s=entry.speed_m_s,
+        success=entry.success,
+        survival=entry.survival,
+        kind=entry.kind,
+    )
+
+
+def _task_of(entry: Board) -> Task:
+    return Task(
+        id=TaskId(entry.task),
+        position_enu_m=entry.position_enu_m,
+        value=entry.value,
+        service_s=entry.service_s,
+        kind=entry.kind,
     )
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.model.ids import COORDINATOR
 
 __all__ = ["Membership"]
@@ -44,6 +45,10 @@ class Membership:
         the old one claimed: its claim counts again once it has said so itself.
         """
         return self.present - self._ghosts
+
+    def is_credible(self, writer: str) -> bool:
+        """Whether ``writer`` is one of them."""
+        return writer in self.present and writer not in self._ghosts
 
     @property
     def steady(self) -> set[str]:
@@ -126,7 +131,8 @@ class Membership:
 
     def lost(self, now_s: float) -> list[str]:
         """Writers given up by now, each told once, in id order."""
-        if not self._linked:
+        deadline_s = self.next_deadline_s()
+        if deadline_s is None or deadline_s > now_s:
             return []
         gone = {w for w, until_s in self._gone_until_s.items() if until_s <= now_s}
         silent = {w for w, at_s in self._silent_at_s.items() if at_s <= now_s}
@@ -144,8 +150,8 @@ class Membership:
         """When `lost` may next have something to tell; once it has been asked, in the future."""
         if not self._linked:
             return None
-        deadlines = (*self._gone_until_s.values(), *self._silent_at_s.values())
-        return min(deadlines, default=None)
+        gone_s = min(self._gone_until_s.values(), default=None)
+        return earliest(gone_s, min(self._silent_at_s.values(), default=None))
 
     # -- pieces -------------------------------------------------------------------------
 

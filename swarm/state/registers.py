@@ -62,6 +62,8 @@ class Replica:
             return False
         key = key_of(message)
         known = self._registers.get(key)
+        if known is message:
+            return False
         if known is not None and not _beats(message, known):
             self.stale += message.stamp < known.stamp
             return False
@@ -108,13 +110,18 @@ class Replica:
         """
         lives: dict[str, int] = {}
         for message in self._registers.values():
-            known = lives.get(message.writer, 0)
-            lives[message.writer] = max(known, message.stamp.incarnation)
-        for _, message in sorted(self._registers.items()):
-            writer = message.writer
-            outlived = message.stamp.incarnation < lives[writer]
-            if writer == own or writer not in steady or outlived:
-                yield message
+            life = message.stamp.incarnation
+            if life > lives.get(message.writer, -1):
+                lives[message.writer] = life
+        answered = [
+            (key, message)
+            for key, message in self._registers.items()
+            if (writer := message.writer) == own
+            or writer not in steady
+            or message.stamp.incarnation < lives[writer]
+        ]
+        for _, message in sorted(answered):
+            yield message
 
     def digest(self) -> dict[str, int]:
         """Writer -> a number that is equal wherever all its registers are."""

@@ -11,7 +11,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Final
 
 import msgpack
@@ -66,7 +66,7 @@ _LARGE: Final = frozenset({"brief", "epoch"})
 
 def key_of(message: Message) -> str:
     """The one key on which ``message`` may be said."""
-    keys, writer = Keys(message.mission), message.writer
+    keys, writer = _keys_of(message.mission), message.writer
     match message.body:
         case Brief():
             return keys.brief
@@ -82,6 +82,11 @@ def key_of(message: Message) -> str:
             return keys.status(writer)
         case Command(target=target):
             return keys.operator(target)
+
+
+@lru_cache(maxsize=16)
+def _keys_of(mission: str) -> Keys:
+    return Keys(mission)
 
 
 def encode(message: Message | Snapshot) -> bytes:

@@ -17,9 +17,10 @@ from distributed import LocalCluster
 from sim.study.config import RandomMissions, Study, Varied
 from sim.study.dask_cluster import on_dask
 from sim.study.policies import ROSTER, Roster
+from sim.study.row_files import read_rows
 from sim.study.rows import Row, without_wall_times
 from sim.study.runner import Fly, fly_here, in_processes, run_study
-from sim.study.store import MemoryStore, read_rows
+from sim.study.store import MemoryStore
 from sim.study.trial import Briefing, jobs_of
 from sim.uncertainty import Uncertainty
 from swarm.errors import InputError, SwarmError

@@ -91,12 +91,12 @@ class Optimiser(ListFollower):
         """Put better lists into force, if any are found."""
         takers = problem.capable[state.active].any(axis=0)
         n_open = int(np.count_nonzero(state.open & takers))
+        if not n_open:
+            return
         going_on = [
             [task for task in route if state.open[task]] if state.active[uav] else []
             for uav, route in enumerate(self._lists)
         ]
-        if not n_open:
-            return
         with self._account.timed():
             team = team_arrays(self._arrays_of(problem), state, state.active, 0.0)
             routes, worth = optimise_routes(

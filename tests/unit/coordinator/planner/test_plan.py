@@ -7,6 +7,7 @@ import pytest
 from coordinator.planner.exact import ProblemTooLargeError
 from coordinator.planner.plan import METHODS, make_plan
 from coordinator.planner.stop import after_evaluations
+from sim.study.generator import mission_of, random_mission
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from tests.problems import table_1_mission
 
@@ -121,3 +122,11 @@ def test_mission_without_tasks_is_planned_as_nothing() -> None:
 def test_unknown_method_is_refused() -> None:
     with pytest.raises(ValueError, match="guided"):
         make_plan(table_1_mission(), "guessed", clock=TickingClock())
+
+
+def test_modest_planning_costs_little_of_the_value_and_saves_most_of_the_work() -> None:
+    missions = [mission_of(random_mission(10, 50, seed), "random") for seed in range(5)]
+    thorough = [make_plan(flown, "greedy", clock=TickingClock()) for flown in missions]
+    modest = [make_plan(flown, "greedy", clock=TickingClock(), modest=True) for flown in missions]
+    assert sum(plan.objective for plan in modest) > 0.99 * sum(p.objective for p in thorough)
+    assert max(plan.evaluations for plan in modest) <= 200

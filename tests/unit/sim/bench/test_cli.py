@@ -61,6 +61,29 @@ def test_decide_times_decisions(capsys: pytest.CaptureFixture[str]) -> None:
     assert "One online decision at 3 × 9" in capsys.readouterr().out
 
 
+def test_missions_flies_them_in_one_process_or_several_alike(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    said = []
+    for jobs in ("1", "2"):
+        arguments = ("--missions", "11", "--size", "2x4", "--loss", "0.5", "--jobs", jobs)
+        assert swarm("missions", *arguments, "--json") == 0
+        said.append(json.loads(capsys.readouterr().out))
+    counts = [(told["missions"], told["done"], told["lost"], told["popup"]) for told in said]
+    assert counts[0] == counts[1]
+    assert counts[0][1] > 0
+    assert counts[0][2] > 0
+    assert min(told[name] for told in said for name in ("plan_cpu_s", "fly_cpu_s", "wall_s")) > 0.0
+
+
+def test_missions_tells_people_what_was_flown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert swarm("missions", "--missions", "2", "--size", "2x3", "--seed", "5", "--jobs", "1") == 0
+    said = capsys.readouterr()
+    assert "2 random missions of 2 × 3, seeds 5..6, by the greedy rule, 1 process:" in said.out
+    assert "CPU per mission" in said.out
+    assert said.err == ""
+
+
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
@@ -75,6 +98,7 @@ def test_decide_times_decisions(capsys: pytest.CaptureFixture[str]) -> None:
         (("plan", "--out", "/no/such/x.md"), "--out: /no/such/x.md: its folder is not there"),
         (("plan", "no-such-scenario"), "no-such-scenario"),
         (("decide", "--size", "ten"), "--size: ten: no size"),
+        (("missions", "--size", "ten"), "--size: ten: no size"),
         ((), "swarm bench: missing command"),
     ],
 )

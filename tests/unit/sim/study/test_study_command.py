@@ -94,6 +94,27 @@ def test_study_of_a_folder_is_itself_a_study_and_goes_on(
     assert not list(tmp_path.glob("*.png"))
 
 
+def test_files_that_cannot_be_written_are_told_in_one_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "summary.md").mkdir()
+
+    status, out, err = run(capsys, *SMALL, *CHEAP, "--out", str(tmp_path))
+
+    assert (status, out) == (1, "")
+    assert err.splitlines()[1:] == [
+        f"swarm: the trials are in {tmp_path}, and the rest cannot be written: Is a directory"
+    ]
+
+
+def test_what_becomes_of_failed_tasks_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    _, stays, _ = run(capsys, *SMALL, *CHEAP, "--outcomes")
+    _, opens, _ = run(capsys, *SMALL, *CHEAP, "--outcomes", "--reattempt")
+
+    assert "where failed tasks stay failed" in stays
+    assert "where failed tasks open again" in opens
+
+
 def test_interruption_ends_with_130_and_says_what_is_kept(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -171,6 +192,14 @@ def test_study_whose_fate_is_certain_is_flown_with_a_word_of_warning(
             ["meadow", "--jobs", "2", "--scheduler", "tcp://127.0.0.1:1"],
             "--jobs: 2: does not go with --scheduler; leave it out",
         ),
+        (
+            [*SMALL[1:-2], *CHEAP, "--scheduler", "nonsense"],
+            "--scheduler: nonsense: is no address; give the address that 'dask scheduler' prints",
+        ),
+        (
+            [*SMALL[1:-2], *CHEAP, "--scheduler", "http://127.0.0.1:80"],
+            "--scheduler: http://127.0.0.1:80: is no address; give the address that",
+        ),
         (["meadow", "--update", "no.md"], "no.md: cannot be read: No such file or directory; give"),
     ],
 )
@@ -182,6 +211,31 @@ def test_wrong_usage_is_one_clear_line_and_status_2(
     assert (status, out) == (2, "")
     assert err.startswith(expected)
     assert err.count("\n") == 1
+
+
+def test_listed_losses_want_missions_that_have_these_uavs(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    study = tmp_path / "mine.toml"
+    study.write_text(
+        'schema = 1\nname = "mine"\n[mission]\nrandom = { uavs = 3, tasks = 4 }\n'
+        "[uncertainty]\nlost_at_s = { uav3 = 5.0 }\n"
+    )
+
+    status, _, err = run(capsys, "study", str(study), "--random", "2,4")
+
+    assert status == 2
+    assert err == (
+        "--random: 2,4: has no uav3, of which the study lists lost_at_s; ask for larger missions\n"
+    )
+
+
+def test_help_names_every_policy(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = run(capsys, "study", "--help")
+
+    assert status == 0
+    words = out.replace(",", " ").replace(":", " ").replace(".", " ").split()
+    assert set(policies.ROSTER.policies) <= set(words)
 
 
 def test_file_without_markers_is_refused_before_anything_is_flown(

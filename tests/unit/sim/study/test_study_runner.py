@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from sim.study.config import RandomMissions, SameMission, Study, Varied, fate_seed, span_s
+from sim.study.row_files import read_rows, write_parquet
 from sim.study.rows import BOUND, COLUMNS, Row, without_wall_times
 from sim.study.runner import fly_here, run_study
-from sim.study.store import FolderStore, MemoryStore, read_rows, write_parquet
+from sim.study.store import FolderStore, MemoryStore
 from sim.study.summary import summarise
 from sim.study.trial import Briefing, Job, jobs_of
 from sim.uncertainty import Uncertainty

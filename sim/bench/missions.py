@@ -1,0 +1,196 @@
+"""How long whole missions take in virtual time, flown by the agents' real cores.
+
+Every mission is another random one, planned anew with modest effort and flown by the greedy rule
+on an ideal bus with its coordinator dead, as the policy `greedy` of studies. What happens by
+chance spreads over the mission's horizon. Leaves out: what missions are worth (`swarm study`) and
+real time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from time import process_time
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from coordinator.planner.plan import make_plan
+from sim.bench.machine import Machine, this_machine
+from sim.study.flight import score
+from sim.study.generator import mission_of, random_mission
+from sim.study.policies.agents import GREEDY
+from sim.study.policy import Planner
+from sim.uncertainty import Uncertainty
+from swarm.clock import Clock, SystemClock
+from swarm.model import Plan
+
+__all__ = [
+    "Flown", "Missions", "MissionsBench", "fly_block", "measure_missions", "missions_as_json",
+    "missions_as_rich",
+]  # fmt: skip
+
+_BLOCK = 10
+"""Missions a process flies between two reports."""
+
+
+@dataclass(frozen=True, slots=True)
+class Missions:
+    """Which missions to fly."""
+
+    n_uav: int
+    n_task: int
+    seeds: range
+    """Of the missions, and of what happens in them."""
+    uncertainty: Uncertainty
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """What some missions took, and came to."""
+
+    plan_cpu_s: float
+    """CPU time of this process spent on planning [s]."""
+    fly_cpu_s: float
+    """The same on flying."""
+    done: int
+    """Tasks done."""
+    lost: int
+    """UAVs lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionsBench:
+    """Everything measured in one run."""
+
+    machine: Machine
+    n_uav: int
+    n_task: int
+    missions: int
+    seed: int
+    """Of the first mission; each of the others has the next."""
+    jobs: int
+    """Processes that flew them."""
+    loss: float
+    popup: float
+    wall_s: float
+    missions_per_min: float
+    plan_cpu_s: float
+    """Per mission [s]."""
+    fly_cpu_s: float
+    """Per mission [s]."""
+    done: int
+    """Tasks done in all missions."""
+    lost: int
+    """UAVs lost in all missions."""
+
+
+def measure_missions(
+    which: Missions, jobs: int, clock: Clock, progress: Callable[[int], None] = lambda _: None
+) -> MissionsBench:
+    """Fly missions in several processes.
+
+    Args:
+        which: the missions; at least one.
+        jobs: processes; with 1 this one flies them.
+        clock: measures the wall time, that of starting processes included.
+        progress: told the number of missions flown since it was last told.
+    """
+    machine, begin_s = this_machine(), clock.now_s()
+    flown: list[Flown] = []
+    for block, done in _flown(which, jobs):
+        flown.append(done)
+        progress(len(block))
+    wall_s, count = clock.now_s() - begin_s, len(which.seeds)
+    return MissionsBench(
+        machine=machine,
+        n_uav=which.n_uav,
+        n_task=which.n_task,
+        missions=count,
+        seed=which.seeds[0],
+        jobs=jobs,
+        loss=which.uncertainty.loss,
+        popup=which.uncertainty.popup,
+        wall_s=wall_s,
+        missions_per_min=60.0 * count / wall_s,
+        plan_cpu_s=sum(done.plan_cpu_s for done in flown) / count,
+        fly_cpu_s=sum(done.fly_cpu_s for done in flown) / count,
+        done=sum(done.done for done in flown),
+        lost=sum(done.lost for done in flown),
+    )
+
+
+def fly_block(which: Missions) -> Flown:
+    """Plan and fly missions one after the other in this process."""
+    clock = SystemClock()
+    plan_cpu_s = fly_cpu_s = 0.0
+    done = lost = 0
+    for seed in which.seeds:
+        name = f"random-{seed}"
+        mission = mission_of(random_mission(which.n_uav, which.n_task, seed), name)
+        fate = which.uncertainty.draw(mission, mission.horizon_s, seed)
+        begin_s = process_time()
+        plan = make_plan(fate.mission, GREEDY.method, clock=clock, seed=seed, modest=True)
+        planned_s = process_time()
+        flight = GREEDY.fly(fate, _planner_of(plan), clock)
+        fly_cpu_s += process_time() - planned_s
+        plan_cpu_s += planned_s - begin_s
+        scored = score(fate, flight)
+        done += scored.done
+        lost += scored.lost_uavs
+    return Flown(plan_cpu_s, fly_cpu_s, done, lost)
+
+
+def missions_as_rich(bench: MissionsBench) -> RenderableType:
+    """Everything for a terminal."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("wall time", "missions/min", "CPU per mission", "planning", "flying"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_row(
+        f"{bench.wall_s:.1f} s",
+        f"{bench.missions_per_min:.0f}",
+        *(
+            f"{1e3 * time_s:.0f} ms"
+            for time_s in (
+                bench.plan_cpu_s + bench.fly_cpu_s,
+                bench.plan_cpu_s,
+                bench.fly_cpu_s,
+            )
+        ),
+    )
+    last = bench.seed + bench.missions - 1
+    return Group(
+        Text(str(bench.machine)),
+        Text(
+            f"{bench.missions} random missions of {bench.n_uav} × {bench.n_task}, seeds "
+            f"{bench.seed}..{last}, by the greedy rule, {bench.jobs} "
+            f"process{'es' if bench.jobs > 1 else ''}:"
+        ),
+        table,
+        Text(
+            f"{bench.loss:.0%} of the UAVs are lost ({bench.lost} were), {bench.popup:.0%} of the "
+            f"tasks pop up; {bench.done} tasks were done."
+        ),
+    )
+
+
+def missions_as_json(bench: MissionsBench) -> dict[str, object]:
+    """Everything for programs, ready for `json.dumps`."""
+    return asdict(bench)
+
+
+def _flown(which: Missions, jobs: int) -> Iterator[tuple[range, Flown]]:
+    blocks = [which.seeds[at : at + _BLOCK] for at in range(0, len(which.seeds), _BLOCK)]
+    parts = [Missions(which.n_uav, which.n_task, b, which.uncertainty) for b in blocks]
+    if jobs == 1:
+        yield from zip(blocks, map(fly_block, parts), strict=True)
+        return
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as workers:
+        yield from zip(blocks, workers.map(fly_block, parts), strict=True)
+
+
+def _planner_of(plan: Plan) -> Planner:
+    return lambda _mission, _method: plan
