@@ -92,7 +92,8 @@ class Hearing:
         for snapshot in snapshots:
             told += snapshot.messages
         for message in told + self._echoes:
-            actions += self._take_in(message, now_s)
+            if self._replica.known(message) is not message:
+                actions += self._take_in(message, now_s)
         self._expect_claimants(now_s)
         self._echoes.clear()
         self._learn_clock([snapshot.mission_s for snapshot in snapshots], now_s)

@@ -42,7 +42,7 @@ from swarm.events import (
     Tick,
 )
 from swarm.log import get_logger
-from swarm.wire.codec import Codec, encode, fit, key_of
+from swarm.wire.codec import Codec, encode, fit
 from swarm.wire.digest import decode_digest, encode_digest, unknown
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Snapshot, Status
@@ -183,7 +183,7 @@ class Shell(Generic[E, A]):
         match action:
             case Publish(message):
                 reliable = not isinstance(message.body, Status)
-                self._bus.publish(key_of(message), encode(message), reliable=reliable)
+                self._bus.publish(message.key, encode(message), reliable=reliable)
             case Ask():
                 task = self._loop.create_task(self._ask())
                 self._asking.add(task)

@@ -17,7 +17,7 @@ import msgpack
 import numpy as np
 
 from swarm.model.ids import COORDINATOR
-from swarm.wire.codec import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, encode, key_of
+from swarm.wire.codec import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, encode
 from swarm.wire.keys import Keys
 from swarm.wire.messages import (
     MAX_COUNT,
@@ -109,7 +109,7 @@ class Hostile:
     def hear(self, message: Message, now_s: float) -> None:
         """Take note of an honest register, to replay what is older."""
         if not isinstance(message.body, Status) and message.stamp.incarnation > 0:
-            self._heard[key_of(message)] = now_s, message
+            self._heard[message.key] = now_s, message
 
     def batch(self, now_s: float) -> list[Forgery]:
         """One message of each kind; none with an old counter as long as nothing was heard."""
@@ -140,7 +140,7 @@ class Hostile:
 
     def _forge(self, kind: Kind) -> Forgery:
         said = self._message()
-        key, honest = key_of(said), encode(said)
+        key, honest = said.key, encode(said)
         parts = msgpack.unpackb(honest)
         match kind:
             case Kind.RANDOM:
@@ -169,7 +169,7 @@ class Hostile:
                 said = replace(said, writer=self._uav(), body=self._claim())
                 parts = msgpack.unpackb(encode(said))
                 parts[-1]["completion_s"] = float(self._rng.choice([math.nan, math.inf, -math.inf]))
-                key, payload = key_of(said), msgpack.packb(parts)
+                key, payload = said.key, msgpack.packb(parts)
             case _:
                 raise ValueError(f"{kind} needs something to be old")
         return Forgery(kind, key, payload)
@@ -183,7 +183,7 @@ class Hostile:
         stamp = Stamp(newest.stamp.incarnation - 1, newest.stamp.counter)
         if isinstance(newest.body, Claim):
             newest = replace(newest, body=self._claim())
-        return Forgery(Kind.OLD, key_of(newest), encode(replace(newest, stamp=stamp)))
+        return Forgery(Kind.OLD, newest.key, encode(replace(newest, stamp=stamp)))
 
     # -- pieces -----------------------------------------------------------------------------
 

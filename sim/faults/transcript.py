@@ -18,7 +18,6 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 from swarm.state.claims import claim_strength
-from swarm.wire.codec import key_of
 from swarm.wire.messages import (
     Board,
     Claim,
@@ -127,7 +126,7 @@ class Transcript:
                 pass
 
     def _check_stamp(self, at_s: float, process: str, message: Message) -> None:
-        register = key_of(message)
+        register = message.key
         before = self._said.get((process, register))
         if before is not None and message.stamp < before.stamp:
             text = f"{process} said {register} with {message.stamp} after {before.stamp}"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 
-from swarm.wire.codec import encode, key_of
+from swarm.wire.codec import encode
 from swarm.wire.digest import fingerprint
 from swarm.wire.messages import (
     Board,
@@ -37,6 +37,8 @@ class Replica:
         """Fingerprint of each register, as far as the digest has been asked for."""
         self._changed: set[str] = set()
         """Keys of registers that have changed since."""
+        self._lives: dict[str, int] = {}
+        """By writer, the latest life of which anything is known."""
         self.brief: Brief | None = None
         self.epoch: Epoch | None = None
         self.board: dict[str, Board] = {}
@@ -58,17 +60,18 @@ class Replica:
 
     def join(self, message: Message) -> bool:
         """Take ``message`` in; whether it was news. Status is no register and never is."""
-        if isinstance(message.body, Status):
-            return False
-        key = key_of(message)
+        key = message.key
         known = self._registers.get(key)
-        if known is message:
+        if known is message or isinstance(message.body, Status):
             return False
         if known is not None and not _beats(message, known):
             self.stale += message.stamp < known.stamp
             return False
         self._registers[key] = message
         self._changed.add(key)
+        life = message.stamp.incarnation
+        if life > self._lives.get(message.writer, -1):
+            self._lives[message.writer] = life
         self.board_version += isinstance(message.body, Brief | Board)
         self.task_version += isinstance(message.body, Brief | Board | Outcome)
         match message.body:
@@ -108,11 +111,7 @@ class Replica:
             own: who answers.
             steady: writers that are there and remember all they ever said.
         """
-        lives: dict[str, int] = {}
-        for message in self._registers.values():
-            life = message.stamp.incarnation
-            if life > lives.get(message.writer, -1):
-                lives[message.writer] = life
+        lives = self._lives
         answered = [
             (key, message)
             for key, message in self._registers.items()
@@ -136,11 +135,11 @@ class Replica:
 
     def writers(self) -> set[str]:
         """Everyone who has said something."""
-        return {message.writer for message in self._registers.values()}
+        return set(self._lives)
 
     def known(self, message: Message) -> Message | None:
         """What is known of the register that ``message`` is about."""
-        return self._registers.get(key_of(message))
+        return self._registers.get(message.key)
 
 
 def _beats(new: Message, known: Message) -> bool:

@@ -11,7 +11,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any, Final
 
 import msgpack
@@ -43,7 +43,6 @@ __all__ = [
     "Codec",
     "encode",
     "fit",
-    "key_of",
 ]
 
 SMALL_LIMIT_BYTES: Final = 4 * 1024
@@ -62,31 +61,6 @@ _KINDS: Final[dict[str, type[Body]]] = {
 }
 _NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in _KINDS.items()}
 _LARGE: Final = frozenset({"brief", "epoch"})
-
-
-def key_of(message: Message) -> str:
-    """The one key on which ``message`` may be said."""
-    keys, writer = _keys_of(message.mission), message.writer
-    match message.body:
-        case Brief():
-            return keys.brief
-        case Epoch():
-            return keys.plan
-        case Board(task=task):
-            return keys.board(task)
-        case Claim():
-            return keys.claim(writer)
-        case Outcome(task=task):
-            return keys.outcome(writer, task)
-        case Status():
-            return keys.status(writer)
-        case Command(target=target):
-            return keys.operator(target)
-
-
-@lru_cache(maxsize=16)
-def _keys_of(mission: str) -> Keys:
-    return Keys(mission)
 
 
 def encode(message: Message | Snapshot) -> bytes:
@@ -163,7 +137,7 @@ class Codec:
             message = self._message(_unpack(data))
             large = _NAMES[type(message.body)] in _LARGE
             _require(large or len(data) <= SMALL_LIMIT_BYTES, "too large")
-            _require(key_of(message) == key, "said on another's key")
+            _require(message.key == key, "said on another's key")
         except _UnacceptableError as fault:
             self.dropped[fault.reason] += 1
             return None

@@ -7,8 +7,9 @@ bytes and checking (swarm.wire.codec), and what a reader makes of it (swarm.stat
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import lru_cache
 from typing import Annotated, ClassVar, Final
 
 from annotated_types import Ge, Gt, Le, Len, Predicate
@@ -16,6 +17,7 @@ from pydantic import Strict
 
 from swarm.model import Origin, valid_id
 from swarm.model.ids import FLEET, RESERVED
+from swarm.wire.keys import Keys
 
 __all__ = [
     "LATEST_S",
@@ -289,12 +291,21 @@ Body = Brief | Epoch | Board | Claim | Outcome | Status | Command
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A statement with its author and place in that author's order."""
+    """A statement with its author and place in that author's order.
+
+    Raises:
+        ValueError: the mission name is not a valid id.
+    """
 
     mission: str
     writer: str
     stamp: Stamp
     body: Body
+    key: str = field(init=False, repr=False, compare=False)
+    """The one key on which it may be said; names its register."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "key", _key_of(self.mission, self.writer, self.body))
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,3 +318,27 @@ class Snapshot:
     """Of the process that answers."""
     mission_s: Instant | None
     messages: tuple[Message, ...]
+
+
+def _key_of(mission: str, writer: str, body: Body) -> str:
+    keys = _keys_of(mission)
+    match body:
+        case Brief():
+            return keys.brief
+        case Epoch():
+            return keys.plan
+        case Board(task=task):
+            return keys.board(task)
+        case Claim():
+            return keys.claim(writer)
+        case Outcome(task=task):
+            return keys.outcome(writer, task)
+        case Status():
+            return keys.status(writer)
+        case Command(target=target):
+            return keys.operator(target)
+
+
+@lru_cache(maxsize=16)
+def _keys_of(mission: str) -> Keys:
+    return Keys(mission)

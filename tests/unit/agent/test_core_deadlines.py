@@ -34,7 +34,7 @@ from swarm.events import (
     Tick,
 )
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
-from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.codec import Codec, encode
 from swarm.wire.messages import (
     Body,
     ClaimPhase,
@@ -119,10 +119,10 @@ class Storm:
                 self.finished = True
             elif isinstance(action, Publish):
                 said = action.message
-                assert self.codec.decode(key_of(said), encode(said)) == said
-                before = self.stamps.get(key_of(said), said.stamp)
+                assert self.codec.decode(said.key, encode(said)) == said
+                before = self.stamps.get(said.key, said.stamp)
                 assert said.stamp >= before, "it went back"
-                self.stamps[key_of(said)] = said.stamp
+                self.stamps[said.key] = said.stamp
         claim = self.core.claim
         if claim is not None and self.core.phase in ("flying", "serving"):
             assert claim.phase in (ClaimPhase.PROPOSED, ClaimPhase.HELD)

@@ -23,7 +23,7 @@ from swarm.model import Origin
 from swarm.model.ids import COORDINATOR
 from swarm.process import StopRequest
 from swarm.shell import take_seat
-from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.codec import Codec, encode
 from swarm.wire.keys import Keys
 from swarm.wire.messages import EpochPhase, Message, Snapshot
 from tests.builders import IDLE, MISSION, brief, epoch, message, uav
@@ -81,7 +81,7 @@ class Played:
 
     def say(self, *said: Message) -> None:
         for each in said:
-            self.coordinator.publish(key_of(each), encode(each))
+            self.coordinator.publish(each.key, encode(each))
 
     async def seated(self) -> None:
         token = TokenSeen(KEYS.alive("u0"))

@@ -10,7 +10,7 @@ from coordinator.events import PlanFailed, PlanMade, Withdraw
 from swarm.config import Timing
 from swarm.events import Ask, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Stop, Tick
 from swarm.model.ids import COORDINATOR
-from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.codec import Codec, encode
 from swarm.wire.messages import Board, Brief, Epoch, EpochPhase, Snapshot
 from tests.builders import (
     IDLE,
@@ -66,7 +66,7 @@ def test_all_it_says_can_be_read() -> None:
     codec = Codec(MISSION)
     for action in coordinator.log:
         if hasattr(action, "message"):
-            assert codec.decode(key_of(action.message), encode(action.message)) == action.message
+            assert codec.decode(action.message.key, encode(action.message)) == action.message
 
 
 def test_it_starts_as_soon_as_all_are_airborne_and_the_plan_is_made() -> None:

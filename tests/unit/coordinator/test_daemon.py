@@ -20,7 +20,7 @@ from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.shell import take_seat
 from swarm.state.registers import Replica
-from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.codec import Codec, encode
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Body, EpochPhase, Message
 from tests.builders import IDLE, MISSION, OUT, done, held, message, mission, task, uav
@@ -64,7 +64,7 @@ class Played:
     def say(self, *bodies: Body, counter: int = 1) -> None:
         for number, body in enumerate(bodies):
             said = message("u0", body, counter=counter + number)
-            self.fleet.publish(key_of(said), encode(said))
+            self.fleet.publish(said.key, encode(said))
 
 
 @asynccontextmanager
@@ -140,7 +140,7 @@ def test_a_mission_is_flown_to_its_end() -> None:
                 # The clock stands still between events: whatever is heard moves it on.
                 played.clock.time_s += 0.5
                 said = message("u1", OUT, counter=counter)
-                played.onlooker.publish(key_of(said), encode(said))
+                played.onlooker.publish(said.key, encode(said))
                 await until(partial(played.heard, said), "hearing the onlooker")
             assert await played.running == 0
 

@@ -30,7 +30,7 @@ from swarm.events import (
 )
 from swarm.model.ids import COORDINATOR
 from swarm.shell import Shell, take_seat
-from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.codec import Codec, encode
 from swarm.wire.digest import decode_digest, encode_digest
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
@@ -159,7 +159,7 @@ def test_every_register_that_is_said_is_heard(said: Message) -> None:
     async def scenario() -> None:
         core = ScriptedCore()
         async with at_work(core) as played:
-            played.other.publish(key_of(said), encode(said))
+            played.other.publish(said.key, encode(said))
             await until(lambda: Heard(said) in core.heard, "hearing it")
             assert played.shell.dropped == {}
 
@@ -174,7 +174,7 @@ def test_what_is_malformed_is_counted_and_the_rest_heard() -> None:
             for data in bad:
                 played.other.publish(KEYS.claim("u1"), data)
             played.other.publish(KEYS.claim("u2"), encode(CLAIM))
-            played.other.publish(key_of(CLAIM), encode(CLAIM))
+            played.other.publish(CLAIM.key, encode(CLAIM))
             await until(lambda: Heard(CLAIM) in core.heard, "hearing the good one")
 
             assert [fact for fact in core.heard if isinstance(fact, Heard)] == [Heard(CLAIM)]
@@ -192,7 +192,7 @@ def test_what_the_inbox_had_no_room_for_is_counted_too() -> None:
         async with at_work(core, capacity=4) as played:
             for counter in range(20):
                 said = message("u1", held("t0", 1.0), counter=counter)
-                played.other.publish(key_of(said), encode(said))
+                played.other.publish(said.key, encode(said))
             newest = Heard(said)
             await until(lambda: newest in core.heard, "hearing the newest")
 
@@ -433,7 +433,7 @@ def test_messages_go_out_on_their_keys() -> None:
 
     async def scenario() -> None:
         async with at_work(ScriptedCore(first=[Publish(said) for said in own])) as played:
-            samples = {Sample(key_of(said), encode(said)) for said in own}
+            samples = {Sample(said.key, encode(said)) for said in own}
             await take_until(
                 played.other, lambda seen: samples <= {e for e in seen if isinstance(e, Sample)}
             )

@@ -10,7 +10,7 @@ from sim.chaos.recorder import RECORDER, Presence, Recorder, recorder_seats
 from sim.launch.fleet import BusKind, LaunchOptions, Layout
 from swarm.bus.config import ClientTopology, MeshTopology
 from swarm.bus.port import LinkUp, Sample, TokenGone, TokenSeen
-from swarm.wire.codec import encode, key_of
+from swarm.wire.codec import encode
 from swarm.wire.messages import Message, Outcome, Result, Stamp
 from tests.builders import mission, task, uav
 
@@ -47,7 +47,7 @@ def layout(kind: BusKind, routers: int = 1) -> Layout:
 
 
 def test_messages_and_tokens_are_kept_with_seat_size_and_time() -> None:
-    clock, key, payload = Hands(), key_of(SAID), encode(SAID)
+    clock, key, payload = Hands(), SAID.key, encode(SAID)
     recorder = Recorder("m", (), clock)
     clock.at_s = 1.5
     recorder.take(0, Sample(key, payload))
@@ -68,7 +68,7 @@ def test_messages_and_tokens_are_kept_with_seat_size_and_time() -> None:
 
 def test_what_nobody_can_read_is_counted() -> None:
     recorder = Recorder("m", (), Hands())
-    recorder.take(0, Sample(key_of(SAID), b"garbage"))
+    recorder.take(0, Sample(SAID.key, b"garbage"))
 
     assert recorder.entries == []
     assert sum(recorder.dropped.values()) == 1

@@ -13,7 +13,7 @@ from swarm.state.board import TaskBoard
 from swarm.state.claims import holders
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
-from swarm.wire.codec import encode, key_of
+from swarm.wire.codec import encode
 from swarm.wire.messages import Body, Claim, Message, Stamp
 from tests.builders import (
     IDLE,
@@ -115,7 +115,7 @@ def test_no_register_ever_goes_back(said: list[Message]) -> None:
         known = replica.known(statement)
         if known is None:
             continue  # status, which is no register
-        key = key_of(statement)
+        key = statement.key
         assert known.stamp >= max(newest.get(key, known.stamp), statement.stamp)
         assert not was_news or known == statement
         newest[key] = known.stamp
@@ -164,12 +164,12 @@ def test_the_last_word_of_the_last_life_stands_whatever_else_arrives(
         if said:
             voice.outdo(max(message.stamp for message in said))
         said += [voice.say(body) for body in life]
-    last_words = {key_of(message): message for message in said}
+    last_words = {message.key: message for message in said}
     heard = [message for message in said if random.random() < 0.7] + list(last_words.values())
     random.shuffle(heard)
     replica = joined(heard)
 
-    assert {key_of(m): m for m in replica.messages()} == last_words
+    assert {m.key: m for m in replica.messages()} == last_words
 
 
 @given(st.permutations([1, 2, 3, 4]))

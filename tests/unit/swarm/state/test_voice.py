@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from swarm.state.voice import Voice
-from swarm.wire.codec import Codec, encode, key_of
+from swarm.wire.codec import Codec, encode
 from swarm.wire.messages import MAX_COUNT, Stamp
 from tests.builders import IDLE, MISSION
 from tests.message_strategies import stamps
@@ -39,7 +39,7 @@ def test_whatever_is_outdone_what_follows_can_be_said(remembered: Stamp) -> None
     voice.outdo(remembered)
     said = [voice.say(IDLE) for _ in range(3)]
 
-    assert [codec.decode(key_of(message), encode(message)) for message in said] == said
+    assert [codec.decode(message.key, encode(message)) for message in said] == said
     assert (said[0].stamp > remembered) == (remembered != LARGEST)
     assert said[0].stamp <= said[1].stamp <= said[2].stamp
 

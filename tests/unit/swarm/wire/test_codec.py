@@ -21,7 +21,6 @@ from swarm.wire.codec import (
     Codec,
     encode,
     fit,
-    key_of,
 )
 from swarm.wire.keys import Keys
 from swarm.wire.messages import (
@@ -76,7 +75,7 @@ def reason_with(said: Message, change: Callable[[Parts], object]) -> str:
     """Why ``said`` is dropped once ``change`` has been at its parts."""
     parts = parts_of(said)
     change(parts)
-    return drop_reason(key_of(said), msgpack.packb(parts))
+    return drop_reason(said.key, msgpack.packb(parts))
 
 
 def reason_with_field(said: Message, **fields: object) -> str:
@@ -90,7 +89,7 @@ def reason_with_field(said: Message, **fields: object) -> str:
 def test_every_message_comes_back_as_it_was_said(said: Message) -> None:
     codec = Codec(MISSION)
 
-    assert codec.decode(key_of(said), encode(said)) == said
+    assert codec.decode(said.key, encode(said)) == said
     assert codec.dropped.total() == 0
 
 
@@ -107,7 +106,7 @@ def test_every_snapshot_comes_back_as_it_was_said(
 def test_whole_numbers_are_taken_for_measures() -> None:
     said = message(COORDINATOR, entry("t0", value=3, service_s=0))
 
-    assert Codec(MISSION).decode(key_of(said), encode(said)) == said
+    assert Codec(MISSION).decode(said.key, encode(said)) == said
 
 
 def test_a_fleet_of_a_thousand_fits_into_brief_and_epoch() -> None:
@@ -116,7 +115,7 @@ def test_a_fleet_of_a_thousand_fits_into_brief_and_epoch() -> None:
         message(COORDINATOR, brief(*(uav(name, t0=0.5, t1=0.5) for name in names))),
         message(COORDINATOR, epoch(*names)),
     ):
-        assert Codec(MISSION).decode(key_of(said), encode(said)) == said
+        assert Codec(MISSION).decode(said.key, encode(said)) == said
 
 
 # -- nothing else does ----------------------------------------------------------------
@@ -124,7 +123,7 @@ def test_a_fleet_of_a_thousand_fits_into_brief_and_epoch() -> None:
 
 @given(st.sampled_from(EVERY_KIND), st.binary(max_size=200))
 def test_random_bytes_are_dropped_and_counted(said: Message, data: bytes) -> None:
-    assert drop_reason(key_of(said), data)
+    assert drop_reason(said.key, data)
 
 
 @given(st.sampled_from(EVERY_KIND), st.data())
@@ -132,12 +131,12 @@ def test_truncated_bytes_are_dropped_as_malformed(said: Message, data: st.DataOb
     whole = encode(said)
     length = data.draw(st.integers(0, len(whole) - 1))
 
-    assert drop_reason(key_of(said), whole[:length]) == "malformed"
+    assert drop_reason(said.key, whole[:length]) == "malformed"
 
 
 @given(st.sampled_from(EVERY_KIND), st.binary(min_size=1, max_size=9))
 def test_bytes_after_the_end_are_dropped_as_malformed(said: Message, tail: bytes) -> None:
-    assert drop_reason(key_of(said), encode(said) + tail) == "malformed"
+    assert drop_reason(said.key, encode(said) + tail) == "malformed"
 
 
 @settings(max_examples=500)
@@ -150,11 +149,11 @@ def test_flipped_bits_never_raise_and_never_change_who_speaks(
         flipped[data.draw(st.integers(0, len(flipped) - 1))] ^= 1 << data.draw(st.integers(0, 7))
     codec = Codec(MISSION)
 
-    heard = codec.decode(key_of(said), bytes(flipped))
+    heard = codec.decode(said.key, bytes(flipped))
 
     assert (heard is None) == (codec.dropped.total() == 1)
     if heard is not None:
-        assert (heard.mission, key_of(heard)) == (MISSION, key_of(said))
+        assert (heard.mission, heard.key) == (MISSION, said.key)
 
 
 plain = st.recursive(
@@ -182,7 +181,7 @@ def test_anything_in_the_place_of_a_part_never_raises(
     parts[place] = instead
     codec = Codec(MISSION)
 
-    heard = codec.decode(key_of(said), msgpack.packb(parts))
+    heard = codec.decode(said.key, msgpack.packb(parts))
 
     assert (heard is None) == (codec.dropped.total() == 1)
 
@@ -196,14 +195,14 @@ def test_anything_in_the_place_of_a_field_never_raises(
     parts[6][data.draw(st.sampled_from(sorted(parts[6])))] = instead
     codec = Codec(MISSION)
 
-    heard = codec.decode(key_of(said), msgpack.packb(parts))
+    heard = codec.decode(said.key, msgpack.packb(parts))
 
     assert (heard is None) == (codec.dropped.total() == 1)
 
 
 @given(plain)
 def test_anything_that_is_messagepack_never_raises(thing: object) -> None:
-    assert drop_reason(key_of(CLAIM), msgpack.packb(thing))
+    assert drop_reason(CLAIM.key, msgpack.packb(thing))
 
 
 @pytest.mark.parametrize("said", EVERY_KIND, ids=EVERY_KIND_IDS)
@@ -333,7 +332,7 @@ def test_every_field_is_needed(said: Message) -> None:
     for field in parts_of(said)[6]:
         parts = parts_of(said)
         del parts[6][field]
-        assert drop_reason(key_of(said), msgpack.packb(parts)) == "malformed"
+        assert drop_reason(said.key, msgpack.packb(parts)) == "malformed"
 
 
 @pytest.mark.parametrize(("field", "value"), [("speed_m_s", 1e-300), ("layer_m", 1e200)])
@@ -366,7 +365,7 @@ def test_what_is_said_on_anothers_key_is_dropped(said: Message) -> None:
     others += [keys.claim("u1"), keys.outcome("u0", "t0"), keys.outcome("u0", "t1")]
     others += [keys.operator("u0"), keys.operator("u1"), keys.operator("fleet")]
     others += [keys.outcome("u1", "t0"), keys.status("u0"), keys.status("u1"), keys.state("u0")]
-    for key in set(others) - {key_of(said)}:
+    for key in set(others) - {said.key}:
         assert drop_reason(key, encode(said)) == "said on another's key"
 
 
@@ -374,21 +373,21 @@ def test_what_is_said_on_anothers_key_is_dropped(said: Message) -> None:
 def test_what_only_the_coordinator_may_say_is_dropped_from_a_uav(said: Message) -> None:
     by_uav = replace(said, writer="u0")
 
-    assert drop_reason(key_of(said), encode(by_uav)) == "said on another's key"
+    assert drop_reason(said.key, encode(by_uav)) == "said on another's key"
 
 
 @pytest.mark.parametrize("said", [CLAIM, OUTCOME, STATUS], ids=["Claim", "Outcome", "Status"])
 def test_what_only_a_uav_may_say_is_dropped_from_the_coordinator(said: Message) -> None:
     by_coordinator = replace(said, writer=COORDINATOR)
 
-    assert drop_reason(key_of(by_coordinator), encode(by_coordinator)) == "said on another's key"
+    assert drop_reason(by_coordinator.key, encode(by_coordinator)) == "said on another's key"
 
 
 @pytest.mark.parametrize("writer", [COORDINATOR, "u0"])
 def test_what_only_the_operator_may_say_is_dropped_from_others(writer: str) -> None:
     by_another = replace(COMMAND, writer=writer)
 
-    assert drop_reason(key_of(COMMAND), encode(by_another)) == "said on another's key"
+    assert drop_reason(COMMAND.key, encode(by_another)) == "said on another's key"
 
 
 @pytest.mark.parametrize(
@@ -402,7 +401,7 @@ def test_commands_that_there_are_not_are_malformed(target: str, kind: str) -> No
 
 
 def test_small_kinds_end_at_the_small_limit() -> None:
-    key = key_of(BOARD)
+    key = BOARD.key
     padding = b"\x00" * SMALL_LIMIT_BYTES
 
     assert drop_reason(key, encode(BOARD) + padding) == "malformed"
@@ -414,14 +413,14 @@ def test_large_kinds_end_at_the_large_limit() -> None:
     names = [f"{n:064d}" for n in range(LARGE_LIMIT_BYTES // 60)]
     said = message(COORDINATOR, Epoch(1, EpochPhase.RUNNING, "greedy", tuple(names), 0.0, "", {}))
 
-    assert drop_reason(key_of(said), encode(said)) == "too large"
+    assert drop_reason(said.key, encode(said)) == "too large"
 
 
 def test_deep_nesting_is_malformed() -> None:
     for depth in (100, 1000, 100_000):
-        assert drop_reason(key_of(CLAIM), b"\x91" * depth + b"\xc0") == "malformed"
+        assert drop_reason(CLAIM.key, b"\x91" * depth + b"\xc0") == "malformed"
         nested = encode(CLAIM)[:-1] + b"\x91" * depth + b"\xc0"
-        assert drop_reason(key_of(CLAIM), nested) == "malformed"
+        assert drop_reason(CLAIM.key, nested) == "malformed"
 
 
 @pytest.mark.parametrize(
@@ -440,7 +439,7 @@ def test_deep_nesting_is_malformed() -> None:
     ],
 )
 def test_hostile_messagepack_is_malformed(data: bytes) -> None:
-    assert drop_reason(key_of(CLAIM), data) == "malformed"
+    assert drop_reason(CLAIM.key, data) == "malformed"
 
 
 # -- snapshots ------------------------------------------------------------------------

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from swarm.bus.keyexpr import intersects
-from swarm.wire.codec import key_of
 from swarm.wire.keys import ANY_TOKEN, Keys, mission_of_token
 from swarm.wire.messages import Command, CommandKind
 from tests.builders import MISSION, brief, done, entry, epoch, held, message, status, uav
@@ -26,7 +25,7 @@ def test_keys_are_those_that_access_control_is_written_for() -> None:
         ),
     ]
     for statement, key in said:
-        assert key_of(statement) == key
+        assert statement.key == key
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "*", "**", "a b", "é", "x" * 65, "$*"])
