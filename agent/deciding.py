@@ -67,8 +67,7 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decisi
     columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
     state = after_outcomes(problem, board)
     taken = {claim.task for claim in stronger.values()} | set(turn.excluded)
-    for index, task in enumerate(problem.task_ids):
-        state.open[index] &= task not in taken
+    state.open[[columns[task] for task in taken if task in columns]] = False
     if not state.open.any():
         return None
     for index, uav in enumerate(problem.uav_ids):
