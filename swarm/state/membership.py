@@ -152,8 +152,10 @@ class Membership:
         """When `lost` may next have something to tell; once it has been asked, in the future."""
         if not self._linked:
             return None
-        gone_s = min(self._gone_until_s.values(), default=None)
-        return earliest(gone_s, next(iter(self._silent_at_s.values()), None))
+        silent_s = next(iter(self._silent_at_s.values()), None)
+        if not self._gone_until_s:
+            return silent_s
+        return earliest(silent_s, min(self._gone_until_s.values()))
 
     # -- pieces -------------------------------------------------------------------------
 
