@@ -514,7 +514,8 @@ class AgentCore:
         if self._stage is not StatusPhase.LEARNING and self._worth_keeping(actions):
             actions.insert(0, Save())
         # The vehicle first: it waits, while keeping and telling take their time.
-        actions.sort(key=lambda action: not isinstance(action, Order))
+        if len(actions) > 1:
+            actions.sort(key=lambda action: not isinstance(action, Order))
         self._deadline_s = self._earliest_deadline_s()
         self._pulse.promise(self._deadline_s)
         return actions

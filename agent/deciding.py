@@ -114,8 +114,7 @@ def _team_at(problem: Problem, board: TaskBoard, turn: Turn) -> tuple[TeamState,
     columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
     state = after_outcomes(problem, board)
     taken = {claim.task for claim in stronger.values()} | set(turn.excluded)
-    for index, task in enumerate(problem.task_ids):
-        state.open[index] &= task not in taken
+    state.open[[columns[task] for task in taken if task in columns]] = False
     for index, uav in enumerate(problem.uav_ids):
         claim = stronger.get(uav)
         state.active[index] = True

@@ -85,9 +85,11 @@ class Peers:
         """Whose claim on ``task`` is the strongest that counts, the own among them."""
         claims = replica.claims.items()
         return winner(
-            (uav, claim)
-            for uav, claim in claims
-            if claim.task == task and (uav == self._uav or self.membership.is_credible(uav))
+            [
+                (uav, claim)
+                for uav, claim in claims
+                if claim.task == task and (uav == self._uav or self.membership.is_credible(uav))
+            ]
         )
 
     def patience_ends_s(self, replica: Replica, now_s: float) -> float | None:

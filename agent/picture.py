@@ -54,6 +54,9 @@ class Picture:
         self._uav = uav
         self._replica = replica
         self._zero_s: float | None = None
+        self._brief: Brief | None = None
+        self._me: Fleet | None = None
+        """The UAV's entry in that brief."""
 
     # -- the registers --------------------------------------------------------------
 
@@ -115,8 +118,11 @@ class Picture:
     def me(self) -> Fleet | None:
         """The UAV's entry in the brief."""
         brief = self._replica.brief
-        fleet = () if brief is None else brief.uavs
-        return next((uav for uav in fleet if uav.id == self._uav), None)
+        if brief is not self._brief:
+            self._brief = brief
+            fleet = () if brief is None else brief.uavs
+            self._me = next((uav for uav in fleet if uav.id == self._uav), None)
+        return self._me
 
     def move(self, telemetry: Telemetry) -> None:
         """The vehicle has told where it is."""

@@ -9,7 +9,7 @@ place, and attitude.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 __all__ = ["IdealMotion", "Leg", "Motion", "Point"]
@@ -63,41 +63,46 @@ class Leg:
     speed_m_s: float
     """Along the line in three dimensions [m/s]; > 0."""
     leaves_s: float
+    arrives_s: float = field(init=False)
+    """When the target is reached [s]."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.speed_m_s < math.inf:
             raise ValueError(f"speed must be positive and finite, not {self.speed_m_s} m/s")
-
-    @property
-    def arrives_s(self) -> float:
-        """When the target is reached [s]."""
         length_m = math.dist(self.start_enu_m, self.target_enu_m)
-        return self.leaves_s + length_m / self.speed_m_s
+        object.__setattr__(self, "arrives_s", self.leaves_s + length_m / self.speed_m_s)
 
     def position_enu_m(self, now_s: float) -> Point:
         """Place at that instant [m]; the target exactly from the arrival on."""
-        arrives_s = self.arrives_s
-        if now_s >= arrives_s:
+        if now_s >= self.arrives_s:
             return self.target_enu_m
         if now_s <= self.leaves_s:
             return self.start_enu_m
-        flown_frac = (now_s - self.leaves_s) / (arrives_s - self.leaves_s)
-        east_m, north_m, up_m = (
-            a + (b - a) * flown_frac
-            for a, b in zip(self.start_enu_m, self.target_enu_m, strict=True)
+        flown_frac = (now_s - self.leaves_s) / (self.arrives_s - self.leaves_s)
+        (east_m, north_m, up_m), (to_east_m, to_north_m, to_up_m) = (
+            self.start_enu_m,
+            self.target_enu_m,
         )
-        return east_m, north_m, up_m
+        return (
+            east_m + (to_east_m - east_m) * flown_frac,
+            north_m + (to_north_m - north_m) * flown_frac,
+            up_m + (to_up_m - up_m) * flown_frac,
+        )
 
     def velocity_enu_m_s(self, now_s: float) -> Point:
         """Velocity at that instant [m/s]; zero before the start and from the arrival on."""
-        arrives_s = self.arrives_s
-        if not self.leaves_s <= now_s < arrives_s:
+        if not self.leaves_s <= now_s < self.arrives_s:
             return _AT_REST
-        duration_s = arrives_s - self.leaves_s
-        east_m_s, north_m_s, up_m_s = (
-            (b - a) / duration_s for a, b in zip(self.start_enu_m, self.target_enu_m, strict=True)
+        duration_s = self.arrives_s - self.leaves_s
+        (east_m, north_m, up_m), (to_east_m, to_north_m, to_up_m) = (
+            self.start_enu_m,
+            self.target_enu_m,
         )
-        return east_m_s, north_m_s, up_m_s
+        return (
+            (to_east_m - east_m) / duration_s,
+            (to_north_m - north_m) / duration_s,
+            (to_up_m - up_m) / duration_s,
+        )
 
 
 class IdealMotion:

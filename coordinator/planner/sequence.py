@@ -6,18 +6,20 @@ lexicographically first sequence, and again only after such a tie. All of them a
 where that is cheap, else a seeded local search runs until it is stopped. Equal UAVs keep their
 order, since exchanging them changes only names. Evaluations go to a kernel many at a time, on
 every processor; results do not depend on how many there are. Leaves out: limits
-(`coordinator.planner.stop`) and lists that no sequence gives.
+(`coordinator.planner.stop`), listing first rounds (`coordinator.planner.first_rounds`) and
+lists that no sequence gives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import islice, permutations
 
 import numpy as np
 
 from coordinator.planner.assignment import single_stage
+from coordinator.planner.first_rounds import FirstRound, FirstRounds
 from coordinator.planner.sequence_space import (
     Sequence,
     disturbed,
@@ -26,7 +28,7 @@ from coordinator.planner.sequence_space import (
     twins,
 )
 from coordinator.planner.stop import ShouldStop, never
-from swarm.allocation.lower_level import CompiledRule, TeamState, next_decision, rank_of
+from swarm.allocation.lower_level import CompiledRule, TeamState
 from swarm.allocation.problem import IntArray, Problem
 from swarm.allocation.rules import EXACT_TASKS
 from swarm.kernels import lower_level as kernel
@@ -36,14 +38,8 @@ __all__ = ["EXHAUSTIVE_UAVS", "Progress", "SearchLimits", "SequenceSearch", "bes
 EXHAUSTIVE_UAVS = 8
 """Up to this many active UAVs every distinct first round is tried."""
 
-FirstRound = tuple[int, ...]
-"""Per active UAV in scenario order, the task it takes first, `_NO_TASK` or `_UNDECIDED`."""
-TaskSet = int
-"""Tasks, a bit for each."""
 Progress = Callable[[int, float], None]
 """Told the evaluations spent so far and the best J found by them [value·s]."""
-_NO_TASK = -1
-_UNDECIDED = -2
 _CLIMBS_IN_VAIN = 20
 _RANDOM_STARTS = 12
 _NEIGHBOURS = 32
@@ -166,13 +162,9 @@ class _Search:
         self._inactive: Sequence = tuple(int(u) for u in np.flatnonzero(~state.active))
         self._most_evaluations = np.inf
         self._looked_up = 0
-        self._is_greedy = rule.code == kernel.GREEDY
-        self._first_decisions: dict[tuple[int, TaskSet], int] = {}
-        self._preferred: dict[int, list[int]] = {}
-        """By UAV, the tasks it likes best, as far as was asked for; at their end `_NO_TASK`."""
         self._twins = twins(problem, state, self.uavs)
         self._any_twins = any(len(equals) > 1 for equals in self._twins.values())
-        self._rank = rank_of(self.uavs + self._inactive)
+        self._first_rounds = FirstRounds(problem, rule, state, self.uavs, self._twins)
         self._values: dict[bytes, float] = {}
         self._best: tuple[float, Sequence] = (-np.inf, self.uavs)
 
@@ -193,30 +185,13 @@ class _Search:
     def list_first_rounds(
         self, most: int, limits: SearchLimits
     ) -> dict[FirstRound, Sequence] | None:
-        """Every distinct first round with its lexicographically first sequence; None if too many.
-
-        Grown UAV by UAV. Which order led to a partial round does not matter to the rest of it,
-        so only the first order of each is carried on.
-        """
-        rounds: dict[FirstRound, tuple[Sequence, TaskSet]]
-        rounds = {(_UNDECIDED,) * len(self.uavs): ((), 0)}
-        for _ in self.uavs:
-            longer: dict[FirstRound, tuple[Sequence, TaskSet]] = {}
-            for first_round, (sequence, taken) in sorted(rounds.items(), key=lambda item: item[1]):
-                for place, uav in enumerate(self.uavs):
-                    if first_round[place] == _UNDECIDED and not self._twin_waits(uav, sequence):
-                        task = self._first_task(uav, taken)
-                        extended = (*first_round[:place], task, *first_round[place + 1 :])
-                        if extended not in longer:
-                            longer[extended] = (*sequence, uav), taken | _only(task)
-                too_many = len(longer) > limits.partial_rounds
-                too_many |= len(self._first_decisions) > limits.decisions
-                if too_many or self._should_stop(self._work()):
-                    return None
-            rounds = longer
-        if len(rounds) > most:
-            return None
-        return {first_round: sequence for first_round, (sequence, _) in rounds.items()}
+        """Every distinct first round with its first sequence; None if too many."""
+        return self._first_rounds.listed(
+            most,
+            most_partial=limits.partial_rounds,
+            most_decisions=limits.decisions,
+            should_stop=lambda: self._should_stop(self._work()),
+        )
 
     def try_first_rounds(self, rounds: dict[FirstRound, Sequence]) -> bool:
         """Evaluate each, and all its sequences where a later tie lets them differ."""
@@ -226,7 +201,8 @@ class _Search:
             return False
         tied = [first for (first, _), (_, tie) in zip(ordered, found, strict=True) if tie]
         for first_round in tied:
-            others = (s for s in self._sequences_of(first_round, ()) if s != rounds[first_round])
+            sequences = self._first_rounds.sequences_of(first_round)
+            others = (s for s in sequences if s != rounds[first_round])
             if not self.try_each(others):
                 return False
         return True
@@ -377,13 +353,8 @@ class _Search:
 
     def _work(self) -> float:
         """Evaluations spent, each first decision counting as its part of one."""
-        looked_up = self._looked_up + len(self._first_decisions)
+        looked_up = self._looked_up + self._first_rounds.decisions
         return self.evaluations + looked_up / max(1, self._problem.n_task)
-
-    def _twin_waits(self, uav: int, sequence: Sequence) -> bool:
-        """Whether ``uav`` would pass an equal UAV of smaller index, which changes only names."""
-        equals = self._twins[uav]
-        return uav != equals[0] and any(u < uav and u not in sequence for u in equals)
 
     def _in_twin_order(self, sequence: Sequence) -> Sequence:
         """The same sequence with equal UAVs in ascending order on their places."""
@@ -391,47 +362,3 @@ class _Search:
             return sequence
         waiting = {equals: iter(equals) for equals in self._twins.values()}
         return tuple(next(waiting[self._twins[uav]]) for uav in sequence)
-
-    def _first_task(self, uav: int, taken: TaskSet) -> int:
-        """What ``uav`` takes when others have ``taken`` so much; `_NO_TASK` if nothing."""
-        task = self._first_decisions.get((uav, taken))
-        if task is None:
-            task = self._favourite(uav, taken) if self._is_greedy else self._decide(uav, taken)
-            self._first_decisions[uav, taken] = task
-        return task
-
-    def _favourite(self, uav: int, taken: TaskSet) -> int:
-        """The same by the greedy rule, whose order of preference does not depend on the others."""
-        preferred = self._preferred.setdefault(uav, [])
-        for task in preferred:
-            if not taken & _only(task):
-                return task
-        while True:
-            task = self._decide(uav, sum(map(_only, preferred)))
-            preferred.append(task)
-            if not taken & _only(task):
-                return task
-
-    def _decide(self, uav: int, taken: TaskSet) -> int:
-        state = self._state.copy()
-        state.open[[task for task in range(self._problem.n_task) if taken & _only(task)]] = False
-        decision = next_decision(self._problem, state, self._rank, self._rule, uav)
-        return _NO_TASK if decision is None else decision.task
-
-    def _sequences_of(self, first_round: FirstRound, sequence: Sequence) -> Iterator[Sequence]:
-        """All sequences that begin with ``sequence`` and lead to ``first_round``, in order."""
-        if len(sequence) == len(self.uavs):
-            yield sequence
-            return
-        decided = (t for u, t in zip(self.uavs, first_round, strict=True) if u in sequence)
-        taken = sum(map(_only, decided))
-        for uav, task in zip(self.uavs, first_round, strict=True):
-            if uav in sequence or self._twin_waits(uav, sequence):
-                continue
-            if self._first_task(uav, taken) == task:
-                yield from self._sequences_of(first_round, (*sequence, uav))
-
-
-def _only(task: int) -> TaskSet:
-    """That task alone; nothing for `_NO_TASK`."""
-    return 1 << task if task >= 0 else 0

@@ -67,6 +67,8 @@ def chances(table: Mapping[str, float], tasks: Iterable[Task], default: float) -
         tasks: which.
         default: where the table says nothing.
     """
+    if not table:
+        return [default for _ in tasks]
     return [
         table.get(task.id, default if task.kind is None else table.get(task.kind, default))
         for task in tasks

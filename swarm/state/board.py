@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from enum import StrEnum
+from itertools import islice
 
 import numpy as np
 
@@ -57,26 +58,28 @@ class TaskBoard:
 
     def __init__(self, replica: Replica, mission: str) -> None:
         self.replica = replica
-        self._mission = mission
+        self._name = mission
         self._entries: list[Board] = []
         """In board order."""
         self._untried: dict[str, TaskState] = {}
         """In board order, what each task would be if nobody had attempted any."""
         self._entries_version = -1
         self._brief: Brief | None = None
-        self._uavs: tuple[Uav, ...] = ()
-        """Of that brief."""
+        self._fleet: Mission | None = None
+        """The mission of that brief, without any tasks."""
         self._tasks: dict[str, tuple[Board, Task]] = {}
         """By id, with the entry each was made from."""
         self._states: dict[str, TaskState] = {}
         self._unfinished = False
         self._states_version = -1
+        self._attempts = 0
+        """How many outcomes the states take into account."""
         self._problem: Problem | None = None
         self._problem_version = -1
 
     @property
     def states(self) -> dict[str, TaskState]:
-        """State of every task on the board, in board order."""
+        """State of every task on the board, in board order, until the replica changes."""
         self._catch_up()
         return self._states
 
@@ -90,24 +93,24 @@ class TaskBoard:
     def problem(self) -> Problem | None:
         """Every UAV of the brief and every task posted so far; None before the brief."""
         if self._problem_version != self.replica.board_version:
-            mission = self._mission_now()
-            self._problem = None if mission is None else Problem.from_mission(mission)
+            self._problem = self._problem_now()
             self._problem_version = self.replica.board_version
         return self._problem
 
-    def _mission_now(self) -> Mission | None:
-        """What `mission_of` gives; UAVs and tasks of which nothing new was said stay the same."""
+    def _problem_now(self) -> Problem | None:
+        """Of `mission_of`; what nothing new was said of is not made anew."""
         brief = self.replica.brief
         if brief is None:
             return None
-        if brief is not self._brief:
-            self._brief, self._uavs = brief, tuple(map(_uav_of, brief.uavs))
+        if self._fleet is None or brief is not self._brief:
+            self._brief = brief
+            self._fleet = _mission(self._name, brief, map(_uav_of, brief.uavs), ())
         self._sort()
         for entry in self._entries:
             if (known := self._tasks.get(entry.task)) is None or known[0] is not entry:
                 self._tasks[entry.task] = entry, _task_of(entry)
-        tasks = (self._tasks[entry.task][1] for entry in self._entries)
-        return _mission(self._mission, brief, self._uavs, tasks)
+        tasks = [self._tasks[entry.task][1] for entry in self._entries]
+        return Problem.from_mission(self._fleet, tasks=tasks)
 
     def _sort(self) -> None:
         if self._entries_version != self.replica.board_version:
@@ -119,24 +122,27 @@ class TaskBoard:
             self._entries_version = self.replica.board_version
 
     def _catch_up(self) -> None:
-        if self._states_version != self.replica.task_version:
-            self._states = self._task_states()
-            self._unfinished = TaskState.OPEN in self._states.values()
-            self._states_version = self.replica.task_version
-
-    def _task_states(self) -> dict[str, TaskState]:
         replica = self.replica
-        self._sort()
-        states = self._untried.copy()
+        changes = replica.task_version - self._states_version
+        if not changes:
+            return
+        attempts = len(replica.outcomes) - self._attempts
+        if changes != attempts:
+            # There is more than outcomes of first attempts, which stand at the end.
+            self._sort()
+            self._states, attempts = self._untried.copy(), len(replica.outcomes)
         reattempt = replica.brief is not None and replica.brief.reattempt_failed
-        for (_, task), outcome in replica.outcomes.items():
-            if task not in states:
+        for (_, task), outcome in islice(reversed(replica.outcomes.items()), attempts):
+            state = self._states.get(task)
+            if state is None:
                 continue
             if outcome.result is Result.DONE:
-                states[task] = TaskState.DONE
-            elif states[task] is TaskState.OPEN and not reattempt:
-                states[task] = TaskState.FAILED
-        return states
+                self._states[task] = TaskState.DONE
+            elif state is TaskState.OPEN and not reattempt:
+                self._states[task] = TaskState.FAILED
+        self._attempts = len(replica.outcomes)
+        self._unfinished = TaskState.OPEN in self._states.values()
+        self._states_version = replica.task_version
 
 
 def mission_of(replica: Replica, name: str, brief: Brief) -> Mission:

@@ -8,7 +8,7 @@ passes in by leaving the lost out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 from swarm.wire.messages import Claim, ClaimPhase
 
@@ -21,8 +21,10 @@ def claim_strength(uav: str, claim: Claim) -> tuple[bool, float, int, str]:
     return (proposed, claim.decided_s if proposed else claim.completion_s, claim.rank, uav)
 
 
-def winner(claims: Iterable[tuple[str, Claim]]) -> str | None:
+def winner(claims: Sequence[tuple[str, Claim]]) -> str | None:
     """The UAV that keeps the task all ``claims`` (UAV id, claim) name; None if there are none."""
+    if len(claims) == 1:
+        return claims[0][0]
     strongest = min(claims, key=lambda item: claim_strength(*item), default=None)
     return None if strongest is None else strongest[0]
 

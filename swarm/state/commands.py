@@ -34,6 +34,8 @@ def in_force(replica: Replica) -> dict[str, Command]:
 
 def newest(replica: Replica, uav: str) -> tuple[Stamp, Command] | None:
     """The newest command that concerns ``uav``, with its stamp; None if there is none."""
+    if not replica.commands:
+        return None
     commands = _of_this_run(replica)
     concerning = [commands[target] for target in (uav, FLEET) if target in commands]
     return max(concerning, key=lambda stamped: stamped[0], default=None)
@@ -41,7 +43,7 @@ def newest(replica: Replica, uav: str) -> tuple[Stamp, Command] | None:
 
 def aborted(replica: Replica) -> Command | None:
     """The command that has ended this flight; None if there is none."""
-    return in_force(replica).get(FLEET)
+    return in_force(replica).get(FLEET) if replica.commands else None
 
 
 def words(command: Command) -> str:

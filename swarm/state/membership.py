@@ -29,7 +29,9 @@ class Membership:
         self._gone_until_s: dict[str, float] = {}
         """Present writers without a token, and when each is lost unless it is seen again."""
         self._silent_at_s: dict[str, float] = {}
-        """Present writers that have been heard, and when each is lost unless it speaks again."""
+        """Present writers that have been heard, and when each is lost unless it speaks again.
+
+        Everyone has equally long from when it was last heard, so they are in order of time."""
         self._mute: set[str] = set()
         """Lost by silence, with a living token."""
         self._interrupted: set[str] = set()
@@ -101,7 +103,7 @@ class Membership:
             self._enter(writer, now_s)
             return True
         if writer in self.present:
-            self._silent_at_s[writer] = now_s + self._timing.silence_s
+            self._wait_for(writer, now_s)
         return False
 
     def expect(self, writers: Iterable[str], now_s: float) -> None:
@@ -109,7 +111,7 @@ class Membership:
         for writer in set(writers) - self._heard:
             self._heard.add(writer)
             if writer in self.present:
-                self._silent_at_s[writer] = now_s + self._timing.silence_s
+                self._wait_for(writer, now_s)
 
     def spoke(self, writer: str) -> None:
         """``writer`` itself has just said what it claims."""
@@ -150,8 +152,10 @@ class Membership:
         """When `lost` may next have something to tell; once it has been asked, in the future."""
         if not self._linked:
             return None
-        gone_s = min(self._gone_until_s.values(), default=None)
-        return earliest(gone_s, min(self._silent_at_s.values(), default=None))
+        silent_s = next(iter(self._silent_at_s.values()), None)
+        if not self._gone_until_s:
+            return silent_s
+        return earliest(silent_s, min(self._gone_until_s.values()))
 
     # -- pieces -------------------------------------------------------------------------
 
@@ -159,7 +163,12 @@ class Membership:
         self.present.add(writer)
         # The coordinator speaks as long as it is there; agents may have nothing to say yet.
         if writer in self._heard or writer == COORDINATOR:
-            self._silent_at_s[writer] = now_s + self._timing.silence_s
+            self._wait_for(writer, now_s)
+
+    def _wait_for(self, writer: str, now_s: float) -> None:
+        """``writer`` shall speak again: of all it has the longest until then."""
+        self._silent_at_s.pop(writer, None)
+        self._silent_at_s[writer] = now_s + self._timing.silence_s
 
     def _grant_grace(self, now_s: float) -> None:
         """Everyone gets the time to show its token, and to speak, that it would need anew."""

@@ -39,7 +39,9 @@ class _TimedAgent(AgentCore):
         """React to one event."""
         began_s = self._clock.now_s()
         actions = super().step(event, now_s)
-        if any(isinstance(action, Note) and action.text == "decided" for action in actions):
+        if actions and any(
+            isinstance(action, Note) and action.text == "decided" for action in actions
+        ):
             self._taken_s.append(self._clock.now_s() - began_s)
         return actions
 

@@ -146,6 +146,38 @@ def test_what_is_kept_equals_what_a_fresh_look_finds(said: list[Message]) -> Non
             assert board.problem.task_ids == fresh.problem.task_ids
 
 
+@given(
+    st.lists(
+        st.builds(
+            lambda writer, task, outcome: (writer, outcome(task)),
+            st.sampled_from(["u0", "u1"]),
+            st.sampled_from(["t0", "t1", "t2"]),
+            st.sampled_from([done, failed]),
+        )
+        | st.builds(
+            lambda task, withdrawn: (COORDINATOR, entry(task, withdrawn=withdrawn)),
+            st.sampled_from(["t0", "t1", "t2"]),
+            st.booleans(),
+        ),
+        max_size=12,
+    ),
+    st.data(),
+)
+def test_however_often_one_looks_tasks_end_as_the_last_look_alone_finds(
+    said: list[tuple[str, Body]], data: st.DataObject
+) -> None:
+    registers = Registers((COORDINATOR, entry("t0")), (COORDINATOR, entry("t1")))
+
+    for writer, body in said:
+        registers.say(writer, body)
+        if data.draw(st.booleans()):
+            _ = registers.board.states
+
+    fresh = TaskBoard(registers.replica, MISSION)
+    assert list(registers.board.states.items()) == list(fresh.states.items())
+    assert registers.board.unfinished == fresh.unfinished
+
+
 def test_doable_is_what_someone_who_takes_part_is_capable_of() -> None:
     fleet = uav("u0", t1=0.0), uav("u1", t0=0.0), uav("u2")
     registers = Registers((COORDINATOR, brief(*fleet)))
