@@ -163,16 +163,18 @@ def test_no_policy_exceeds_it(seed: int) -> None:
 
 @settings(deadline=None, max_examples=30)
 @given(seed=st.integers(0, 2**32 - 1), n_task=st.integers(1, 3))
-def test_it_is_reached_by_one_uav_whose_legs_do_not_vary(seed: int, n_task: int) -> None:
+def test_it_is_reached_by_one_uav_whose_legs_do_not_vary_and_who_tries_once(
+    seed: int, n_task: int
+) -> None:
     fate = tiny_fate(seed, 1, n_task)
     steady = replace(fate.uncertainty, leg_sd_frac=0.0, survival=True)
-    fate = replace(fate, uncertainty=steady)
+    # Where failed tasks open again, other tasks between two attempts are bounded less tightly.
+    mission = replace(fate.mission, reattempt_failed=False)
+    fate = replace(fate, mission=mission, uncertainty=steady)
 
     most = max(value_of(fate, flown(fate, lists)) for lists in all_lists(1, n_task))
 
-    assert clairvoyant_bound(fate) == pytest.approx(
-        max(0.0, most), rel=0.01 if n_task > 1 else 1e-6
-    )
+    assert clairvoyant_bound(fate) == pytest.approx(max(0.0, most), rel=1e-6)
 
 
 @pytest.mark.parametrize(("n_uav", "n_task"), [(5, 20), (2, 12)])
