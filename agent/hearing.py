@@ -161,7 +161,9 @@ class Hearing:
         if news is None:
             return []
         self._peers.stated(message.writer, message.body, now_s)
-        if news is News.OPENING:
+        if news is News.APPEARANCE:
+            self._tasking.tempt()
+        if news in (News.APPEARANCE, News.OPENING):
             self._awake(now_s)
         elif news is News.CLAIM:
             self._tasking.peer_claimed(now_s)
@@ -217,6 +219,7 @@ class Hearing:
             claim = self._replica.claims.get(writer)
             left = claim is not None and claim.phase is ClaimPhase.OUT
             actions.append(Note("left" if left else "lost", {"writer": writer, "why": why}))
+            self._tasking.tempt()
             self._awake(now_s)
             self.learning.want(now_s)  # others may have heard its last words
         return actions

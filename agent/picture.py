@@ -30,6 +30,7 @@ __all__ = ["News", "Picture"]
 class News(Enum):
     """What a statement changes for an agent that is free to take a task."""
 
+    APPEARANCE = "a task that nobody knew of"
     OPENING = "a task may have opened"
     CLAIM = "somebody's claim, which opens nothing"
     OTHER = "anything else"
@@ -62,9 +63,12 @@ class Picture:
     def take_in(self, message: Message) -> News | None:
         """Join another's statement; gives what it changes, None if it was known."""
         before, epoch = self._replica.claims.get(message.writer), self._replica.epoch
+        appears = isinstance(message.body, Board) and message.body.task not in self._replica.board
         if not self._replica.join(message):
             return None
         match message.body:
+            case Board() if appears:
+                return News.APPEARANCE
             case Brief() | Board() | Outcome(result=Result.FAILED):
                 return News.OPENING
             case Claim(task=task):

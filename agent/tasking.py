@@ -1,21 +1,22 @@
 """The tasks of one airborne UAV, one after the other: from the decision to the outcome.
 
-Decides whenever the UAV is free, claims and flies at once, gives way to stronger
-claims and waits idle while there is nothing for it. Leaves out: which task is best
-(agent.deciding), getting airborne and going home (agent.core).
+Decides whenever the UAV is free, claims and flies at once, turns to something better that
+opens on the way, gives way to stronger claims and waits idle while there is nothing for it.
+Leaves out: which task is best (agent.deciding), getting airborne and going home (agent.core).
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from agent.deciding import Turn, decide
+from agent.deciding import Turn, decide, turn_aside
 from agent.events import Action, Order
 from agent.peers import Peers
 from agent.picture import Picture
 from agent.speech import Speech
 from agent.vehicle import GoTo
 from swarm.allocation.lower_level import Decision, Rule
+from swarm.allocation.problem import Problem
 from swarm.config import Timing
 from swarm.deadline import earliest
 from swarm.events import Note
@@ -65,6 +66,7 @@ class Tasking:
         self._refusals: dict[str, tuple[int, float]] = {}
         """How often the vehicle refused a task, and until when it is left alone."""
         self._adrift = False
+        self._tempted = False
         self._to_decide = False
         self._idled = False
         self._awaits_peers = False
@@ -137,6 +139,13 @@ class Tasking:
             if self._picture.running:
                 self._free_since_s = self._picture.mission_s(now_s)
 
+    def tempt(self) -> None:
+        """A task has appeared, or a lost UAV's has opened: it may be worth turning to in flight.
+
+        Told once for each, so no plan and nobody's change of mind can keep a UAV from arriving.
+        """
+        self._tempted = True
+
     def peer_claimed(self, now_s: float) -> None:
         """Somebody has said what it claims; it may be whom this UAV waits for."""
         if self._awaits_peers:
@@ -176,6 +185,8 @@ class Tasking:
         actions = self._serve(now_s) + self._keep_or_lose_claim(now_s)
         if self._retry_at_s is not None and self._retry_at_s <= now_s:
             self.wake(now_s)
+        if self._tempted and informed and self.airborne:
+            actions += self._turn_aside(now_s)
         if self.phase is StatusPhase.IDLE and self._to_decide:
             ready = informed and self.airborne
             actions += self._decide(now_s) if ready else self._give_up_claim()
@@ -217,6 +228,24 @@ class Tasking:
             return [self._speech.say(replace(claim, phase=ClaimPhase.HELD))]
         return []
 
+    def _turn_aside(self, now_s: float) -> list[Action]:
+        """Leave the task for a better one, unless somebody free is about to take that."""
+        self._tempted = False
+        claim, epoch, problem = self.claim, self._replica.epoch, self._picture.board.problem
+        turn = self._turn(self._picture.mission_s(now_s), now_s)
+        if claim is None or epoch is None or problem is None or turn is None or turn.awaited:
+            return []
+        rule, actions = self._rule_of(epoch)
+        if rule is None or self.phase is not StatusPhase.FLYING:
+            return actions
+        decision = turn_aside(problem, self._picture.board, rule, turn, claim)
+        if decision is None:
+            return actions
+        self._become_free(turn.now_s)
+        why: dict[str, object] = {"task": claim.task, "for": problem.task_ids[decision.task]}
+        actions.append(Note("turns aside", why))
+        return actions + self._set_off(decision, problem, epoch, now_s)
+
     def _lost(self) -> str | None:
         """Why the claimed task is not this UAV's to do; None if it is."""
         task = self._task()
@@ -245,29 +274,33 @@ class Tasking:
     # -- without one ----------------------------------------------------------------
 
     def _decide(self, now_s: float) -> list[Action]:
-        epoch, place = self._replica.epoch, self._picture.place_enu_m
-        problem = self._picture.board.problem
-        if epoch is None or problem is None or place is None or self._uav not in problem.uav_ids:
+        epoch, problem = self._replica.epoch, self._picture.board.problem
+        turn = self._turn(self._free_since_s, now_s)
+        if epoch is None or problem is None or turn is None:
             return []
         rule, actions = self._rule_of(epoch)
         if rule is None:
             return actions + self._stay_idle(now_s)
-        turn = Turn(
+        decision = decide(problem, self._picture.board, rule, turn)
+        if decision is None:
+            return self._stay_idle(now_s)
+        return self._set_off(decision, problem, epoch, now_s)
+
+    def _turn(self, free_since_s: float, now_s: float) -> Turn | None:
+        """The turn of this UAV, free since then; None as long as too little is known."""
+        place, problem = self._picture.place_enu_m, self._picture.board.problem
+        if place is None or problem is None or self._uav not in problem.uav_ids:
+            return None
+        return Turn(
             uav=self._uav,
             now_s=self._picture.mission_s(now_s),
-            decided_s=self._free_since_s,
+            decided_s=free_since_s,
             place_enu_m=place,
             credible=self._peers.credible,
             awaited=self._peers.awaited(self._replica, now_s),
             patience_s=self._timing.patience_s,
             excluded={t for t, (_, until_s) in self._refusals.items() if now_s < until_s},
         )
-        decision = decide(problem, self._picture.board, rule, turn)
-        if decision is None:
-            return self._stay_idle(now_s)
-        task = self._replica.board[problem.task_ids[decision.task]]
-        rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
-        return self._set_off(task, decision, rank, now_s)
 
     def _rule_of(self, epoch: Epoch) -> tuple[Rule | None, list[Action]]:
         """The rule in force, and what to say about it when it is new."""
@@ -280,9 +313,13 @@ class Tasking:
         self._speech.note = f"cannot decide by rule {epoch.rule}"
         return None, [Note("unknown rule", {"rule": epoch.rule})]
 
-    def _set_off(self, task: Board, decision: Decision, rank: int, now_s: float) -> list[Action]:
+    def _set_off(
+        self, decision: Decision, problem: Problem, epoch: Epoch, now_s: float
+    ) -> list[Action]:
+        task = self._replica.board[problem.task_ids[decision.task]]
+        rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
         self.phase = StatusPhase.FLYING
-        self._retry_at_s, self._adrift = None, False
+        self._retry_at_s, self._adrift, self._tempted = None, False, False
         self._held_at_s = now_s + self._timing.objection_window_s
         claim = Claim(
             ClaimPhase.PROPOSED, task.task, self._free_since_s, rank, decision.completion_s

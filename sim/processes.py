@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from agent.vehicle import Telemetry
 from sim.event_queue import EventQueue
-from swarm.events import BusFact, Heard, LinkChanged, Tick
+from swarm.events import BusFact, Heard, Learned, LinkChanged, Tick
 from swarm.shell import Core
 from swarm.wire.messages import Snapshot
 
@@ -121,7 +121,7 @@ class Process:
             return
         if isinstance(event, LinkChanged):
             self.linked = event.up
-        if self._telemetry is not None and isinstance(event, Heard):
+        if self._telemetry is not None and isinstance(event, Heard | Learned | Tick):
             self._tell_telemetry(self._telemetry)
         self._act(lambda now_s: self.core.step(event, now_s))
 

@@ -115,6 +115,11 @@ class Judge:
 
     def noted(self, process: Process, note: Note) -> None:
         """``process`` has written a line into its log."""
+        if note.text == "lost":
+            self.transcript.missed(process.name)
+        if note.text == "turns aside":
+            self.transcript.turned_aside(self._now_s, process.name, str(note.fields["task"]))
+            self._stop_if_broken()
         if note.text == "lost" and not process.linked:
             text = f"{process.name} gives {note.fields['writer']} up while its own link is down"
             self._break("suspects without link", text)

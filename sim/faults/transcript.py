@@ -14,7 +14,7 @@ what takes a view into the processes (sim.faults.judge).
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 
 from swarm.state.claims import claim_strength
@@ -67,7 +67,10 @@ class Transcript:
         self._said: dict[tuple[str, str], Message] = {}
         self._claims: dict[tuple[str, int], Claim] = {}
         self._rivals: dict[str, dict[str, list[Claim]]] = defaultdict(lambda: defaultdict(list))
-        self._refused: set[tuple[str, str]] = set()
+        self._left: set[tuple[str, str]] = set()
+        """UAV and task, where the UAV may leave the task undone."""
+        self._turns: Counter[str] = Counter()
+        self._missed: Counter[str] = Counter()
 
     @property
     def done(self) -> set[str]:
@@ -95,7 +98,18 @@ class Transcript:
 
     def refused(self, uav: str, task: str) -> None:
         """The vehicle of ``uav`` will not fly to ``task``."""
-        self._refused.add((uav, task))
+        self._left.add((uav, task))
+
+    def missed(self, uav: str) -> None:
+        """``uav`` has given somebody up."""
+        self._missed[uav] += 1
+
+    def turned_aside(self, at_s: float, uav: str, task: str) -> None:
+        """``uav`` has left ``task`` of its own accord; once for each task or loss it learned of."""
+        self._left.add((uav, task))
+        self._turns[uav] += 1
+        if self._turns[uav] > len(self.posted) + self._missed[uav]:
+            self._break(at_s, "left its task", f"{uav} left {task} though nothing had opened")
 
     def said(self, at_s: float, process: str, life: int, message: Message) -> None:
         """A process has said something.
@@ -151,7 +165,7 @@ class Transcript:
 
     def _may_leave(self, uav: str, before: Claim, claim: Claim) -> bool:
         task = str(before.task)
-        if task in self.done | self.failed | self.withdrawn or (uav, task) in self._refused:
+        if task in self.done | self.failed | self.withdrawn or (uav, task) in self._left:
             return True
         if claim.phase is ClaimPhase.OUT and (self.ended or self.sent_home(uav)):
             return True

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import platform
+import re
 import warnings
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -22,6 +23,7 @@ from sim.study.runner import Fly
 from sim.study.trial import Briefing, Job, TrialRunner
 from swarm.clock import SystemClock
 from swarm.errors import Fault, InputError, SwarmError
+from swarm.scenario.findings import printable
 
 __all__ = ["on_dask"]
 
@@ -31,6 +33,8 @@ _LARGEST_CHUNK = 16
 _AHEAD = 2
 """Chunks handed out per thread of the cluster, so that none waits for the next one."""
 _RETRIES = 3
+_ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]{1,5}")
+_RIGHT_ADDRESS = "give the address that 'dask scheduler' prints, such as tcp://10.0.0.1:8786"
 _OPTION = "--scheduler"
 _LOGGERS = ("distributed", "distributed.client")
 """Those that Dask gives levels of their own."""
@@ -44,6 +48,8 @@ def on_dask(address: str, timeout_s: float = CONNECT_TIMEOUT_S) -> Fly:
     """
 
     def fly(briefing: Briefing, jobs: Sequence[Job]) -> Generator[list[Row]]:
+        if _ADDRESS.fullmatch(address) is None:
+            raise InputError(Fault(_OPTION, printable(address), "is no address", _RIGHT_ADDRESS))
         with _client(address, timeout_s) as client:
             threads = _threads_ready(client, address, timeout_s)
             yield from _flown_by(client, briefing, jobs, threads)
@@ -64,8 +70,7 @@ def _client(address: str, timeout_s: float) -> Iterator[Any]:
         try:
             client = distributed.Client(address, timeout=timeout_s, set_as_default=False)
         except (OSError, ValueError) as error:
-            remedy = "give the address that 'dask scheduler' prints, such as tcp://10.0.0.1:8786"
-            fault = Fault(_OPTION, address, "no Dask scheduler answers there", remedy)
+            fault = Fault(_OPTION, address, "no Dask scheduler answers there", _RIGHT_ADDRESS)
             raise InputError(fault) from error
         try:
             yield client

@@ -64,7 +64,7 @@ class Tally:
 
     def noted(self, process: Process, note: Note) -> None:
         """Count a task that is given up on the way."""
-        self.released += note.text == "released" and process.name != COORDINATOR
+        self.released += note.text in ("released", "turns aside") and process.name != COORDINATOR
 
     def _end_attempt(self, process: Process, uav: str, outcome: Outcome) -> None:
         attempt = uav, outcome.task, outcome.attempt

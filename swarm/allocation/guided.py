@@ -16,7 +16,7 @@ import numpy as np
 
 from swarm.allocation.lower_level import Decision, TeamState
 from swarm.allocation.problem import BoolArray, IntArray, Problem
-from swarm.kernels.rollout import guided_choice
+from swarm.kernels.rollout import GuidedChoice, guided_choice
 from swarm.kernels.routes import RouteArrays, Routes, TeamArrays
 
 __all__ = ["GuidedRule", "route_arrays", "team_arrays"]
@@ -60,21 +60,10 @@ class GuidedRule:
         """
         if not (state.open & problem.capable[uav]).any():
             return None
-        mission = self._arrays_of(problem)
-        now_s = float(state.free_s[uav])
-        active = state.active & ~_has_declined(state, rank, now_s, int(rank[uav]))
-        active[uav] = True
-        team = team_arrays(mission, state, active, now_s)
-        on_a_list = self._owner >= 0
-        kept = on_a_list & active[self._owner]
-        disturbed = bool((problem.capable.any(axis=0) & ~on_a_list).any())
-        disturbed |= bool((state.open & ~kept).any())
-        choice = guided_choice(
-            team, self._routes, uav, iterations=self._repair_iterations if disturbed else 0
-        )
+        choice = self._choice(problem, state, rank, uav)
         if choice.task is None:
             return None
-        task = choice.task
+        task, now_s = choice.task, float(state.free_s[uav])
         travel_s = problem.travel_s(uav, state.place_enu_m[uav])[task]
         return Decision(
             uav=uav,
@@ -85,6 +74,24 @@ class GuidedRule:
             second_score=choice.second_worth,
             certificate=False,
             exact=False,
+        )
+
+    def worth(self, problem: Problem, state: TeamState, rank: IntArray, uav: int) -> float:
+        """J to go of the whole team when ``uav`` has its turn [value·s]; the score of `decide`."""
+        return self._choice(problem, state, rank, uav).worth
+
+    def _choice(self, problem: Problem, state: TeamState, rank: IntArray, uav: int) -> GuidedChoice:
+        mission = self._arrays_of(problem)
+        now_s = float(state.free_s[uav])
+        active = state.active & ~_has_declined(state, rank, now_s, int(rank[uav]))
+        active[uav] = True
+        team = team_arrays(mission, state, active, now_s)
+        on_a_list = self._owner >= 0
+        kept = on_a_list & active[self._owner]
+        disturbed = bool((problem.capable.any(axis=0) & ~on_a_list).any())
+        disturbed |= bool((state.open & ~kept).any())
+        return guided_choice(
+            team, self._routes, uav, iterations=self._repair_iterations if disturbed else 0
         )
 
     def _arrays_of(self, problem: Problem) -> RouteArrays:

@@ -202,6 +202,22 @@ def test_one_that_is_late_is_awaited_as_long_as_patience_lasts(late_s: float, ch
     assert scene.choice(replace(TURN, now_s=5.0, decided_s=5.0)) == choice
 
 
+def test_someone_who_is_very_late_is_left_the_tasks_that_it_will_reach_first() -> None:
+    """u1 stands at its task, beside its next one, which is nearer to u0 than u0's own."""
+    at, beside, far = (
+        entry(name, east_m=east_m, number=n)
+        for n, (name, east_m) in enumerate({"at": 35.0, "beside": 40.0, "far": 75.0}.items())
+    )
+    routes = {"u0": ("far",), "u1": ("at", "beside")}
+    scene = Scene(at, beside, far, fleet=FLEET[:2], sequence=("u1", "u0"))
+    plan = replace(epoch("u1", "u0", rule="guided", number=2), routes=routes)
+    scene.say(COORDINATOR, plan).say("u1", held("at", 0.0, 0, 35.0))
+    turn = replace(TURN, place_enu_m=(50.0, 0.0, 0.0), now_s=50.0, decided_s=50.0)
+
+    assert scene.choice(turn) == "far"
+    assert scene.choice(replace(turn, credible=frozenset())) == "beside"
+
+
 def test_nothing_odd_is_computed_about_someone_who_is_very_late() -> None:
     """Infinite times would meet a worth of 0 and make no number."""
     scene = Scene(

@@ -192,6 +192,14 @@ def test_study_whose_fate_is_certain_is_flown_with_a_word_of_warning(
             ["meadow", "--jobs", "2", "--scheduler", "tcp://127.0.0.1:1"],
             "--jobs: 2: does not go with --scheduler; leave it out",
         ),
+        (
+            [*SMALL[1:-2], *CHEAP, "--scheduler", "nonsense"],
+            "--scheduler: nonsense: is no address; give the address that 'dask scheduler' prints",
+        ),
+        (
+            [*SMALL[1:-2], *CHEAP, "--scheduler", "http://127.0.0.1:80"],
+            "--scheduler: http://127.0.0.1:80: is no address; give the address that",
+        ),
         (["meadow", "--update", "no.md"], "no.md: cannot be read: No such file or directory; give"),
     ],
 )
