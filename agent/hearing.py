@@ -60,6 +60,8 @@ class Hearing:
         self._answered: set[str] = set()
         self._insisted = False
         self._insists_until_s = -math.inf
+        self._left_open = False
+        """Whether somebody was lost, and what it leaves open is not known for sure yet."""
         self._echoes: list[Message] = []
         """Heard in the own name, though this life has not said so."""
 
@@ -100,6 +102,9 @@ class Hearing:
         somebody_knows = any(isinstance(message.body, Brief) for message in told)
         self.learning.take(enough=somebody_knows and not self.at_work)
         self._answered.update(snapshot.writer for snapshot in snapshots)
+        if self._left_open:
+            self._left_open = False
+            self._tasking.tempt()
         if self.learning.current:
             self._insist(now_s)
         return actions
@@ -219,9 +224,9 @@ class Hearing:
             claim = self._replica.claims.get(writer)
             left = claim is not None and claim.phase is ClaimPhase.OUT
             actions.append(Note("left" if left else "lost", {"writer": writer, "why": why}))
-            self._tasking.tempt()
             self._awake(now_s)
             self.learning.want(now_s)  # others may have heard its last words
+            self._left_open = True
         return actions
 
     def _greet(self, writer: str, now_s: float) -> list[Action]:

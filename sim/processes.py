@@ -121,7 +121,7 @@ class Process:
             return
         if isinstance(event, LinkChanged):
             self.linked = event.up
-        if self._telemetry is not None and isinstance(event, Heard | Learned | Tick):
+        if self._telemetry is not None and isinstance(event, Heard | Learned):
             self._tell_telemetry(self._telemetry)
         self._act(lambda now_s: self.core.step(event, now_s))
 

@@ -72,6 +72,9 @@ def test_it_turns_to_what_a_lost_uav_was_flying_to() -> None:
     assert agent.task == "far"
 
     agent.lose("u1", 4.0)
+    assert agent.task == "far", "somebody may have heard its last words"
+
+    agent.learn()
     assert agent.task == "new"
 
 
