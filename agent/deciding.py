@@ -69,22 +69,22 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: Turn) -> Decisi
 
 
 def turn_aside(
-    problem: Problem, board: TaskBoard, rule: Rule, turn: Turn, claim: Claim
+    problem: Problem, board: TaskBoard, rule: GuidedRule, turn: Turn, claim: Claim
 ) -> Decision | None:
     """What ``turn.uav`` takes now instead of the task it is flying to; None to fly on.
 
     The team's J with this UAV free at once, and its task open again, is set against J with the
-    task finished first; only the rule `guided` values the whole team.
+    task finished first.
 
     Args:
         problem: every UAV and every task on the board.
         board: the registers and what they say about tasks.
-        rule: how UAVs choose in the epoch in force.
+        rule: of the epoch in force; of all rules it alone values the whole team.
         turn: who decides, when and where; it became free just now.
         claim: its claim, on a task of ``problem``.
     """
     current = next((i for i, task in enumerate(problem.task_ids) if task == claim.task), None)
-    if current is None or not isinstance(rule, GuidedRule):
+    if current is None:
         return None
     mine = problem.uav_ids.index(turn.uav)
     free, order = _team_at(problem, board, turn)

@@ -15,6 +15,7 @@ from agent.peers import Peers
 from agent.picture import Picture
 from agent.speech import Speech
 from agent.vehicle import GoTo
+from swarm.allocation.guided import GuidedRule
 from swarm.allocation.lower_level import Decision, Rule
 from swarm.allocation.problem import Problem
 from swarm.config import Timing
@@ -231,12 +232,17 @@ class Tasking:
     def _turn_aside(self, now_s: float) -> list[Action]:
         """Leave the task for a better one, unless somebody free is about to take that."""
         self._tempted = False
-        claim, epoch, problem = self.claim, self._replica.epoch, self._picture.board.problem
-        turn = self._turn(self._picture.mission_s(now_s), now_s)
-        if claim is None or epoch is None or problem is None or turn is None or turn.awaited:
+        claim, epoch = self.claim, self._replica.epoch
+        if claim is None or epoch is None or self.phase is not StatusPhase.FLYING:
             return []
         rule, actions = self._rule_of(epoch)
-        if rule is None or self.phase is not StatusPhase.FLYING:
+        if not isinstance(rule, GuidedRule):
+            return actions  # no other one values the whole team
+        problem, turn = (
+            self._picture.board.problem,
+            self._turn(self._picture.mission_s(now_s), now_s),
+        )
+        if problem is None or turn is None or turn.awaited:
             return actions
         decision = turn_aside(problem, self._picture.board, rule, turn, claim)
         if decision is None:

@@ -147,7 +147,7 @@ class Process:
 
     def _tell_telemetry(self, telemetry: Callable[[], Telemetry | None]) -> None:
         time_s = self._queue.now_s()
-        if time_s - self._told_s >= self._telemetry_gap_s:
+        if time_s > self._told_s and time_s - self._told_s >= self._telemetry_gap_s:
             told = telemetry()
             if told is not None:
                 self._told_s = time_s

@@ -7,7 +7,7 @@ happened so far (`swarm.allocation.lower_level.TeamState`) and every decision.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -123,24 +123,40 @@ class Problem:
             tasks: columns in this order; the mission's own, pop-ups included, when None.
         """
         rows = tuple(mission.uavs if uavs is None else uavs)
-        columns = tuple(mission.tasks if tasks is None else tasks)
-        shape = (len(rows), len(columns))
-
-        def table(by_uav: Iterable[Mapping[str, float]], default: float) -> FloatArray:
-            found = [chances(given, columns, default) for given in by_uav]
-            return np.array(found, float).reshape(shape)
-
+        columns = _columns(mission, rows, mission.tasks if tasks is None else tasks)
         return cls(
             uav_ids=tuple(uav.id for uav in rows),
-            task_ids=tuple(task.id for task in columns),
+            task_ids=columns.ids,
             start_enu_m=np.array([u.position_enu_m for u in rows], float).reshape(-1, 3),
-            task_enu_m=np.array([t.position_enu_m for t in columns], float).reshape(-1, 3),
+            task_enu_m=columns.place_enu_m,
             speed_m_s=np.array([u.speed_m_s for u in rows], float),
-            value=np.array([t.value for t in columns], float),
-            service_s=np.array([t.service_s for t in columns], float),
-            success=table((uav.success for uav in rows), mission.success_default),
-            survival=table((uav.survival for uav in rows), mission.survival_default),
+            value=columns.value,
+            service_s=columns.service_s,
+            success=columns.success,
+            survival=columns.survival,
             horizon_s=mission.horizon_s,
+        )
+
+    def with_tasks(self, mission: Mission, tasks: Sequence[Task], known: Sequence[int]) -> Problem:
+        """The same UAVs and other tasks, exactly as `from_mission` has them.
+
+        Args:
+            mission: this problem's, whose own tasks play no part.
+            tasks: columns in this order.
+            known: (n_task,) of each the index of its column here; -1 of a new one.
+        """
+        fresh = [task for task, index in zip(tasks, known, strict=True) if index < 0]
+        new = _columns(mission, mission.uavs, fresh)
+        index = np.array(known, dtype=np.int64)
+        index[index < 0] = np.arange(self.n_task, self.n_task + len(fresh))
+        return replace(
+            self,
+            task_ids=tuple(task.id for task in tasks),
+            task_enu_m=np.concatenate([self.task_enu_m, new.place_enu_m])[index],
+            value=np.concatenate([self.value, new.value])[index],
+            service_s=np.concatenate([self.service_s, new.service_s])[index],
+            success=np.concatenate([self.success, new.success], axis=1)[:, index],
+            survival=np.concatenate([self.survival, new.survival], axis=1)[:, index],
         )
 
     @property
@@ -170,6 +186,35 @@ class Problem:
     def _freeze(self, name: str, array: npt.NDArray[np.generic]) -> None:
         array.setflags(write=False)
         object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Columns:
+    """What a problem says of its tasks; shapes as there."""
+
+    ids: tuple[TaskId, ...]
+    place_enu_m: FloatArray
+    value: FloatArray
+    service_s: FloatArray
+    success: FloatArray
+    survival: FloatArray
+
+
+def _columns(mission: Mission, uavs: Sequence[Uav], tasks: Sequence[Task]) -> _Columns:
+    shape = (len(uavs), len(tasks))
+
+    def table(by_uav: Iterable[Mapping[str, float]], default: float) -> FloatArray:
+        found = [chances(given, tasks, default) for given in by_uav]
+        return np.array(found, float).reshape(shape)
+
+    return _Columns(
+        ids=tuple(task.id for task in tasks),
+        place_enu_m=np.array([t.position_enu_m for t in tasks], float).reshape(-1, 3),
+        value=np.array([t.value for t in tasks], float),
+        service_s=np.array([t.service_s for t in tasks], float),
+        success=table((uav.success for uav in uavs), mission.success_default),
+        survival=table((uav.survival for uav in uavs), mission.survival_default),
+    )
 
 
 def _require_distinct(name: str, ids: Sequence[str]) -> None:

@@ -74,6 +74,8 @@ class TaskBoard:
         self._states_version = -1
         self._attempts = 0
         """How many outcomes the states take into account."""
+        self._columns: list[Task] = []
+        """Of the problem."""
         self._problem: Problem | None = None
         self._problem_version = -1
 
@@ -103,14 +105,19 @@ class TaskBoard:
         if brief is None:
             return None
         if self._fleet is None or brief is not self._brief:
-            self._brief = brief
+            self._brief, self._problem = brief, None
             self._fleet = _mission(self._name, brief, map(_uav_of, brief.uavs), ())
         self._sort()
         for entry in self._entries:
             if (known := self._tasks.get(entry.task)) is None or known[0] is not entry:
                 self._tasks[entry.task] = entry, _task_of(entry)
         tasks = [self._tasks[entry.task][1] for entry in self._entries]
-        return Problem.from_mission(self._fleet, tasks=tasks)
+        before, had = self._problem, {id(task): column for column, task in enumerate(self._columns)}
+        columns = [had.get(id(task), -1) for task in tasks]
+        self._columns = tasks
+        if before is None:
+            return Problem.from_mission(self._fleet, tasks=tasks)
+        return before.with_tasks(self._fleet, tasks, columns)
 
     def _sort(self) -> None:
         if self._entries_version != self.replica.board_version:

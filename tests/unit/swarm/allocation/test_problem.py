@@ -44,6 +44,27 @@ def test_rows_and_columns_may_be_chosen() -> None:
     assert problem.service_s.tolist() == [4.0, 0.0]
 
 
+def test_other_tasks_make_the_same_problem_as_one_made_of_them_from_the_start() -> None:
+    mission = table_1_mission()
+    extra = Task(TaskId("extra"), (1.0, 2.0, 3.0), 2.0, service_s=4.0)
+    t = mission.tasks
+    before = Problem.from_mission(mission, tasks=[t[0], t[4], t[7]])
+
+    for tasks, known in (
+        ([t[4], extra, t[0], t[6]], [1, -1, 0, -1]),
+        ([t[0], t[4], t[7]], [0, 1, 2]),
+        ([extra], [-1]),
+        ([], []),
+    ):
+        again, anew = (
+            before.with_tasks(mission, tasks, known),
+            Problem.from_mission(mission, tasks=tasks),
+        )
+        assert (again.uav_ids, again.task_ids) == (anew.uav_ids, anew.task_ids)
+        for name in ("task_enu_m", "value", "service_s", "success", "survival", "weight"):
+            assert np.array_equal(getattr(again, name), getattr(anew, name))
+
+
 def test_empty_fleet_and_empty_task_list_keep_their_shapes() -> None:
     problem = Problem.from_mission(table_1_mission(), uavs=[], tasks=[])
 
