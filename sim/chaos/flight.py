@@ -36,6 +36,8 @@ __all__ = ["ChaosFlight", "Verdict", "open_chaos_flight"]
 
 CUT = "the network"
 LEFT = "left its task"
+TURN_LINE = re.compile(r'event="turns aside" .*\btask=(\S+)')
+"""What an agent's log says when it leaves a task in flight for one that has opened."""
 DONE_LINE = re.compile(r'event="task done".* task=(\S+)')
 
 
@@ -158,9 +160,20 @@ class ChaosFlight:
         )
 
     def _broken_rules(self, told: list[Transcript]) -> set[str]:
-        """Broken rules of the messages; who has not heard all knows not why a task was left."""
+        """Broken rules of the messages; who has not heard all knows not why a task was left.
+
+        Nor is it said on the bus that a UAV turned aside for what had opened; its log says so.
+        """
+        turned = {
+            f"{who} left {m[1]} " for who, line in self.lines if (m := TURN_LINE.search(line))
+        }
         broken = [each for transcript in told for each in transcript.broken]
-        return {str(each) for each in broken if self._heard_all or each.invariant != LEFT}
+        return {
+            str(each)
+            for each in broken
+            if each.invariant != LEFT
+            or (self._heard_all and not each.text.startswith(tuple(turned)))
+        }
 
     def _lost_outcomes(self, flight: Flight) -> list[str]:
         """Tasks a UAV says it has done, of which the fleet knows nothing in the end."""

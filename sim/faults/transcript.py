@@ -6,7 +6,8 @@
   an earlier one, nor with the same stamp and other contents;
 - *keeps its task*: a UAV leaves a task it claimed only when the task is done or withdrawn,
   another has a stronger claim on it, its vehicle refused, its process started anew, the
-  operator has said so, or the mission has ended for it; so never because of re-planning.
+  operator has said so, or the mission has ended for it; or, once for each task that appears and
+  each loss it learns of, in flight for something better; so never because of re-planning.
 
 It knows no process from within, so recordings of real ones can be told as well. Leaves out:
 what takes a view into the processes (sim.faults.judge).

@@ -233,12 +233,12 @@ def test_under_everything_at_once_a_mission_ends_and_loses_no_task(seed: int) ->
     )
     fate = EVERYTHING.draw(drawn, 60.0, seed)
     flown = Flown(fate, "guided" if seed % 3 else "greedy", 0.0 if seed % 2 else None)
-    left = [each for each in drawn.uavs if each.id in flown.world.world.finished]
+    left = [each for each in fate.mission.uavs if each.id in flown.world.world.finished]
     outcomes = {name: [done for _, _, done in each] for name, each in flown.visits.items()}
 
     for each in fate.mission.tasks:
         tried = outcomes.get(each.id, [])
         ended = any(tried) or (bool(tried) and not drawn.reattempt_failed)
-        able = [one.id for one in left if drawn.success(one, each) > 0.0]
+        able = [one.id for one in left if fate.mission.success(one, each) > 0.0]
         assert ended or each.id in fate.withdrawn_at_s or not able, each.id
     assert set(flown.world.lost) == {each.id for each in drawn.uavs} - {each.id for each in left}

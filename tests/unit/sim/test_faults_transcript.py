@@ -146,3 +146,19 @@ def test_visits_beyond_the_first_are_duplicates(told: Telling) -> None:
 
     assert told.transcript.duplicates == 2
     assert told.transcript.done == {"t0", "t1"}
+
+
+def test_a_uav_may_turn_aside_as_often_as_something_opened(told: Telling) -> None:
+    told.say(COORDINATOR, Board("t0", 0, (0.0, 0.0, 0.0), 1.0, 0.0, None, False))
+    told.claim("u0", "t0")
+    told.transcript.turned_aside(3.0, "u0", "t0")
+    told.claim("u0", "t1")
+    assert not told.broken
+
+    told.transcript.missed("u0")
+    told.transcript.turned_aside(4.0, "u0", "t1")
+    told.claim("u0", "t0")
+    assert not told.broken
+
+    told.transcript.turned_aside(5.0, "u0", "t0")
+    assert told.broken == ["left its task"]
