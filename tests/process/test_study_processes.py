@@ -140,7 +140,7 @@ def test_lost_worker_of_a_dask_cluster_costs_nothing(cluster: LocalCluster) -> N
     jobs = jobs_of(STUDY)
     flying = fly(Briefing(STUDY, ROSTER), jobs)
     rows.append(next(flying))
-    next(iter(cluster.workers.values())).process.process.kill()
+    os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
     rows += flying
 
     assert len(rows) == len(jobs)
