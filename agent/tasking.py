@@ -238,10 +238,8 @@ class Tasking:
         rule, actions = self._rule_of(epoch)
         if not isinstance(rule, GuidedRule):
             return actions  # no other one values the whole team
-        problem, turn = (
-            self._picture.board.problem,
-            self._turn(self._picture.mission_s(now_s), now_s),
-        )
+        problem = self._picture.board.problem
+        turn = self._turn(self._picture.mission_s(now_s), now_s)
         if problem is None or turn is None or turn.awaited:
             return actions
         decision = turn_aside(problem, self._picture.board, rule, turn, claim)
@@ -386,10 +384,8 @@ class Tasking:
 
     def _order_to(self, task: Board, *, idled: bool = False) -> Action:
         self._leg += 1
-        place_enu_m, attempt = (
-            self._picture.in_layer(task.position_enu_m),
-            self._attempt_at(task.task),
-        )
+        place_enu_m = self._picture.in_layer(task.position_enu_m)
+        attempt = self._attempt_at(task.task)
         return Order(GoTo(self._leg, place_enu_m, task.service_s, idled, task.task, attempt))
 
     def _say_idle(self) -> Action:
