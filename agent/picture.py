@@ -11,6 +11,7 @@ from enum import Enum
 from agent.vehicle import Telemetry
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.registers import Replica
+from swarm.wire.bounds import Point
 from swarm.wire.messages import (
     Board,
     Brief,
@@ -20,7 +21,6 @@ from swarm.wire.messages import (
     Fleet,
     Message,
     Outcome,
-    Point,
     Result,
 )
 

@@ -1,6 +1,6 @@
 """The commands `swarm run` and `swarm simulate`.
 
-Leaves out: what they do (sim.launch, sim.world) and how it is shown (sim.view).
+Leaves out: what they do (sim.launch, sim.world) and how it is shown (coordinator.view).
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, LinkOption, ScenarioArgument, SeedOption, SpeedupOption
 
 if TYPE_CHECKING:
+    from coordinator.view.report import MissionReport
     from sim.launch.fleet import BusKind
-    from sim.view.report import MissionReport
 
 __all__ = ["run", "simulate"]
 
@@ -255,13 +255,13 @@ def run(
     from rich.console import Console
 
     from coordinator.planner.plan import check_online_method
+    from coordinator.view.live import LiveView
+    from coordinator.view.report import MissionReport, check_report_path
     from sim.launch.autopilots import check_speedup, parse_autopilots
     from sim.launch.fence import fence_around
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
     from sim.launch.run import fly
-    from sim.view.live import LiveView
-    from sim.view.report import MissionReport, check_report_path
     from swarm.log import LogLevel, configure_logging
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
@@ -384,11 +384,11 @@ def simulate(
     import sys
 
     from coordinator.planner.plan import check_online_method
+    from coordinator.view.report import MissionReport, check_report_path
     from sim.faults.replay import fly_with_faults
     from sim.faults.schedule import format_schedule
     from sim.simulate import simulate_mission
     from sim.uncertainty import Uncertainty
-    from sim.view.report import MissionReport, check_report_path
     from swarm.scenario import load_scenario
 
     check_online_method(method)
@@ -468,7 +468,7 @@ def _tell(told: MissionReport, *, json: bool, report: Path | None) -> int:
 
     from rich.console import Console
 
-    from sim.view.report import mission_ok, write_report
+    from coordinator.view.report import mission_ok, write_report
 
     if json:
         print(dumps(told.as_json(), allow_nan=False))

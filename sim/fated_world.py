@@ -18,11 +18,11 @@ import numpy as np
 
 from agent.core import AgentCore
 from agent.vehicle import GoTo, Report
+from coordinator.operator.task_seat import TaskSeat
 from sim.event_queue import EventQueue
 from sim.fate import Fate, Partition
 from sim.fated_vehicle import FatedVehicle
 from sim.network import IdealNetwork, Network
-from sim.operator.task_seat import TaskSeat
 from sim.processes import Process
 from sim.rough_network import Conditions, RoughNetwork, Topology
 from sim.uncertainty import Uncertainty

@@ -24,11 +24,11 @@ from coordinator.core import CoordinatorCore, FlightLayers
 from coordinator.events import Action as CoordinatorAction
 from coordinator.events import MakePlan, PlanMade, Replan, Replanned, TakeSeat, Withdraw
 from coordinator.observer import Observer
+from coordinator.operator.seat import OperatorSeat
 from coordinator.planner.live import NewPlan, replan
 from coordinator.standby import StandbyCore
 from sim.event_queue import EventQueue
 from sim.network import IdealNetwork, Network
-from sim.operator.seat import OperatorSeat
 from sim.processes import LocalClock, Process
 from sim.virtual_vehicle import SimulatedVehicle, VehicleFactory, VirtualVehicle
 from swarm.config import Timing

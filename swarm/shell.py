@@ -287,15 +287,15 @@ def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:
 def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None:
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
-    Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``
-    and ``operator/*``, watches ``alive/*``.
+    Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
+    ``operator/*`` and ``operator/task/*``, watches ``alive/*``.
 
     Args:
         bus: an open bus.
         mission: mission name.
         name: writer id: declares ``alive/<name>`` and serves ``state/<name>``; None for
             an onlooker.
-        status: subscribe to ``uav/*/status`` too, newest first.
+        status: subscribe to ``uav/*/status`` too, newest first, and to ``uav/*/choice``.
     """
     keys = Keys(mission)
     for key_expr in (
@@ -305,10 +305,12 @@ def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None
         keys.claim("*"),
         keys.outcome("*", "*"),
         keys.operator("*"),
+        keys.operator_task("*"),
     ):
         bus.subscribe(key_expr)
     if status:
         bus.subscribe(keys.status("*"), latest=True)
+        bus.subscribe(keys.choice("*"))
     bus.watch_tokens(keys.alive("*"))
     if name is not None:
         bus.serve(keys.state(name))

@@ -16,13 +16,13 @@ from agent.mavlink.bridge import Bridge, Phase
 from agent.mavlink.config import BridgeConfig, CommandStyle
 from agent.mavlink.events import Action, Event, LinkUp, Received, Send, Tick
 from agent.vehicle import Arrived, HandedOver, Orders, Refused, Report, ReturnAdvised, Telemetry
+from coordinator.operator.seat import OperatorSeat
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.faults import VehicleFault, parse_fault
 from sim.autopilot.flavours import FlavourName
 from sim.bridged_vehicle import BridgedVehicle, Equipment, LinkQuality
 from sim.event_queue import EventQueue
 from sim.network import IdealNetwork, Network
-from sim.operator.seat import OperatorSeat
 from sim.world import Planner, Setting, Watch, World
 from swarm.config import Timing
 from swarm.model import Mission, Task, TaskId, Uav, UavId

@@ -10,6 +10,7 @@ import numpy as np
 from swarm.config import Timing
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
+from swarm.wire.bounds import Point
 from swarm.wire.messages import (
     Board,
     Body,
@@ -21,7 +22,6 @@ from swarm.wire.messages import (
     Fleet,
     Message,
     Outcome,
-    Point,
     Result,
     Stamp,
     Status,

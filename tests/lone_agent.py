@@ -13,6 +13,7 @@ from swarm.config import Timing
 from swarm.events import Finish, Heard, Learned, Note, PeerGone, PeerSeen, Publish, Tick
 from swarm.model import Uav
 from swarm.model.ids import COORDINATOR
+from swarm.wire.bounds import Point
 from swarm.wire.messages import (
     Board,
     Body,
@@ -21,7 +22,6 @@ from swarm.wire.messages import (
     EpochPhase,
     Message,
     Outcome,
-    Point,
     Snapshot,
     Status,
 )

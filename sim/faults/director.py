@@ -10,8 +10,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from functools import partial
 
+from coordinator.operator.seat import OperatorSeat
 from sim.faults.schedule import Disturbance, Kind
-from sim.operator.seat import OperatorSeat
 from sim.processes import Process
 from sim.rough_network import RoughNetwork
 from sim.world import Recall, World

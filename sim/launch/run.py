@@ -2,7 +2,7 @@
 
 Starts the processes, watches the bus as an onlooker, starts a router that dies anew,
 and ends every process whatever happens. Leaves out: what the processes do, single
-processes (sim.launch.launch), and how the run is shown (sim.view).
+processes (sim.launch.launch), and how the run is shown (coordinator.view).
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from swarm.wire.digest import fingerprint
 from swarm.wire.messages import (
     Board,
     Brief,
+    Choice,
     Claim,
     Command,
     Epoch,
@@ -59,10 +60,10 @@ class Replica:
         """Grows with every change of brief, board or outcomes."""
 
     def join(self, message: Message) -> bool:
-        """Take ``message`` in; whether it was news. Status is no register and never is."""
+        """Take ``message`` in; whether it was news. Status and choice are no registers."""
         key = message.key
         known = self._registers.get(key)
-        if known is message or isinstance(message.body, Status):
+        if known is message or isinstance(message.body, Status | Choice):
             return False
         if known is not None and not _beats(message, known):
             self.stale += message.stamp < known.stamp

@@ -26,6 +26,7 @@ from swarm.wire.messages import (
     Board,
     Body,
     Brief,
+    Choice,
     Claim,
     Command,
     Epoch,
@@ -34,6 +35,7 @@ from swarm.wire.messages import (
     Snapshot,
     Stamp,
     Status,
+    TaskOrder,
 )
 
 __all__ = [
@@ -57,10 +59,12 @@ _KINDS: Final[dict[str, type[Body]]] = {
     "claim": Claim,
     "outcome": Outcome,
     "status": Status,
+    "choice": Choice,
     "command": Command,
+    "task": TaskOrder,
 }
 _NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in _KINDS.items()}
-_LARGE: Final = frozenset({"brief", "epoch"})
+_LARGE: Final = frozenset({"brief", "choice", "epoch"})
 
 
 def encode(message: Message | Snapshot) -> bytes:
@@ -197,9 +201,9 @@ def _may_say(writer: str, body: Body) -> bool:
     match body:
         case Brief() | Epoch() | Board():
             return writer == COORDINATOR
-        case Command():
+        case Command() | TaskOrder():
             return writer == OPERATOR
-        case Claim() | Outcome() | Status():
+        case Claim() | Outcome() | Status() | Choice():
             return writer not in (COORDINATOR, OPERATOR)
 
 

@@ -1,7 +1,8 @@
 """Key expressions of one mission; every register key has exactly one writer.
 
 ``swarm/<mission>/…``: ``brief``, ``plan`` and ``board/<task>`` are written by the
-coordinator, ``uav/<id>/…`` by that UAV's agent, ``operator/<target>`` by the operator;
+coordinator, ``uav/<id>/…`` by that UAV's agent, ``operator/<target>`` and
+``operator/task/<task>`` by the operator;
 ``alive/<id>`` holds the liveliness token of a process and ``state/<id>`` answers what that
 process knows.
 """
@@ -74,6 +75,14 @@ class Keys:
     def operator(self, target: str) -> str:
         """The operator's newest command to a UAV, or to the fleet; ``*`` for all."""
         return f"{self.root}/operator/{target}"
+
+    def operator_task(self, task: str) -> str:
+        """A task that the operator has added or withdrawn; ``*`` for all."""
+        return f"{self.root}/operator/task/{task}"
+
+    def choice(self, uav: str) -> str:
+        """Why a UAV took a task; ``*`` for all."""
+        return f"{self.root}/uav/{uav}/choice"
 
     def alive(self, writer: str) -> str:
         """Liveliness token of a process; ``*`` for all."""

@@ -10,13 +10,32 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import lru_cache
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, ClassVar
 
-from annotated_types import Ge, Gt, Le, Len, Predicate
+from annotated_types import Ge, Le, Len
 from pydantic import Strict
 
-from swarm.model import Origin, valid_id
+from swarm.model import Origin
 from swarm.model.ids import FLEET, RESERVED
+from swarm.wire.bounds import (
+    CHECKED,
+    LATEST_S,
+    MAX_COUNT,
+    Count,
+    Duration,
+    Flag,
+    Horizon,
+    Id,
+    Instant,
+    Metres,
+    Point,
+    Probability,
+    Reason,
+    Speed,
+    Value,
+    Words,
+)
+from swarm.wire.choice import Choice
 from swarm.wire.keys import Keys
 
 __all__ = [
@@ -26,6 +45,7 @@ __all__ = [
     "Board",
     "Body",
     "Brief",
+    "Choice",
     "Claim",
     "ClaimPhase",
     "Command",
@@ -40,38 +60,17 @@ __all__ = [
     "Stamp",
     "Status",
     "StatusPhase",
+    "TaskOrder",
 ]
 
 SCHEMA_VERSION = 1
-
-_CHECKED = {"extra": "forbid", "allow_inf_nan": False}
-
-MAX_COUNT: Final = 2**53
-"""Largest count; whoever counts on from what it heard stays within."""
-LATEST_S: Final = 1e15
-"""Farthest instant from mission time 0 [s]."""
-
-# The bounds admit whatever a scenario may hold and keep every computation finite.
-Id = Annotated[str, Strict(), Predicate(valid_id)]
-Flag = Annotated[bool, Strict()]
-Metres = Annotated[float, Strict(), Ge(-1e8), Le(1e8)]
-Point = tuple[Metres, Metres, Metres]
-Instant = Annotated[float, Strict(), Ge(-LATEST_S), Le(LATEST_S)]
-Duration = Annotated[float, Strict(), Ge(0.0), Le(1e9)]
-Horizon = Annotated[float, Strict(), Gt(0.0), Le(1e9)]
-Speed = Annotated[float, Strict(), Ge(1e-6), Le(1e6)]
-Value = Annotated[float, Strict(), Ge(0.0), Le(1e12)]
-Probability = Annotated[float, Strict(), Ge(0.0), Le(1.0)]
-Count = Annotated[int, Strict(), Ge(0), Le(MAX_COUNT)]
-Reason = Annotated[str, Strict(), Len(1, 40)]
-Words = Annotated[str, Strict(), Len(0, 200)]
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Stamp:
     """Order of one writer's statements in one register: later beats earlier."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     incarnation: Count
     """Grows whenever the writer's process starts anew."""
@@ -83,7 +82,7 @@ class Stamp:
 class Fleet:
     """One UAV as the brief describes it."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     id: Id
     position_enu_m: Point
@@ -100,7 +99,7 @@ class Fleet:
 class Brief:
     """Register ``brief``: what stays the same for a whole mission."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     horizon_s: Horizon
     success_default: Probability
@@ -131,7 +130,7 @@ class EpochPhase(StrEnum):
 class Epoch:
     """Register ``plan``: the pecking order in force."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     number: Count
     phase: EpochPhase
@@ -150,7 +149,7 @@ class Epoch:
 class Board:
     """Register ``board/<task>``: one task of the task board."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     task: Id
     number: Count
@@ -179,7 +178,7 @@ class ClaimPhase(StrEnum):
 class Claim:
     """Register ``uav/<id>/claim``: the task a UAV has taken."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     phase: ClaimPhase
     task: Id | None
@@ -210,7 +209,7 @@ class Result(StrEnum):
 class Outcome:
     """Register ``uav/<id>/outcome/<task>``: how this UAV's last attempt ended."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     task: Id
     result: Result
@@ -238,7 +237,7 @@ class StatusPhase(StrEnum):
 class Status:
     """Key ``uav/<id>/status``: news that may be dropped."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     phase: StatusPhase
     task: Id | None
@@ -271,7 +270,7 @@ class CommandKind(StrEnum):
 class Command:
     """Register ``operator/<target>``: the operator's newest word to one UAV, or to the fleet."""
 
-    __pydantic_config__: ClassVar = _CHECKED
+    __pydantic_config__: ClassVar = CHECKED
 
     target: Id
     """Id of a UAV, or the name that stands for the fleet."""
@@ -286,7 +285,30 @@ class Command:
             raise ValueError(f"{self.kind} is no command to {self.target}")
 
 
-Body = Brief | Epoch | Board | Claim | Outcome | Status | Command
+@dataclass(frozen=True, slots=True)
+class TaskOrder:
+    """Register ``operator/task/<task>``: a task that the operator adds, or takes off the board.
+
+    For a task that the coordinator has posted, too, the operator's word counts.
+    """
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    task: Id
+    number: Count
+    """Position on the board, as in `Board`."""
+    position_enu_m: Point
+    value: Value
+    service_s: Duration
+    kind: Id | None
+    withdrawn: Flag
+    run: Count
+    """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
+    reason: Words
+    """Why, in the operator's words; empty when there are none."""
+
+
+Body = Brief | Epoch | Board | Claim | Outcome | Status | Choice | Command | TaskOrder
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,8 +357,12 @@ def _key_of(mission: str, writer: str, body: Body) -> str:
             return keys.outcome(writer, task)
         case Status():
             return keys.status(writer)
+        case Choice():
+            return keys.choice(writer)
         case Command(target=target):
             return keys.operator(target)
+        case TaskOrder(task=task):
+            return keys.operator_task(task)
 
 
 @lru_cache(maxsize=16)

@@ -9,8 +9,8 @@ import pytest
 from agent.mavlink.bridge import Phase
 from agent.mavlink.config import CommandStyle
 from agent.vehicle import GoTo, HandedOver, Hold, Return
+from coordinator.operator.seat import Result
 from sim.autopilot.flavours import FlavourName
-from sim.operator.seat import Result
 from sim.world import Recall
 from swarm.wire.messages import CommandKind, StatusPhase
 from tests.bridged_fleet import KINDS, LIMIT_S, BridgedFleet, Logbook

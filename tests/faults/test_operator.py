@@ -6,10 +6,10 @@ from functools import partial
 
 import pytest
 
+from coordinator.operator.seat import OperatorSeat, Result
 from sim.event_queue import EventQueue
 from sim.faults.case import Verdict, parse_case, play
 from sim.network import IdealNetwork
-from sim.operator.seat import OperatorSeat, Result
 from sim.rough_network import Conditions, RoughNetwork, Topology
 from sim.world import Recall, Setting, World
 from swarm.config import Timing

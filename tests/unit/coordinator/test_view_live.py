@@ -10,7 +10,7 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from coordinator.observer import Observer
-from sim.view.live import LiveView, picture
+from coordinator.view.live import LiveView, picture
 from swarm.model import Task, TaskId, UavId
 from swarm.wire.messages import EpochPhase, Result, StatusPhase
 from tests.observed_mission import Teller, random_mission, shipped, watch

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from sim.status.onlooker import Onlooker, find_missions
+from coordinator.status.onlooker import Onlooker, find_missions
 from swarm.bus.memory import MemoryNetwork
 from swarm.config import Timing
 from swarm.events import Ask, BusFact, Finish, Heard, Learned, PeerSeen, Tick

@@ -1,7 +1,7 @@
 """The report of a mission that is over: for people, for programs, and as a file.
 
-Leaves out: comparing (sim.view.comparison) and laying out for the terminal
-(sim.view.report_text).
+Leaves out: comparing (coordinator.view.comparison) and laying out for the terminal
+(coordinator.view.report_text).
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from rich.console import Console
 
 from coordinator.observer import Happening, MissionResult
 from coordinator.plan_report import plan_as_json
-from sim.view.comparison import Fact, compare_lists, facts, verdict, worth
-from sim.view.report_text import report_text
-from sim.view.signs import signs_for
-from sim.view.story import clean, shown_s, shown_value, told_at
+from coordinator.view.comparison import Fact, compare_lists, facts, verdict, worth
+from coordinator.view.report_text import report_text
+from coordinator.view.signs import signs_for
+from coordinator.view.story import clean, shown_s, shown_value, told_at
 from swarm.errors import Fault, InputError
 from swarm.model import Mission, Plan, UavId
 

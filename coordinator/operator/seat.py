@@ -2,7 +2,7 @@
 
 The command is stamped above every command that is known, and repeated until it was seen to
 take effect; whoever is out of reach learns it later from those who have heard it. Leaves
-out: the commands a person types (sim.operator.cli), and obeying (agent.core,
+out: the commands a person types (coordinator.operator.cli), and obeying (agent.core,
 coordinator.core).
 """
 
@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from sim.status.onlooker import Onlooker
+from coordinator.status.onlooker import Onlooker
 from swarm.config import Timing
 from swarm.events import Ask, BusFact, Finish, Learned, Publish, Wish
 from swarm.model.ids import FLEET, OPERATOR

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from coordinator.observer import Observer
 from coordinator.plan_report import plan_as_json
-from sim.view.report import MissionReport, check_report_path, mission_ok, write_report
+from coordinator.view.report import MissionReport, check_report_path, mission_ok, write_report
 from swarm.errors import InputError
 from swarm.model import Plan, UavId
 from swarm.wire.messages import Result

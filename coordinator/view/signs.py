@@ -1,7 +1,7 @@
 """Characters and colours of everything shown in a terminal.
 
 States differ in shape, never in colour alone; UAV colours are Okabe and Ito's, as in
-plots. Leaves out: where things are put (sim.view.map_panel, sim.view.live).
+plots. Leaves out: where things are put (coordinator.view.map_panel, coordinator.view.live).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The live picture of a running mission in a terminal: map, fleet, worth and story.
 
 Off a terminal, only new lines of the story are printed. Leaves out: what is known
-(coordinator.observer) and the report at the end (sim.view.report).
+(coordinator.observer) and the report at the end (coordinator.view.report).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from rich.live import Live
 from rich.text import Text
 
 from coordinator.observer import Happening, Observer
-from sim.view.fleet_table import fit, fleet_table, lists, table_width
-from sim.view.map_panel import ideal_width, map_panel
-from sim.view.scene import Scene, scene_of
-from sim.view.signs import BAD, Signs, signs_for
-from sim.view.story import clean, is_trouble, shown_value, story_line, story_style
+from coordinator.view.fleet_table import fit, fleet_table, lists, table_width
+from coordinator.view.map_panel import ideal_width, map_panel
+from coordinator.view.scene import Scene, scene_of
+from coordinator.view.signs import BAD, Signs, signs_for
+from coordinator.view.story import clean, is_trouble, shown_value, story_line, story_style
 from swarm.state.board import TaskState
 from swarm.wire.messages import EpochPhase
 

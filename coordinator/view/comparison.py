@@ -1,6 +1,6 @@
 """What was flown beside what was planned: lists, worth, and what went otherwise.
 
-Leaves out: how it is printed or written (sim.view.report, sim.view.report_text).
+Leaves out: how it is printed or written (coordinator.view.report, coordinator.view.report_text).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from coordinator.observer import MissionResult
-from sim.view.story import shown_s
+from coordinator.view.story import shown_s
 from swarm.model import Mission, Plan, TaskId, UavId
 
 __all__ = ["Compared", "Fact", "Stop", "Worth", "compare_lists", "facts", "verdict", "worth"]

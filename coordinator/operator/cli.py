@@ -1,6 +1,6 @@
 """The commands `swarm hold`, `resume`, `return` and `abort`.
 
-Leaves out: giving a command on the bus and seeing what comes of it (sim.operator.seat).
+Leaves out: giving a command on the bus and seeing what comes of it (coordinator.operator.seat).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from swarm.options import (
 )
 
 if TYPE_CHECKING:
-    from sim.operator.seat import OperatorSeat
+    from coordinator.operator.seat import OperatorSeat
     from swarm.bus.config import BusConfig
     from swarm.clock import ScaledClock
     from swarm.config import Timing
@@ -183,7 +183,7 @@ def _give(
     import asyncio
     from json import dumps
 
-    from sim.operator.seat import Result
+    from coordinator.operator.seat import Result
     from swarm.clock import ScaledClock
     from swarm.config import preset
     from swarm.log import LogLevel, configure_logging
@@ -247,8 +247,8 @@ async def _sit(
     patience_s: float,
 ) -> tuple[str, OperatorSeat]:
     """Take a seat on the bus and give the command; the mission's name, and the seat."""
-    from sim.operator.seat import OperatorSeat
-    from sim.status.onlooker import only_mission
+    from coordinator.operator.seat import OperatorSeat
+    from coordinator.status.onlooker import only_mission
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import incarnation
     from swarm.events import BusFact, Wish

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.operator.task_seat import TaskSeat
+from coordinator.operator.task_seat import TaskSeat
 from swarm.config import Timing
 from swarm.events import Finish, Heard, LinkChanged, Publish, Tick, Wish
 from swarm.model import TaskId

@@ -1,6 +1,6 @@
 """The report of a mission for a terminal, from 80 columns on.
 
-Leaves out: the report as a document or for programs (sim.view.report).
+Leaves out: the report as a document or for programs (coordinator.view.report).
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from rich.table import Table
 from rich.text import Text
 
 from coordinator.observer import Happening, MissionResult
-from sim.view.comparison import Compared, Fact, Stop, compare_lists, verdict, worth
-from sim.view.signs import BAD, Signs
-from sim.view.story import clean, notable, shown_s, shown_value, story_style, told_at
+from coordinator.view.comparison import Compared, Fact, Stop, compare_lists, verdict, worth
+from coordinator.view.signs import BAD, Signs
+from coordinator.view.story import clean, notable, shown_s, shown_value, story_style, told_at
 from swarm.model import Mission, Plan
 
 __all__ = ["report_text"]

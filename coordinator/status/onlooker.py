@@ -1,7 +1,7 @@
 """An onlooker that knows only a mission's name and learns the rest from the bus.
 
 Leaves out: what it makes of what it hears (coordinator.observer), and how that is
-shown (sim.status.table).
+shown (coordinator.status.table).
 """
 
 from __future__ import annotations

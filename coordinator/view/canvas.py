@@ -1,7 +1,7 @@
 """A field of character cells: thin lines below, signs and names on top.
 
 Lines are made of braille dots, two by four to a cell, or of full stops where only
-ASCII can be shown. Leaves out: what is drawn (sim.view.map_panel).
+ASCII can be shown. Leaves out: what is drawn (coordinator.view.map_panel).
 """
 
 from __future__ import annotations

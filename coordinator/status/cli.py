@@ -1,6 +1,6 @@
 """The command `swarm status`.
 
-Leaves out: looking (sim.status.onlooker) and showing (sim.status.table).
+Leaves out: looking (coordinator.status.onlooker) and showing (coordinator.status.table).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from swarm.options import (
 )
 
 if TYPE_CHECKING:
-    from sim.status.table import MissionStatus
+    from coordinator.status.table import MissionStatus
     from swarm.bus.config import BusConfig
     from swarm.clock import ScaledClock
     from swarm.config import Timing
@@ -66,8 +66,8 @@ def status(
 
     from rich.console import Console
 
-    from sim.status.table import status_as_json, status_table
-    from sim.view.signs import signs_for
+    from coordinator.status.table import status_as_json, status_table
+    from coordinator.view.signs import signs_for
     from swarm.bus.config import bus_config
     from swarm.clock import ScaledClock
     from swarm.config import preset
@@ -99,8 +99,8 @@ async def _look(
     name: str | None, config: BusConfig, timing: Timing, clock: ScaledClock, patience_s: float
 ) -> MissionStatus:
     """Learn how a mission stands."""
-    from sim.status.onlooker import Onlooker, only_mission
-    from sim.status.table import mission_status
+    from coordinator.status.onlooker import Onlooker, only_mission
+    from coordinator.status.table import mission_status
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.events import BusFact, Wish
     from swarm.shell import Shell, take_seat

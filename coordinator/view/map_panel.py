@@ -1,7 +1,7 @@
 """The map of a running mission in character cells, north up, true to scale.
 
 Cells are taken to be twice as high as wide. Leaves out: everything beside the map
-(sim.view.live).
+(coordinator.view.live).
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from itertools import pairwise
 
 from rich.text import Text
 
-from sim.view.canvas import Canvas, Spot
-from sim.view.scene import Scene, TaskView, UavView
-from sim.view.signs import BAD, Signs, uav_colour
+from coordinator.view.canvas import Canvas, Spot
+from coordinator.view.scene import Scene, TaskView, UavView
+from coordinator.view.signs import BAD, Signs, uav_colour
 from swarm.state.board import TaskState
 
 __all__ = ["ideal_width", "map_panel"]

@@ -1,7 +1,8 @@
 """How a mission stands, as an onlooker knows it: for people and for programs.
 
 `mission_status` is the one place that reads an `Observer`; whoever shows it again and
-again calls it again and again. Leaves out: how the onlooker came to know (sim.status.onlooker).
+again calls it again and again. Leaves out: how the onlooker came to know
+(coordinator.status.onlooker).
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from rich.table import Table
 from rich.text import Text
 
 from coordinator.observer import Observer
-from sim.view.live import task_counts, title
-from sim.view.scene import LOST, Scene, scene_of
-from sim.view.signs import BAD, Signs, uav_colour
-from sim.view.story import clean, shown_value
+from coordinator.view.live import task_counts, title
+from coordinator.view.scene import LOST, Scene, scene_of
+from coordinator.view.signs import BAD, Signs, uav_colour
+from coordinator.view.story import clean, shown_value
 from swarm.model import TaskId, UavId
 from swarm.model.ids import COORDINATOR, FLEET
 from swarm.state.board import TaskState

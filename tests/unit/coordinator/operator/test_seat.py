@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from sim.operator.seat import OperatorSeat, Result
+from coordinator.operator.seat import OperatorSeat, Result
 from swarm.config import Timing
 from swarm.events import (
     Ask,

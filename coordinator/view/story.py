@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coordinator.observer import Happening
-from sim.view.signs import BAD
+from coordinator.view.signs import BAD
 
 __all__ = [
     "clean",

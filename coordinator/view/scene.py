@@ -1,6 +1,6 @@
 """One moment of a mission, in the words and numbers that a picture needs.
 
-Leaves out: where and how they are shown (sim.view.live).
+Leaves out: where and how they are shown (coordinator.view.live).
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from coordinator.observer import Observer
-from sim.view.signs import short_names
+from coordinator.view.signs import short_names
 from swarm.model import Mission, Plan, TaskId, Uav, UavId
 from swarm.state.board import TaskState
 from swarm.wire.messages import ClaimPhase, EpochPhase, StatusPhase

@@ -8,8 +8,8 @@ from dataclasses import replace
 from rich.console import Console
 
 from coordinator.observer import Observer
-from sim.status.table import mission_status, status_as_json, status_table
-from sim.view.signs import signs_for
+from coordinator.status.table import mission_status, status_as_json, status_table
+from coordinator.view.signs import signs_for
 from swarm.events import PeerGone, PeerSeen, Tick
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.wire.messages import Command, CommandKind, Status, StatusPhase

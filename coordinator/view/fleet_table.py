@@ -1,6 +1,6 @@
 """The table of UAVs in a running mission: what each does, on which task, for how long yet.
 
-Leaves out: the map and everything else beside it (sim.view.live).
+Leaves out: the map and everything else beside it (coordinator.view.live).
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from rich.cells import set_cell_size
 from rich.text import Text
 
-from sim.view.scene import Scene, UavView
-from sim.view.signs import BAD, Signs, uav_colour
-from sim.view.story import clean
+from coordinator.view.scene import Scene, UavView
+from coordinator.view.signs import BAD, Signs, uav_colour
+from coordinator.view.story import clean
 from swarm.wire.messages import StatusPhase
 
 __all__ = ["fit", "fleet_table", "lists", "table_width"]
