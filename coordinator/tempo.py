@@ -8,7 +8,7 @@ from __future__ import annotations
 
 __all__ = ["Tempo"]
 
-BASELINE_S = 1.5
+BASELINE_S = 0.8
 """Two words of one UAV that far apart tell the pace [s of the onlooker's clock]."""
 TOLERANCE = 1.25
 """Within this factor of 1 the two clocks run alike: what differs is the network's delay."""

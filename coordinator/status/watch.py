@@ -20,13 +20,15 @@ from swarm.clock import ScaledClock
 from swarm.config import Timing
 from swarm.errors import SwarmError
 from swarm.state.commands import aborted
-from swarm.wire.messages import EpochPhase
+from swarm.wire.messages import EpochPhase, StatusPhase
 
 __all__ = ["Shows", "deserted", "watch"]
 
 FRAME_S = 0.2
 """Wall time between two pictures."""
 FOREVER_S = 1e9
+_ENDS = (StatusPhase.HOME, StatusPhase.OUT)
+"""Where an agent's part ends."""
 
 
 class Shows(Protocol):
@@ -80,14 +82,23 @@ async def watch(
 def deserted(observer: Observer) -> bool:
     """Whether the mission is over and nobody is there any more, as far as is known.
 
-    A mission without a coordinator is over when no task is left, and who was sent home ends
-    it as well. While the own link is down, nobody can be seen leaving.
+    A mission without a coordinator is over when no task is left, or it was aborted. While the
+    own link is down nobody is seen leaving: who was home then needs no watching, as when the
+    bus ends with the mission.
     """
-    if observer.present or observer.cut_since_s is not None or observer.replica.brief is None:
+    if observer.replica.brief is None:
         return False
-    if observer.phase is EpochPhase.ENDED or aborted(observer.replica) is not None:
-        return True
-    return observer.phase is EpochPhase.RUNNING and not observer.board.unfinished
+    done = observer.phase is EpochPhase.RUNNING and not observer.board.unfinished
+    if not (done or observer.phase is EpochPhase.ENDED or aborted(observer.replica) is not None):
+        return False
+    there = observer.present
+    if observer.cut_since_s is not None:
+        there = {
+            uav
+            for uav, status in observer.statuses.items()
+            if uav in there and status.phase not in _ENDS
+        }
+    return not there
 
 
 async def _look_on(

@@ -47,7 +47,7 @@ def _trouble(scene: Scene) -> list[str]:
     """What is wrong right now, the worst first."""
     parts = []
     if scene.cut_s is not None:
-        parts.append(f"own link to the bus LOST for {scene.cut_s:.0f} s: nothing here is newer")
+        parts.append(f"own link LOST for {scene.cut_s:.0f} s: all this is old")
     if scene.phase is EpochPhase.RUNNING and not scene.coordinator and scene.cut_s is None:
         parts.append("coordinator not there")
     lost = [uav.id for uav in scene.uavs if uav.does == LOST]
