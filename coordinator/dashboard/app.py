@@ -1,7 +1,7 @@
-"""HTTP and websocket of the dashboard: who asks is checked, then answered; README.md has the words.
+"""HTTP and websocket of the dashboard: who asks is checked, then answered.
 
-Leaves out: what is told (coordinator.dashboard.feed), whether it may be (coordinator.dashboard.access)
-and what comes of an order (coordinator.dashboard.desk).
+README.md has the words. Leaves out: what is told (coordinator.dashboard.feed), who may ask
+(coordinator.dashboard.access) and what comes of an order (coordinator.dashboard.desk).
 """
 
 from __future__ import annotations
@@ -87,11 +87,9 @@ class Dashboard:
             Route("/", self._page),
             Route("/healthz", self._health),
             Route("/metrics", self._measured),
-            Route("/api/command", self._taking(CommandSaid, self._command), methods=["POST"]),
-            Route("/api/task", self._taking(TaskSaid, self._add_task), methods=["POST"]),
-            Route(
-                "/api/task/withdraw", self._taking(WithdrawalSaid, self._withdraw), methods=["POST"]
-            ),
+            Route("/api/command", self._taking(CommandSaid, self._give), methods=["POST"]),
+            Route("/api/task", self._taking(TaskSaid, self._give), methods=["POST"]),
+            Route("/api/task/withdraw", self._taking(WithdrawalSaid, self._give), methods=["POST"]),
             Route("/api/recording", self._taking(PlayerSaid, self._play), methods=["POST"]),
             WebSocketRoute("/feed", self._feed),
             Mount("/static", StaticFiles(directory=static, check_dir=False)),
@@ -114,8 +112,7 @@ class Dashboard:
         self.hub.end(reason)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(END_S):
-                while self.hub.clients:
-                    await asyncio.sleep(END_S / 50)
+                await self.hub.deserted.wait()
 
     # -- looking ----------------------------------------------------------------------
 
@@ -139,7 +136,7 @@ class Dashboard:
         if self.hub.clients >= MAX_CLIENTS:
             await socket.close(_FULL, "too many look on")
             return
-        self.hub.clients += 1
+        self.hub.enter()
         try:
             await _send(socket, self.hub.feed.hello())
             if self._access.token is None or await self._hear_token(socket):
@@ -149,7 +146,7 @@ class Dashboard:
         except (WebSocketDisconnect, TimeoutError):
             pass  # it is gone, or does not read
         finally:
-            self.hub.clients -= 1
+            self.hub.leave()
 
     async def _hear_token(self, socket: WebSocket) -> bool:
         try:
@@ -217,20 +214,12 @@ class Dashboard:
 
         return endpoint
 
-    def _command(self, said: CommandSaid, who: str) -> dict[str, int]:
+    def _give(self, said: CommandSaid | TaskSaid | WithdrawalSaid, who: str) -> dict[str, int]:
         if (orders := self._source.orders) is None:
-            raise _HttpError(403, "a recording takes no commands")
-        return self._given(orders.command(said.command, said.target, said.reason, who))
-
-    def _add_task(self, said: TaskSaid, who: str) -> dict[str, int]:
-        if (orders := self._source.orders) is None:
-            raise _HttpError(403, "a recording takes no tasks")
-        return self._given(orders.add_task(said.draft, who))
-
-    def _withdraw(self, said: WithdrawalSaid, who: str) -> dict[str, int]:
-        if (orders := self._source.orders) is None:
-            raise _HttpError(403, "a recording takes no tasks")
-        return self._given(orders.withdraw(said.id, said.reason, who))
+            raise _HttpError(403, "a recording takes no orders")
+        n = orders.give(said.wish, who)
+        self.hub.nudge()
+        return {"n": n}
 
     def _play(self, said: PlayerSaid, _: str) -> dict[str, int]:
         if (player := self._source.player) is None:
@@ -238,10 +227,6 @@ class Dashboard:
         player.control(playing=said.playing, speed=said.speed, t_s=said.t_s)
         self.hub.nudge()
         return {}
-
-    def _given(self, n: int) -> dict[str, int]:
-        self.hub.nudge()
-        return {"n": n}
 
 
 def create_app(

@@ -153,8 +153,8 @@ class Feed:
         self.seq += 1
         self._frames.clear()
         now_s = self._source.now_s()
-        for row in self._source.commands:
-            self._commands.put(row.n, _command_row(row), self.seq)
+        for given in self._source.commands:
+            self._commands.put(given.n, _command_row(given), self.seq)
         observer = self._source.observer
         brief = None if observer is None else observer.replica.brief
         if observer is not self._observer or brief is not self._brief:
@@ -184,8 +184,9 @@ class Feed:
             table.clear()
         self._progress, self._progress_version, self._curve_seqs = None, (-1, -1), []
         self._whole_since, self.mission_seq = self.seq, self.seq
-        known = observer is not None and brief is not None
-        self.mission = _mission_text(observer.mission.name, brief) if known else None
+        self.mission = None
+        if observer is not None and brief is not None:
+            self.mission = _mission_text(observer.mission.name, brief)
 
     def _head_of(self, observer: Observer | None, now_s: float) -> dict[str, object]:
         head: dict[str, object] = {"mission_s": None, "phase": None, "link": self._source.link}
@@ -262,7 +263,7 @@ class Feed:
                     "taken": taken,
                     "uav": holder if done is None else done[0],
                     "completed_s": None if done is None else _rounded(done[1], 3),
-                    "by": "scenario",
+                    "by": "scenario" if replica.operates(task) is None else "operator",
                 },
                 self.seq,
             )

@@ -38,6 +38,8 @@ class Hub:
     """Connections that follow the feed."""
     ended: str | None = None
     """Why nothing more will come; None while something may."""
+    deserted: asyncio.Event = field(default_factory=asyncio.Event)
+    """Set while nobody follows the feed."""
     _turn: asyncio.Event = field(default_factory=asyncio.Event)
     """Set at the next look, or the end, and replaced."""
     _wanted: asyncio.Event = field(default_factory=asyncio.Event)
@@ -45,6 +47,9 @@ class Hub:
     _bounding: asyncio.Task[None] | None = None
     _bounded: list[Measure] = field(default_factory=list)
     """Whose bound has been asked for."""
+
+    def __post_init__(self) -> None:
+        self.deserted.set()
 
     async def run(self) -> None:
         """Look again and again, until cancelled."""
@@ -61,6 +66,17 @@ class Hub:
         finally:
             if self._bounding is not None:
                 self._bounding.cancel()
+
+    def enter(self) -> None:
+        """Somebody begins to follow the feed."""
+        self.clients += 1
+        self.deserted.clear()
+
+    def leave(self) -> None:
+        """Somebody has ceased to follow the feed."""
+        self.clients -= 1
+        if self.clients == 0:
+            self.deserted.set()
 
     def nudge(self) -> None:
         """Look soon: something has just happened."""

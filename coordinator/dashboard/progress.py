@@ -41,8 +41,8 @@ def progress_of(problem: Problem, outcomes: Mapping[tuple[str, str], Outcome]) -
     Returns:
         The same lists, times and J as `coordinator.observer.Observer.result`.
     """
-    columns = {task: number for number, task in enumerate(problem.task_ids)}
-    rows = {uav: number for number, uav in enumerate(problem.uav_ids)}
+    columns = {str(task): number for number, task in enumerate(problem.task_ids)}
+    rows = {str(uav): number for number, uav in enumerate(problem.uav_ids)}
     visits = [
         (outcome.completed_s, uav, task)
         for (uav, task), outcome in outcomes.items()
@@ -50,7 +50,7 @@ def progress_of(problem: Problem, outcomes: Mapping[tuple[str, str], Outcome]) -
     ]
     # Tasks at one place may end at one instant: those stay in the order they were told in.
     visits.sort(key=lambda visit: visit[:2])
-    flown: dict[str, list[str]] = {uav: [] for uav in problem.uav_ids}
+    flown: dict[str, list[str]] = {uav: [] for uav in rows}
     survived = dict.fromkeys(rows, 1.0)
     completed: dict[str, tuple[str, float]] = {}
     curve: list[tuple[float, float]] = []

@@ -11,7 +11,8 @@ from typing import Annotated, ClassVar
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import Strict, ValidationError
 
-from coordinator.dashboard.source import TaskDraft
+from coordinator.operator.commanding import CommandWish
+from coordinator.operator.task_orders import NewTask, Withdrawal
 from swarm.model.ids import FLEET
 from swarm.wire.bounds import CHECKED, Duration, Flag, Id, Point, Value
 from swarm.wire.messages import CommandKind
@@ -41,9 +42,9 @@ class CommandSaid:
             raise ValueError(f"{self.command} concerns {'one UAV: name it' if one else 'all UAVs'}")
 
     @property
-    def target(self) -> str:
-        """Id of the UAV, or the name that stands for the fleet."""
-        return FLEET if self.uav is None else self.uav
+    def wish(self) -> CommandWish:
+        """What the operator wants."""
+        return CommandWish(self.command, self.uav or FLEET, self.reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,16 +55,17 @@ class TaskSaid:
 
     position: Point
     """East, north, up [m; mission origin]."""
-    value: Value
+    value: Value | None = None
+    """None for the median of the board's."""
     id: Id | None = None
     service_s: Duration = 0.0
     kind: Id | None = None
     reason: Reason = ""
 
     @property
-    def draft(self) -> TaskDraft:
-        """The task as the desk takes it."""
-        return TaskDraft(self.id, self.position, self.value, self.service_s, self.kind, self.reason)
+    def wish(self) -> NewTask:
+        """What the operator wants."""
+        return NewTask(self.position, self.id, self.value, self.service_s, self.kind, self.reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,11 @@ class WithdrawalSaid:
 
     id: Id
     reason: Reason = ""
+
+    @property
+    def wish(self) -> Withdrawal:
+        """What the operator wants."""
+        return Withdrawal(self.id, self.reason)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from swarm.errors import Fault, InputError
 
 __all__ = ["listen", "serving", "url_of"]
 
-END_S = 1.0
+END_S = 1
 """Wall time that connections have to end in order."""
 
 

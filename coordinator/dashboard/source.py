@@ -12,8 +12,8 @@ from enum import StrEnum
 from typing import Protocol
 
 from coordinator.observer import Observer
+from coordinator.operator.errands import OperatorWish
 from swarm.errors import SwarmError
-from swarm.wire.messages import CommandKind
 
 __all__ = [
     "CommandRow",
@@ -24,7 +24,6 @@ __all__ = [
     "Refusal",
     "RefusedError",
     "Source",
-    "TaskDraft",
 ]
 
 
@@ -49,19 +48,6 @@ class CommandRow:
     """What came of it, in words; empty as long as that is open."""
 
 
-@dataclass(frozen=True, slots=True)
-class TaskDraft:
-    """A task as an operator describes it."""
-
-    id: str | None
-    """None for the next free one."""
-    position_enu_m: tuple[float, float, float]
-    value: float
-    service_s: float = 0.0
-    kind: str | None = None
-    reason: str = ""
-
-
 class Refusal(StrEnum):
     """Why nothing was said on the bus."""
 
@@ -80,22 +66,18 @@ class RefusedError(SwarmError):
 
 
 class Orders(Protocol):
-    """Takes what an operator wants said; each method returns the number of its `CommandRow`.
+    """Takes what an operator wants said."""
 
-    Raises:
-        RefusedError: it was not said.
-    """
+    def give(self, wish: OperatorWish, who: str) -> int:
+        """Say it on the bus; the number of its `CommandRow`.
 
-    def command(self, kind: CommandKind, target: str, reason: str, who: str) -> int:
-        """Command one UAV, or the fleet; ``who`` asks, for the log."""
-        ...
+        Args:
+            wish: what the operator wants.
+            who: asks for it, for the log.
 
-    def add_task(self, draft: TaskDraft, who: str) -> int:
-        """Put a task on the board."""
-        ...
-
-    def withdraw(self, task: str, reason: str, who: str) -> int:
-        """Take a task off the board."""
+        Raises:
+            RefusedError: it was not said.
+        """
         ...
 
 

@@ -24,12 +24,12 @@ SETTLE_S = 0.4
 """Wall time after the first token of a mission in which those of others come too."""
 
 
-async def find_missions(bus: Bus, patience_s: float) -> list[str]:
+async def find_missions(bus: Bus, patience_s: float | None) -> list[str]:
     """Names of all missions that somebody on ``bus`` flies, once there is one.
 
     Args:
         bus: open; its inbox is read.
-        patience_s: how long to wait for the first [wall s].
+        patience_s: how long to wait for the first [wall s]; None for as long as it takes.
     """
     bus.watch_tokens(ANY_TOKEN)
     found: set[str] = set()
@@ -46,12 +46,12 @@ async def find_missions(bus: Bus, patience_s: float) -> list[str]:
         return sorted(found)
 
 
-async def only_mission(bus: Bus, patience_s: float) -> str:
+async def only_mission(bus: Bus, patience_s: float | None) -> str:
     """The mission that is meant when none is named.
 
     Args:
         bus: open; its inbox is read.
-        patience_s: how long to wait for it [wall s].
+        patience_s: how long to wait for it [wall s]; None for as long as it takes.
 
     Raises:
         SwarmError: there is none.
