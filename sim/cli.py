@@ -226,6 +226,16 @@ def run(
             show_default=False,
         ),
     ] = None,
+    dashboard: Annotated[
+        str | None,
+        typer.Option(
+            "--dashboard",
+            metavar="[ADDRESS:]PORT",
+            help="Also show the run in a browser, and let an operator step in there, until it "
+            "ends; 0: any port that is free. See swarm dashboard.",
+            show_default=False,
+        ),
+    ] = None,
     report: ReportOption = None,
     json: JsonOption = False,
     verbose: Annotated[
@@ -241,6 +251,7 @@ def run(
     Examples:
         swarm run table-1
         swarm run valley-survey --speedup 20 --report flight.md
+        swarm run valley-survey --dashboard 8080
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
         swarm run meadow --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
@@ -254,6 +265,7 @@ def run(
 
     from rich.console import Console
 
+    from coordinator.dashboard.place import parse_place
     from coordinator.planner.plan import check_online_method
     from coordinator.view.live import LiveView
     from coordinator.view.report import MissionReport, check_report_path
@@ -297,6 +309,7 @@ def run(
         link=link,
         autopilots=autopilots,
         handed_on=handed_on,
+        dashboard=None if dashboard is None else parse_place(dashboard),
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.
@@ -304,6 +317,9 @@ def run(
 
     def log(name: str, line: str) -> None:
         print(f"{name}: {line}", file=sys.stderr)
+
+    for line in () if options.dashboard is None else options.dashboard.lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     async def work() -> int:
         try:

@@ -117,9 +117,10 @@ def dashboard(
 
     from coordinator.dashboard.access import access_for, read_token
     from coordinator.dashboard.app import create_app
+    from coordinator.dashboard.listening import listen as take_port
+    from coordinator.dashboard.listening import url_of
     from coordinator.dashboard.live import LiveMission
-    from coordinator.dashboard.serve import listen as take_port
-    from coordinator.dashboard.serve import serving, url_of
+    from coordinator.dashboard.serve import serving
     from swarm.bus.config import bus_config
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock
