@@ -69,7 +69,7 @@ _LARGE: Final = frozenset({"brief", "choice", "epoch"})
 
 def encode(message: Message | Snapshot) -> bytes:
     """The bytes of a message or snapshot."""
-    packed: bytes = msgpack.packb(_packable(message))
+    packed: bytes = msgpack.packb(_packable(message), default=_fields_of)
     return packed
 
 
@@ -107,8 +107,18 @@ def _packable(message: Message | Snapshot) -> list[Any]:
         message.stamp.incarnation,
         message.stamp.counter,
         _NAMES[type(message.body)],
-        dataclasses.asdict(message.body),
+        message.body,
     ]
+
+
+def _fields_of(part: Any) -> dict[str, object]:
+    """A body, or a dataclass within one, by the names of its fields."""
+    return {name: getattr(part, name) for name in _names_of(type(part))}
+
+
+@cache
+def _names_of(kind: type[Any]) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(kind))
 
 
 @cache
