@@ -396,7 +396,7 @@ class Observer:
         self._tell(_COMMANDED[command.kind].format(command.target) + why, now_s)
 
     def _hear_task_order(self, order: TaskOrder, now_s: float) -> None:
-        if self.replica.operates(order.task) is order:  # and not of an earlier flight
+        if self.replica.ordered(order.task) is order:  # and not of an earlier flight
             what = f"withdraws {order.task}" if order.withdrawn else f"adds task {order.task}"
             self._tell(f"operator {what}" + (f": {order.reason}" if order.reason else ""), now_s)
             self._added_s.setdefault(order.task, max(0.0, self.mission_s(now_s) or 0.0))
@@ -406,7 +406,7 @@ class Observer:
         """The mission as it was given, with the tasks that the operator has ordered in it."""
         tasks = {task.id: task for task in self._given.tasks}
         for order in self.replica.task_orders.values():
-            if self.replica.operates(order.task) is not order:
+            if self.replica.ordered(order.task) is not order:
                 continue
             known = tasks.get(TaskId(order.task))
             if known is None or not order.withdrawn:

@@ -102,7 +102,7 @@ class Replica:
                 self.commands[target] = message.stamp, command
         return True
 
-    def operates(self, task: str) -> TaskOrder | None:
+    def ordered(self, task: str) -> TaskOrder | None:
         """The operator's order about ``task`` in this flight; None if there is none."""
         order, brief = self.task_orders.get(task), self.brief
         return order if order and brief is not None and order.run == brief.run else None
@@ -118,7 +118,7 @@ class Replica:
 
     def _settle(self, task: str) -> None:
         """Find out anew what counts of all that is said of ``task``."""
-        order, known = self.operates(task), self._ordered.pop(task, None)
+        order, known = self.ordered(task), self._ordered.pop(task, None)
         if order is None:
             entry = self.posted.get(task)
         else:
