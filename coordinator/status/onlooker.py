@@ -9,19 +9,23 @@ from __future__ import annotations
 import asyncio
 
 from coordinator.observer import Observer
+from coordinator.tempo import Tempo
 from swarm.bus.port import Bus, TokenSeen
 from swarm.config import Timing
 from swarm.deadline import earliest
 from swarm.errors import Fault, InputError, SwarmError
-from swarm.events import BusFact, Finish, Learned, Wish
+from swarm.events import BusFact, Finish, Heard, Learned, Wish
 from swarm.model import Mission
 from swarm.state.board import mission_of
 from swarm.wire.keys import ANY_TOKEN, mission_of_token
+from swarm.wire.messages import Message, Status
 
 __all__ = ["Onlooker", "find_missions", "only_mission"]
 
 SETTLE_S = 0.4
 """Wall time after the first token of a mission in which those of others come too."""
+_UNEVEN = 0.02
+"""Change of the mission's pace that is worth setting the clock anew."""
 
 
 async def find_missions(bus: Bus, patience_s: float | None) -> list[str]:
@@ -82,6 +86,7 @@ class Onlooker:
         self._leave_at_s: float | None = None
         self._version = self.observer.replica.board_version
         self._learned = False
+        self._tempo = Tempo()
 
     def start(self, now_s: float) -> list[Wish]:
         """Ask what has happened so far."""
@@ -98,9 +103,23 @@ class Onlooker:
             self.observer.revise(mission_of(replica, self.observer.mission.name, replica.brief))
         if isinstance(fact, Learned):
             self._learned = self.known
+        if isinstance(fact, Heard):
+            self._keep_time(fact.message, now_s)
         if self._leave_at_s is not None and (self.informed or self._leave_at_s <= now_s):
             wishes.append(Finish(0 if self.known else 1))
         return wishes
+
+    def _keep_time(self, message: Message, now_s: float) -> None:
+        """Follow the mission's time if it runs otherwise than the own clock."""
+        if not isinstance(message.body, Status) or message.body.mission_s is None:
+            return
+        mission_s, known_s = message.body.mission_s, self.observer.mission_s(now_s)
+        pace = self._tempo.told(message.writer, now_s, mission_s)
+        if known_s is None or (pace == 1.0 and self.observer.pace == 1.0):
+            return
+        # The picture's clock shall run evenly: small differences are the network's.
+        if abs(pace / self.observer.pace - 1.0) > _UNEVEN or abs(known_s - mission_s) > pace:
+            self.observer.keep_time(now_s, mission_s, pace)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
