@@ -317,6 +317,7 @@ class Feed:
                 dropped.get(uav.id, {}),
                 now_s,
                 mission_s,
+                self._source.speedup,
             )
             self._uavs.put(uav.id, row, self.seq, but="silent_s")
             self._uavs.touch(uav.id, row, self.seq, _QUIET_LOOKS)
@@ -329,6 +330,7 @@ def _uav_row(
     dropped: Mapping[str, int],
     now_s: float,
     mission_s: float | None,
+    speedup: float,
 ) -> dict[str, object]:
     status, claim = observer.statuses.get(uav.id), observer.replica.claims.get(uav.id)
     heard_s, present = observer.heard_s.get(uav.id), uav.id in observer.present
@@ -347,7 +349,7 @@ def _uav_row(
         "position": None if status is None else _point(status.position_enu_m),
         "velocity": None if status is None else _point(status.velocity_enu_m_s),
         "battery": None if status is None else _rounded(status.battery_frac, 3),
-        "silent_s": None if heard_s is None else _rounded(now_s - heard_s, 1),
+        "silent_s": None if heard_s is None else _rounded((now_s - heard_s) / speedup, 1),
         "lost": does == LOST,
         "present": present,
         "note": "" if status is None else clean(status.note),
