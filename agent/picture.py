@@ -22,6 +22,7 @@ from swarm.wire.messages import (
     Message,
     Outcome,
     Result,
+    TaskOrder,
 )
 
 __all__ = ["News", "Picture"]
@@ -62,13 +63,18 @@ class Picture:
 
     def take_in(self, message: Message) -> News | None:
         """Join another's statement; gives what it changes, None if it was known."""
+        if self._is_premature(message):
+            return None
         before, epoch = self._replica.claims.get(message.writer), self._replica.epoch
-        appears = isinstance(message.body, Board) and message.body.task not in self._replica.board
+        body, board = message.body, self._replica.board
+        entry = board.get(body.task) if isinstance(body, Board | TaskOrder) else None
         if not self._replica.join(message):
             return None
-        match message.body:
-            case Board() if appears:
+        match body:
+            case Board(task=task) | TaskOrder(task=task) if entry is None and task in board:
                 return News.APPEARANCE
+            case TaskOrder(task=task):
+                return News.OTHER if board.get(task) == entry else News.OPENING
             case Brief() | Board() | Outcome(result=Result.FAILED):
                 return News.OPENING
             case Claim(task=task):
@@ -78,6 +84,19 @@ class Picture:
                 return News.OPENING
             case _:
                 return News.OTHER
+
+    def _is_premature(self, message: Message) -> bool:
+        """Whether it briefs for another flight, by a coordinator that has not taken charge.
+
+        One that starts and finds nobody begins a flight of its own until it learns of the one
+        that is on, whose brief it restates then. What the operator has ordered counts on.
+        """
+        body, known, ours = message.body, self._replica.brief, self._replica.epoch_stamp
+        if not (isinstance(body, Brief) and known is not None and self.running):
+            return False
+        return body.run != known.run and (
+            ours is None or ours.incarnation < message.stamp.incarnation
+        )
 
     def is_open(self, task: str | None) -> bool:
         """Whether that is a task which is still to be done."""

@@ -13,7 +13,17 @@ from sim.study.flight import Visit
 from swarm.events import Note
 from swarm.model import TaskId, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Board, Claim, Epoch, EpochPhase, Message, Outcome, Result
+from swarm.wire.messages import (
+    Board,
+    Choice,
+    Claim,
+    Epoch,
+    EpochPhase,
+    Message,
+    Outcome,
+    Result,
+    TaskOrder,
+)
 
 __all__ = ["Tally"]
 
@@ -34,8 +44,8 @@ class Tally:
         self._epoch: Epoch | None = None
 
     def said(self, process: Process, message: Message) -> None:
-        """Count a message, and what it tells for the first time."""
-        self.messages += 1
+        """Count a message, unless it is for onlookers alone, and what it tells that is new."""
+        self.messages += not isinstance(message.body, Choice)
         match message.body:
             case Claim(task=task):
                 self._claimed[message.writer] = process, task
@@ -43,7 +53,7 @@ class Tally:
                 self._end_attempt(process, message.writer, outcome)
             case Epoch(phase=EpochPhase.RUNNING) as epoch:
                 self._take_epoch(process, epoch)
-            case Board(task=task, withdrawn=True):
+            case Board(task=task, withdrawn=True) | TaskOrder(task=task, withdrawn=True):
                 self._closed.add(task)
             case _:
                 pass
