@@ -72,14 +72,14 @@ def simulate(
     report: ReportOption = None,
     json: JsonOption = False,
 ) -> int:
-    """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
+    """Fly a mission in virtual time, by the agents' real code.
 
-    Unless told otherwise nothing is uncertain: vehicles and network are ideal, and the lists flown
-    are exactly those planned. Each kind of uncertainty is drawn from the seed by itself, so asking
-    for one leaves what the others draw as it was.
-    With --faults the network and the clocks are like real ones, what goes wrong is told
-    on standard error in lines that a file may hold, and the invariants of a fleet are watched.
-    Exit status 0: every task was done, and no invariant broken.
+    The coordinator's code is the real one as well; there are no sockets. Unless told otherwise
+    nothing is uncertain: vehicles and network are ideal, and the lists flown are exactly those
+    planned. Each kind of uncertainty is drawn from the seed by itself, so asking for one leaves
+    what the others draw as it was. With --faults the network and the clocks are like real ones,
+    what goes wrong is told on standard error in lines that a file may hold, and the invariants of
+    a fleet are watched. Exit status 0: every task was done, and no invariant broken.
 
     Examples:
         swarm simulate table-1
