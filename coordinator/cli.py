@@ -302,7 +302,7 @@ def coordinator(
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, SystemClock, incarnation
     from swarm.config import preset
-    from swarm.log import configure_logging
+    from swarm.log import configure_logging, identify
     from swarm.model.ids import COORDINATOR
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
@@ -321,12 +321,16 @@ def coordinator(
             print(dumps(plan_as_json(made), allow_nan=False), flush=True)
         return made
 
+    identify(mission=mission.name)
+
     def core(memory: Snapshot | None, memory_age_s: float) -> CoordinatorCore:
+        life = incarnation()
+        identify(incarnation=life)
         return CoordinatorCore(
             mission,
             method=method,
             seed=seed,
-            incarnation=incarnation(),
+            incarnation=life,
             timing=timing,
             start_timeout_s=start_timeout_s * max(1.0, speedup),
             layers=FlightLayers(lowest_layer_m, layer_spacing_m),

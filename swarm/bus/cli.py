@@ -15,7 +15,15 @@ import typer
 
 from swarm.bus.config import DEFAULT_ROUTER
 from swarm.config import Link, preset
-from swarm.options import JsonOption, LeaseOption, LifelineOption, LinkOption
+from swarm.log import LogFormat, LogLevel
+from swarm.options import (
+    JsonOption,
+    LeaseOption,
+    LifelineOption,
+    LinkOption,
+    LogFormatOption,
+    LogLevelOption,
+)
 
 if TYPE_CHECKING:
     from swarm.bus.config import RouterConfig
@@ -53,6 +61,8 @@ def router(
     lease_s: LeaseOption = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
+    log_level: LogLevelOption = LogLevel.INFO,
+    log_format: LogFormatOption = LogFormat.AUTO,
 ) -> int:
     """Be the place that a fleet's processes reach each other by.
 
@@ -65,8 +75,10 @@ def router(
     """
     from swarm.bus.config import RouterConfig
     from swarm.errors import Fault, InputError
+    from swarm.log import configure_logging
     from swarm.process import run_until_stopped
 
+    configure_logging(log_level, log_format)
     listens = tuple(listen or (() if config else (DEFAULT_ROUTER,)))
     try:
         lease_s = preset(link, lease_s).lease_s
