@@ -78,7 +78,9 @@ export class Header {
     if (this.state === "lost") {
       const since = new Date(this.feed.lostSince);
       const age = Math.round((Date.now() - this.feed.lostSince) / 1000);
-      told.push(["lost", `Connection lost since ${since.toLocaleTimeString()} (${age} s). What you see is from then; trying again.`]);
+      told.push(this.feed.ended
+        ? ["note", `The dashboard has ended: ${this.feed.ended}. What you see is from ${since.toLocaleTimeString()}; looking whether it comes back.`]
+        : ["lost", `Connection lost since ${since.toLocaleTimeString()} (${age} s). What you see is from then; trying again.`]);
     } else if (head && !head.link && hello?.kind === "live") {
       told.push(["lost", "The dashboard has lost the bus: nothing new is heard, and commands reach nobody until it is back."]);
     }
@@ -103,8 +105,9 @@ export class Header {
   }
 
   #nothing() {
-    const { mission, tasks } = this.picture;
+    const { head, hello, mission, tasks } = this.picture;
     const text = this.state === "connecting" ? "Connecting …"
+      : !mission && hello?.token && !head ? "Waiting for the token."
       : !mission ? (this.state === "lost" ? "No connection to the dashboard." : "No mission yet. It appears here as soon as somebody on the bus flies one.")
         : "";
     setText(byId("nothing-text"), text);

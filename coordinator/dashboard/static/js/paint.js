@@ -209,9 +209,11 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
     const [x, y] = view.spot(target.position);
     line(canvas, spot[0], spot[1], x, y);
   }
+  const labels = [];
   for (const [id, spot] of spots) {
-    if (view.holds(spot)) paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look);
+    if (view.holds(spot)) labels.push(paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look));
   }
+  paintLabels(canvas, labels, look);
   for (const ghost of look.ghosts) paintGhost(canvas, view.spot(ghost.position), ghost.label, look);
 }
 
@@ -242,9 +244,26 @@ function paintUav(canvas, picture, motion, row, [x, y], look) {
   }
   if (look.selected === row.id) ring(canvas, 0, 0, size + 6, ink.accent);
   canvas.restore();
-  if (!look.labels && look.selected !== row.id && !troubled) return;
-  const text = look.selected === row.id ? told(row, picture) : described.short;
-  label(canvas, text, x + size + 3, y + 4, troubled ? ink.trouble : ink.text, look);
+  const chosen = look.selected === row.id;
+  return {
+    text: chosen ? told(row, picture) : described.short,
+    weight: chosen ? 2 : troubled ? 1 : 0,
+    x: x + size + 3,
+    y: y + 4,
+    colour: troubled ? ink.trouble : ink.text,
+  };
+}
+
+/** Labels that have room; what is chosen or in trouble goes first and is always named. */
+function paintLabels(canvas, labels, look) {
+  const taken = [];
+  for (const each of labels.sort((one, other) => other.weight - one.weight)) {
+    const right = each.x + canvas.measureText(each.text).width;
+    const hits = ([left, top, end]) => each.x < end && right > left && Math.abs(each.y - top) < 12;
+    if (!each.weight && taken.some(hits)) continue;
+    taken.push([each.x, each.y, right]);
+    label(canvas, each.text, each.x, each.y, each.colour, look);
+  }
 }
 
 /** Id, target and rule of the UAV that is selected. */
