@@ -47,7 +47,7 @@ class Watched:
 
 @contextlib.contextmanager
 def open_page(url: str) -> Iterator[Watched]:
-    """The dashboard at ``url`` in a headless browser of 1440 × 900."""
+    """The dashboard at ``url`` in a headless browser of 1440 × 900; `make browser` gets one."""
     found = next((path for name in _NAMES if (path := shutil.which(name))), None)
     if found is None:
         pytest.fail("no Chromium found: install one, on Debian by `apt-get install chromium`")
