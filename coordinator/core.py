@@ -21,7 +21,7 @@ from coordinator.beginning import Beginning, Verdict
 from coordinator.briefing import FlightLayers, brief_of, differences
 from coordinator.ending import Ending
 from coordinator.events import Action, Event, PlanFailed, PlanMade, Replanned, Withdraw
-from coordinator.heritage import Heritage, inherit, statements
+from coordinator.heritage import Heritage, inherit, statements, without_life
 from coordinator.inquiry import Inquiry
 from coordinator.planner.live import Situation
 from coordinator.postings import Postings, exit_status
@@ -57,6 +57,7 @@ from swarm.wire.messages import (
     EpochPhase,
     Message,
     Snapshot,
+    TaskOrder,
 )
 
 __all__ = ["CoordinatorCore", "FlightLayers"]
@@ -195,9 +196,11 @@ class CoordinatorCore:
             case Heard(message):
                 if self._membership.heard(message.writer, now_s):
                     self._welcome(message.writer, now_s)
-                self.replica.join(message)
+                news = self.replica.join(message)
                 if isinstance(message.body, Claim):
                     self._membership.spoke(message.writer)
+                elif news and isinstance(message.body, TaskOrder):
+                    self._note_order(message.body)
                 if self._standing is Standing.BRIEFED and self._beginning.is_forestalled:
                     self._inquiry.want(now_s, before_deciding=True)
             case Learned(snapshots):
@@ -221,13 +224,18 @@ class CoordinatorCore:
                 self._end(f"no plan: {reason}", now_s)
             case Replanned() as replanned:
                 self._judge(replanned, now_s)
-            case Withdraw(task) if (entry := self.replica.board.get(task)) is not None:
+            case Withdraw(task) if (entry := self.replica.posted.get(task)) is not None:
                 if not entry.withdrawn:
                     self._say(replace(entry, withdrawn=True))
             case Stop(reason):
                 self._end(reason, now_s)
             case _:
                 pass
+
+    def _note_order(self, order: TaskOrder) -> None:
+        if self.replica.ordered(order.task) is order:
+            what = "task withdrawn by the operator" if order.withdrawn else "task by the operator"
+            self._actions.append(Note(what, {"task": order.task, "reason": order.reason}))
 
     def _welcome(self, writer: str, now_s: float) -> None:
         """Somebody is there who was not: it may know more, even of a mission that runs."""
@@ -302,9 +310,10 @@ class CoordinatorCore:
         come as far lives they are not outdone, or the two would outbid each other for ever
         instead of one giving way.
         """
-        heritage = inherit(snapshots)
-        theirs = statements(heritage.replica.messages())
         mine, started = self._speech.incarnation, self._zero_s is not None
+        # Who has only begun a flight takes the brief of the one that runs for its own.
+        heritage = inherit(snapshots if started else without_life(snapshots, mine))
+        theirs = statements(heritage.replica.messages())
         newer = [m for m in theirs if m.stamp.incarnation > mine]
         equals = any(standing_of(other) is self._standing for other in others)
         if equals and (newer or any(m.stamp.incarnation > mine for m in self._overheard)):

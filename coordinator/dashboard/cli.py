@@ -29,6 +29,7 @@ from swarm.options import (
 
 if TYPE_CHECKING:
     from coordinator.dashboard.feed import Display
+    from swarm.bus.port import Bus
 
 __all__ = ["dashboard"]
 
@@ -121,19 +122,19 @@ def dashboard(
     from coordinator.dashboard.listening import url_of
     from coordinator.dashboard.live import LiveMission
     from coordinator.dashboard.serve import serving
+    from coordinator.joining import check_mission
+    from coordinator.status.watch import FOREVER_S
     from swarm.bus.config import bus_config
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock
     from swarm.config import preset
     from swarm.log import configure_logging
-    from swarm.model.ids import ID_RULE, valid_id
     from swarm.process import run_until_stopped
 
     configure_logging(log_level, log_format)
     network = preset(link, lease_s)
     config = bus_config(bus, listen, connect or (), network.lease_s)
-    if mission is not None and not valid_id(mission):
-        raise InputError(Fault("--mission", "", f"{mission!r} is no id", f"give {ID_RULE}"))
+    check_mission(mission)
     token = read_token(token_file, os.environ)
     access, made = access_for(host, allow_host or (), token)
     display = _display(access.token is not None, tiles, tiles_credit)
@@ -146,7 +147,11 @@ def dashboard(
         if made:
             print(f"token: {access.token}", flush=True)
     clock = ScaledClock(speedup)
-    source = LiveMission(mission, lambda: open_zenoh_bus(config), network, clock, speedup)
+
+    async def open_bus() -> Bus:
+        return await open_zenoh_bus(config, timeout_s=FOREVER_S)
+
+    source = LiveMission(mission, open_bus, network, clock, speedup)
 
     async def work() -> int:
         served = create_app(source, access, display)

@@ -16,6 +16,8 @@ from coordinator.dashboard.source import CommandRow, CommandState, Refusal, Refu
 from coordinator.observer import Observer
 from coordinator.operator.errands import Errand, Errands, OperatorWish
 from coordinator.operator.verdict import Result
+from coordinator.status.onlooker import Onlooker
+from coordinator.status.watch import deserted
 from swarm.config import Timing
 from swarm.deadline import earliest
 from swarm.events import (
@@ -29,16 +31,12 @@ from swarm.events import (
     PeerSeen,
     Wish,
 )
-from swarm.model import Mission
 from swarm.model.ids import OPERATOR
-from swarm.wire.messages import Brief, EpochPhase, Message
+from swarm.wire.messages import Brief, Message
 
 __all__ = ["Desk"]
 
 KEPT_ROWS = 1000
-DESERTED_S = 5.0
-"""A mission that has ended, and of which nobody has been there for so long, is over and done with
-[s of ``now_s``]."""
 
 
 @dataclass(slots=True)
@@ -58,7 +56,6 @@ class Desk:
         timing: timers, in the seconds of ``now_s``.
         incarnation: wall time in milliseconds.
         patience_s: how long to wait for the effect of an order [s of ``now_s``].
-        linked: whether the link to the bus is up already.
         stays: look on for ever; else until the mission is over and everyone has left.
         first: number of the first order.
     """
@@ -70,12 +67,9 @@ class Desk:
         *,
         incarnation: int,
         patience_s: float,
-        linked: bool = False,
         stays: bool = True,
         first: int = 1,
     ) -> None:
-        self.link = linked
-        """Whether the own link to the bus is up."""
         self.rows: deque[CommandRow] = deque(maxlen=KEPT_ROWS)
         """What was ordered, oldest first."""
         self._mission = mission
@@ -88,11 +82,16 @@ class Desk:
         self._given: list[_Given] = []
         self._notes: list[Wish] = []
         self._deserted_at_s: float | None = None
-        self.observer, self._errands = self._begin()
+        self._onlooker, self._errands = self._begin()
+
+    @property
+    def observer(self) -> Observer:
+        """What is known of the flight that is on."""
+        return self._onlooker.observer
 
     def start(self, now_s: float) -> list[Wish]:
         """Ask what there is to know."""
-        return self.observer.start(now_s)
+        return self._onlooker.start(now_s)
 
     def step(self, fact: BusFact, now_s: float) -> list[Wish]:
         """Take note of one fact."""
@@ -101,10 +100,8 @@ class Desk:
                 self._tokens.add(writer)
             case PeerGone(writer):
                 self._tokens.discard(writer)
-            case LinkChanged(up):
-                self.link = up
         wishes = self._begin_anew(now_s) if self._is_flown_anew(fact) else []
-        wishes += self.observer.step(fact, now_s)
+        wishes += self._onlooker.step(fact, now_s)
         wishes += self._errands.step(fact, now_s)
         self._follow()
         wishes += self._notes
@@ -116,7 +113,7 @@ class Desk:
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
         return earliest(
-            self.observer.next_deadline_s(), self._errands.next_deadline_s(), self._deserted_at_s
+            self._onlooker.next_deadline_s(), self._errands.next_deadline_s(), self._deserted_at_s
         )
 
     def give(self, wish: OperatorWish, who: str, now_s: float) -> int:
@@ -170,16 +167,15 @@ class Desk:
 
     # -- flights ----------------------------------------------------------------------
 
-    def _begin(self) -> tuple[Observer, Errands]:
-        nothing = Mission(self._mission, horizon_s=1.0, uavs=(), tasks=())
-        observer = Observer(nothing, self._timing)
+    def _begin(self) -> tuple[Onlooker, Errands]:
+        onlooker = Onlooker(self._mission, self._timing, None, complete=False)
         errands = Errands(
-            observer,
+            onlooker.observer,
             incarnation=self._incarnation,
             timing=self._timing,
             patience_s=self._patience_s,
         )
-        return observer, errands
+        return onlooker, errands
 
     def _is_flown_anew(self, fact: BusFact) -> bool:
         """Whether ``fact`` tells of a later flight than the one that is known."""
@@ -209,22 +205,22 @@ class Desk:
         for given in self._given:
             self._close(given, "the mission was begun anew before it took effect", _FAILED)
         self._given = []
-        said = list(self.observer.replica.messages({OPERATOR}))
-        self.observer, self._errands = self._begin()
-        self.observer.replica.join_all(said)
-        wishes = self.observer.start(now_s)
-        wishes += self.observer.step(LinkChanged(self.link), now_s)
+        before = self.observer
+        self._onlooker, self._errands = self._begin()
+        self.observer.replica.join_all(before.replica.messages({OPERATOR}))
+        wishes = self._onlooker.start(now_s)
+        if before.cut_since_s is not None:
+            wishes += self._onlooker.step(LinkChanged(False), now_s)
         for writer in sorted(self._tokens):
-            wishes += self.observer.step(PeerSeen(writer), now_s)
+            wishes += self._onlooker.step(PeerSeen(writer), now_s)
         return wishes
 
     def _is_over(self, now_s: float) -> bool:
-        ended = self.observer.phase is EpochPhase.ENDED and not self.observer.present
-        if self._stays or not (ended and self.link):
+        if self._stays or not deserted(self.observer):
             self._deserted_at_s = None
             return False
         if self._deserted_at_s is None:
-            self._deserted_at_s = now_s + DESERTED_S
+            self._deserted_at_s = now_s + self._timing.relink_grace_s
         return self._deserted_at_s <= now_s
 
 

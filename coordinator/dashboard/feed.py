@@ -11,6 +11,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 
 import swarm
 from coordinator.dashboard.measure import Measure, measure_of
@@ -25,12 +26,12 @@ from swarm.allocation.problem import Problem
 from swarm.model.ids import COORDINATOR
 from swarm.state.board import TaskState
 from swarm.state.commands import aborted, in_force
-from swarm.wire.messages import Brief, Fleet, StatusPhase
+from swarm.wire.messages import Brief, Choice, Fleet, StatusPhase
 
 __all__ = ["PROTOCOL", "Display", "Feed"]
 
 PROTOCOL = 1
-_STORY, _CURVE, _COMMANDS = 500, 600, 200
+_STORY, _CHOICES, _CURVE, _COMMANDS = 500, 300, 600, 200
 _QUIET_LOOKS = 5
 """A row of which only the silence has grown is sent after so many looks."""
 _GONE = (StatusPhase.HOME, StatusPhase.RETURNING, StatusPhase.OUT)
@@ -73,6 +74,9 @@ class Feed:
         self._uavs, self._tasks, self._lists = RowTable(), RowTable(), RowTable()
         self._story = Growing(_STORY)
         self._told = 0
+        self._choices = Growing(_CHOICES)
+        self._chosen = 0
+        self._last_choice: object = None
         self._progress: Progress | None = None
         self._progress_version = (-1, -1)
         self._curve_seqs: list[int] = []
@@ -130,6 +134,7 @@ class Feed:
             "tasks": self._tasks.after(after),
             "lists": self._lists.after(after),
             "story": self._story.after(after),
+            "choices": self._choices.after(after),
             "objective_curve": self._curve_after(after),
             "commands": self._commands.after(after)[-_COMMANDS:],
         }
@@ -171,6 +176,7 @@ class Feed:
             }
             self._story.add(as_text(row), self.seq)
         self._told = len(observer.story)
+        self._look_at_choices(observer)
         if brief is not None:
             self._look_at_uavs(observer, brief, now_s)
 
@@ -178,7 +184,8 @@ class Feed:
         """Another mission, or the same in other words: everything is told anew."""
         if observer is not self._observer:
             self._story.clear()
-            self._told = 0
+            self._choices.clear()
+            self._told, self._chosen, self._last_choice = 0, 0, None
         self._observer, self._brief = observer, brief
         for table in (self._uavs, self._tasks, self._lists):
             table.clear()
@@ -187,6 +194,17 @@ class Feed:
         self.mission = None
         if observer is not None and brief is not None:
             self.mission = _mission_text(observer.mission.name, brief)
+
+    def _look_at_choices(self, observer: Observer) -> None:
+        """Take in those that have come since: the observer forgets old ones."""
+        new = list(
+            takewhile(lambda told: told is not self._last_choice, reversed(observer.choices))
+        )
+        for told in reversed(new):
+            self._chosen += 1
+            uav, _, choice = told
+            self._choices.add(as_text(_choice_row(self._chosen, uav, choice)), self.seq)
+            self._last_choice = told
 
     def _head_of(self, observer: Observer | None, now_s: float) -> dict[str, object]:
         head: dict[str, object] = {"mission_s": None, "phase": None, "link": self._source.link}
@@ -263,7 +281,7 @@ class Feed:
                     "taken": taken,
                     "uav": holder if done is None else done[0],
                     "completed_s": None if done is None else _rounded(done[1], 3),
-                    "by": "scenario" if replica.operates(task) is None else "operator",
+                    "by": "scenario" if replica.ordered(task) is None else "operator",
                 },
                 self.seq,
             )
@@ -299,6 +317,7 @@ class Feed:
                 dropped.get(uav.id, {}),
                 now_s,
                 mission_s,
+                self._source.speedup,
             )
             self._uavs.put(uav.id, row, self.seq, but="silent_s")
             self._uavs.touch(uav.id, row, self.seq, _QUIET_LOOKS)
@@ -311,6 +330,7 @@ def _uav_row(
     dropped: Mapping[str, int],
     now_s: float,
     mission_s: float | None,
+    speedup: float,
 ) -> dict[str, object]:
     status, claim = observer.statuses.get(uav.id), observer.replica.claims.get(uav.id)
     heard_s, present = observer.heard_s.get(uav.id), uav.id in observer.present
@@ -329,7 +349,7 @@ def _uav_row(
         "position": None if status is None else _point(status.position_enu_m),
         "velocity": None if status is None else _point(status.velocity_enu_m_s),
         "battery": None if status is None else _rounded(status.battery_frac, 3),
-        "silent_s": None if heard_s is None else _rounded(now_s - heard_s, 1),
+        "silent_s": None if heard_s is None else _rounded((now_s - heard_s) / speedup, 1),
         "lost": does == LOST,
         "present": present,
         "note": "" if status is None else clean(status.note),
@@ -361,6 +381,25 @@ def _mission_text(name: str, brief: Brief) -> str:
         },
         allow_nan=False,
     )
+
+
+def _choice_row(n: int, uav: str, choice: Choice) -> dict[str, object]:
+    return {
+        "n": n,
+        "id": f"{uav}-{choice.number}",
+        "uav": uav,
+        "task": choice.task,
+        "left": choice.left,
+        "mission_s": _rounded(choice.chosen_s, 3),
+        "rule": choice.rule,
+        "epoch": choice.epoch,
+        "rank": choice.rank,
+        "score": choice.score,
+        "second_score": choice.second_score,
+        "certificate": choice.certificate,
+        "completion_s": _rounded(choice.completion_s, 3),
+        "candidates": [{"task": each.task, "score": each.score} for each in choice.candidates],
+    }
 
 
 def _command_row(row: CommandRow) -> dict[str, object]:

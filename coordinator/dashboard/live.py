@@ -12,17 +12,17 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from coordinator.dashboard.desk import KEPT_ROWS, Desk
 from coordinator.dashboard.source import CommandRow, Player, Refusal, RefusedError
+from coordinator.joining import onlooking
 from coordinator.observer import Observer
 from coordinator.operator.errands import OperatorWish
 from coordinator.status.onlooker import only_mission
 from swarm.bus.port import Bus
 from swarm.clock import Clock, incarnation
 from swarm.config import LinkPreset
-from swarm.errors import BusError
 from swarm.events import BusFact, Tick, Wish
 from swarm.log import get_logger
 from swarm.model.ids import OPERATOR
-from swarm.shell import Shell, take_seat
+from swarm.shell import Shell
 
 __all__ = ["LiveMission"]
 
@@ -35,7 +35,7 @@ class LiveMission:
 
     Args:
         mission: its name; None for the only one there is, and after it for the next.
-        open_bus: takes a seat on the bus.
+        open_bus: takes a seat on the bus, however long that takes.
         network: timers.
         clock: gives ``now_s``.
         speedup: of that clock.
@@ -68,7 +68,7 @@ class LiveMission:
             InputError: no mission is named, and there are several.
         """
         while True:
-            bus = await self._reach_bus()
+            bus = await self._open_bus()
             try:
                 self._linked = True
                 mission = self._mission or await only_mission(bus, None)
@@ -76,16 +76,6 @@ class LiveMission:
             finally:
                 self._shell, self._linked = None, False
                 bus.close()
-
-    async def _reach_bus(self) -> Bus:
-        told = False
-        while True:
-            try:
-                return await self._open_bus()
-            except BusError as error:
-                if not told:
-                    self._log.warning("the bus is not there, trying on", problem=str(error))
-                told = True
 
     async def _look_on(self, bus: Bus, mission: str) -> None:
         first = 1
@@ -97,23 +87,10 @@ class LiveMission:
             self._network.timing.scaled(self._speedup),
             incarnation=incarnation(),
             patience_s=EFFECT_S * self._speedup,
-            linked=self._mission is None,  # then others have been seen
             stays=self._mission is not None,
             first=first,
         )
-        self._shell = Shell(
-            self._desk,
-            bus,
-            self._clock,
-            mission=mission,
-            name=OPERATOR,
-            from_bus=lambda fact: fact,
-            execute=lambda _: None,
-            snapshot=None,
-            known=lambda: {} if self._desk is None else self._desk.observer.replica.digest(),
-            answer_s=self._network.answer_s,
-        )
-        take_seat(bus, mission, None, status=True)
+        self._shell = onlooking(self._desk, bus, self._clock, mission, OPERATOR)
         self._log.info("looking on", mission=mission)
         await self._shell.run()
 
@@ -127,7 +104,12 @@ class LiveMission:
     @property
     def link(self) -> bool:
         """Whether the link to the bus is up."""
-        return self._linked and (self._desk is None or self._shell is None or self._desk.link)
+        return self._linked and (self.observer is None or self.observer.cut_since_s is None)
+
+    @property
+    def speedup(self) -> float:
+        """Of the clock."""
+        return self._speedup
 
     def now_s(self) -> float:
         """Now."""

@@ -61,7 +61,7 @@ class _Mission(Collector):
         brief = None if observer is None else observer.replica.brief
         if observer is not None and brief is not None:
             yield from self._of_mission(observer)
-            yield from _of_uavs(observer, brief, self._source.now_s(), self._done())
+            yield from _of_uavs(observer, brief, self._source, self._done())
 
     def _commands(self) -> Metric:
         family = GaugeMetricFamily(
@@ -117,7 +117,7 @@ class _Mission(Collector):
 
 
 def _of_uavs(
-    observer: Observer, brief: Brief, now_s: float, done: dict[str, int]
+    observer: Observer, brief: Brief, source: Source, done: dict[str, int]
 ) -> Iterable[Metric]:
     mission = observer.mission.name
     labels = ("mission", "uav")
@@ -154,7 +154,7 @@ def _of_uavs(
         if status is not None and status.battery_frac is not None:
             battery.add_metric(names, status.battery_frac)
         if heard_s is not None:
-            silence.add_metric(names, now_s - heard_s)
+            silence.add_metric(names, (source.now_s() - heard_s) / source.speedup)
         tasks.add_metric(names, done.get(uav.id, 0))
     for name, reasons in sorted(observer.dropped.items()):
         for reason, number in sorted(reasons.items()):

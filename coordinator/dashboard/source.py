@@ -129,6 +129,11 @@ class Source(Protocol):
         ...
 
     @property
+    def speedup(self) -> float:
+        """Seconds of the observer per wall second, of then in a recording."""
+        ...
+
+    @property
     def commands(self) -> Sequence[CommandRow]:
         """What was said here, oldest first; an old row may be gone, its number is not reused."""
         ...

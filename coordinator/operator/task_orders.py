@@ -9,7 +9,8 @@ of it later from those who know. Leaves out: saying it and asking
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from statistics import median
 from typing import Final
 
@@ -26,7 +27,7 @@ from swarm.state.commands import aborted
 from swarm.wire.bounds import MAX_COUNT, Point
 from swarm.wire.messages import Board, Brief, ClaimPhase, EpochPhase, Message, TaskOrder
 
-__all__ = ["NewTask", "Ordering", "Wgs84", "Withdrawal"]
+__all__ = ["NewTask", "Ordering", "Wgs84", "Withdrawal", "order_of"]
 
 FARTHEST_M: Final = 1e8
 MOST_VALUE: Final = 1e12
@@ -142,8 +143,7 @@ class Ordering:
 
     def body(self, brief: Brief) -> TaskOrder | Verdict:
         """What to say; or why it cannot be said."""
-        replica = self._observer.replica
-        if self._observer.phase is EpochPhase.ENDED or aborted(replica) is not None:
+        if self._is_over:
             return Verdict(Result.NOT_OBEYED, "the mission has ended: nothing is taken up any more")
         if isinstance(self._wish, NewTask):
             found = self._addition(self._wish, brief)
@@ -151,17 +151,7 @@ class Ordering:
             found = self._withdrawal(self._wish)
         if isinstance(found, Verdict):
             return found
-        self._order = TaskOrder(
-            task=found.task,
-            number=found.number,
-            position_enu_m=found.position_enu_m,
-            value=found.value,
-            service_s=found.service_s,
-            kind=found.kind,
-            withdrawn=found.withdrawn,
-            run=brief.run,
-            reason=self._wish.reason,
-        )
+        self._order = order_of(found, brief.run, self._wish.reason)
         return self._order
 
     def _addition(self, wish: NewTask, brief: Brief) -> Board | Verdict:
@@ -198,15 +188,7 @@ class Ordering:
             return Verdict(Result.UNKNOWN_TASK, f"the board holds {_some(list(board))}")
         if state in (TaskState.DONE, TaskState.WITHDRAWN):
             return Verdict(Result.NOT_OBEYED, f"{wish.task} is {state} already")
-        return Board(
-            task=entry.task,
-            number=entry.number,
-            position_enu_m=entry.position_enu_m,
-            value=entry.value,
-            service_s=entry.service_s,
-            kind=entry.kind,
-            withdrawn=True,
-        )
+        return replace(entry, withdrawn=True)
 
     # -- what comes of it ---------------------------------------------------------------
 
@@ -234,6 +216,9 @@ class Ordering:
                 f"another operator has {'withdrawn' if done else 'changed'} {order.task} meanwhile"
             )
             return Verdict(Result.NOT_OBEYED, text)
+        if self._is_over:
+            text = f"the mission has ended meanwhile: nothing more comes of {order.task}"
+            return Verdict(Result.NOT_OBEYED, text)
         silent = sorted(self._expected - self.known_to)
         everyone = not silent and bool(self.known_to)
         if not (everyone or late):
@@ -253,21 +238,23 @@ class Ordering:
 
     def _taken(self, order: TaskOrder, now_s: float, late: bool) -> Verdict | None:
         """What is told of a task that is on the board; None to look a little longer."""
-        task, state = order.task, self._observer.board.states.get(order.task)
-        uav = self.uav
-        if uav is None and state is TaskState.OPEN and self._somebody_can and not late:
+        state, uav = self._observer.board.states.get(order.task), self.uav
+        somebody_can = self._able(self._expected)
+        if uav is None and state is TaskState.OPEN and somebody_can and not late:
             if math.isinf(self._look_until_s):
                 self._look_until_s = now_s + self._look_s
             if now_s < self._look_until_s:
                 return None
-        what = "nobody has taken it yet"
-        if not self._somebody_can:
-            what = "but no UAV is capable of it: the success of each there is 0"
-        elif uav is not None:
+        result, what = Result.OBEYED, "nobody has taken it yet"
+        if uav is not None:
             what = f"{uav} flies there"
-        elif state is not None and state is not TaskState.OPEN:
+        elif state is not TaskState.OPEN:
             what = f"it is {state}"
-        return Verdict(Result.OBEYED, f"{task} is on the board, worth {order.value:g}; {what}")
+        elif not self._able(self._fleet):
+            what = "but no UAV is capable of it: the success of each there is 0"
+        elif not somebody_can:
+            result, what = Result.NOT_OBEYED, "but nobody who could do it takes part any more"
+        return Verdict(result, f"{order.task} is on the board, worth {order.value:g}; {what}")
 
     def _gone(self, order: TaskOrder) -> Verdict | None:
         """What is told of a task that is off the board; None while somebody claims it."""
@@ -288,13 +275,21 @@ class Ordering:
         return None if self.task is None else self._observer.holders.get(self.task)
 
     @property
+    def _is_over(self) -> bool:
+        observer = self._observer
+        return observer.phase is EpochPhase.ENDED or aborted(observer.replica) is not None
+
+    @property
     def _expected(self) -> set[str]:
         """Who is there and takes part, and so ought to know of it."""
-        replica = self._observer.replica
-        fleet = () if replica.brief is None else replica.brief.uavs
-        claims = replica.claims
-        out = {uav for uav, claim in claims.items() if claim.phase is ClaimPhase.OUT}
-        return ({uav.id for uav in fleet} - out | {COORDINATOR}) & self._observer.present
+        claims = self._observer.replica.claims.items()
+        out = {uav for uav, claim in claims if claim.phase is ClaimPhase.OUT}
+        return (self._fleet - out | {COORDINATOR}) & self._observer.present
+
+    @property
+    def _fleet(self) -> set[str]:
+        brief = self._observer.replica.brief
+        return set() if brief is None else {uav.id for uav in brief.uavs}
 
     @property
     def _claimants(self) -> list[str]:
@@ -302,13 +297,30 @@ class Ordering:
         there = self._observer.present
         return sorted(u for u, claim in claims if claim.task == self.task and u in there)
 
-    @property
-    def _somebody_can(self) -> bool:
+    def _able(self, uavs: Collection[str]) -> bool:
+        """Whether one of ``uavs`` is capable of the task."""
         problem = self._observer.board.problem
-        if problem is None or self.task not in problem.task_ids:
-            return True
-        column = [str(task) for task in problem.task_ids].index(self.task)
-        return bool(problem.capable[:, column].any())
+        if problem is None:
+            return False
+        capable = zip(problem.task_ids, problem.capable.T, strict=True)
+        column = next((able for task, able in capable if task == self.task), None)
+        rows = [row for row, uav in enumerate(problem.uav_ids) if uav in uavs]
+        return column is not None and bool(column[rows].any())
+
+
+def order_of(entry: Board, run: int, reason: str = "") -> TaskOrder:
+    """The order that puts ``entry`` on the board, in the flight of that ``run``."""
+    return TaskOrder(
+        task=entry.task,
+        number=entry.number,
+        position_enu_m=entry.position_enu_m,
+        value=entry.value,
+        service_s=entry.service_s,
+        kind=entry.kind,
+        withdrawn=entry.withdrawn,
+        run=run,
+        reason=reason,
+    )
 
 
 def next_id(taken: set[str]) -> str:

@@ -44,6 +44,7 @@ class Replica:
         """By writer, of its newest statement that is known."""
         self.brief: Brief | None = None
         self.epoch: Epoch | None = None
+        self.epoch_stamp: Stamp | None = None
         self.board: dict[str, Board] = {}
         """By task id, the entry that counts: of the operator's order about the flight that the
         brief tells of, where there is one, else the coordinator's."""
@@ -87,7 +88,7 @@ class Replica:
             case Brief() as brief:
                 self._take_brief(brief)
             case Epoch() as epoch:
-                self.epoch = epoch
+                self.epoch, self.epoch_stamp = epoch, message.stamp
             case Board(task=task) as entry:
                 self.posted[task] = entry
                 self._settle(task)
@@ -102,7 +103,7 @@ class Replica:
                 self.commands[target] = message.stamp, command
         return True
 
-    def operates(self, task: str) -> TaskOrder | None:
+    def ordered(self, task: str) -> TaskOrder | None:
         """The operator's order about ``task`` in this flight; None if there is none."""
         order, brief = self.task_orders.get(task), self.brief
         return order if order and brief is not None and order.run == brief.run else None
@@ -118,7 +119,7 @@ class Replica:
 
     def _settle(self, task: str) -> None:
         """Find out anew what counts of all that is said of ``task``."""
-        order, known = self.operates(task), self._ordered.pop(task, None)
+        order, known = self.ordered(task), self._ordered.pop(task, None)
         if order is None:
             entry = self.posted.get(task)
         else:
