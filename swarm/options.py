@@ -38,6 +38,7 @@ __all__ = [
     "ListenOption",
     "LogFormatOption",
     "LogLevelOption",
+    "MaybeScenarioArgument",
     "MissionOption",
     "ScenarioArgument",
     "SeedOption",
@@ -78,6 +79,18 @@ ScenarioArgument = Annotated[
     ),
 ]
 """Path of an existing scenario file; shipped names are resolved already."""
+
+MaybeScenarioArgument = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="[SCENARIO]",
+        help="Scenario file, or the name of a shipped one such as table-1.",
+        parser=resolve_scenario,
+        autocompletion=_complete_scenario,
+        show_default=False,
+    ),
+]
+"""The same, and None when none is given."""
 
 JsonOption = Annotated[
     bool,
