@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.recording.options import RecordOption, check_new_recording
 from sim.uncertainty_options import (
     CoordinatorLostOption,
     DelayOption,
@@ -227,6 +228,7 @@ def run(
         ),
     ] = None,
     report: ReportOption = None,
+    record: RecordOption = None,
     json: JsonOption = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Show what every process logs, instead of a picture.")
@@ -255,6 +257,8 @@ def run(
     from rich.console import Console
 
     from coordinator.planner.plan import check_online_method
+    from coordinator.recording.flight_recorder import recording_or_none, wall_ns
+    from coordinator.recording.recorder import About
     from coordinator.view.live import LiveView
     from coordinator.view.report import MissionReport, check_report_path
     from sim.launch.autopilots import check_speedup, parse_autopilots
@@ -262,6 +266,7 @@ def run(
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
     from sim.launch.run import fly
+    from swarm.config import preset
     from swarm.log import LogLevel, configure_logging
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
@@ -269,6 +274,8 @@ def run(
     check_online_method(method)
     if report is not None:
         check_report_path(report)
+    if record is not None:
+        check_new_recording(record)
     mission = load_scenario(scenario)
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
@@ -306,10 +313,18 @@ def run(
         print(f"{name}: {line}", file=sys.stderr)
 
     async def work() -> int:
+        about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))
         try:
-            with LiveView(console, speedup=speedup) as view:
+            with (
+                recording_or_none(record, about, wall_ns(), console.print) as recorder,
+                LiveView(console, speedup=speedup) as view,
+            ):
                 flight = await fly(
-                    mission, options, on_frame=view.update, on_log=log if verbose else None
+                    mission,
+                    options,
+                    on_frame=view.update,
+                    on_log=log if verbose else None,
+                    recorder=recorder,
                 )
         except asyncio.CancelledError:
             console.print("interrupted: the mission was given up and every process ended")
@@ -324,7 +339,8 @@ def run(
             speedup=speedup,
             fates=flight.fates,
         )
-        return _tell(told, json=json, report=report)
+        status = _tell(told, json=json, report=report)
+        return status or int(recorder is not None and recorder.fault is not None)
 
     return asyncio.run(run_until_stopped(work()))
 
@@ -361,6 +377,7 @@ def simulate(
         ),
     ] = None,
     report: ReportOption = None,
+    record: RecordOption = None,
     json: JsonOption = False,
 ) -> int:
     """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
@@ -387,6 +404,7 @@ def simulate(
     from coordinator.view.report import MissionReport, check_report_path
     from sim.faults.replay import fly_with_faults
     from sim.faults.schedule import format_schedule
+    from sim.recorded import recording_simulation
     from sim.simulate import simulate_mission
     from sim.uncertainty import Uncertainty
     from swarm.scenario import load_scenario
@@ -394,6 +412,8 @@ def simulate(
     check_online_method(method)
     if report is not None:
         check_report_path(report)
+    if record is not None:
+        check_new_recording(record)
     uncertainty = asked_for(Uncertainty(), loss=loss, popup=popup, popups_per_min=popup_rate)
     beside_faults = uncertainty
     uncertainty = asked_for(
@@ -413,24 +433,29 @@ def simulate(
     )
     mission = with_reattempts(load_scenario(scenario), reattempt=reattempt)
     if faults is None:
-        flown = simulate_mission(
-            mission,
-            method=method,
-            seed=seed,
-            uncertainty=uncertainty,
-            coordinator_lost_s=coordinator_lost_s,
-        )
-        if not flown.in_time:
-            print("broken off: somebody would have waited for ever", file=sys.stderr)
-        told = MissionReport(
-            mission=flown.world.mission,
-            plan=flown.world.observer.plan,
-            result=flown.result,
-            story=tuple(flown.world.observer.story),
-            lost_because=flown.lost_because,
-            value=flown.value,
-        )
-        return _tell(told, json=json, report=report)
+        with recording_simulation(mission.name, str(scenario), record) as looks_on:
+            flown = simulate_mission(
+                mission,
+                method=method,
+                seed=seed,
+                uncertainty=uncertainty,
+                coordinator_lost_s=coordinator_lost_s,
+                make_onlooker=looks_on,
+            )
+            if not flown.in_time:
+                print("broken off: somebody would have waited for ever", file=sys.stderr)
+            told = MissionReport(
+                mission=flown.world.mission,
+                plan=flown.world.observer.plan,
+                result=flown.result,
+                story=tuple(flown.world.observer.story),
+                lost_because=flown.lost_because,
+                value=flown.value,
+            )
+            return _tell(told, json=json, report=report)
+    if record is not None:
+        problem, remedy = "goes without --faults only", "leave one of them out"
+        raise InputError(Fault("--record", str(record), problem, remedy))
     if uncertainty != beside_faults or coordinator_lost_s is not None:
         problem = "goes with --loss, --popup and --popup-rate only"
         remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"
