@@ -15,7 +15,7 @@ from swarm.wire.messages import Message
 from tests.builders import IDLE, brief, done, entry, held, message, uav
 from tests.message_strategies import messages
 
-crowds = st.lists(messages(statuses_too=False), max_size=5)
+crowds = st.lists(messages(all_kinds=False), max_size=5)
 
 
 def replica_of(*said: Message) -> Replica:
