@@ -22,6 +22,7 @@ from swarm.wire.messages import (
     Message,
     Outcome,
     Result,
+    TaskOrder,
 )
 
 __all__ = ["News", "Picture"]
@@ -63,12 +64,15 @@ class Picture:
     def take_in(self, message: Message) -> News | None:
         """Join another's statement; gives what it changes, None if it was known."""
         before, epoch = self._replica.claims.get(message.writer), self._replica.epoch
-        appears = isinstance(message.body, Board) and message.body.task not in self._replica.board
+        body, board = message.body, self._replica.board
+        entry = board.get(body.task) if isinstance(body, Board | TaskOrder) else None
         if not self._replica.join(message):
             return None
-        match message.body:
-            case Board() if appears:
+        match body:
+            case Board(task=task) | TaskOrder(task=task) if entry is None and task in board:
                 return News.APPEARANCE
+            case TaskOrder(task=task):
+                return News.OTHER if board.get(task) == entry else News.OPENING
             case Brief() | Board() | Outcome(result=Result.FAILED):
                 return News.OPENING
             case Claim(task=task):

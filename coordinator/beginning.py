@@ -58,6 +58,7 @@ class Beginning:
         self._start_timeout_s = start_timeout_s
         self._start_by_s: float | None = None
         self._planned_for: tuple[UavId, ...] = ()
+        self._planned_tasks: set[str] = set()
         self._request = 0
 
     def begin(self, now_s: float) -> list[Action]:
@@ -102,6 +103,9 @@ class Beginning:
             missing = sorted(set(uavs) - set(ready))
             note = Note("starting without", {"uavs": ", ".join(missing)})
             return Verdict.WAIT, [note, *self._make_plan(ready)]
+        if self._planned_tasks != self._open_tasks:
+            note = Note("plans anew", {"because": "the operator has added or withdrawn tasks"})
+            return Verdict.WAIT, [note, *self._make_plan(ready)]
         if self.plan is None:
             return Verdict.WAIT, []
         self._start_by_s = None
@@ -128,6 +132,10 @@ class Beginning:
         brief = self._replica.brief
         return () if brief is None else tuple(UavId(uav.id) for uav in brief.uavs)
 
+    @property
+    def _open_tasks(self) -> set[str]:
+        return {task for task, entry in self._replica.board.items() if not entry.withdrawn}
+
     def _phase_of(self, uav: str) -> ClaimPhase | None:
         """Phase of its claim; None while it is absent or has none."""
         claim = self._replica.claims.get(uav)
@@ -135,11 +143,12 @@ class Beginning:
 
     def _make_plan(self, uavs: tuple[UavId, ...]) -> list[Action]:
         self._request += 1
-        self._planned_for, self.plan = uavs, None
+        self._planned_for, self._planned_tasks, self.plan = uavs, self._open_tasks, None
         brief = self._replica.brief
         if brief is None:
             return []
         mission = mission_of(self._replica, self._mission.name, brief)
         fleet = tuple(uav for uav in mission.uavs if uav.id in uavs)
-        mission = replace(mission, uavs=fleet, origin=self._mission.origin)
+        tasks = tuple(task for task in mission.tasks if task.id in self._planned_tasks)
+        mission = replace(mission, uavs=fleet, tasks=tasks, origin=self._mission.origin)
         return [MakePlan(self._request, mission, self._method, self._seed)]

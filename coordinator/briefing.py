@@ -78,15 +78,15 @@ def entry_of(task: Task, number: int) -> Board:
 def differences(mission: Mission, layers: FlightLayers, replica: Replica) -> list[str]:
     """In what the mission that the registers describe is not the one of the scenario file.
 
-    Tasks that are on the board and not in the file may have been added by an operator, and
-    withdrawn ones have been withdrawn by one: neither is a difference.
+    What the operator has ordered about tasks is no difference, nor that a coordinator has
+    withdrawn some or posted others, which it does for an operator.
     """
     found = []
     brief = replica.brief
     if brief is not None and brief != brief_of(mission, layers, brief.run):
         found.append("fleet, horizon or defaults")
     for number, task in enumerate(mission.tasks):
-        entry = replica.board.get(task.id)
+        entry = replica.posted.get(task.id)
         if entry is not None and replace(entry, withdrawn=False) != entry_of(task, number):
             found.append(f"task {task.id}")
     return found

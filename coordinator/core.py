@@ -57,6 +57,7 @@ from swarm.wire.messages import (
     EpochPhase,
     Message,
     Snapshot,
+    TaskOrder,
 )
 
 __all__ = ["CoordinatorCore", "FlightLayers"]
@@ -195,9 +196,11 @@ class CoordinatorCore:
             case Heard(message):
                 if self._membership.heard(message.writer, now_s):
                     self._welcome(message.writer, now_s)
-                self.replica.join(message)
+                news = self.replica.join(message)
                 if isinstance(message.body, Claim):
                     self._membership.spoke(message.writer)
+                elif news and isinstance(message.body, TaskOrder):
+                    self._note_order(message.body)
                 if self._standing is Standing.BRIEFED and self._beginning.is_forestalled:
                     self._inquiry.want(now_s, before_deciding=True)
             case Learned(snapshots):
@@ -221,13 +224,18 @@ class CoordinatorCore:
                 self._end(f"no plan: {reason}", now_s)
             case Replanned() as replanned:
                 self._judge(replanned, now_s)
-            case Withdraw(task) if (entry := self.replica.board.get(task)) is not None:
+            case Withdraw(task) if (entry := self.replica.posted.get(task)) is not None:
                 if not entry.withdrawn:
                     self._say(replace(entry, withdrawn=True))
             case Stop(reason):
                 self._end(reason, now_s)
             case _:
                 pass
+
+    def _note_order(self, order: TaskOrder) -> None:
+        if self.replica.ordered(order.task) is order:
+            what = "task withdrawn by the operator" if order.withdrawn else "task by the operator"
+            self._actions.append(Note(what, {"task": order.task, "reason": order.reason}))
 
     def _welcome(self, writer: str, now_s: float) -> None:
         """Somebody is there who was not: it may know more, even of a mission that runs."""

@@ -17,7 +17,7 @@ from swarm.asking import Asking
 from swarm.config import Timing
 from swarm.deadline import earliest
 from swarm.events import Ask, BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Wish
-from swarm.model import Mission, Plan, TaskId, UavId
+from swarm.model import Mission, Plan, Task, TaskId, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.pulse import Pulse
 from swarm.state.board import TaskBoard, TaskState
@@ -27,6 +27,7 @@ from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.wire.messages import (
     Board,
+    Brief,
     Choice,
     Claim,
     ClaimPhase,
@@ -40,6 +41,7 @@ from swarm.wire.messages import (
     Stamp,
     Status,
     StatusPhase,
+    TaskOrder,
 )
 
 __all__ = ["CHOICES_KEPT", "Happening", "MissionResult", "Observer"]
@@ -104,6 +106,7 @@ class Observer:
 
     def __init__(self, mission: Mission, timing: Timing) -> None:
         self.mission = mission
+        """The one being flown, with what the operator has added to it."""
         self.plan: Plan | None = None
         """The offline plan; set by whoever knows it."""
         self.replica = Replica()
@@ -141,6 +144,9 @@ class Observer:
         self._asking = Asking(timing.ask_gap_s)
         self._ask_at_s = 0.0
         self._problem = Problem.from_mission(mission)
+        self._given = mission
+        self._added_s: dict[str, float] = {}
+        """By task that the operator has added: when that was heard [s mission time]."""
 
     def start(self, now_s: float) -> list[Wish]:
         """Ask what has happened so far."""
@@ -190,8 +196,12 @@ class Observer:
 
     def revise(self, mission: Mission) -> None:
         """Take ``mission`` for the one being flown: it was unknown, or the board has changed."""
-        self.mission = mission
-        self._problem = Problem.from_mission(mission)
+        self._given = mission
+        self._complete_mission()
+
+    def take_note(self, message: Message, now_s: float) -> None:
+        """Take in what is being said by this very process."""
+        self._hear(message, now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
@@ -291,6 +301,8 @@ class Observer:
         match message.body:
             case Epoch() as epoch:
                 self._hear_epoch(epoch, now_s)
+            case Board(task=task) as entry if self.replica.board.get(task) is not entry:
+                pass  # the operator has said otherwise
             case Board(task=task, withdrawn=True):
                 self._tell(f"task {task} withdrawn", now_s)
             case Board(task=task) if self._is_news(task):
@@ -301,6 +313,10 @@ class Observer:
                 self._hear_outcome(message.writer, outcome, earlier, now_s)
             case Command() as command:
                 self._hear_command(command, now_s)
+            case TaskOrder() as order:
+                self._hear_task_order(order, now_s)
+            case Brief() if self.replica.task_orders:
+                self._complete_mission()
             case _:
                 pass
 
@@ -402,6 +418,32 @@ class Observer:
             return  # of an earlier flight
         why = f": {command.reason}" if command.reason else ""
         self._tell(_COMMANDED[command.kind].format(command.target) + why, now_s)
+
+    def _hear_task_order(self, order: TaskOrder, now_s: float) -> None:
+        if self.replica.ordered(order.task) is order:  # and not of an earlier flight
+            what = f"withdraws {order.task}" if order.withdrawn else f"adds task {order.task}"
+            self._tell(f"operator {what}" + (f": {order.reason}" if order.reason else ""), now_s)
+            self._added_s.setdefault(order.task, max(0.0, self.mission_s(now_s) or 0.0))
+        self._complete_mission()
+
+    def _complete_mission(self) -> None:
+        """The mission as it was given, with the tasks that the operator has ordered in it."""
+        tasks = {task.id: task for task in self._given.tasks}
+        for order in self.replica.task_orders.values():
+            if self.replica.ordered(order.task) is not order:
+                continue
+            known = tasks.get(TaskId(order.task))
+            if known is None or not order.withdrawn:
+                tasks[TaskId(order.task)] = Task(
+                    TaskId(order.task),
+                    order.position_enu_m,
+                    order.value,
+                    order.service_s,
+                    order.kind,
+                    self._added_s.get(order.task, 0.0) if known is None else known.appears_s,
+                )
+        self.mission = replace(self._given, tasks=tuple(tasks.values()))
+        self._problem = Problem.from_mission(self.mission)
 
     def _lose(self, writer: str, now_s: float) -> bool:
         """Tell of a loss; whether others may have heard last words."""

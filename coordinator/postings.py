@@ -1,6 +1,8 @@
 """The task board as the coordinator keeps it: what of the scenario is on it and what will be.
 
-Leaves out: saying it (coordinator.core), and what became of the tasks (swarm.state.board).
+What the operator has ordered counts before that: a task that they have withdrawn before it
+appeared is not posted any more. Leaves out: saying it (coordinator.core), and what became of
+the tasks (swarm.state.board).
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ class Postings:
         entries = []
         for message in theirs:
             if isinstance(entry := message.body, Board):
-                known = self._replica.board.get(entry.task)
+                known = self._replica.posted.get(entry.task)
                 if known is None or (entry.withdrawn and not known.withdrawn):
                     entries.append(entry)
         return entries

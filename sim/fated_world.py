@@ -191,11 +191,13 @@ class FatedWorld:
     def _seat_operator(self) -> None:
         world, timing = self.world, self._timing
         zero_s, now_s = world.zero_s or 0.0, world.queue.now_s()
+        briefs = [agent.replica.brief for agent in world.agents.values()]
         seat = TaskSeat(
             self._mission,
             self.fate.withdrawn_at_s,
             since_s=self._coordinator_lost_s or 0.0,
             mission_s=now_s - zero_s,
+            run=max((brief.run for brief in briefs if brief is not None), default=0),
             incarnation=2_000_000 + round(1e3 * now_s),
             timing=timing,
             patience_s=self._told_s,

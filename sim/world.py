@@ -24,6 +24,8 @@ from coordinator.core import CoordinatorCore, FlightLayers
 from coordinator.events import Action as CoordinatorAction
 from coordinator.events import MakePlan, PlanMade, Replan, Replanned, TakeSeat, Withdraw
 from coordinator.observer import Observer
+from coordinator.operator.commanding import CommandWish
+from coordinator.operator.errands import OperatorWish
 from coordinator.operator.seat import OperatorSeat
 from coordinator.planner.live import NewPlan, replan
 from coordinator.standby import StandbyCore
@@ -290,11 +292,13 @@ class World:
         They leave it once the command has been seen to take effect, or `OPERATOR_PATIENCE_S`
         after they gave it.
         """
+        return self.operate(CommandWish(kind, uav, reason))
+
+    def operate(self, wish: OperatorWish) -> OperatorSeat:
+        """Let an operator take a seat and say what they want; see `command`."""
         seat = OperatorSeat(
             self.mission.name,
-            uav,
-            kind,
-            reason,
+            wish,
             incarnation=1_000_000 + round(1e3 * self.queue.now_s()),
             timing=self._timing,
             patience_s=OPERATOR_PATIENCE_S,

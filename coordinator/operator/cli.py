@@ -25,11 +25,11 @@ from swarm.options import (
 )
 
 if TYPE_CHECKING:
+    from coordinator.operator.errands import OperatorWish
     from coordinator.operator.seat import OperatorSeat
     from swarm.bus.config import BusConfig
     from swarm.clock import ScaledClock
     from swarm.config import Timing
-    from swarm.wire.messages import CommandKind
 
 __all__ = ["abort", "hold", "resume", "return_home"]
 
@@ -183,7 +183,8 @@ def _give(
     import asyncio
     from json import dumps
 
-    from coordinator.operator.seat import Result
+    from coordinator.operator.commanding import CommandWish
+    from coordinator.operator.verdict import Result
     from swarm.clock import ScaledClock
     from swarm.config import preset
     from swarm.log import LogLevel, configure_logging
@@ -204,11 +205,11 @@ def _give(
         faults.append(Fault("--reason", "", problem, f"give at most {LONGEST_REASON}"))
     if faults:
         raise InputError(*faults)
-    kind = CommandKind(name)
+    wish = CommandWish(CommandKind(name), target, reason)
 
     async def work() -> int:
         clock = ScaledClock(speedup)
-        of, seat = await _sit(mission, target, kind, reason, config, timing, clock, timeout_s)
+        of, seat = await sit(mission, wish, config, timing, clock, timeout_s)
         verdict = seat.verdict
         if verdict is None:
             raise SwarmError("the command was not given")
@@ -236,17 +237,15 @@ def _give(
     return asyncio.run(run_until_stopped(work()))
 
 
-async def _sit(
+async def sit(
     name: str | None,
-    target: str,
-    kind: CommandKind,
-    reason: str,
+    wish: OperatorWish,
     config: BusConfig,
     timing: Timing,
     clock: ScaledClock,
     patience_s: float,
 ) -> tuple[str, OperatorSeat]:
-    """Take a seat on the bus and give the command; the mission's name, and the seat."""
+    """Take a seat on the bus and say what is wanted; the mission's name, and the seat."""
     from coordinator.operator.seat import OperatorSeat
     from coordinator.status.onlooker import only_mission
     from swarm.bus.zenoh_bus import open_zenoh_bus
@@ -260,9 +259,7 @@ async def _sit(
         mission = name or await only_mission(bus, patience_s)
         seat = OperatorSeat(
             mission,
-            target,
-            kind,
-            reason,
+            wish,
             incarnation=incarnation(),
             timing=timing,
             patience_s=patience_s * clock.speedup,

@@ -1,10 +1,9 @@
-"""An operator's seat that keeps the task board of a mission whose coordinator is lost.
+"""An operator's seat that goes on with the scenario of a mission whose coordinator is lost.
 
-The operator has the scenario and a watch: tasks are posted when they appear and withdrawn when
-they are withdrawn, in the coordinator's name. Each entry of the board is a register of that seat,
-and its newest statement counts, whoever sits there. It shows no token and plans nothing, so the
-fleet goes on without a coordinator. What it says it repeats for a while, as nobody acknowledges
-anything. Leaves out: agreeing with a coordinator that lives or comes back.
+The operator has the scenario and a watch: tasks are added when they appear and withdrawn when
+they are withdrawn, by the orders that `swarm task add` and `swarm task withdraw` give. The seat
+plans nothing, so the fleet goes on without a coordinator. What it says it repeats for a while,
+and asks nobody what came of it. Leaves out: what a person types (coordinator.operator.errands).
 """
 
 from __future__ import annotations
@@ -13,12 +12,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from coordinator.briefing import entry_of
+from coordinator.operator.task_orders import order_of
 from swarm.config import Timing
 from swarm.events import BusFact, Finish, Publish, Wish
 from swarm.model import Mission, TaskId
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import OPERATOR
 from swarm.state.voice import Voice
-from swarm.wire.messages import Board, Message
+from swarm.wire.messages import Message, TaskOrder
 
 __all__ = ["TaskSeat"]
 
@@ -31,7 +31,8 @@ class TaskSeat:
         withdrawn_at_s: tasks that are withdrawn, and when [s mission time].
         since_s: when the coordinator was lost; what came before it has told [s mission time].
         mission_s: when the operator sits down [s mission time].
-        incarnation: greater than in any life of the coordinator.
+        run: of the flight, as its brief has it.
+        incarnation: greater than of any seat before.
         timing: timers, in the seconds of ``now_s``.
         patience_s: for how long to repeat what it says [s of ``now_s``]; 0 where nothing is lost.
     """
@@ -43,11 +44,15 @@ class TaskSeat:
         *,
         since_s: float,
         mission_s: float,
+        run: int,
         incarnation: int,
         timing: Timing,
         patience_s: float,
     ) -> None:
-        entries = {task.id: entry_of(task, place) for place, task in enumerate(mission.tasks)}
+        entries = {
+            task.id: order_of(entry_of(task, place), run)
+            for place, task in enumerate(mission.tasks)
+        }
         appear = [(task.appears_s, entries[task.id]) for task in mission.tasks if task.appears_s]
         go = [
             (at_s, replace(entries[task], withdrawn=True))
@@ -55,8 +60,8 @@ class TaskSeat:
             if task in entries
         ]
         changes = [(at_s, entry) for at_s, entry in appear + go if at_s >= since_s]
-        self._to_come: list[tuple[float, Board]] = sorted(changes, key=lambda each: each[0])
-        self._voice = Voice(mission.name, COORDINATOR, incarnation)
+        self._to_come: list[tuple[float, TaskOrder]] = sorted(changes, key=lambda each: each[0])
+        self._voice = Voice(mission.name, OPERATOR, incarnation)
         self._announce_s = timing.announce_s
         self._patience_s = patience_s
         self._mission_s = mission_s

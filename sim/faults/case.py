@@ -180,6 +180,7 @@ def limit_s(case: Case) -> float:
     speed_m_s = slow * min(uav.speed_m_s for uav in mission.uavs)
     appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
     work_s = sum(task.service_s + across_m / speed_m_s for task in mission.tasks)
+    work_s += sum(each.kind is Kind.ADD for each in case.schedule) * across_m / speed_m_s
     if any(each.kind is Kind.HOLD for each in case.schedule):
         last_s += OPERATOR_PATIENCE_S
     waits_s = TIMING.abandon_s + TIMING.stalemate_s + 2.0 * TIMING.reconsider_s + 60.0

@@ -11,10 +11,12 @@ from collections.abc import Callable, Iterable
 from functools import partial
 
 from coordinator.operator.seat import OperatorSeat
+from coordinator.operator.task_orders import NewTask, Withdrawal
 from sim.faults.schedule import Disturbance, Kind
 from sim.processes import Process
 from sim.rough_network import RoughNetwork
 from sim.world import Recall, World
+from swarm.wire.bounds import Point
 from swarm.wire.messages import CommandKind
 
 __all__ = ["Director"]
@@ -87,6 +89,10 @@ class Director:
                 self._until(what, partial(world.refuses.discard, refusal))
             case Kind.WITHDRAW:
                 world.withdraw(names[0])
+            case Kind.ADD:
+                world.operate(NewTask(self._place(what.amount or 0.0)))
+            case Kind.RETRACT:
+                world.operate(Withdrawal(names[0]))
             case Kind.HOLD:
                 held = world.command(CommandKind.HOLD, names[0])
                 self._until(what, partial(self._let_go_on, names[0], held))
@@ -94,6 +100,13 @@ class Director:
                 world.command(CommandKind.RETURN, names[0])
             case Kind.ABORT:
                 world.command(CommandKind.ABORT)
+
+    def _place(self, along_frac: float) -> Point:
+        """As far between the scenario's outermost places [m; mission origin]."""
+        places = [task.position_enu_m for task in self._world.mission.tasks]
+        corners = [(min(axis), max(axis)) for axis in zip(*places, strict=True)]
+        east_m, north_m, up_m = (low + along_frac * (high - low) for low, high in corners)
+        return east_m, north_m, up_m
 
     def _hold(self, process: Process, what: Disturbance) -> None:
         """Hold one life of a process; several holds end with the last of them."""

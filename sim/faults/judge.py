@@ -11,8 +11,10 @@ Beside the invariants of the messages (sim.faults.transcript):
 - *winners differ*: whenever two have equal registers, they see the same states and winners;
 - *disobeys*: no agent that knows of it takes tasks in an aborted mission, or though the
   operator's last word to its UAV was to hold or to come home;
-- *task lost*: in the end each posted task is done, failed, withdrawn, or open with no UAV
-  able to do it that knew of it, and of a mission that had begun, and came home of its own accord;
+- *task lost*: in the end each task that was posted, or added by the operator, is done, failed,
+  withdrawn, or open with no UAV able to do it that knew of it before it left, and of a mission
+  that had begun, and came home of its own accord; or the operator added it too late, when the
+  coordinator ended the mission;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
 - *miscounted*: the onlooker knows the visits of every UAV that left in calm, invents none, and
   counts as duplicates all that it knows of, and no more than there were.
@@ -38,10 +40,21 @@ from sim.processes import Process
 from sim.rough_network import RoughNetwork
 from sim.world import World
 from swarm.events import Note
+from swarm.model import Task, TaskId
 from swarm.state.board import TaskState
 from swarm.state.claims import holders
 from swarm.state.commands import aborted, newest
-from swarm.wire.messages import CommandKind, Message, Result, StatusPhase
+from swarm.state.registers import Replica
+from swarm.wire.messages import (
+    Claim,
+    ClaimPhase,
+    CommandKind,
+    Epoch,
+    EpochPhase,
+    Message,
+    Result,
+    StatusPhase,
+)
 
 __all__ = ["SETTLED_S", "Judge"]
 
@@ -69,6 +82,10 @@ class Judge:
         self._steps = 0
         self._steps_at_s = 0.0
         self._left_in_calm: set[str] = set()
+        self._left_undone: dict[str, set[str]] = {}
+        """By UAV that takes no further part: the tasks it knew of that were on the board."""
+        self._known_at_the_end: set[str] = set()
+        """Tasks that a coordinator knew of when it ended the mission."""
         self._shared_since_s: dict[tuple[Process, Process, str], float] = {}
 
     @property
@@ -89,7 +106,21 @@ class Judge:
         life = self._lives.setdefault(process, len(self._lives))
         self._changed_s[process.name] = now_s
         transcript.said(now_s, process.name, life, message)
+        self._note_what_is_left(process, message)
         self._stop_if_broken()
+
+    def _note_what_is_left(self, process: Process, message: Message) -> None:
+        """What somebody leaves undone whose word ends the mission, for itself or for all."""
+        core = process.core
+        match message.body:
+            case Claim(phase=ClaimPhase.OUT) if isinstance(core, AgentCore):
+                self._left_undone.setdefault(process.name, _on_board(core.replica))
+            case Claim():
+                self._left_undone.pop(process.name, None)
+            case Epoch(phase=EpochPhase.ENDED) if isinstance(core, CoordinatorCore | StandbyCore):
+                self._known_at_the_end |= _on_board(core.replica)
+            case _:
+                pass
 
     def stepped(self, process: Process) -> None:
         """``process`` has made a step."""
@@ -211,12 +242,20 @@ class Judge:
             if world.finished.get(uav.id) == 0 and not transcript.sent_home(uav.id)
         ]
         to_do = {
-            uav: {task for task, entry in core.replica.board.items() if not entry.withdrawn}
+            uav: self._left_undone.get(uav, _on_board(core.replica))
             for uav, core in world.agents.items()
             if core.replica.epoch is not None
         }
-        for task in world.mission.tasks:
-            if task.id not in transcript.posted or task.id in settled:
+        added = {
+            task: order
+            for task, order in transcript.ordered.items()
+            if task not in transcript.posted
+        }
+        tasks = [task for task in world.mission.tasks if task.id in transcript.posted]
+        tasks += [Task(TaskId(task), added[task].position_enu_m, 0.0) for task in added]
+        for task in tasks:
+            unheard = task.id in added and task.id not in self._known_at_the_end
+            if task.id in settled or (transcript.ended and unheard):
                 continue
             able = [
                 uav.id
@@ -291,6 +330,10 @@ class Judge:
 def _task_states(core: AgentCore) -> dict[str, TaskState]:
     """What the agent itself makes of its registers."""
     return core._picture.board.states  # noqa: SLF001 - a look inside is the point
+
+
+def _on_board(replica: Replica) -> set[str]:
+    return {task for task, entry in replica.board.items() if not entry.withdrawn}
 
 
 def _coordinates(core: object) -> bool:

@@ -52,7 +52,11 @@ class Kind(StrEnum):
     REFUSE = "refuse"
     """A vehicle will not fly to a task."""
     WITHDRAW = "withdraw"
-    """A task is taken off the board."""
+    """The coordinator takes a task off the board."""
+    ADD = "add"
+    """The operator adds a task; the amount says where between the scenario's."""
+    RETRACT = "retract"
+    """The operator takes a task off the board, with or without a coordinator."""
     HOLD = "hold"
     """The operator stops a UAV, and lets it go on in the end."""
     RETURN = "return"
@@ -92,6 +96,8 @@ _SHAPES: Final = {
     Kind.SLOW: Shape("uav", amount=True),
     Kind.REFUSE: Shape("uav task", lasts=True),
     Kind.WITHDRAW: Shape("task"),
+    Kind.ADD: Shape("", amount=True),
+    Kind.RETRACT: Shape("task"),
     Kind.HOLD: Shape("uav", lasts=True, must_end=True),
     Kind.RETURN: Shape("uav"),
     Kind.ABORT: Shape(""),

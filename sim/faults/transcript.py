@@ -31,6 +31,7 @@ from swarm.wire.messages import (
     Outcome,
     Result,
     Status,
+    TaskOrder,
 )
 
 __all__ = ["Broken", "Transcript"]
@@ -56,7 +57,9 @@ class Transcript:
     def __init__(self) -> None:
         self.broken: list[Broken] = []
         self.posted: dict[str, Board] = {}
-        """The newest entry of every task that was ever on the board."""
+        """The newest entry of every task that a coordinator has ever put on the board."""
+        self.ordered: dict[str, TaskOrder] = {}
+        """The operator's newest word about every task that they have ever said anything about."""
         self.visits: dict[tuple[str, str], set[float]] = defaultdict(set)
         """By UAV and task: when attempts ended done [s mission time]."""
         self.failed: set[str] = set()
@@ -81,7 +84,8 @@ class Transcript:
     @property
     def withdrawn(self) -> set[str]:
         """Tasks that were taken off the board."""
-        return {task for task, entry in self.posted.items() if entry.withdrawn}
+        entries: list[Board | TaskOrder] = [*self.posted.values(), *self.ordered.values()]
+        return {entry.task for entry in entries if entry.withdrawn}
 
     @property
     def duplicates(self) -> int:
@@ -109,7 +113,8 @@ class Transcript:
         """``uav`` has left ``task`` of its own accord; once for each task or loss it learned of."""
         self._left.add((uav, task))
         self._turns[uav] += 1
-        if self._turns[uav] > len(self.posted) + self._missed[uav]:
+        appeared = self.posted.keys() | self.ordered.keys()
+        if self._turns[uav] > len(appeared) + self._missed[uav]:
             self._break(at_s, "left its task", f"{uav} left {task} though nothing had opened")
 
     def said(self, at_s: float, process: str, life: int, message: Message) -> None:
@@ -127,6 +132,8 @@ class Transcript:
         match message.body:
             case Board(task=task) as entry:
                 self.posted[task] = entry
+            case TaskOrder(task=task) as order:
+                self.ordered[task] = order
             case Epoch(phase=EpochPhase.ENDED):
                 self.ended = True
             case Outcome(task=task, result=Result.DONE, completed_s=completed_s):

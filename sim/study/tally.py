@@ -13,7 +13,17 @@ from sim.study.flight import Visit
 from swarm.events import Note
 from swarm.model import TaskId, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Board, Choice, Claim, Epoch, EpochPhase, Message, Outcome, Result
+from swarm.wire.messages import (
+    Board,
+    Choice,
+    Claim,
+    Epoch,
+    EpochPhase,
+    Message,
+    Outcome,
+    Result,
+    TaskOrder,
+)
 
 __all__ = ["Tally"]
 
@@ -43,7 +53,7 @@ class Tally:
                 self._end_attempt(process, message.writer, outcome)
             case Epoch(phase=EpochPhase.RUNNING) as epoch:
                 self._take_epoch(process, epoch)
-            case Board(task=task, withdrawn=True):
+            case Board(task=task, withdrawn=True) | TaskOrder(task=task, withdrawn=True):
                 self._closed.add(task)
             case _:
                 pass

@@ -2,7 +2,8 @@
 
 A `Replica` keeps of every register the statement with the highest stamp.
 Joining is commutative, associative and idempotent, so loss, duplication and
-reordering delay agreement and never break it. Leaves out: who is alive and what
+reordering delay agreement and never break it. On the board the operator's word about a
+task comes before the coordinator's. Leaves out: who is alive and what
 follows from the registers (swarm.state.board, swarm.state.claims).
 """
 
@@ -23,6 +24,7 @@ from swarm.wire.messages import (
     Outcome,
     Stamp,
     Status,
+    TaskOrder,
 )
 
 __all__ = ["Replica"]
@@ -43,7 +45,12 @@ class Replica:
         self.brief: Brief | None = None
         self.epoch: Epoch | None = None
         self.board: dict[str, Board] = {}
-        """By task id."""
+        """By task id, the entry that counts: of the operator's order about the flight that the
+        brief tells of, where there is one, else the coordinator's."""
+        self.posted: dict[str, Board] = {}
+        """By task id, what the coordinator says, whether it counts or not."""
+        self.task_orders: dict[str, TaskOrder] = {}
+        """By task id, what the operator says, orders for other flights among it."""
         self.claims: dict[str, Claim] = {}
         """By UAV id."""
         self.outcomes: dict[tuple[str, str], Outcome] = {}
@@ -58,6 +65,8 @@ class Replica:
         """Grows with every change of brief or board."""
         self.task_version = 0
         """Grows with every change of brief, board or outcomes."""
+        self._ordered: dict[str, tuple[TaskOrder, Board]] = {}
+        """By task id, the order that counts and the entry of the board made from it."""
 
     def join(self, message: Message) -> bool:
         """Take ``message`` in; whether it was news. Status and choice are no registers."""
@@ -73,15 +82,18 @@ class Replica:
         head = self.heads.get(message.writer)
         if head is None or message.stamp > head:
             self.heads[message.writer] = message.stamp
-        self.board_version += isinstance(message.body, Brief | Board)
-        self.task_version += isinstance(message.body, Brief | Board | Outcome)
+        self.task_version += isinstance(message.body, Outcome)
         match message.body:
             case Brief() as brief:
-                self.brief = brief
+                self._take_brief(brief)
             case Epoch() as epoch:
                 self.epoch = epoch
             case Board(task=task) as entry:
-                self.board[task] = entry
+                self.posted[task] = entry
+                self._settle(task)
+            case TaskOrder(task=task) as order:
+                self.task_orders[task] = order
+                self._settle(task)
             case Claim() as claim:
                 self.claims[message.writer] = claim
             case Outcome(task=task) as outcome:
@@ -89,6 +101,38 @@ class Replica:
             case Command(target=target) as command:
                 self.commands[target] = message.stamp, command
         return True
+
+    def ordered(self, task: str) -> TaskOrder | None:
+        """The operator's order about ``task`` in this flight; None if there is none."""
+        order, brief = self.task_orders.get(task), self.brief
+        return order if order and brief is not None and order.run == brief.run else None
+
+    def _take_brief(self, brief: Brief) -> None:
+        """Of another flight than before, other orders of the operator count."""
+        before, self.brief = self.brief, brief
+        if before is None or before.run != brief.run:
+            for task in self.task_orders:
+                self._settle(task)
+        self.board_version += 1
+        self.task_version += 1
+
+    def _settle(self, task: str) -> None:
+        """Find out anew what counts of all that is said of ``task``."""
+        order, known = self.ordered(task), self._ordered.pop(task, None)
+        if order is None:
+            entry = self.posted.get(task)
+        else:
+            entry = known[1] if known is not None and known[0] is order else _entry_of(order)
+            self._ordered[task] = order, entry
+        before = self.board.get(task)
+        if entry == before:
+            return
+        if entry is None:
+            del self.board[task]
+        else:
+            self.board[task] = entry
+        self.board_version += 1
+        self.task_version += 1
 
     def join_all(self, messages: Iterable[Message]) -> bool:
         """Take many in; whether any was news."""
@@ -145,6 +189,19 @@ class Replica:
     def register(self, key: str) -> Message | None:
         """What is known of the register of that key."""
         return self._registers.get(key)
+
+
+def _entry_of(order: TaskOrder) -> Board:
+    """What ``order`` puts on the board."""
+    return Board(
+        task=order.task,
+        number=order.number,
+        position_enu_m=order.position_enu_m,
+        value=order.value,
+        service_s=order.service_s,
+        kind=order.kind,
+        withdrawn=order.withdrawn,
+    )
 
 
 def _beats(new: Message, known: Message) -> bool:

@@ -9,7 +9,7 @@ import pytest
 from agent.mavlink.bridge import Phase
 from agent.mavlink.config import CommandStyle
 from agent.vehicle import GoTo, HandedOver, Hold, Return
-from coordinator.operator.seat import Result
+from coordinator.operator.verdict import Result
 from sim.autopilot.flavours import FlavourName
 from sim.world import Recall
 from swarm.wire.messages import CommandKind, StatusPhase

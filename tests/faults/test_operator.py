@@ -6,7 +6,8 @@ from functools import partial
 
 import pytest
 
-from coordinator.operator.seat import OperatorSeat, Result
+from coordinator.operator.seat import OperatorSeat
+from coordinator.operator.verdict import Result
 from sim.event_queue import EventQueue
 from sim.faults.case import Verdict, parse_case, play
 from sim.network import IdealNetwork

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.operator.seat import OperatorSeat, Result
+from coordinator.operator.commanding import CommandWish
+from coordinator.operator.seat import OperatorSeat
+from coordinator.operator.verdict import Result
 from swarm.config import Timing
 from swarm.events import (
     Ask,
@@ -46,9 +48,7 @@ class Seat:
     def __init__(self, kind: CommandKind, target: str = "u0") -> None:
         self.core = OperatorSeat(
             MISSION,
-            target,
-            kind,
-            "because",
+            CommandWish(kind, target, "because"),
             incarnation=50,
             timing=TIMING,
             patience_s=PATIENCE_S,

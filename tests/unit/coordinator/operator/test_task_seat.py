@@ -1,4 +1,4 @@
-"""An operator who keeps the board of a mission without a coordinator."""
+"""An operator who goes on with the scenario of a mission without a coordinator."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from coordinator.operator.task_seat import TaskSeat
 from swarm.config import Timing
 from swarm.events import Finish, Heard, LinkChanged, Publish, Tick, Wish
 from swarm.model import TaskId
-from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Board
+from swarm.model.ids import OPERATOR
+from swarm.wire.messages import TaskOrder
 from tests.builders import entry, message, mission, task, uav
 
 TIMING = Timing(announce_s=4.0, silence_s=20.0)
@@ -25,6 +25,7 @@ def flown(
         {TaskId(name): at_s for name, at_s in (withdrawn_at_s or {}).items()},
         since_s=since_s,
         mission_s=20.0,
+        run=7,
         incarnation=50,
         timing=TIMING,
         patience_s=10.0,
@@ -40,10 +41,11 @@ def said(wishes: list[tuple[float, Wish]]) -> list[tuple[float, str, bool]]:
     found = []
     for at_s, wish in wishes:
         if isinstance(wish, Publish):
-            assert wish.message.writer == COORDINATOR
+            assert wish.message.writer == OPERATOR
             assert wish.message.stamp.incarnation == 50
             body = wish.message.body
-            assert isinstance(body, Board)
+            assert isinstance(body, TaskOrder)
+            assert body.run == 7
             found.append((at_s, body.task, body.withdrawn))
     return found
 

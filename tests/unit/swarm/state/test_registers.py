@@ -245,7 +245,8 @@ def test_versions_grow_only_with_what_they_are_about() -> None:
     assert growth(message(COORDINATOR, brief(uav("u0")))) == (1, 1)
     assert growth(posted) == (1, 1)
     assert growth(posted) == (0, 0)
-    assert growth(replace(posted, stamp=Stamp(2, 1))) == (1, 1)
+    assert growth(replace(posted, stamp=Stamp(2, 1))) == (0, 0)  # said again, and no other
+    assert growth(message(COORDINATOR, entry("t0", value=2.0), 2, incarnation=2)) == (1, 1)
     assert growth(message(COORDINATOR, epoch("u0"))) == (0, 0)
     assert growth(message("u0", IDLE)) == (0, 0)
     assert growth(message("u0", done("t0"))) == (0, 1)

@@ -1,0 +1,343 @@
+"""A task that the operator adds or withdraws: what is to be said, and what comes of it.
+
+An order is a register like any other, so it has arrived where somebody's answer shows it:
+everyone who is there is asked until all have confirmed it. Whoever is out of reach learns
+of it later from those who know. Leaves out: saying it and asking
+(coordinator.operator.errands), and what agents and coordinator make of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from statistics import median
+from typing import Final
+
+from coordinator.briefing import entry_of
+from coordinator.observer import Observer
+from coordinator.operator.verdict import Result, Verdict
+from swarm.config import Timing
+from swarm.events import BusFact, Learned
+from swarm.model import Origin
+from swarm.model.frames import enu_from_wgs84
+from swarm.model.ids import COORDINATOR, ID_RULE, valid_id
+from swarm.state.board import TaskState
+from swarm.state.commands import aborted
+from swarm.wire.bounds import MAX_COUNT, Point
+from swarm.wire.messages import Board, Brief, ClaimPhase, EpochPhase, Message, TaskOrder
+
+__all__ = ["NewTask", "Ordering", "Wgs84", "Withdrawal", "order_of"]
+
+FARTHEST_M: Final = 1e8
+MOST_VALUE: Final = 1e12
+LONGEST_S: Final = 1e9
+"""As far as a message can say it: `swarm.wire.bounds`."""
+OWN_PREFIX: Final = "op"
+"""Of ids that are not chosen by hand. They differ from a scenario's: the next free one in its
+manner might be that of a task which is yet to appear, and this one would take its place."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wgs84:
+    """A place on the earth.
+
+    Raises:
+        ValueError: there is no such place, or it is too high.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    alt_m: float | None = None
+    """Height above mean sea level [m]; None for that of the mission's origin."""
+
+    def __post_init__(self) -> None:
+        _require("latitude", self.lat_deg, -90.0, 90.0)
+        _require("longitude", self.lon_deg, -180.0, 180.0)
+        if self.alt_m is not None:
+            _require("altitude", self.alt_m, -1e7, 1e7)
+
+    def enu_m(self, origin: Origin) -> Point:
+        """The same place in the frame of the mission [m; east, north, up]."""
+        alt_m = origin.alt_m if self.alt_m is None else self.alt_m
+        return enu_from_wgs84(origin, self.lat_deg, self.lon_deg, alt_m)
+
+
+@dataclass(frozen=True, slots=True)
+class NewTask:
+    """A task to be added.
+
+    Raises:
+        ValueError: something is out of bounds; says what, and what would be right.
+    """
+
+    place: Point | Wgs84
+    """[m; east, north, up from the mission's origin], or on the earth."""
+    task: str | None = None
+    """Id; None for the next free one."""
+    value: float | None = None
+    """m_i of eq. 1; None for the median of the board's, 1 while that is empty."""
+    service_s: float = 0.0
+    kind: str | None = None
+    reason: str = ""
+    """Why, in the operator's words."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.place, Wgs84):
+            for metres in self.place:
+                _require("position", metres, -FARTHEST_M, FARTHEST_M)
+        if self.value is not None:
+            _require("value", self.value, 0.0, MOST_VALUE)
+        _require("time on the spot", self.service_s, 0.0, LONGEST_S)
+        for what, text in (("id", self.task), ("kind", self.kind)):
+            if text is not None and not valid_id(text):
+                raise ValueError(f"{what} {text!r} is not {ID_RULE}")
+
+    def __str__(self) -> str:
+        return "add a task" if self.task is None else f"add task {self.task}"
+
+
+@dataclass(frozen=True, slots=True)
+class Withdrawal:
+    """A task to be taken off the board."""
+
+    task: str
+    reason: str = ""
+    """Why, in the operator's words."""
+
+    def __str__(self) -> str:
+        return f"withdraw task {self.task}"
+
+
+class Ordering:
+    """One task order, and what comes of it.
+
+    Args:
+        wish: what the operator wants.
+        observer: of the mission.
+        timing: timers, in the seconds of ``now_s``.
+        patience_s: how long to wait for the effect [s of ``now_s``].
+    """
+
+    asks = True
+    """Whether everyone is to be asked for what has come of it."""
+
+    def __init__(
+        self,
+        wish: NewTask | Withdrawal,
+        observer: Observer,
+        timing: Timing,
+        patience_s: float,
+    ) -> None:
+        self.known_to: set[str] = set()
+        """Who has confirmed that it knows of the order."""
+        self._wish = wish
+        self._observer = observer
+        self._patience_s = patience_s
+        self._look_s = 2.0 * timing.patience_s
+        """How long to look for who takes a new task, once all know of it."""
+        self._look_until_s = math.inf
+        self._order: TaskOrder | None = None
+
+    # -- what to say --------------------------------------------------------------------
+
+    def body(self, brief: Brief) -> TaskOrder | Verdict:
+        """What to say; or why it cannot be said."""
+        if self._is_over:
+            return Verdict(Result.NOT_OBEYED, "the mission has ended: nothing is taken up any more")
+        if isinstance(self._wish, NewTask):
+            found = self._addition(self._wish, brief)
+        else:
+            found = self._withdrawal(self._wish)
+        if isinstance(found, Verdict):
+            return found
+        self._order = order_of(found, brief.run, self._wish.reason)
+        return self._order
+
+    def _addition(self, wish: NewTask, brief: Brief) -> Board | Verdict:
+        replica = self._observer.replica
+        board, scenario = replica.board, {task.id for task in self._observer.mission.tasks}
+        if wish.task is not None and (wish.task in board or wish.task in scenario):
+            states = self._observer.board.states
+            state = states[wish.task].value if wish.task in board else "yet to appear"
+            return Verdict(Result.TAKEN_ID, f"it is {state}: give another id, or none")
+        taken = board.keys() | scenario | replica.task_orders.keys()
+        values = [entry.value for entry in board.values() if not entry.withdrawn]
+        place = wish.place
+        number = max((entry.number for entry in board.values()), default=-1) + 1
+        return Board(
+            task=wish.task or next_id(taken),
+            number=min(number, MAX_COUNT),
+            position_enu_m=(
+                place.enu_m(Origin(*brief.origin)) if isinstance(place, Wgs84) else place
+            ),
+            value=wish.value if wish.value is not None else median(values) if values else 1.0,
+            service_s=wish.service_s,
+            kind=wish.kind,
+            withdrawn=False,
+        )
+
+    def _withdrawal(self, wish: Withdrawal) -> Board | Verdict:
+        board = self._observer.replica.board
+        entries = {
+            task.id: entry_of(task, number)
+            for number, task in enumerate(self._observer.mission.tasks)
+        } | board
+        entry, state = entries.get(wish.task), self._observer.board.states.get(wish.task)
+        if entry is None:
+            return Verdict(Result.UNKNOWN_TASK, f"the board holds {_some(list(board))}")
+        if state in (TaskState.DONE, TaskState.WITHDRAWN):
+            return Verdict(Result.NOT_OBEYED, f"{wish.task} is {state} already")
+        return replace(entry, withdrawn=True)
+
+    # -- what comes of it ---------------------------------------------------------------
+
+    def heed(self, fact: BusFact, said: Message) -> None:
+        """See who knows of the order."""
+        if isinstance(fact, Learned):
+            for snapshot in fact.snapshots:
+                for message in snapshot.messages:
+                    if message.key == said.key and message.stamp >= said.stamp:
+                        self.known_to.add(snapshot.writer)
+
+    def next_deadline_s(self) -> float | None:
+        """When `judge` may find that it has looked for long enough."""
+        return None if math.isinf(self._look_until_s) else self._look_until_s
+
+    def judge(self, said: Message, now_s: float, *, late: bool) -> Verdict | None:
+        """What has come of it by now; None as long as that is open, and it is not ``late``."""
+        order, known = self._order, self._observer.replica.known(said)
+        if order is None or known is None:
+            return None
+        if known.stamp != said.stamp:
+            other = known.body
+            done = isinstance(other, TaskOrder) and other.withdrawn
+            text = (
+                f"another operator has {'withdrawn' if done else 'changed'} {order.task} meanwhile"
+            )
+            return Verdict(Result.NOT_OBEYED, text)
+        if self._is_over:
+            text = f"the mission has ended meanwhile: nothing more comes of {order.task}"
+            return Verdict(Result.NOT_OBEYED, text)
+        silent = sorted(self._expected - self.known_to)
+        everyone = not silent and bool(self.known_to)
+        if not (everyone or late):
+            self._look_until_s = math.inf
+            return None
+        if not self.known_to:
+            text = f"nobody has confirmed it within {self._patience_s:g} s"
+            return Verdict(Result.NOT_OBEYED, f"{order.task}: {text}")
+        verdict = self._gone(order) if order.withdrawn else self._taken(order, now_s, late)
+        if verdict is None and late:
+            text = ", ".join(self._claimants)
+            return Verdict(Result.NOT_OBEYED, f"{text} still claims {order.task}")
+        if verdict is None or not silent:
+            return verdict
+        unsure = f"{', '.join(silent)} {'have' if len(silent) > 1 else 'has'} not confirmed it yet"
+        return Verdict(verdict.result, f"{verdict.text}; {unsure}")
+
+    def _taken(self, order: TaskOrder, now_s: float, late: bool) -> Verdict | None:
+        """What is told of a task that is on the board; None to look a little longer."""
+        state, uav = self._observer.board.states.get(order.task), self.uav
+        somebody_can = self._able(self._expected)
+        if uav is None and state is TaskState.OPEN and somebody_can and not late:
+            if math.isinf(self._look_until_s):
+                self._look_until_s = now_s + self._look_s
+            if now_s < self._look_until_s:
+                return None
+        result, what = Result.OBEYED, "nobody has taken it yet"
+        if uav is not None:
+            what = f"{uav} flies there"
+        elif state is not TaskState.OPEN:
+            what = f"it is {state}"
+        elif not self._able(self._fleet):
+            what = "but no UAV is capable of it: the success of each there is 0"
+        elif not somebody_can:
+            result, what = Result.NOT_OBEYED, "but nobody who could do it takes part any more"
+        return Verdict(result, f"{order.task} is on the board, worth {order.value:g}; {what}")
+
+    def _gone(self, order: TaskOrder) -> Verdict | None:
+        """What is told of a task that is off the board; None while somebody claims it."""
+        if self._observer.board.states.get(order.task) is TaskState.DONE:
+            return Verdict(Result.NOT_OBEYED, f"{order.task} was done before it could be withdrawn")
+        if self._claimants:
+            return None
+        return Verdict(Result.OBEYED, f"{order.task} is withdrawn")
+
+    @property
+    def task(self) -> str | None:
+        """Id of the task; None as long as it has none."""
+        return self._wish.task if self._order is None else self._order.task
+
+    @property
+    def uav(self) -> str | None:
+        """Who is on its way to the task or serves it."""
+        return None if self.task is None else self._observer.holders.get(self.task)
+
+    @property
+    def _is_over(self) -> bool:
+        observer = self._observer
+        return observer.phase is EpochPhase.ENDED or aborted(observer.replica) is not None
+
+    @property
+    def _expected(self) -> set[str]:
+        """Who is there and takes part, and so ought to know of it."""
+        claims = self._observer.replica.claims.items()
+        out = {uav for uav, claim in claims if claim.phase is ClaimPhase.OUT}
+        return (self._fleet - out | {COORDINATOR}) & self._observer.present
+
+    @property
+    def _fleet(self) -> set[str]:
+        brief = self._observer.replica.brief
+        return set() if brief is None else {uav.id for uav in brief.uavs}
+
+    @property
+    def _claimants(self) -> list[str]:
+        claims = self._observer.replica.claims.items()
+        there = self._observer.present
+        return sorted(u for u, claim in claims if claim.task == self.task and u in there)
+
+    def _able(self, uavs: Collection[str]) -> bool:
+        """Whether one of ``uavs`` is capable of the task."""
+        problem = self._observer.board.problem
+        if problem is None:
+            return False
+        capable = zip(problem.task_ids, problem.capable.T, strict=True)
+        column = next((able for task, able in capable if task == self.task), None)
+        rows = [row for row, uav in enumerate(problem.uav_ids) if uav in uavs]
+        return column is not None and bool(column[rows].any())
+
+
+def order_of(entry: Board, run: int, reason: str = "") -> TaskOrder:
+    """The order that puts ``entry`` on the board, in the flight of that ``run``."""
+    return TaskOrder(
+        task=entry.task,
+        number=entry.number,
+        position_enu_m=entry.position_enu_m,
+        value=entry.value,
+        service_s=entry.service_s,
+        kind=entry.kind,
+        withdrawn=entry.withdrawn,
+        run=run,
+        reason=reason,
+    )
+
+
+def next_id(taken: set[str]) -> str:
+    """The next free id for a task that was given none."""
+    number = 1
+    while f"{OWN_PREFIX}{number}" in taken:
+        number += 1
+    return f"{OWN_PREFIX}{number}"
+
+
+def _require(what: str, number: float, least: float, most: float) -> None:
+    if not least <= number <= most:
+        raise ValueError(f"{what} must be within {least:g}..{most:g}, not {number:g}")
+
+
+def _some(ids: list[str]) -> str:
+    if not ids:
+        return "no task"
+    shown = sorted(ids)
+    return ", ".join(shown[:12]) + (f" and {len(shown) - 12} more" if len(shown) > 12 else "")
