@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from coordinator.recording.options import RecordOption, check_new_recording
 from sim.mission_command import MethodOption, ReportOption, tell
 from sim.uncertainty_options import (
     CoordinatorLostOption,
@@ -82,6 +83,7 @@ def simulate(
         ),
     ] = None,
     report: ReportOption = None,
+    record: RecordOption = None,
     json: JsonOption = False,
 ) -> int:
     """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
@@ -116,6 +118,7 @@ def simulate(
     from coordinator.view.report import MissionReport, check_report_path
     from sim.faults.replay import fly_with_faults
     from sim.faults.schedule import format_schedule
+    from sim.recorded import recording_simulation
     from sim.simulate import simulate_mission
     from sim.uncertainty import Uncertainty
     from swarm.scenario import load_scenario
@@ -123,6 +126,8 @@ def simulate(
     check_online_method(method)
     if report is not None:
         check_report_path(report)
+    if record is not None:
+        check_new_recording(record)
     uncertainty = asked_for(Uncertainty(), loss=loss, popup=popup, popups_per_min=popup_rate)
     beside_faults = uncertainty
     uncertainty = asked_for(
@@ -142,24 +147,29 @@ def simulate(
     )
     mission = with_reattempts(load_scenario(scenario), reattempt=reattempt)
     if faults is None:
-        flown = simulate_mission(
-            mission,
-            method=method,
-            seed=seed,
-            uncertainty=uncertainty,
-            coordinator_lost_s=coordinator_lost_s,
-        )
-        if not flown.in_time:
-            typer.echo("broken off: somebody would have waited for ever", err=True)
-        told = MissionReport(
-            mission=flown.world.mission,
-            plan=flown.world.observer.plan,
-            result=flown.result,
-            story=tuple(flown.world.observer.story),
-            lost_because=flown.lost_because,
-            value=flown.value,
-        )
-        return tell(told, json=json, report=report)
+        with recording_simulation(mission.name, str(scenario), record) as looks_on:
+            flown = simulate_mission(
+                mission,
+                method=method,
+                seed=seed,
+                uncertainty=uncertainty,
+                coordinator_lost_s=coordinator_lost_s,
+                make_onlooker=looks_on,
+            )
+            if not flown.in_time:
+                typer.echo("broken off: somebody would have waited for ever", err=True)
+            told = MissionReport(
+                mission=flown.world.mission,
+                plan=flown.world.observer.plan,
+                result=flown.result,
+                story=tuple(flown.world.observer.story),
+                lost_because=flown.lost_because,
+                value=flown.value,
+            )
+            return tell(told, json=json, report=report)
+    if record is not None:
+        problem, remedy = "goes without --faults only", "leave one of them out"
+        raise InputError(Fault("--record", str(record), problem, remedy))
     if uncertainty != beside_faults or coordinator_lost_s is not None:
         problem = "goes with --loss, --popup and --popup-rate only"
         remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -41,7 +42,7 @@ from swarm.model import Origin
 from swarm.model.frames import wgs84_from_enu
 from swarm.state.board import TaskState
 
-__all__ = ["PROGRESS", "PROGRESS_SCHEMA", "Pictures", "log_line"]
+__all__ = ["PROGRESS", "PROGRESS_SCHEMA", "Pictures", "level_of", "log_line"]
 
 PROGRESS: Final = "peckorder.Progress"
 FRAME: Final = "mission"
@@ -49,6 +50,8 @@ FRAME: Final = "mission"
 MOST_LABELS: Final = 150
 """A scene of more tasks shows them without their names."""
 _SMALLEST_M: Final = 0.05
+_LEVEL: Final = re.compile(r"""\blevel["']?[=:] ?["']?(\w+)""")
+"""In lines of logfmt and in JSON."""
 _STILL_M_S: Final = 0.1
 """Who is slower points nowhere."""
 _OF_MISSION: Final = 1.0 / 60.0
@@ -165,6 +168,12 @@ class Pictures:
                 view.id, time_ns, *wgs84_from_enu(origin, at), _uav_colour(view.number)
             )
             yield Line(f"/uav/{view.id}/fix", LOCATION_FIX, _bytes(fix))
+
+
+def level_of(line: str) -> str:
+    """Level of a line that one of our processes has logged; empty when it tells none."""
+    found = _LEVEL.search(line)
+    return "" if found is None else found[1].lower()
 
 
 def log_line(name: str, message: str, level: str, time_ns: int) -> Line:

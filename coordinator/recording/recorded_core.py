@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Generic, Protocol, TypeVar
 
+from coordinator.observer import Observer
 from coordinator.recording.records import Begun, Recorded
 from swarm.events import BusFact, Heard, Publish
+from swarm.model import Plan
 from swarm.shell import Core
 
 __all__ = ["Notebook", "RecordedCore"]
@@ -32,11 +34,14 @@ class RecordedCore(Generic[A]):
     Args:
         core: an onlooker, or whoever else hears what onlookers hear.
         notebook: told every fact before the core is.
+        observer: may be given a plan by somebody else, which is written down, too.
     """
 
-    def __init__(self, core: Core[BusFact, A], notebook: Notebook) -> None:
+    def __init__(self, core: Core[BusFact, A], notebook: Notebook, observer: Observer) -> None:
         self._core = core
         self._notebook = notebook
+        self._observer = observer
+        self._plan: Plan | None = None
 
     def start(self, now_s: float) -> Sequence[A]:
         """Start the core."""
@@ -45,6 +50,9 @@ class RecordedCore(Generic[A]):
 
     def step(self, event: BusFact, now_s: float) -> Sequence[A]:
         """Step the core."""
+        if self._observer.plan is not self._plan and self._observer.plan is not None:
+            self._plan = self._observer.plan
+            self._notebook.note(self._plan, now_s)
         self._notebook.note(event, now_s)
         return self._told(self._core.step(event, now_s), now_s)
 

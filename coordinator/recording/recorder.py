@@ -15,7 +15,7 @@ from typing import Final
 
 from coordinator.recording.foxglove import FOXGLOVE_SCHEMAS
 from coordinator.recording.growing_mcap import GrowingMcap
-from coordinator.recording.pictures import PROGRESS, PROGRESS_SCHEMA, Pictures, log_line
+from coordinator.recording.pictures import PROGRESS, PROGRESS_SCHEMA, Pictures, level_of, log_line
 from coordinator.recording.records import (
     FORMAT,
     SCHEMAS,
@@ -113,9 +113,9 @@ class Recorder:
             self._picture_at_s = now_s + self._period_s
             self.draw()
 
-    def log(self, name: str, text: str, level: str, time_ns: int) -> None:
+    def log(self, name: str, line: str, time_ns: int) -> None:
         """Write down what a process has logged."""
-        self._add(log_line(name, text, level, time_ns), time_ns)
+        self._add(log_line(name, line, level_of(line), time_ns), time_ns)
 
     def draw(self) -> None:
         """Show how everything stands as of the newest fact."""

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import queue
 import threading
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
@@ -104,6 +104,7 @@ class RecordingThread:
         sink: takes its bytes.
         on_fault: called once, from the thread, with the reason why nothing more is recorded.
         last: done after all other jobs.
+        patient: whether jobs that there is no room for wait for it, as nobody flies meanwhile.
         period_s: wall time between two writes.
     """
 
@@ -114,6 +115,7 @@ class RecordingThread:
         *,
         on_fault: Callable[[str], None] = lambda _: None,
         last: Job = lambda: None,
+        patient: bool = False,
         period_s: float = PERIOD_S,
     ) -> None:
         self._mcap = mcap
@@ -121,7 +123,8 @@ class RecordingThread:
         self._on_fault = on_fault
         self._last = last
         self._period_s = period_s
-        self._jobs: deque[Job] = deque()
+        self._patient = patient
+        self._jobs: queue.Queue[Job] = queue.Queue(MAX_WAITING)
         self._stop = threading.Event()
         self.fault: str | None = None
         """Why nothing more is recorded; None while all is well."""
@@ -132,13 +135,13 @@ class RecordingThread:
         self._thread.start()
 
     def hand_over(self, job: Job) -> None:
-        """Have ``job`` done; returns at once."""
+        """Have ``job`` done; returns at once, unless the thread is patient and has no room."""
         if self.fault is not None or self._stop.is_set():
             return
-        if len(self._jobs) >= MAX_WAITING:
+        try:
+            self._jobs.put(job, block=self._patient)
+        except queue.Full:
             self.lost += 1
-            return
-        self._jobs.append(job)
 
     def close(self) -> None:
         """Write all that is left, and wait until it is written."""
@@ -153,12 +156,14 @@ class RecordingThread:
         self._round(last=True)
 
     def _round(self, *, last: bool) -> None:
-        if self.fault is not None:
-            self._jobs.clear()
-            return
         try:
-            while self._jobs:
-                self._jobs.popleft()()
+            # No more than there are now: new ones come while these are done.
+            for _ in range(self._jobs.qsize()):
+                job = self._jobs.get_nowait()
+                if self.fault is None:
+                    job()
+            if self.fault is not None:
+                return
             if last:
                 self._last()
         except Exception as fault:  # noqa: BLE001 - top of the thread: the flight must go on
@@ -177,5 +182,4 @@ class RecordingThread:
 
     def _fail(self, why: str) -> None:
         self.fault = why
-        self._jobs.clear()
         self._on_fault(why)

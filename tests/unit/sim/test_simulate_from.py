@@ -5,37 +5,33 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from coordinator.observer import Observer
 from coordinator.recording.flight_recorder import FlightRecorder, virtual_ns
 from coordinator.recording.recorder import About
 from coordinator.recording.recording_file import FileSink
-from sim.world import QUIET, World
+from sim.world import QUIET
 from swarm.cli import main
 from swarm.events import Heard
 from swarm.wire.messages import Message, Stamp
-from tests.builders import choice
-from tests.fleet_builders import Ear, plan_for, random_mission
+from tests.builders import choice, mission
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of three UAVs and twelve tasks."""
+    """Of a flight of the shipped valley-popups."""
     file = tmp_path_factory.mktemp("recorded") / "flight.mcap"
-    mission = random_mission(np.random.default_rng(2), n_uav=3, n_task=12)
-    world = World(mission, plan_for, method="guided", seed=2)
-    recorder = FlightRecorder(About(mission.name, QUIET, virtual=True), FileSink(file), virtual_ns)
-    world.admit("recorder", recorder.around(Ear()))
-    assert world.run(limit_s=1e5)
-    recorder.close()
+    flight = ["valley-popups", "--method", "guided", "--record", str(file), "--json"]
+    assert main(["simulate", *flight]) == 0
     return file
 
 
 def recorded(file: Path, *said: Message) -> Path:
     """A recording in which nothing else is said."""
     recorder = FlightRecorder(About("test", QUIET, virtual=True), FileSink(file), virtual_ns)
-    core = recorder.around(Ear())
+    observer = Observer(mission([], []), QUIET)
+    core = recorder.around(observer, observer)
     core.start(0.0)
     for number, message in enumerate(said):
         core.step(Heard(message), float(number))
@@ -49,15 +45,15 @@ def test_a_faultless_flight_comes_out_the_same(
     assert main(["simulate", "--from", str(recording), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told == {
-        "mission": "random",
-        "choices": 12,
-        "agreeing": 12,
+        "mission": "valley-popups",
+        "choices": 16,
+        "agreeing": 16,
         "differing": [],
         "without_inputs": 0,
     }
 
     assert main(["simulate", "--from", str(recording)]) == 0
-    assert "of 12 choices 12 come out the same" in capsys.readouterr().out
+    assert "of 16 choices 16 come out the same" in capsys.readouterr().out
 
 
 def test_choices_without_inputs_are_no_success(
