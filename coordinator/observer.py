@@ -6,7 +6,7 @@ how any of it is shown.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,7 @@ from swarm.state.registers import Replica
 from swarm.wire.messages import (
     Board,
     Brief,
+    Choice,
     Claim,
     ClaimPhase,
     Command,
@@ -43,7 +44,7 @@ from swarm.wire.messages import (
     TaskOrder,
 )
 
-__all__ = ["Happening", "MissionResult", "Observer"]
+__all__ = ["CHOICES_KEPT", "Happening", "MissionResult", "Observer"]
 
 _COMMANDED = {
     CommandKind.HOLD: "operator holds {}",
@@ -64,6 +65,10 @@ class Happening:
 
 _LEAVING = {StatusPhase.OUT: "gave its vehicle up", StatusPhase.RETURNING: "goes home"}
 """Parts of an agent's life in which it takes no tasks any more, in words."""
+
+
+CHOICES_KEPT = 2000
+"""What an onlooker remembers of why tasks were taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +122,15 @@ class Observer:
         self.lost: list[UavId] = []
         """UAVs that disappeared while they took part, and are not back."""
         self.story: list[Happening] = []
+        self.choices: deque[tuple[str, Stamp, Choice]] = deque(maxlen=CHOICES_KEPT)
+        """Why UAVs took tasks, in order of arrival; without `Basis.heads`, of which an onlooker
+        makes nothing."""
+        self._chosen: set[tuple[str, Stamp]] = set()
+        """Which those are."""
+        self.cut_since_s: float | None = None
+        """When the own link to the bus went down [s of ``now_s``]; None while it is up."""
+        self.pace = 1.0
+        """Mission seconds per second of ``now_s``; see `keep_time`."""
         self._membership = Membership(timing)
         self._zero_s: float | None = None
         self._orphans: dict[str, str] = {}
@@ -159,7 +173,7 @@ class Observer:
             case Learned(snapshots):
                 for snapshot in snapshots:
                     if self._zero_s is None and snapshot.mission_s is not None:
-                        self._zero_s = now_s - snapshot.mission_s
+                        self._zero_s = now_s - snapshot.mission_s / self.pace
                     for message in snapshot.messages:
                         self._hear(message, now_s)
                 self._membership.expect(self.replica.claims, now_s)
@@ -172,6 +186,8 @@ class Observer:
                 self._membership.gone(writer, now_s)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
+                if up or self.cut_since_s is None:
+                    self.cut_since_s = None if up else now_s
                 ask |= up
             case _:
                 pass
@@ -203,7 +219,29 @@ class Observer:
 
     def mission_s(self, now_s: float) -> float | None:
         """Mission time; None before the start."""
-        return None if self._zero_s is None else now_s - self._zero_s
+        return None if self._zero_s is None else (now_s - self._zero_s) * self.pace
+
+    def keep_time(self, now_s: float, mission_s: float, pace: float) -> None:
+        """Follow a mission whose time runs otherwise than the own clock.
+
+        Args:
+            now_s: time of the own clock [s].
+            mission_s: mission time then [s].
+            pace: mission seconds per second of the own clock; > 0.
+        """
+        self.pace = pace
+        self._zero_s = now_s - mission_s / pace
+
+    def silent_s(self, uav: str, now_s: float) -> float | None:
+        """How long one that is there has said nothing, once that is half of what gives it up [s].
+
+        While the own link is down nothing is heard of anybody, which says nothing of them.
+        """
+        heard_s = self.heard_s.get(uav)
+        if heard_s is None or uav not in self.present or self.cut_since_s is not None:
+            return None
+        silent_s = now_s - heard_s
+        return silent_s if silent_s >= self._timing.silence_s / 2.0 else None
 
     @property
     def phase(self) -> EpochPhase:
@@ -281,6 +319,9 @@ class Observer:
         if isinstance(message.body, Status):
             self._hear_status(message.writer, message.stamp, message.body, now_s)
             return
+        if isinstance(message.body, Choice):
+            self._hear_choice(message.writer, message.stamp, message.body, now_s)
+            return
         before = self.replica.claims.get(message.writer)
         earlier = self.replica.known(message)
         if not self.replica.join(message):
@@ -326,6 +367,17 @@ class Observer:
             self._left.add(uav)
             self._tell(f"{uav} {_LEAVING[status.phase]}: {status.note}", now_s)
 
+    def _hear_choice(self, uav: str, stamp: Stamp, choice: Choice, now_s: float) -> None:
+        if (uav, stamp) in self._chosen:
+            return
+        if len(self.choices) == CHOICES_KEPT:
+            self._chosen.discard(self.choices[0][:2])
+        self._chosen.add((uav, stamp))
+        slim = replace(choice, basis=replace(choice.basis, heads={}))
+        self.choices.append((uav, stamp, slim))
+        if choice.left is not None:
+            self._tell(f"{uav} turns aside from {choice.left} to {choice.task}", now_s)
+
     def _hear_outcome(
         self, uav: str, outcome: Outcome, earlier: Message | None, now_s: float
     ) -> None:
@@ -370,7 +422,7 @@ class Observer:
         if epoch.phase is EpochPhase.RUNNING and course not in self._epochs:
             self._epochs.add(course)
             if self._zero_s is None:
-                self._zero_s = now_s - epoch.mission_s
+                self._zero_s = now_s - epoch.mission_s / self.pace
             order = " > ".join(epoch.sequence)
             why = f" ({epoch.reason})" if epoch.number > 1 and epoch.reason else ""
             self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}{why}", now_s)

@@ -1,6 +1,6 @@
-"""The commands `swarm run` and `swarm simulate`.
+"""The command `swarm run`.
 
-Leaves out: what they do (sim.launch, sim.world) and how it is shown (coordinator.view).
+Leaves out: what it does (sim.launch) and how it is shown (coordinator.view).
 """
 
 from __future__ import annotations
@@ -11,51 +11,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coordinator.recording.options import RecordOption, check_new_recording
-from sim.uncertainty_options import (
-    CoordinatorLostOption,
-    DelayOption,
-    JitterOption,
-    LegSdOption,
-    LossOption,
-    MessageLossOption,
-    OutcomesOption,
-    PartitionLengthOption,
-    PartitionRateOption,
-    PopupOption,
-    PopupRateOption,
-    PositionErrorOption,
-    ReattemptOption,
-    SpeedSdOption,
-    SurvivalOption,
-    WindOption,
-    WithdrawRateOption,
-    asked_for,
-    with_reattempts,
-)
+from sim.mission_command import MethodOption, ReportOption, tell
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, LinkOption, ScenarioArgument, SeedOption, SpeedupOption
 
 if TYPE_CHECKING:
-    from coordinator.view.report import MissionReport
     from sim.launch.fleet import BusKind
 
-__all__ = ["run", "simulate"]
-
-MethodOption = Annotated[
-    str,
-    typer.Option("--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."),
-]
-
-ReportOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--report",
-        metavar="FILE",
-        help="Also write the report, as .json or .md.",
-        show_default=False,
-    ),
-]
+__all__ = ["run"]
 
 
 def run(
@@ -227,6 +191,16 @@ def run(
             show_default=False,
         ),
     ] = None,
+    dashboard: Annotated[
+        str | None,
+        typer.Option(
+            "--dashboard",
+            metavar="[ADDRESS:]PORT",
+            help="Also show the run in a browser, and let an operator step in there, until it "
+            "ends; 0: any port that is free. See swarm dashboard.",
+            show_default=False,
+        ),
+    ] = None,
     report: ReportOption = None,
     record: RecordOption = None,
     json: JsonOption = False,
@@ -243,6 +217,7 @@ def run(
     Examples:
         swarm run table-1
         swarm run valley-survey --speedup 20 --report flight.md
+        swarm run valley-survey --dashboard 8080
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
         swarm run meadow --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
@@ -256,6 +231,7 @@ def run(
 
     from rich.console import Console
 
+    from coordinator.dashboard.place import parse_place
     from coordinator.planner.plan import check_online_method
     from coordinator.recording.flight_recorder import recording_or_none, wall_ns
     from coordinator.recording.recorder import About
@@ -304,6 +280,7 @@ def run(
         link=link,
         autopilots=autopilots,
         handed_on=handed_on,
+        dashboard=None if dashboard is None else parse_place(dashboard),
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.
@@ -311,6 +288,9 @@ def run(
 
     def log(name: str, line: str) -> None:
         print(f"{name}: {line}", file=sys.stderr)
+
+    for line in () if options.dashboard is None else options.dashboard.lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     async def work() -> int:
         about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))
@@ -339,142 +319,10 @@ def run(
             speedup=speedup,
             fates=flight.fates,
         )
-        status = _tell(told, json=json, report=report)
+        status = tell(told, json=json, report=report)
         return status or int(recorder is not None and recorder.fault is not None)
 
     return asyncio.run(run_until_stopped(work()))
-
-
-def simulate(
-    scenario: ScenarioArgument,
-    method: MethodOption = "greedy",
-    seed: SeedOption = 0,
-    loss: LossOption = None,
-    popup: PopupOption = None,
-    popup_rate: PopupRateOption = None,
-    withdraw_rate: WithdrawRateOption = None,
-    outcomes: OutcomesOption = None,
-    reattempt: ReattemptOption = None,
-    survival: SurvivalOption = None,
-    speed_sd: SpeedSdOption = None,
-    leg_sd: LegSdOption = None,
-    wind: WindOption = None,
-    position_error_m: PositionErrorOption = None,
-    message_loss: MessageLossOption = None,
-    delay_s: DelayOption = None,
-    jitter_s: JitterOption = None,
-    partition_rate: PartitionRateOption = None,
-    partition_s: PartitionLengthOption = None,
-    coordinator_lost_s: CoordinatorLostOption = None,
-    faults: Annotated[
-        str | None,
-        typer.Option(
-            "--faults",
-            metavar="KINDS|FILE",
-            help="Let more go wrong: kinds of fault with commas between, all, or a file with a "
-            "schedule of them.",
-            show_default=False,
-        ),
-    ] = None,
-    report: ReportOption = None,
-    record: RecordOption = None,
-    json: JsonOption = False,
-) -> int:
-    """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
-
-    Unless told otherwise nothing is uncertain: vehicles and network are ideal, and the lists flown
-    are exactly those planned. Each kind of uncertainty is drawn from the seed by itself, so asking
-    for one leaves what the others draw as it was.
-    With --faults the network and the clocks are like real ones, what goes wrong is told
-    on standard error in lines that a file may hold, and the invariants of a fleet are watched.
-    Exit status 0: every task was done, and no invariant broken.
-
-    Examples:
-        swarm simulate table-1
-        swarm simulate valley-survey --loss 0.3 --popup 0.3 --seed 7
-        swarm simulate valley-survey --method guided --loss 0.3 --coordinator-lost-s 0
-        swarm simulate table-1 --outcomes --reattempt --seed 1
-        swarm simulate valley-survey --speed-sd 0.1 --leg-sd 0.1 --wind 5
-        swarm simulate valley-survey --message-loss 0.2 --delay-s 0.05 --jitter-s 0.05
-        swarm simulate valley-survey --faults cut,crash --seed 7
-    """
-    import sys
-
-    from coordinator.planner.plan import check_online_method
-    from coordinator.view.report import MissionReport, check_report_path
-    from sim.faults.replay import fly_with_faults
-    from sim.faults.schedule import format_schedule
-    from sim.recorded import recording_simulation
-    from sim.simulate import simulate_mission
-    from sim.uncertainty import Uncertainty
-    from swarm.scenario import load_scenario
-
-    check_online_method(method)
-    if report is not None:
-        check_report_path(report)
-    if record is not None:
-        check_new_recording(record)
-    uncertainty = asked_for(Uncertainty(), loss=loss, popup=popup, popups_per_min=popup_rate)
-    beside_faults = uncertainty
-    uncertainty = asked_for(
-        uncertainty,
-        withdrawals_per_min=withdraw_rate,
-        outcomes=outcomes,
-        survival=survival,
-        speed_sd_frac=speed_sd,
-        leg_sd_frac=leg_sd,
-        wind_m_s=wind,
-        position_error_m=position_error_m,
-        message_loss=message_loss,
-        delay_s=delay_s,
-        jitter_s=jitter_s,
-        partitions_per_min=partition_rate,
-        partition_s=partition_s,
-    )
-    mission = with_reattempts(load_scenario(scenario), reattempt=reattempt)
-    if faults is None:
-        with recording_simulation(mission.name, str(scenario), record) as looks_on:
-            flown = simulate_mission(
-                mission,
-                method=method,
-                seed=seed,
-                uncertainty=uncertainty,
-                coordinator_lost_s=coordinator_lost_s,
-                make_onlooker=looks_on,
-            )
-            if not flown.in_time:
-                print("broken off: somebody would have waited for ever", file=sys.stderr)
-            told = MissionReport(
-                mission=flown.world.mission,
-                plan=flown.world.observer.plan,
-                result=flown.result,
-                story=tuple(flown.world.observer.story),
-                lost_because=flown.lost_because,
-                value=flown.value,
-            )
-            return _tell(told, json=json, report=report)
-    if record is not None:
-        problem, remedy = "goes without --faults only", "leave one of them out"
-        raise InputError(Fault("--record", str(record), problem, remedy))
-    if uncertainty != beside_faults or coordinator_lost_s is not None:
-        problem = "goes with --loss, --popup and --popup-rate only"
-        remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"
-        raise InputError(Fault("--faults", faults, problem, remedy))
-    verdict = fly_with_faults(
-        mission, method=method, seed=seed, uncertainty=uncertainty, faults=faults
-    )
-    print(format_schedule(verdict.case.schedule), end="", file=sys.stderr)
-    if verdict.broken is not None:
-        print(f"broken: {verdict.broken}", file=sys.stderr)
-    world = verdict.world
-    told = MissionReport(
-        mission=world.mission,
-        plan=world.observer.plan,
-        result=world.observer.result(),
-        story=tuple(world.observer.story),
-    )
-    status = _tell(told, json=json, report=report)
-    return status if verdict.broken is None else 1
 
 
 def _bus_kind(text: str) -> BusKind:
@@ -485,20 +333,3 @@ def _bus_kind(text: str) -> BusKind:
     except ValueError:
         remedy = f"choose one of {', '.join(BusKind)}"
         raise InputError(Fault("--bus", text, "no such bus", remedy)) from None
-
-
-def _tell(told: MissionReport, *, json: bool, report: Path | None) -> int:
-    """Print and write the report; the exit status of the command."""
-    from json import dumps
-
-    from rich.console import Console
-
-    from coordinator.view.report import mission_ok, write_report
-
-    if json:
-        print(dumps(told.as_json(), allow_nan=False))
-    else:
-        told.render(Console(highlight=False))
-    if report is not None:  # last: a full disk must not hide the result
-        write_report(told, report)
-    return 0 if mission_ok(told.result) else 1

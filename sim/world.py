@@ -34,7 +34,7 @@ from sim.network import IdealNetwork, Network
 from sim.processes import LocalClock, Process
 from sim.virtual_vehicle import SimulatedVehicle, VehicleFactory, VirtualVehicle
 from swarm.config import Timing
-from swarm.events import Ask, BusFact, Finish, Note, Publish, Save, Wish
+from swarm.events import Ask, BusFact, Finish, Note, Publish, PublishLast, Save, Wish
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.shell import Core
@@ -328,6 +328,8 @@ class World:
         match action:
             case Publish(message):
                 self._publish(process, message)
+            case PublishLast(make):
+                self._publish(process, make())
             case Order(order):
                 self._order(process, order)
             case Ask():

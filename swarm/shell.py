@@ -38,6 +38,7 @@ from swarm.events import (
     PeerGone,
     PeerSeen,
     Publish,
+    PublishLast,
     Save,
     Tick,
 )
@@ -45,7 +46,7 @@ from swarm.log import get_logger
 from swarm.wire.codec import Codec, encode, fit
 from swarm.wire.digest import decode_digest, encode_digest, unknown
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Snapshot, Status
+from swarm.wire.messages import Choice, Message, Snapshot, Status
 
 __all__ = ["Core", "Shell", "take_seat"]
 
@@ -182,8 +183,9 @@ class Shell(Generic[E, A]):
     def _carry_out(self, action: A) -> None:
         match action:
             case Publish(message):
-                reliable = not isinstance(message.body, Status)
-                self._bus.publish(message.key, encode(message), reliable=reliable)
+                self._publish(message)
+            case PublishLast(make):
+                self._publish(make())
             case Ask():
                 task = self._loop.create_task(self._ask())
                 self._asking.add(task)
@@ -199,6 +201,10 @@ class Shell(Generic[E, A]):
                     self._done.set_result(status)
             case _:
                 self._execute(action)
+
+    def _publish(self, message: Message) -> None:
+        reliable = not isinstance(message.body, Status | Choice)
+        self._bus.publish(message.key, encode(message), reliable=reliable)
 
     def _reschedule(self) -> None:
         if self._timer is not None:

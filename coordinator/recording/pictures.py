@@ -80,7 +80,7 @@ class _Progress:
     objective: float
     """J so far [value·s]."""
     plan_objective: float | None
-    """J of the offline plan [value·s]."""
+    """J of the lists it began with, flown without delay [value·s]."""
     bound: float | None
     """No lists have more than this J [value·s]."""
     open: int
@@ -182,10 +182,7 @@ def log_line(name: str, message: str, level: str, time_ns: int) -> Line:
 
 
 def _progress(observer: Observer, scene: Scene, now_s: float) -> Line:
-    plan, epoch = scene.plan, observer.replica.epoch
-    bound = None
-    if plan is not None:
-        bound = plan.optimum if plan.optimum is not None else plan.bound
+    plan, epoch = observer.plan, observer.replica.epoch
     progress = _Progress(
         now_s=now_s,
         mission_s=scene.mission_s,
@@ -193,8 +190,8 @@ def _progress(observer: Observer, scene: Scene, now_s: float) -> Line:
         epoch=None if epoch is None else epoch.number,
         rule=scene.rule,
         objective=scene.objective,
-        plan_objective=None if plan is None else plan.objective,
-        bound=bound,
+        plan_objective=scene.planned_objective,
+        bound=plan.bound if scene.optimum is None and plan is not None else scene.optimum,
         open=scene.count(TaskState.OPEN),
         taken=scene.count(TaskState.OPEN, taken=True),
         done=scene.count(TaskState.DONE),
@@ -202,7 +199,7 @@ def _progress(observer: Observer, scene: Scene, now_s: float) -> Line:
         withdrawn=scene.count(TaskState.WITHDRAWN),
         uavs=len(scene.uavs),
         lost=len(observer.lost),
-        dropped=sum(sum(counts.values()) for counts in observer.dropped.values()),
+        dropped=scene.dropped,
     )
     return Line("/progress", PROGRESS, _ADAPTER.dump_json(progress))
 
