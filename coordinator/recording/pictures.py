@@ -140,7 +140,7 @@ class Pictures:
         if tasks != self._tasks:
             self._tasks = tasks
             yield _scene("tasks", _task_entities(scene.tasks, size_m, time_ns))
-        lists = _lists(observer, scene)
+        lists = _lists(scene)
         if lists != self._lists:
             self._lists = lists
             entities = [
@@ -243,17 +243,17 @@ def _task_entities(tasks: tuple[TaskView, ...], size_m: float, time_ns: int) -> 
     return entities
 
 
-def _lists(observer: Observer, scene: Scene) -> tuple[tuple[str, tuple[Point, ...], Colour], ...]:
-    """What each UAV's list still holds, by the epoch in force: places in order."""
-    epoch = observer.replica.epoch
-    left = [task for task in scene.tasks if task.state is TaskState.OPEN]
-    places: dict[str, Point] = {task.id: task.position_enu_m for task in left}
-    found = []
-    for view in scene.uavs:
-        route = () if epoch is None or view.troubled else epoch.routes.get(view.id, ())
-        points = tuple(places[task] for task in route if task in places)
-        found.append((str(view.id), points, _uav_colour(view.number)))
-    return tuple(found)
+def _lists(scene: Scene) -> tuple[tuple[str, tuple[Point, ...], Colour], ...]:
+    """What each UAV's list still holds: places in order."""
+    places = {task.id: task.position_enu_m for task in scene.tasks}
+    return tuple(
+        (
+            str(view.id),
+            tuple(places[task] for task in view.planned if task in places),
+            _uav_colour(view.number),
+        )
+        for view in scene.uavs
+    )
 
 
 def _state(task: TaskView) -> str:
