@@ -139,7 +139,7 @@ def dashboard(
     access, made = access_for(host, allow_host or (), token)
     display = _display(access.token is not None, tiles, tiles_credit)
     taken = take_port(host, port)
-    url = url_of(taken, host)
+    url = url_of(host, taken.getsockname()[1])
     if json:
         print(dumps({"url": url, "token": access.token if made else None}), flush=True)
     else:

@@ -40,9 +40,8 @@ def listen(host: str, port: int, option: str = "--port") -> socket.socket:
     return listening
 
 
-def url_of(listening: socket.socket, host: str) -> str:
+def url_of(host: str, port: int) -> str:
     """Where a browser finds what is served there."""
-    port = listening.getsockname()[1]
     name = host.strip("[]")
     if name in ("0.0.0.0", "::"):  # noqa: S104 - compared, not bound
         name = socket.gethostname()

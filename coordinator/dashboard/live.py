@@ -90,7 +90,9 @@ class LiveMission:
             stays=self._mission is not None,
             first=first,
         )
-        self._shell = onlooking(self._desk, bus, self._clock, mission, OPERATOR)
+        self._shell = onlooking(
+            self._desk, bus, self._clock, mission, OPERATOR, self._network.answer_s
+        )
         self._log.info("looking on", mission=mission)
         await self._shell.run()
 

@@ -24,7 +24,7 @@ TOKEN_FILE = "dashboard-token"  # noqa: S105 - a file's name
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a dashboard is served: a port that was free just now."""
+    """Where a dashboard is served."""
 
     host: str
     port: int
@@ -49,8 +49,15 @@ class Place:
         return [f"dashboard: {self.url}", *token]
 
 
-def parse_place(text: str, environment: Mapping[str, str] = os.environ) -> Place:
+def parse_place(
+    text: str, environment: Mapping[str, str] = os.environ, *, must_be_free: bool = True
+) -> Place:
     """The place that ``[HOST:]PORT`` names; of port 0 any that is free.
+
+    Args:
+        text: what was given.
+        environment: may hold the token.
+        must_be_free: whether a port that is taken is a fault now.
 
     Raises:
         InputError: it is no place, or it is taken.
@@ -59,8 +66,9 @@ def parse_place(text: str, environment: Mapping[str, str] = os.environ) -> Place
     if match is None or int(match["port"]) > 0xFFFF:
         problem = f"{text!r} is no place to listen at"
         raise InputError(Fault(OPTION, "", problem, "give PORT or ADDRESS:PORT; 0 is any port"))
-    host = (match["host"] or "127.0.0.1").strip("[]")
+    host, port = (match["host"] or "127.0.0.1").strip("[]"), int(match["port"])
     access, made = access_for(host, (), read_token(None, environment))
-    with listen(host, int(match["port"]), OPTION) as taken:
-        url, port = url_of(taken, host), int(taken.getsockname()[1])
-    return Place(host, port, url, access.token if made else None)
+    if must_be_free or port == 0:
+        with listen(host, port, OPTION) as taken:
+            port = int(taken.getsockname()[1])
+    return Place(host, port, url_of(host, port), access.token if made else None)
