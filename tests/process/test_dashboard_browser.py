@@ -21,14 +21,15 @@ from tests.process.mission import wait_until
 pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
 
 UAVS = ["uav1", "uav2", "uav3"]
-TASKS = 36
+SIDE = 12
+"""Tasks in a row, and rows of them: enough that none but an abort ends the mission."""
 MISSION = Mission(
     "watched",
     9000.0,
     tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 6.0) for n, u in enumerate(UAVS)),
     tuple(
-        Task(TaskId(f"t{n + 1}"), (24.0 * (n % 6) - 60.0, 25.0 * (1 + n // 6), 0.0), 1.0)
-        for n in range(TASKS)
+        Task(TaskId(f"t{n + 1}"), (10.0 * (n % SIDE - 4), 10.0 * (1 + n // SIDE), 0.0), 1.0)
+        for n in range(SIDE * SIDE)
     ),
     origin=Origin(46.8, 9.7, 1100.0),
 )
@@ -96,6 +97,8 @@ def test_an_operator_sees_and_commands_a_living_fleet_in_a_browser(flown: ByHand
         for uav in ("uav1", "uav2"):
             expect(uav_row(page, uav).locator(".col-does")).to_contain_text("home", timeout=SOON_MS)
         expect(page.locator("#phase")).to_have_text("aborted", timeout=SOON_MS)
+        page.set_viewport_size({"width": 390, "height": 844})
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
         assert watched.faults == []
         assert watched.strangers == []
 

@@ -26,7 +26,9 @@ export function reasonField() {
 export function ask({ title, text, fields = [], confirm, danger = false, send }) {
   return new Promise((resolve) => {
     const fault = make("p", { class: "fault", role: "alert" });
-    const yes = make("button", { type: "submit", class: danger ? "danger" : "primary" }, confirm);
+    // Fields are for who wants them: on a touch screen no keyboard covers half of the question.
+    const touch = window.matchMedia("(pointer: coarse)").matches;
+    const yes = make("button", { type: "submit", class: danger ? "danger" : "primary", autofocus: touch }, confirm);
     const no = make("button", { type: "button", click: () => dialog.close() }, "Cancel");
     const form = make("form", { method: "dialog" },
       make("h2", { id: "dialog-title" }, title), text ? make("p", {}, text) : null, ...fields, fault,

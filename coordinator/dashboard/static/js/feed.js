@@ -34,16 +34,21 @@ export class Feed {
     this.socket = socket;
     this.heardAt = null;
     socket.onmessage = (event) => this.#hear(socket, event.data);
-    socket.onclose = (event) => this.#lose(socket, event.code === WRONG_TOKEN);
+    socket.onclose = (event) => this.#lose(socket, event.code === WRONG_TOKEN && this.given === socket);
   }
 
   /** Gives the token where one is wanted; without one nothing comes. */
   async #introduce(socket) {
     const token = await this.askToken(this.refused ?? false);
     this.refused = false;
-    if (token !== null && socket.readyState === WebSocket.OPEN) {
-      socket.send(JSON.stringify({ type: "token", token }));
-    }
+    if (token === null || socket.readyState !== WebSocket.OPEN) return;
+    this.given = socket;
+    socket.send(JSON.stringify({ type: "token", token }));
+  }
+
+  /** Asks for the token once more, after the person had none. */
+  introduceAgain() {
+    if (this.socket) this.#introduce(this.socket);
   }
 
   #hear(socket, data) {

@@ -13,6 +13,7 @@ export class Header {
     this.parts = TASK_STATES.map((state) => make("i", { class: `task-${state}` }));
     byId("progress").append(...this.parts);
     this.state = "connecting";
+    byId("give-token").addEventListener("click", () => feed.introduceAgain());
     setInterval(() => this.showConnection(), 1000);
   }
 
@@ -87,7 +88,7 @@ export class Header {
     if (head && this.state === "open") {
       if (!head.coordinator && (head.phase === "running" || head.phase === "preparing")) {
         told.push(["warn", head.phase === "running"
-          ? `Coordinator lost. The fleet goes on with epoch ${head.epoch ?? NOTHING}; your commands still reach it.`
+          ? `Coordinator lost. The fleet goes on with epoch ${head.epoch ?? NOTHING}${hello?.kind === "live" ? "; your commands still reach it" : ""}.`
           : "No coordinator yet: the mission has not begun."]);
       }
       if (head.aborted && head.phase !== "ended") told.push(["warn", "The mission is aborted: every UAV flies home."]);
@@ -112,6 +113,7 @@ export class Header {
         : "";
     setText(byId("nothing-text"), text);
     byId("nothing").hidden = text === "";
+    byId("give-token").hidden = !(this.state === "open" && hello?.token && !head);
     document.body.classList.toggle("unheard", !mission);
     document.body.classList.toggle("empty", tasks.size === 0);
   }

@@ -89,11 +89,11 @@ function show(changed) {
 /** Chooses a UAV or a task everywhere on the page; null chooses nothing. */
 function select(kind, id) {
   const of = kind && (kind === "uav" ? picture.uavs : picture.tasks).has(id) ? { kind, id } : null;
+  card.select(of); // first, as it takes room from the lists
   map.select(of?.id ?? null);
   fleet.grid.select(of?.kind === "uav" ? of.id : null, true);
   tasks.grid.select(of?.kind === "task" ? of.id : null, true);
   links.grid.select(of?.kind === "uav" ? of.id : null, true);
-  card.select(of);
   tools.show();
 }
 

@@ -109,7 +109,7 @@ export class MissionMap {
     if (!places.length) return;
     const bounds = window.L.latLngBounds(places.map((position) => this.projection.toLeaflet(position)));
     this.map.invalidateSize({ animate: false });
-    this.map.fitBounds(bounds, { paddingTopLeft: [40, 56], paddingBottomRight: [40, 40], maxZoom: this.projection === PLANE ? 6 : 20, animate: false });
+    this.map.fitBounds(bounds, { paddingTopLeft: [40, 56], paddingBottomRight: [40, this.picture.hello?.kind === "replay" ? 100 : 40], maxZoom: this.projection === PLANE ? 6 : 20, animate: false });
     this.fitted = this.picture.mission?.name ?? null;
     this.#measure();
   }

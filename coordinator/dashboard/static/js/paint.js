@@ -80,7 +80,7 @@ function paintLists(canvas, view, picture, motion, look) {
     canvas.lineWidth = strong ? 2.5 : 1.5;
     if (visited.length && described.start) path(canvas, view, [described.start, ...visited]);
     const uav = picture.uavs.get(id);
-    if (uav?.lost || uav?.does === "home" || uav?.does === "out") continue;
+    if (uav?.lost || uav?.claim === "out") continue;
     const ahead = planned
       .map((task) => picture.tasks.get(task))
       .filter((task) => task && task.state === "open" && task.id !== uav?.task);
