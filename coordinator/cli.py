@@ -269,7 +269,7 @@ def coordinator(
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
 ) -> int:
-    """Plan a mission, brief the agents, start them together and tell them when it is over.
+    """Plan a mission, brief the agents, and start and end it.
 
     Once it has started, the fleet finishes without the coordinator. Started anew, it takes
     charge of the mission that is being flown, as far as agents or its own --state know it.
@@ -376,10 +376,11 @@ def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     from coordinator.export import Firmware
     from coordinator.planner.plan import METHODS
     from coordinator.plot import PLOT_SUFFIXES
+    from swarm.suggest import instead
 
     faults = []
     if method not in METHODS:
-        remedy = f"choose one of {', '.join(METHODS)}"
+        remedy = instead(method, METHODS)
         faults.append(Fault("--method", method, "no such method", remedy))
     if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
@@ -387,7 +388,7 @@ def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
         faults.append(Fault("--plot", str(plot), problem, remedy))
     firmwares = [known.value for known in Firmware]
     if firmware not in firmwares:
-        remedy = f"choose one of {', '.join(firmwares)}"
+        remedy = instead(firmware, firmwares)
         faults.append(Fault("--firmware", firmware, "no such firmware", remedy))
     if faults:
         raise InputError(*faults)

@@ -15,6 +15,7 @@ from sim.mission_command import MethodOption, ReportOption, tell
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, LinkOption, ScenarioArgument, SeedOption, SpeedupOption
+from swarm.suggest import instead
 
 if TYPE_CHECKING:
     from sim.launch.fleet import BusKind
@@ -208,7 +209,7 @@ def run(
         bool, typer.Option("--verbose", help="Show what every process logs, instead of a picture.")
     ] = False,
 ) -> int:
-    """Fly a mission with real processes on this machine and report how it went.
+    """Fly a mission with real processes on this machine, and report.
 
     Starts the bus, the coordinator and, for every UAV, an agent and a simulated autopilot;
     shows the mission live and ends with a report. Exit status 0: every task was done.
@@ -331,5 +332,5 @@ def _bus_kind(text: str) -> BusKind:
     try:
         return BusKind(text)
     except ValueError:
-        remedy = f"choose one of {', '.join(BusKind)}"
+        remedy = instead(text, BusKind)
         raise InputError(Fault("--bus", text, "no such bus", remedy)) from None

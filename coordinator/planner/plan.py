@@ -20,6 +20,7 @@ from swarm.allocation.rules import EXACT_TASKS
 from swarm.clock import Clock
 from swarm.errors import Fault, InputError
 from swarm.model import Mission, Plan
+from swarm.suggest import instead
 
 __all__ = ["METHODS", "ONLINE_METHODS", "check_online_method", "make_plan"]
 
@@ -143,7 +144,7 @@ def check_online_method(method: str) -> None:
     """
     if method not in ONLINE_METHODS:
         problem = "has no decision rule to fly by" if method in METHODS else "no such method"
-        remedy = f"choose one of {', '.join(ONLINE_METHODS)}"
+        remedy = instead(method, ONLINE_METHODS)
         raise InputError(Fault("--method", method, problem, remedy))
 
 

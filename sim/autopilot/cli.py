@@ -18,6 +18,7 @@ from swarm.options import (
     SeedOption,
     SpeedupOption,
 )
+from swarm.suggest import instead
 
 if TYPE_CHECKING:
     from agent.mavlink.signing import SigningKey
@@ -137,10 +138,11 @@ def autopilot(
     json: JsonOption = False,
     lifeline: LifelineOption = False,
 ) -> int:
-    """Simulate the autopilots of a scenario's UAVs, speaking MAVLink 2 like ArduCopter or PX4.
+    """Simulate autopilots that speak MAVLink 2 as firmwares do.
 
-    Prints one JSON object per vehicle with the address to connect to, then runs
-    until interrupted. With --json nothing else is printed.
+    They are those of a scenario's UAVs, like ArduCopter's or PX4's. Prints one JSON object per
+    vehicle with the address to connect to, then runs until interrupted. With --json nothing else
+    is printed.
 
     Examples:
         swarm autopilot table-1
@@ -165,8 +167,8 @@ def autopilot(
     known = [member.id for member in mission.uavs]
     unknown = [name for name in uav or () if name not in known]
     if unknown:
-        remedy = f"the scenario has {', '.join(known)}"
-        raise InputError(*(Fault("--uav", "", f"no UAV {name!r}", remedy) for name in unknown))
+        told = ((name, instead(name, known, "the scenario has")) for name in unknown)
+        raise InputError(*(Fault("--uav", "", f"no UAV {name!r}", what) for name, what in told))
     try:
         endpoint = parse_endpoint(listen)
     except ValueError as error:

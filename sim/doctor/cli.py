@@ -101,7 +101,7 @@ def doctor(
     ] = 5.0,
     json: JsonOption = False,
 ) -> int:
-    """Check everything a flight leans on, and say what to do about what is wrong.
+    """Check all that a flight leans on, and say what to do.
 
     Looks at Python and its packages, the compiled kernels, the machine's clock and limits and
     Zenoh; at the scenario, ports, bus, autopilots, signing key and state folder that are

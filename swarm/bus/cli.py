@@ -54,10 +54,10 @@ def router(
     json: JsonOption = False,
     lifeline: LifelineOption = False,
 ) -> int:
-    """Serve a fleet whose agents and coordinator are clients of one place.
+    """Be the place that a fleet's processes reach each other by.
 
-    Prints one JSON line with the endpoints it really listens on, then serves until
-    SIGTERM (exit status 0) or Ctrl-C (130).
+    Agents and coordinator are clients of it. Prints one JSON line with the endpoints it really
+    listens on, then serves until SIGTERM (exit status 0) or Ctrl-C (130).
 
     Examples:
         swarm router

@@ -112,11 +112,12 @@ def import_tasks(
         ),
     ] = None,
 ) -> int:
-    """Make a scenario of tasks in a QGroundControl plan, a waypoint file, GeoJSON or CSV.
+    """Make a scenario of a plan's waypoints, or of GeoJSON or CSV.
 
-    Every waypoint or point becomes a task, also those within surveys and corridor scans; hold
-    times become service times. Take-off, landing, cameras and the like are left out, and told.
-    The scenario is commented, to be looked over and flown.
+    Reads QGroundControl plans and waypoint files, too. Every waypoint or point becomes a task,
+    also those within surveys and corridor scans; hold times become service times. Take-off,
+    landing, cameras and the like are left out, and told. The scenario is commented, to be looked
+    over and flown.
 
     A CSV has columns lat_deg, lon_deg and maybe alt_m, or east_m, north_m and maybe up_m, and
     any of id, value, service_s, kind and appears_s; GeoJSON has the latter as properties.
@@ -180,10 +181,10 @@ def new(
         ),
     ] = None,
 ) -> int:
-    """Write a new scenario in which every field is explained; it flies as it is.
+    """Write a new scenario in which every field is explained.
 
-    UAVs stand side by side at the origin, tasks lie around them. Change what you like: `swarm
-    plan FILE` tells every fault at its place.
+    It flies as it is. UAVs stand side by side at the origin, tasks lie around them. Change what
+    you like: `swarm plan FILE` tells every fault at its place.
 
     Examples:
         swarm new field.toml
