@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.planner.methods import METHODS, ONLINE_METHODS
+from swarm.complete import among
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
@@ -53,6 +55,7 @@ def plan(
         str,
         typer.Option(
             metavar="METHOD",
+            autocompletion=among(*METHODS),
             help="greedy or lookahead: how UAVs decide; guided: optimised lists; exact: the proven "
             "best lists.",
         ),
@@ -208,7 +211,10 @@ def coordinator(
     method: Annotated[
         str,
         typer.Option(
-            "--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."
+            "--method",
+            metavar="METHOD",
+            help="Decision rule: greedy, lookahead or guided.",
+            autocompletion=among(*ONLINE_METHODS),
         ),
     ] = "guided",
     seed: SeedOption = 0,
@@ -374,7 +380,6 @@ def coordinator(
 def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     """Refuse what cannot be done before any work is done."""
     from coordinator.export import Firmware
-    from coordinator.planner.plan import METHODS
     from coordinator.plot import PLOT_SUFFIXES
     from swarm.suggest import instead
 

@@ -12,6 +12,7 @@ import typer
 
 from coordinator.recording.options import RecordOption, check_new_recording
 from sim.mission_command import MethodOption, ReportOption, tell
+from swarm.complete import among
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, LinkOption, ScenarioArgument, SeedOption, SpeedupOption
@@ -33,6 +34,7 @@ def run(
         typer.Option(
             "--bus",
             metavar="auto|mesh|router",
+            autocompletion=among("auto", "mesh", "router"),
             help="How the processes reach each other; auto takes a mesh for small fleets.",
         ),
     ] = "auto",
@@ -53,6 +55,7 @@ def run(
         typer.Option(
             "--autopilot",
             metavar="sim|sim-px4|ardupilot|px4|URL,…",
+            autocompletion=among("sim", "sim-px4", "ardupilot", "px4"),
             help="What flies: an autopilot simulated like ArduCopter or like PX4, real firmware "
             "in software-in-the-loop (PX4 1.16 or newer), or vehicles that run already, one URL "
             "for each UAV in the scenario's order or as UAV=URL; #ID at its end is the vehicle's "

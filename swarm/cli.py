@@ -34,6 +34,8 @@ from swarm.help import Panels, explain_family, help_text
 __all__ = ["COMMAND_GROUP", "console_main", "main"]
 
 COMMAND_GROUP = "peckorder.commands"
+_COMPLETE = "_SWARM_COMPLETE"
+"""Environment variable by which shells, and the library, ask for completions."""
 _DONE, _FAILED, _WRONG_USAGE, _INTERRUPTED = 0, 1, 2, 130
 _CHOICE = re.compile(r"'([^']*)' is not one of (.+)")
 _HELP = """Task allocation for fleets of UAVs: plan, simulate and fly.
@@ -106,12 +108,17 @@ def _installed_commands() -> dict[str, EntryPoint]:
 
 
 def _run(arguments: list[str], commands: Mapping[str, EntryPoint]) -> int:
+    if len(arguments) == 2 and arguments[0] == "--show-completion":
+        # The library knows the shell it runs in, and takes no name of another one.
+        os.environ[_COMPLETE] = f"source_{arguments.pop()}"
+    completing = _COMPLETE in os.environ
     name = next((word for word in arguments if not word.startswith("-")), None)
     if name is not None and name not in commands:
         raise InputError(_unknown_command(name, commands))
-    completing = "_SWARM_COMPLETE" in os.environ
+    if completing:
+        name = next((word for word in _typed() if word in commands), None)
     app = _application()
-    if name is not None and not completing:
+    if name is not None:
         _register(app, name, commands[name].load())
     else:
         for other, entry in commands.items():
@@ -130,6 +137,13 @@ def _run(arguments: list[str], commands: Mapping[str, EntryPoint]) -> int:
     if not isinstance(result, int):
         raise TypeError(f"command {name} must return an exit status or None, not {result!r}")
     return int(result)
+
+
+def _typed() -> list[str]:
+    """Words behind ``swarm`` on the line that a shell wants completed."""
+    environment = os.environ
+    line = environment.get("_TYPER_COMPLETE_ARGS") or environment.get("COMP_WORDS") or ""
+    return line.split()[1:]
 
 
 def _application() -> typer.Typer:

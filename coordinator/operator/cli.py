@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.operator.completing import complete_uav
 from swarm.config import Link
 from swarm.errors import Fault, InputError, SwarmError
 from swarm.options import (
@@ -33,7 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = ["abort", "hold", "resume", "return_home", "task"]
 
-UavArgument = Annotated[str, typer.Argument(metavar="UAV", help="Id of the UAV.")]
+UavArgument = Annotated[
+    str, typer.Argument(metavar="UAV", help="Id of the UAV.", autocompletion=complete_uav)
+]
 ReasonOption = Annotated[
     str,
     typer.Option(
