@@ -207,7 +207,7 @@ AltOption = Annotated[
 @task.command("add", help=_ADD_HELP, short_help="Add a task.")
 def add(
     name: Annotated[
-        str | None, typer.Argument(metavar="[ID]", help="Default: the next free one.")
+        str | None, typer.Argument(metavar="ID", help="Default: the next free one.")
     ] = None,
     position: Annotated[
         str | None,

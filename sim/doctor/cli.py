@@ -18,7 +18,7 @@ from swarm.options import (
     ConnectOption,
     JsonOption,
     ListenOption,
-    MaybeScenarioArgument,
+    OptionalScenarioArgument,
 )
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ _DEFAULT_UAVS = 3
 
 
 def doctor(
-    scenario: MaybeScenarioArgument = None,
+    scenario: OptionalScenarioArgument = None,
     mission: Annotated[
         str | None,
         typer.Option(
