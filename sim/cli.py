@@ -207,6 +207,15 @@ def run(
     ] = None,
     report: ReportOption = None,
     record: RecordOption = None,
+    logs: Annotated[
+        Path | None,
+        typer.Option(
+            "--logs",
+            metavar="DIR",
+            help="Keep what every process logs: a file of JSON lines each, in that folder.",
+            show_default=False,
+        ),
+    ] = None,
     json: JsonOption = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Show what every process logs, instead of a picture.")
@@ -220,7 +229,7 @@ def run(
 
     Examples:
         swarm run table-1
-        swarm run valley-survey --speedup 20 --report flight.md
+        swarm run valley-survey --speedup 20 --report flight.md --logs logs
         swarm run valley-survey --dashboard 8080
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
@@ -230,6 +239,7 @@ def run(
         swarm run table-1 --json
     """
     import asyncio
+    import contextlib
     import os
     import sys
 
@@ -245,9 +255,10 @@ def run(
     from sim.launch.fence import fence_around
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
+    from sim.launch.kept_logs import KeptLogs
     from sim.launch.run import fly
     from swarm.config import preset
-    from swarm.log import LogLevel, configure_logging
+    from swarm.log import LogFormat, LogLevel, configure_logging
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
 
@@ -285,13 +296,19 @@ def run(
         autopilots=autopilots,
         handed_on=handed_on,
         dashboard=None if dashboard is None else parse_place(dashboard),
+        log_format=LogFormat.AUTO if logs is None else LogFormat.JSON,
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.
     console = Console(stderr=True, force_terminal=False if verbose else None)
 
+    kept = None if logs is None else KeptLogs(logs, console.print)
+
     def log(name: str, line: str) -> None:
-        print(f"{name}: {line}", file=sys.stderr)
+        if kept is not None:
+            kept.write(name, line)
+        if verbose:
+            print(f"{name}: {line}", file=sys.stderr)
 
     for line in () if options.dashboard is None else options.dashboard.lines:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
@@ -300,6 +317,7 @@ def run(
         about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))
         try:
             with (
+                kept or contextlib.nullcontext(),
                 recording_or_none(record, about, wall_ns(), console.print) as recorder,
                 LiveView(console, speedup=speedup) as view,
             ):
@@ -307,7 +325,7 @@ def run(
                     mission,
                     options,
                     on_frame=view.update,
-                    on_log=log if verbose else None,
+                    on_log=log if verbose or kept else None,
                     recorder=recorder,
                 )
         except asyncio.CancelledError:

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sim.autopilot.flavours import FlavourName
+from swarm.log import LogFormat, LogLevel, configure_logging, get_logger
 from swarm.options import (
     JsonOption,
     LifelineOption,
+    LogFormatOption,
+    LogLevelOption,
     ScenarioArgument,
     SeedOption,
     SpeedupOption,
@@ -137,6 +140,8 @@ def autopilot(
     ] = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
+    log_level: LogLevelOption = LogLevel.INFO,
+    log_format: LogFormatOption = LogFormat.AUTO,
 ) -> int:
     """Simulate autopilots that speak MAVLink 2 as firmwares do.
 
@@ -164,6 +169,7 @@ def autopilot(
     from swarm.scenario import load_scenario
 
     mission = load_scenario(scenario)
+    configure_logging(log_level, log_format, mission=mission.name)
     known = [member.id for member in mission.uavs]
     unknown = [name for name in uav or () if name not in known]
     if unknown:
@@ -215,7 +221,6 @@ async def _serve(
     """Serve every vehicle until cancelled."""
     import asyncio
     import json
-    import sys
 
     from sim.autopilot.faulty_vehicle import FaultyVehicle
     from sim.autopilot.flavours import flavour_of
@@ -247,7 +252,9 @@ async def _serve(
             print(json.dumps(line), flush=True)
         if not quiet:
             flown = f"{len(fleet)} simulated vehicle{'s' if len(fleet) > 1 else ''}"
-            print(f"{flown} at {speedup:g} times wall speed; Ctrl-C ends.", file=sys.stderr)
+            names = ", ".join(member.uav for member in fleet)
+            text = f"{flown} at {speedup:g} times wall speed; Ctrl-C ends"
+            get_logger("autopilot").info(text, uavs=names)
         await asyncio.Event().wait()
     finally:
         for server in servers:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import json as json_format
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -93,12 +92,13 @@ def router(
 
 async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
     from swarm.bus.router import open_router
+    from swarm.log import get_logger
 
     serving = await open_router(settings)
     try:
         print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
         if not quiet:
-            print(f"router ready at {', '.join(serving.endpoints)}", file=sys.stderr, flush=True)
+            get_logger("router").info(f"router ready at {', '.join(serving.endpoints)}")
         await asyncio.Event().wait()
         return 0
     finally:
