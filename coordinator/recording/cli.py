@@ -72,10 +72,10 @@ def record(
 ) -> int:
     """Record a mission that is flown elsewhere.
 
-    Joins as an onlooker, until the mission is over or Ctrl-C; nobody flies any differently for it. Everything that is said goes
-    into the file, with a map, a scene and curves for Foxglove. After every second the file is
-    whole, whatever happens then. Exit status 1: nobody flies a mission, or not everything
-    could be written.
+    Joins as an onlooker, until the mission is over or Ctrl-C; nobody flies any differently for
+    it. Everything that is said goes into the file, with a map, a scene and curves for Foxglove.
+    After every second the file is whole, whatever happens then. Exit status 1: nobody flies a
+    mission, or not everything could be written.
 
     Examples:
         swarm record flight.mcap
