@@ -230,7 +230,8 @@ class Layout:
         return ["--flavour", autopilots.flavour] if isinstance(autopilots, Simulated) else []
 
     def _log(self) -> list[str]:
-        return ["--log-format", self._options.log_format]
+        form = self._options.log_format
+        return [] if form is LogFormat.AUTO else ["--log-format", form]
 
     def _speed(self) -> list[str]:
         return ["--speedup", repr(self._options.speedup)]
