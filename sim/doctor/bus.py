@@ -19,7 +19,7 @@ from sim.doctor.machine import check_port
 from sim.doctor.probes import listen_problem, port_holder
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology, bus_config
 from swarm.bus.endpoints import free_loopback_endpoints
-from swarm.bus.port import Bus, LinkUp, TokenSeen
+from swarm.bus.port import Bus, LinkUp, Query, TokenSeen
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.errors import SwarmError
 from swarm.wire.keys import ANY_TOKEN, Keys, mission_of_token
@@ -92,8 +92,6 @@ async def check_zenoh() -> Finding:
 
 
 async def _answer(bus: Bus) -> None:
-    from swarm.bus.port import Query
-
     while True:
         await bus.inbox.wait()
         for event in bus.inbox.take():
