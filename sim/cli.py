@@ -315,7 +315,7 @@ def run(
             console.print("interrupted: the mission was given up and every process ended")
             raise
         told = MissionReport(
-            mission=mission,
+            mission=flight.observer.mission,
             plan=flight.plan,
             result=flight.result,
             story=tuple(flight.observer.story),
@@ -443,7 +443,7 @@ def simulate(
         print(f"broken: {verdict.broken}", file=sys.stderr)
     world = verdict.world
     told = MissionReport(
-        mission=world.mission,
+        mission=world.observer.mission,
         plan=world.observer.plan,
         result=world.observer.result(),
         story=tuple(world.observer.story),
