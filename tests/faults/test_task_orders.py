@@ -150,6 +150,11 @@ SCHEDULES = {
         16 crash coordinator for 2 with none
         17 add by 0.5
     """,
+    "added before a coordinator forgets all and its clock goes back": """
+        fleet seed=82075 uavs=2 tasks=8 popups=0 topology=router method=greedy standby=yes
+        12 add by 1
+        18.7 crash coordinator for 0.2 with past
+    """,
     "added before the start, and a pop-up withdrawn before it appears": """
         fleet seed=6 uavs=3 tasks=6 popups=2 topology=router method=greedy standby=yes
         0 add by 0.2

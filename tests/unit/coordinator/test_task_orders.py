@@ -7,10 +7,10 @@ from dataclasses import replace
 from coordinator.briefing import brief_of, differences
 from coordinator.events import Withdraw
 from coordinator.postings import Postings
-from swarm.events import LinkChanged
+from swarm.events import LinkChanged, Publish
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.state.registers import Replica
-from swarm.wire.messages import Board, Brief, EpochPhase, Message, Snapshot
+from swarm.wire.messages import Board, Brief, Epoch, EpochPhase, Message, Snapshot
 from tests.builders import (
     MISSION,
     done,
@@ -170,9 +170,12 @@ def test_one_that_briefed_too_early_takes_the_run_of_the_flight_that_is_on() -> 
     added = message(OPERATOR, order("op1", run=77))
     echo = Snapshot(MISSION, "u9", 7, 20.0, (message(COORDINATOR, own, 1, 600),))
     coordinator.answers = [agents_answer(added), echo]
-    coordinator.see("u0")
+    actions = coordinator.see("u0")
 
     assert said(coordinator.log, Brief)[-1].run == 77
+    resumed = [a.message.body for a in actions if isinstance(a, Publish)]
+    kinds = [type(body) for body in resumed]
+    assert kinds.index(Brief) < kinds.index(Epoch), "nobody in charge is known by the other run"
     assert set(coordinator.core.replica.board) == {"t0", "op1"}
 
 
