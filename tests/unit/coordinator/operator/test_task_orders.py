@@ -327,6 +327,17 @@ def test_after_the_end_nothing_is_taken_up() -> None:
     assert came(desk.give(Withdrawal("t0"))) == (Result.NOT_OBEYED, text)
 
 
+def test_a_mission_that_ends_by_what_was_ordered_has_obeyed() -> None:
+    over = epoch("u0", "u1", phase=EpochPhase.ENDED, number=2)
+    desk = Desk()
+    added, gone = desk.give(HERE), desk.give(Withdrawal("t0"))
+    desk.hear("u0", done("op1"))
+    desk.hear(COORDINATOR, over)
+
+    assert came(added) == (Result.OBEYED, "op1 was added and is done")
+    assert came(gone) == (Result.OBEYED, "t0 is withdrawn")
+
+
 def test_when_the_brief_turns_out_to_be_of_another_run_it_says_so_anew() -> None:
     desk = Desk()
     errand = desk.give(HERE)
