@@ -360,6 +360,10 @@ class CoordinatorCore:
             self._replanning.begin(None, {}, now_s)
             epoch = replace(epoch, mission_s=self._mission_s(now_s))
         self._speech.outdo(theirs)
+        brief, own = heritage.replica.brief, self.replica.brief
+        if brief is not None and own is not None and own.run != brief.run:
+            # Before others take the one that it began for that of who is in charge.
+            self._say(brief)
         bodies = [message.body for message in theirs if not isinstance(message.body, Epoch)]
         self._actions += self._speech.restate(bodies if epoch is None else [epoch, *bodies])
         self._actions.append(Note("resumes the mission", {"mission_s": self._mission_s(now_s)}))

@@ -262,10 +262,7 @@ def add(
 
     check_words(reason, ("--mission", mission), ("ID", name), ("--kind", kind))
     place = _place(position, lat_deg, lon_deg, alt_m)
-    try:
-        wish = NewTask(place, name, value, service_s, kind, reason)
-    except ValueError as error:
-        raise InputError(Fault("swarm task add", "", str(error), "see --help")) from error
+    wish = NewTask(place, name, value, service_s, kind, reason)
     reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
     return _order("add", wish, reach, json=json)
 

@@ -218,14 +218,11 @@ class Ordering:
             return None
         if known.stamp != said.stamp:
             other = known.body
-            done = isinstance(other, TaskOrder) and other.withdrawn
-            text = (
-                f"another operator has {'withdrawn' if done else 'changed'} {order.task} meanwhile"
-            )
-            return Verdict(Result.NOT_OBEYED, text)
-        if self._is_over:
-            text = f"the mission has ended meanwhile: nothing more comes of {order.task}"
-            return Verdict(Result.NOT_OBEYED, text)
+            gone = isinstance(other, TaskOrder) and other.withdrawn
+            did = f"{'withdrawn' if gone else 'changed'} {order.task}"
+            return Verdict(Result.NOT_OBEYED, f"another operator has {did} meanwhile")
+        if self._is_over and (verdict := self._in_the_end(order)) is not None:
+            return verdict
         silent = sorted(self._expected - self.known_to)
         everyone = not silent and bool(self.known_to)
         if not (everyone or late):
@@ -242,6 +239,15 @@ class Ordering:
             return verdict
         unsure = f"{', '.join(silent)} {'have' if len(silent) > 1 else 'has'} not confirmed it yet"
         return Verdict(verdict.result, f"{verdict.text}; {unsure}")
+
+    def _in_the_end(self, order: TaskOrder) -> Verdict | None:
+        """What is told when the mission has ended, maybe for what was ordered."""
+        if order.withdrawn:
+            return self._gone(order)
+        if self._observer.board.states.get(order.task) is TaskState.DONE:
+            return Verdict(Result.OBEYED, f"{order.task} was added and is done")
+        text = f"the mission has ended meanwhile: nothing more comes of {order.task}"
+        return Verdict(Result.NOT_OBEYED, text)
 
     def _taken(self, order: TaskOrder, now_s: float, late: bool) -> Verdict | None:
         """What is told of a task that is on the board; None to look a little longer."""
