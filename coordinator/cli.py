@@ -254,6 +254,16 @@ def coordinator(
     link: LinkOption = Link.NORMAL,
     lease_s: LeaseOption = None,
     speedup: SpeedupOption = 1.0,
+    dashboard: Annotated[
+        str | None,
+        typer.Option(
+            "--dashboard",
+            metavar="[ADDRESS:]PORT",
+            help="Also show the mission in a browser, by a process of its own that ends with "
+            "this one; 0: any port that is free. See swarm dashboard.",
+            show_default=False,
+        ),
+    ] = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
@@ -270,12 +280,15 @@ def coordinator(
         swarm coordinator table-1
         swarm coordinator valley-survey --connect tcp/192.168.1.2:7447 --state /var/lib/peckorder
         swarm coordinator valley-survey --connect tcp/192.168.1.2:7447 --standby
+        swarm coordinator valley-survey --dashboard 8080
     """
     import asyncio
     from json import dumps
 
     from coordinator.briefing import FlightLayers
     from coordinator.core import CoordinatorCore
+    from coordinator.dashboard.keeper import page_beside
+    from coordinator.dashboard.place import parse_place
     from coordinator.plan_report import plan_as_json
     from coordinator.planner.plan import check_online_method, make_plan
     from coordinator.service import Service
@@ -315,6 +328,18 @@ def coordinator(
             memory_age_s=memory_age_s,
         )
 
+    place = None if dashboard is None else parse_place(dashboard, must_be_free=False)
+    page = page_beside(
+        place,
+        mission.name,
+        bus=bus,
+        connect=connect or (),
+        link=link,
+        lease_s=lease_s,
+        speedup=speedup,
+    )
+    for line in () if place is None else place.lines:
+        print(line, file=sys.stderr)
     store = None if state is None else Store(state, mission.name, COORDINATOR, speedup=speedup)
     service = Service(
         mission=mission,
@@ -327,13 +352,17 @@ def coordinator(
         store=store,
     )
 
-    async def work() -> int:
+    async def coordinate() -> int:
         if standby:
             return await service.stand_by()
         status, stood_down = await service.coordinate()
         if stood_down is not None:
             print(f"{stood_down}; add --standby to wait for its loss", file=sys.stderr)
         return status
+
+    async def work() -> int:
+        async with page:
+            return await coordinate()
 
     try:
         return asyncio.run(run_until_stopped(work(), lifeline=lifeline))

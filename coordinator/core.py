@@ -21,7 +21,7 @@ from coordinator.beginning import Beginning, Verdict
 from coordinator.briefing import FlightLayers, brief_of, differences
 from coordinator.ending import Ending
 from coordinator.events import Action, Event, PlanFailed, PlanMade, Replanned, Withdraw
-from coordinator.heritage import Heritage, inherit, statements
+from coordinator.heritage import Heritage, inherit, statements, without_life
 from coordinator.inquiry import Inquiry
 from coordinator.planner.live import Situation
 from coordinator.postings import Postings, exit_status
@@ -310,9 +310,10 @@ class CoordinatorCore:
         come as far lives they are not outdone, or the two would outbid each other for ever
         instead of one giving way.
         """
-        heritage = inherit(snapshots)
-        theirs = statements(heritage.replica.messages())
         mine, started = self._speech.incarnation, self._zero_s is not None
+        # Who has only begun a flight takes the brief of the one that runs for its own.
+        heritage = inherit(snapshots if started else without_life(snapshots, mine))
+        theirs = statements(heritage.replica.messages())
         newer = [m for m in theirs if m.stamp.incarnation > mine]
         equals = any(standing_of(other) is self._standing for other in others)
         if equals and (newer or any(m.stamp.incarnation > mine for m in self._overheard)):

@@ -6,7 +6,7 @@ Leaves out: what it makes of that (coordinator.core).
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median_high
 
 from swarm.model.ids import COORDINATOR
@@ -14,7 +14,7 @@ from swarm.state.commands import aborted
 from swarm.state.registers import Replica
 from swarm.wire.messages import EpochPhase, Message, Snapshot
 
-__all__ = ["Heritage", "inherit", "statements"]
+__all__ = ["Heritage", "inherit", "statements", "without_life"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +63,18 @@ def inherit(
         replica.join_all(memory.messages)
         mission_s = memory.mission_s if mission_s is None else mission_s
     return Heritage(replica, mission_s)
+
+
+def without_life(snapshots: Iterable[Snapshot], incarnation: int) -> list[Snapshot]:
+    """``snapshots`` without what the coordinator of that life has said."""
+
+    def counts(message: Message) -> bool:
+        return message.writer != COORDINATOR or message.stamp.incarnation != incarnation
+
+    return [
+        replace(snapshot, messages=tuple(filter(counts, snapshot.messages)))
+        for snapshot in snapshots
+    ]
 
 
 def statements(messages: Iterable[Message]) -> list[Message]:

@@ -127,6 +127,10 @@ class Observer:
         makes nothing."""
         self._chosen: set[tuple[str, Stamp]] = set()
         """Which those are."""
+        self.cut_since_s: float | None = None
+        """When the own link to the bus went down [s of ``now_s``]; None while it is up."""
+        self.pace = 1.0
+        """Mission seconds per second of ``now_s``; see `keep_time`."""
         self._membership = Membership(timing)
         self._zero_s: float | None = None
         self._orphans: dict[str, str] = {}
@@ -169,7 +173,7 @@ class Observer:
             case Learned(snapshots):
                 for snapshot in snapshots:
                     if self._zero_s is None and snapshot.mission_s is not None:
-                        self._zero_s = now_s - snapshot.mission_s
+                        self._zero_s = now_s - snapshot.mission_s / self.pace
                     for message in snapshot.messages:
                         self._hear(message, now_s)
                 self._membership.expect(self.replica.claims, now_s)
@@ -182,6 +186,8 @@ class Observer:
                 self._membership.gone(writer, now_s)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
+                if up or self.cut_since_s is None:
+                    self.cut_since_s = None if up else now_s
                 ask |= up
             case _:
                 pass
@@ -213,7 +219,29 @@ class Observer:
 
     def mission_s(self, now_s: float) -> float | None:
         """Mission time; None before the start."""
-        return None if self._zero_s is None else now_s - self._zero_s
+        return None if self._zero_s is None else (now_s - self._zero_s) * self.pace
+
+    def keep_time(self, now_s: float, mission_s: float, pace: float) -> None:
+        """Follow a mission whose time runs otherwise than the own clock.
+
+        Args:
+            now_s: time of the own clock [s].
+            mission_s: mission time then [s].
+            pace: mission seconds per second of the own clock; > 0.
+        """
+        self.pace = pace
+        self._zero_s = now_s - mission_s / pace
+
+    def silent_s(self, uav: str, now_s: float) -> float | None:
+        """How long one that is there has said nothing, once that is half of what gives it up [s].
+
+        While the own link is down nothing is heard of anybody, which says nothing of them.
+        """
+        heard_s = self.heard_s.get(uav)
+        if heard_s is None or uav not in self.present or self.cut_since_s is not None:
+            return None
+        silent_s = now_s - heard_s
+        return silent_s if silent_s >= self._timing.silence_s / 2.0 else None
 
     @property
     def phase(self) -> EpochPhase:
@@ -399,7 +427,7 @@ class Observer:
         if epoch.phase is EpochPhase.RUNNING and course not in self._epochs:
             self._epochs.add(course)
             if self._zero_s is None:
-                self._zero_s = now_s - epoch.mission_s
+                self._zero_s = now_s - epoch.mission_s / self.pace
             order = " > ".join(epoch.sequence)
             why = f" ({epoch.reason})" if epoch.number > 1 and epoch.reason else ""
             self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}{why}", now_s)

@@ -191,6 +191,16 @@ def run(
             show_default=False,
         ),
     ] = None,
+    dashboard: Annotated[
+        str | None,
+        typer.Option(
+            "--dashboard",
+            metavar="[ADDRESS:]PORT",
+            help="Also show the run in a browser, and let an operator step in there, until it "
+            "ends; 0: any port that is free. See swarm dashboard.",
+            show_default=False,
+        ),
+    ] = None,
     report: ReportOption = None,
     record: RecordOption = None,
     json: JsonOption = False,
@@ -207,6 +217,7 @@ def run(
     Examples:
         swarm run table-1
         swarm run valley-survey --speedup 20 --report flight.md
+        swarm run valley-survey --dashboard 8080
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
         swarm run meadow --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
@@ -220,6 +231,7 @@ def run(
 
     from rich.console import Console
 
+    from coordinator.dashboard.place import parse_place
     from coordinator.planner.plan import check_online_method
     from coordinator.recording.flight_recorder import recording_or_none, wall_ns
     from coordinator.recording.recorder import About
@@ -268,6 +280,7 @@ def run(
         link=link,
         autopilots=autopilots,
         handed_on=handed_on,
+        dashboard=None if dashboard is None else parse_place(dashboard),
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.
@@ -275,6 +288,9 @@ def run(
 
     def log(name: str, line: str) -> None:
         print(f"{name}: {line}", file=sys.stderr)
+
+    for line in () if options.dashboard is None else options.dashboard.lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     async def work() -> int:
         about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))

@@ -105,6 +105,7 @@ def simulate(
         swarm simulate valley-survey --speed-sd 0.1 --leg-sd 0.1 --wind 5
         swarm simulate valley-survey --message-loss 0.2 --delay-s 0.05 --jitter-s 0.05
         swarm simulate valley-survey --faults cut,crash --seed 7
+        swarm simulate valley-survey --loss 0.3 --record flight.mcap
         swarm simulate --from flight.mcap
     """
     if recording is not None:
@@ -168,7 +169,7 @@ def simulate(
             )
             return tell(told, json=json, report=report)
     if record is not None:
-        problem, remedy = "goes without --faults only", "leave one of them out"
+        problem, remedy = "does not go with --faults", "leave one of them out"
         raise InputError(Fault("--record", str(record), problem, remedy))
     if uncertainty != beside_faults or coordinator_lost_s is not None:
         problem = "goes with --loss, --popup and --popup-rate only"

@@ -246,17 +246,12 @@ async def sit(
     patience_s: float,
 ) -> tuple[str, OperatorSeat]:
     """Take a seat on the bus and say what is wanted; the mission's name, and the seat."""
+    from coordinator.joining import joined, onlooking
     from coordinator.operator.seat import OperatorSeat
-    from coordinator.status.onlooker import only_mission
-    from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import incarnation
-    from swarm.events import BusFact, Wish
     from swarm.model.ids import OPERATOR
-    from swarm.shell import Shell, take_seat
 
-    bus = await open_zenoh_bus(config, timeout_s=patience_s)
-    try:
-        mission = name or await only_mission(bus, patience_s)
+    async with joined(name, config, patience_s) as (mission, bus):
         seat = OperatorSeat(
             mission,
             wish,
@@ -264,18 +259,5 @@ async def sit(
             timing=timing,
             patience_s=patience_s * clock.speedup,
         )
-        shell: Shell[BusFact, Wish] = Shell(
-            seat,
-            bus,
-            clock,
-            mission=mission,
-            name=OPERATOR,
-            from_bus=lambda fact: fact,
-            execute=lambda _: None,
-            snapshot=None,
-        )
-        take_seat(bus, mission, None, status=True)
-        await shell.run()
+        await onlooking(seat, bus, clock, mission, OPERATOR).run()
         return mission, seat
-    finally:
-        bus.close()

@@ -23,6 +23,7 @@ may have them.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Protocol
 
 from coordinator.observer import Observer
@@ -135,11 +136,8 @@ class Errands:
         if isinstance(body, Verdict):
             errand.verdict = body
             return errand
-        for message in observer.replica.messages({OPERATOR}):
-            self._voice.outdo(message.stamp)
-        errand.said = self._voice.say(body)
-        observer.take_note(errand.said, now_s)
-        errand.leave_at_s, errand.again_at_s = now_s + self._patience_s, now_s
+        self._say(errand, body, now_s)
+        errand.leave_at_s = now_s + self._patience_s
         if deed.asks:
             errand.ask_at_s = now_s + self._timing.ask_gap_s
         self.open.append(errand)
@@ -150,7 +148,7 @@ class Errands:
         wishes: list[Wish] = []
         asks = False
         for errand in self.open:
-            said = errand.said
+            said = self._said_for_this_run(errand, now_s)
             if said is None:
                 continue
             errand.deed.heed(fact, said)
@@ -164,6 +162,24 @@ class Errands:
             errand.verdict = errand.deed.judge(said, now_s, late=late)
         self.open = [errand for errand in self.open if errand.verdict is None]
         return [*wishes, Ask()] if asks else wishes
+
+    def _say(self, errand: Errand, body: Command | TaskOrder, now_s: float) -> Message:
+        """State ``body`` above all that is known of any operator."""
+        for message in self._observer.replica.messages({OPERATOR}):
+            self._voice.outdo(message.stamp)
+        said = self._voice.say(body)
+        self._observer.take_note(said, now_s)
+        errand.said, errand.again_at_s = said, now_s
+        return said
+
+    def _said_for_this_run(self, errand: Errand, now_s: float) -> Message | None:
+        """What was said; anew, if the brief turns out to be of another run than it was told of."""
+        said, brief = errand.said, self._observer.replica.brief
+        if said is None or brief is None or not isinstance(said.body, Command | TaskOrder):
+            return said
+        if said.body.run == brief.run:
+            return said
+        return self._say(errand, replace(said.body, run=brief.run), now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick; None while nothing is open."""

@@ -1,7 +1,6 @@
 """The story of one task or one UAV of a recorded mission: what happened, why, and what came of it.
 
-Leaves out: finding what happened (coordinator.recording.chronicle) and printing it
-(coordinator.recording.cli).
+Leaves out: finding what happened (coordinator.recording.chronicle).
 """
 
 from __future__ import annotations
@@ -11,18 +10,24 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from coordinator.observer import MissionResult, Observer
+from rich.console import Console, Group
+from rich.table import Table
+from rich.text import Text
+
+from coordinator.dashboard.progress import progress_of
+from coordinator.observer import Observer
 from coordinator.recording.chronicle import Event, chronicle
 from coordinator.recording.reader import Recording
 from coordinator.recording.sentences import seconds
-from coordinator.view.story import shown_s, shown_value
+from coordinator.view.signs import BAD
+from coordinator.view.story import clean, shown_s, shown_value
 from swarm.errors import Fault, InputError
-from swarm.model import TaskId, UavId
 from swarm.state.board import TaskState
-from swarm.wire.messages import Result
+from swarm.wire.messages import Result, StatusPhase
 
 __all__ = ["Explanation", "explain_task", "explain_uav"]
 
+_TROUBLE = ("failed", "lost")
 _MOST_NAMED = 12
 _MOST_PASSED_OVER = 3
 """Choices that passed a task over are told so often; of more only the number."""
@@ -46,14 +51,18 @@ class Explanation:
     ending: str
     """The same in a sentence."""
 
-    def lines(self) -> list[str]:
-        """For people."""
+    def render(self, console: Console) -> None:
+        """Print it for people, in the width of ``console``."""
         noun = "Task" if self.subject == "task" else "UAV"
-        told = [f"{noun} {self.id} of mission {self.mission}", ""]
+        story = Table.grid(padding=(0, 2, 0, 0))
+        story.add_column(justify="right", no_wrap=True, style="dim")
+        story.add_column()
         for event in self.events:
             when = "start-up" if event.mission_s is None else f"{shown_s(event.mission_s)} s"
-            told.append(f"{when:>9}  {event.text}")
-        return [*told, "", self.ending]
+            story.add_row(when, Text(clean(event.text), BAD if event.kind in _TROUBLE else ""))
+        title = Text(f"{noun} {self.id} of mission {self.mission}", "bold")
+        ending = Text(clean(self.ending), "bold")
+        console.print(Group(title, "", story, "", ending) if self.events else Group(title, ending))
 
     def as_json(self) -> dict[str, Any]:
         """For programs, ready for `json.dumps`."""
@@ -88,15 +97,13 @@ def explain_task(recording: Recording, task: str) -> Explanation:
     states = observer.board.states
     if task not in states:
         raise _unknown(recording, "--task", task, states)
-    result = observer.result()
-    worth = _worth(observer, result).get(task, 0.0)
+    objective = observer.result().executed_objective
+    by, at_s, worth = _worths(observer).get(task, ("", 0.0, 0.0))
     events = _without_most_passings([event for event in told.events if task in event.tasks], task)
-    state, share = states[task], _share(worth, result.executed_objective)
+    state, share = states[task], _share(worth, objective)
     match state:
         case TaskState.DONE:
-            by = _doer(result, task)
-            at = seconds(result.executed_completion_s[TaskId(task)])
-            ending = f"So {task} was done by {by} at {at}. That is worth {share}."
+            ending = f"So {task} was done by {by} at {seconds(at_s)}. That is worth {share}."
         case TaskState.FAILED:
             ending = f"So {task} failed, and is worth nothing."
         case TaskState.WITHDRAWN:
@@ -112,7 +119,7 @@ def explain_task(recording: Recording, task: str) -> Explanation:
         events=events,
         state=state.value,
         worth=worth,
-        objective=result.executed_objective,
+        objective=objective,
         ending=ending,
     )
 
@@ -128,10 +135,9 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
     fleet = [each.id for each in observer.mission.uavs]
     if uav not in fleet:
         raise _unknown(recording, "--uav", uav, fleet)
-    result = observer.result()
-    worths = _worth(observer, result)
-    mine = [task for task in result.executed_routes[UavId(uav)] if _doer(result, task) == uav]
-    worth = sum(worths[task] for task in mine)
+    objective = observer.result().executed_objective
+    mine = {task: worth for task, (who, _, worth) in _worths(observer).items() if who == uav}
+    worth = sum(mine.values())
     failed = [
         task
         for (who, task), outcome in observer.replica.outcomes.items()
@@ -141,10 +147,11 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
         state, how = "lost", "was lost"
     elif uav in observer.present:
         state, how = "there", "was there to the end"
+    elif (status := observer.statuses.get(uav)) and status.phase is StatusPhase.HOME:
+        state, how = "home", "came home"
     else:
         state, how = "gone", "had left by the end"
-    done = f"did {_named(mine)}, worth {_share(worth, result.executed_objective)}"
-    did = done if mine else "did no task"
+    did = f"did {_named(list(mine))}, worth {_share(worth, objective)}" if mine else "did no task"
     but = f", failed at {_named(failed)}" if failed else ""
     return Explanation(
         mission=recording.mission,
@@ -153,7 +160,7 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
         events=tuple(event for event in told.events if uav in event.uavs),
         state=state,
         worth=worth,
-        objective=result.executed_objective,
+        objective=objective,
         ending=f"So {uav} {did}{but}, and {how}.",
     )
 
@@ -179,21 +186,19 @@ def _without_most_passings(events: Sequence[Event], task: str) -> tuple[Event, .
     return tuple(kept)
 
 
-def _doer(result: MissionResult, task: str) -> str:
-    """Whose visit to a task that was done counts: the first that ended, as J has it."""
-    visitors = [uav for uav, tasks in result.executed_routes.items() if task in tasks]
-    return visitors[0] if len(visitors) == 1 else _first(result, task, visitors)
-
-
-def _first(result: MissionResult, task: str, visitors: Sequence[str]) -> str:
-    del result, task
-    return visitors[0]
-
-
-def _worth(observer: Observer, result: MissionResult) -> dict[str, float]:
-    """What each task that was done adds to J [value·s]."""
-    del observer, result
-    return {}
+def _worths(observer: Observer) -> dict[str, tuple[str, float, float]]:
+    """Of each task done: who did it first, when [s mission time], and what that adds to J."""
+    problem = observer.board.problem
+    if problem is None:
+        return {}
+    progress = progress_of(problem, observer.replica.outcomes)
+    found, before = {}, 0.0
+    for (task, (uav, completed_s)), (_, objective) in zip(
+        progress.completed.items(), progress.curve, strict=True
+    ):
+        found[task] = uav, completed_s, objective - before
+        before = objective
+    return found
 
 
 def _share(worth: float, objective: float) -> str:

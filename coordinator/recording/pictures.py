@@ -80,7 +80,7 @@ class _Progress:
     objective: float
     """J so far [value·s]."""
     plan_objective: float | None
-    """J of the offline plan [value·s]."""
+    """J of the lists it began with, flown without delay [value·s]."""
     bound: float | None
     """No lists have more than this J [value·s]."""
     open: int
@@ -140,7 +140,7 @@ class Pictures:
         if tasks != self._tasks:
             self._tasks = tasks
             yield _scene("tasks", _task_entities(scene.tasks, size_m, time_ns))
-        lists = _lists(observer, scene)
+        lists = _lists(scene)
         if lists != self._lists:
             self._lists = lists
             entities = [
@@ -182,10 +182,7 @@ def log_line(name: str, message: str, level: str, time_ns: int) -> Line:
 
 
 def _progress(observer: Observer, scene: Scene, now_s: float) -> Line:
-    plan, epoch = scene.plan, observer.replica.epoch
-    bound = None
-    if plan is not None:
-        bound = plan.optimum if plan.optimum is not None else plan.bound
+    plan, epoch = observer.plan, observer.replica.epoch
     progress = _Progress(
         now_s=now_s,
         mission_s=scene.mission_s,
@@ -193,8 +190,8 @@ def _progress(observer: Observer, scene: Scene, now_s: float) -> Line:
         epoch=None if epoch is None else epoch.number,
         rule=scene.rule,
         objective=scene.objective,
-        plan_objective=None if plan is None else plan.objective,
-        bound=bound,
+        plan_objective=scene.planned_objective,
+        bound=plan.bound if scene.optimum is None and plan is not None else scene.optimum,
         open=scene.count(TaskState.OPEN),
         taken=scene.count(TaskState.OPEN, taken=True),
         done=scene.count(TaskState.DONE),
@@ -202,7 +199,7 @@ def _progress(observer: Observer, scene: Scene, now_s: float) -> Line:
         withdrawn=scene.count(TaskState.WITHDRAWN),
         uavs=len(scene.uavs),
         lost=len(observer.lost),
-        dropped=sum(sum(counts.values()) for counts in observer.dropped.values()),
+        dropped=scene.dropped,
     )
     return Line("/progress", PROGRESS, _ADAPTER.dump_json(progress))
 
@@ -246,17 +243,17 @@ def _task_entities(tasks: tuple[TaskView, ...], size_m: float, time_ns: int) -> 
     return entities
 
 
-def _lists(observer: Observer, scene: Scene) -> tuple[tuple[str, tuple[Point, ...], Colour], ...]:
-    """What each UAV's list still holds, by the epoch in force: places in order."""
-    epoch = observer.replica.epoch
-    left = [task for task in scene.tasks if task.state is TaskState.OPEN]
-    places: dict[str, Point] = {task.id: task.position_enu_m for task in left}
-    found = []
-    for view in scene.uavs:
-        route = () if epoch is None or view.troubled else epoch.routes.get(view.id, ())
-        points = tuple(places[task] for task in route if task in places)
-        found.append((str(view.id), points, _uav_colour(view.number)))
-    return tuple(found)
+def _lists(scene: Scene) -> tuple[tuple[str, tuple[Point, ...], Colour], ...]:
+    """What each UAV's list still holds: places in order."""
+    places = {task.id: task.position_enu_m for task in scene.tasks}
+    return tuple(
+        (
+            str(view.id),
+            tuple(places[task] for task in view.planned if task in places),
+            _uav_colour(view.number),
+        )
+        for view in scene.uavs
+    )
 
 
 def _state(task: TaskView) -> str:

@@ -1,16 +1,18 @@
 """The command `swarm status`.
 
-Leaves out: looking (coordinator.status.onlooker) and showing (coordinator.status.table).
+Leaves out: looking (coordinator.status.onlooker, coordinator.status.watch) and showing
+(coordinator.status.table, coordinator.view.live).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swarm.config import Link
-from swarm.errors import Fault, InputError, SwarmError
+from swarm.errors import SwarmError
 from swarm.options import (
     BusOption,
     ConnectOption,
@@ -23,26 +25,44 @@ from swarm.options import (
 )
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
+    from coordinator.observer import Observer
     from coordinator.status.table import MissionStatus
     from swarm.bus.config import BusConfig
     from swarm.clock import ScaledClock
     from swarm.config import Timing
 
-__all__ = ["status"]
+__all__ = ["JsonLines", "status"]
+
+PATIENCE_S = 4.0
+"""How long to wait when looking once, unless told otherwise [wall s]."""
 
 
 def status(
     mission: SomeMissionOption = None,
+    watch: Annotated[
+        bool,
+        typer.Option(
+            "--watch",
+            "-w",
+            help="Stay and show the live picture until the mission is over and everybody has "
+            "left; with --json one object on a line each second, otherwise off a terminal the "
+            "story line by line.",
+        ),
+    ] = False,
     timeout_s: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--timeout-s",
             min=0.1,
             max=600.0,
             metavar="S",
-            help="How long to wait for the bus, and for what is still unknown; wall seconds.",
+            help="How long to wait for the bus, and for what is still unknown; wall seconds. "
+            f"Default: {PATIENCE_S:g}, with --watch as long as it takes.",
+            show_default=False,
         ),
-    ] = 4.0,
+    ] = None,
     bus: BusOption = "router",
     listen: ListenOption = "",
     connect: ConnectOption = None,
@@ -55,39 +75,47 @@ def status(
 
     Joins the mission as an onlooker, learns, prints and leaves; nobody flies any
     differently for it. Exit status 1: nobody flies the mission.
+    With --watch it waits for the mission, shows it live as `swarm run` does, and ends with 0
+    when the mission is over and nobody is there any more. It goes on when processes, the
+    coordinator or its own link to the bus are lost, and shows that. At which speed-up the
+    mission is flown it sees by itself.
 
     Examples:
         swarm status
         swarm status --mission table-1 --json
         swarm status --connect tcp/192.168.1.2:7447
+        swarm status --watch
+        swarm status --watch --json --mission table-1
     """
     import asyncio
     from json import dumps
 
     from rich.console import Console
 
+    from coordinator.joining import check_mission
     from coordinator.status.table import status_as_json, status_table
     from coordinator.view.signs import signs_for
     from swarm.bus.config import bus_config
     from swarm.clock import ScaledClock
     from swarm.config import preset
     from swarm.log import LogLevel, configure_logging
-    from swarm.model.ids import ID_RULE, valid_id
     from swarm.process import run_until_stopped
 
     configure_logging(LogLevel.ERROR)
     settings = preset(link, lease_s)
     config = bus_config(bus, listen, connect or (), settings.lease_s)
     timing = settings.timing.scaled(speedup)
-    if mission is not None and not valid_id(mission):
-        raise InputError(Fault("--mission", "", f"{mission!r} is no id", f"give {ID_RULE}"))
+    check_mission(mission)
+    console, clock = Console(highlight=False), ScaledClock(speedup)
 
     async def work() -> int:
-        found = await _look(mission, config, timing, ScaledClock(speedup), timeout_s)
+        if watch:
+            await _watch(mission, config, timing, clock, timeout_s, console, json=json)
+            return 0
+        found = await _look(mission, config, timing, clock, timeout_s or PATIENCE_S)
         if json:
             print(dumps(status_as_json(found), allow_nan=False))
         else:
-            console = Console(highlight=False)
             signs = signs_for(console.options.ascii_only)
             console.print(status_table(found, console.width, signs))
         return 0
@@ -99,29 +127,71 @@ async def _look(
     name: str | None, config: BusConfig, timing: Timing, clock: ScaledClock, patience_s: float
 ) -> MissionStatus:
     """Learn how a mission stands."""
-    from coordinator.status.onlooker import Onlooker, only_mission
+    from coordinator.joining import joined, onlooking
+    from coordinator.status.onlooker import Onlooker
     from coordinator.status.table import mission_status
-    from swarm.bus.zenoh_bus import open_zenoh_bus
-    from swarm.events import BusFact, Wish
-    from swarm.shell import Shell, take_seat
 
-    seat = await open_zenoh_bus(config, timeout_s=patience_s)
-    try:
-        mission = name or await only_mission(seat, patience_s)
+    async with joined(name, config, patience_s) as (mission, seat):
         onlooker = Onlooker(mission, timing, patience_s * clock.speedup)
-        shell: Shell[BusFact, Wish] = Shell(
-            onlooker,
-            seat,
-            clock,
-            mission=mission,
-            name="status",
-            from_bus=lambda fact: fact,
-            execute=lambda _: None,
-            snapshot=None,
-        )
-        take_seat(seat, mission, None, status=True)
-        if await shell.run() != 0:
+        if await onlooking(onlooker, seat, clock, mission, "status").run() != 0:
             raise SwarmError(onlooker.lack)
         return mission_status(onlooker.observer, clock.now_s())
-    finally:
-        seat.close()
+
+
+async def _watch(
+    mission: str | None,
+    config: BusConfig,
+    timing: Timing,
+    clock: ScaledClock,
+    patience_s: float | None,
+    console: Console,
+    *,
+    json: bool,
+) -> None:
+    """Stay until the mission is over."""
+    from coordinator.status.watch import watch
+    from coordinator.view.live import LiveView
+
+    if json:
+        lines = JsonLines(lambda line: print(line, flush=True), clock.speedup)
+        await watch(mission, config, timing, clock, lines, patience_s=patience_s)
+        lines.close()
+        return
+    with LiveView(console, speedup=clock.speedup) as view:
+        await watch(mission, config, timing, clock, view, patience_s=patience_s)
+    console.print("the mission is over, and everybody has left")
+
+
+class JsonLines:
+    """Tells how a mission stands as one JSON object on a line, about once a second.
+
+    Args:
+        tell: prints a line.
+        every_s: between two lines [s of the observer's clock].
+    """
+
+    def __init__(self, tell: Callable[[str], object], every_s: float) -> None:
+        self._tell = tell
+        self._every_s = every_s
+        self._due_s = 0.0
+        self._untold: dict[str, Any] | None = None
+
+    def wait(self, text: str) -> None:
+        """A reader of lines waits for the first one."""
+
+    def update(self, observer: Observer, now_s: float) -> None:
+        """Print how the mission stands, if it is time."""
+        from coordinator.status.table import mission_status, status_as_json
+
+        self._untold = status_as_json(mission_status(observer, now_s))
+        if now_s >= self._due_s:
+            self._due_s = now_s + self._every_s
+            self.close()
+
+    def close(self) -> None:
+        """Print the last state unless it has been."""
+        from json import dumps
+
+        if self._untold is not None:
+            self._tell(dumps(self._untold, allow_nan=False))
+            self._untold = None

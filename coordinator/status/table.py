@@ -24,8 +24,8 @@ from coordinator.view.story import clean, shown_value
 from swarm.model import TaskId, UavId
 from swarm.model.ids import COORDINATOR, FLEET
 from swarm.state.board import TaskState
-from swarm.state.commands import in_force, words
-from swarm.wire.messages import Command, CommandKind
+from swarm.state.commands import words
+from swarm.wire.messages import Command
 
 __all__ = ["MissionStatus", "UavStatus", "mission_status", "status_as_json", "status_table"]
 
@@ -62,13 +62,19 @@ class MissionStatus:
     epoch: int | None
     reason: str
     """Why that epoch."""
-    coordinator: bool
-    """Whether it is there."""
     others: tuple[str, ...]
     """Who else is there under a name that is no UAV's."""
     uavs: tuple[UavStatus, ...]
-    commands: tuple[Command, ...]
-    """The operator's newest word to each whom there was any, in this flight."""
+
+    @property
+    def coordinator(self) -> bool:
+        """Whether it is there."""
+        return self.scene.coordinator
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """The operator's newest word to each whom there was any, in this flight."""
+        return self.scene.commands
 
     @property
     def dropped(self) -> Mapping[str, int]:
@@ -104,10 +110,8 @@ def mission_status(observer: Observer, now_s: float) -> MissionStatus:
         scene=scene,
         epoch=None if epoch is None else epoch.number,
         reason="" if epoch is None else epoch.reason,
-        coordinator=COORDINATOR in observer.present,
         others=tuple(sorted(observer.present - known)),
         uavs=tuple(uavs),
-        commands=tuple(in_force(observer.replica).values()),
     )
 
 
@@ -125,13 +129,15 @@ def status_as_json(status: MissionStatus) -> dict[str, Any]:
         "mission_s": scene.mission_s,
         "horizon_s": scene.mission.horizon_s,
         "objective": scene.objective,
+        "planned_objective": scene.planned_objective,
         "tasks": {
             **{state: _count(scene, state) for state in TaskState},
             "taken": taken,
         },
+        "link": scene.cut_s is None,
         "coordinator": status.coordinator,
         "others": list(status.others),
-        "aborted": any(command.kind is CommandKind.ABORT for command in status.commands),
+        "aborted": scene.aborted,
         "commands": {
             command.target: {"command": command.kind.value, "reason": command.reason}
             for command in status.commands

@@ -149,12 +149,16 @@ def _row(uav: UavView, columns: _Columns, width: int, signs: Signs) -> Text:
     colour = BAD if uav.troubled else f"bold {uav_colour(uav.number)}"
     row = Text().append(f"{sign} {fit(uav.id, columns.id, signs)} ", colour)
     does = uav.does.upper() if uav.troubled else uav.does
-    row.append(fit(does, _DOES_CELLS, signs) + " ", BAD if uav.troubled else "")
+    if uav.silent_s is not None and not uav.troubled:
+        does = f"silent {uav.silent_s:.0f}s"
+    bad = uav.troubled or uav.silent_s is not None
+    held = "yellow" if uav.does == StatusPhase.HOLDING else ""
+    row.append(fit(does, _DOES_CELLS, signs) + " ", BAD if bad else held)
     ascii_only = not signs.braille
     note = clean(uav.note, ascii_only=ascii_only)
     if uav.does in (StatusPhase.RETURNING, StatusPhase.HOME):
         note = ""  # the same for all, and the story's last line
-    if note and (uav.unready or uav.does == StatusPhase.OUT):
+    if note and (uav.unready or uav.does in (StatusPhase.OUT, StatusPhase.HOLDING)):
         row.append(fit(note, width - row.cell_len, signs), "dim")
         return row
     row.append(fit(uav.task or signs.nothing, columns.task, signs), "" if uav.task else "dim")
@@ -180,7 +184,7 @@ def _low(uav: UavView) -> bool:
 
 def _urgency(uav: UavView) -> int:
     """Trouble first, then those that keep the others waiting, then the busy."""
-    if uav.troubled:
+    if uav.troubled or uav.silent_s is not None:
         return 0
     if uav.unready:
         return 1

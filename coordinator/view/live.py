@@ -11,10 +11,12 @@ from types import TracebackType
 from typing import Self
 
 from rich.console import Console, Group, RenderableType
+from rich.control import Control
 from rich.live import Live
 from rich.text import Text
 
 from coordinator.observer import Happening, Observer
+from coordinator.view.alerts import alerts
 from coordinator.view.fleet_table import fit, fleet_table, lists, table_width
 from coordinator.view.map_panel import ideal_width, map_panel
 from coordinator.view.scene import Scene, scene_of
@@ -86,6 +88,9 @@ class LiveView:
         self._console = console
         self._speedup = speedup
         self._told = 0
+        self._noticed = ""
+        self._cut = False
+        self._size = console.size
         self._live: Live | None = None
 
     def __enter__(self) -> Self:
@@ -122,9 +127,26 @@ class LiveView:
             now_s,
             width=width,
             height=min(_TALLEST, max(1, height - 1)),
-            speedup=self._speedup,
+            speedup=self._speedup * observer.pace,
             ascii_only=self._ascii_only,
         )
+        self._show(frame)
+
+    def wait(self, text: str) -> None:
+        """Say what is waited for, before there is a mission to show."""
+        if self._live is not None:
+            line = Text(clean(text, ascii_only=self._ascii_only), "dim", no_wrap=True)
+            self._show(line)
+        else:
+            self._notice(text)
+
+    def _show(self, frame: RenderableType) -> None:
+        if self._live is None:
+            return
+        if self._console.size != self._size:
+            # What stands there was wrapped anew by the terminal: nobody knows where it begins.
+            self._size = self._console.size
+            self._console.control(Control.clear(), Control.home())
         self._live.update(frame, refresh=True)
 
     def _tell(self, observer: Observer) -> None:
@@ -132,6 +154,16 @@ class LiveView:
             line = story_line(happening, ascii_only=self._ascii_only)
             self._console.print(Text(line), soft_wrap=True)
         self._told = len(observer.story)
+        cut = observer.cut_since_s is not None
+        if cut != self._cut:
+            self._cut = cut
+            self._notice(f"own link to the bus is {'lost' if cut else 'back'}")
+
+    def _notice(self, text: str) -> None:
+        """Print ``text`` unless it is what was printed last."""
+        if text != self._noticed:
+            self._noticed = text
+            self._console.print(Text(clean(text, ascii_only=self._ascii_only)), soft_wrap=True)
 
     @property
     def _ascii_only(self) -> bool:
@@ -144,7 +176,7 @@ class LiveView:
 def _narrow(observer: Observer, scene: Scene, width: int, height: int, signs: Signs) -> list[Text]:
     """Map and fleet side by side, counts and story below."""
     n_story = max(0, min(10, height // 4))
-    worth = _worth(scene, width, signs)
+    worth = [*_worth(scene, width, signs), *alerts(scene, width, signs)]
     above = max(0, height - len(worth) - n_story)
     lines = []
     map_width = min(max(_NARROWEST_MAP, ideal_width(scene, above)), width - table_width(scene) - 2)
@@ -164,7 +196,7 @@ def _wide(observer: Observer, scene: Scene, width: int, height: int, signs: Sign
     column = max(_COLUMN, table_width(scene))
     map_width = min(max(_NARROWEST_MAP, ideal_width(scene, height)), width - column - 2)
     rest = width - map_width - 1
-    worth = _worth(scene, rest, signs)
+    worth = [*_worth(scene, rest, signs), *alerts(scene, rest, signs)]
     least_story = max(4, height // 5)
     n_table = min(len(scene.uavs) + 1, max(2, height - len(worth) - least_story - 2))
     table = fleet_table(scene, rest, n_table, signs)
@@ -194,7 +226,8 @@ def title(scene: Scene, width: int, speedup: float, signs: Signs) -> Text:
     line = Text().append(clean(scene.mission.name), "bold")
     between = f" {signs.dot} "
     line.append(between)
-    line.append(scene.phase.upper(), _PHASE_STYLE[scene.phase])
+    aborted = scene.aborted and scene.phase is not EpochPhase.ENDED
+    line.append("ABORTED" if aborted else scene.phase.upper(), _PHASE_STYLE[scene.phase])
     if scene.mission_s is not None:
         horizon_s = scene.mission.horizon_s
         line.append(f"{between}mission time {scene.mission_s:.1f} s")
@@ -233,10 +266,10 @@ def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
     counts = Text().append("tasks  ", "bold").append_text(task_counts(scene, signs))
     value = Text().append("J      ", "bold")
     value.append(shown_value(scene.objective), "bold")
-    if scene.plan is not None:
-        value.append(f" of {shown_value(scene.plan.objective)} planned")
-        if scene.plan.optimum is not None:
-            value.append(f", optimum {shown_value(scene.plan.optimum)}")
+    if scene.planned_objective is not None:
+        value.append(f" of {shown_value(scene.planned_objective)} planned")
+    if scene.optimum is not None:
+        value.append(f", optimum {shown_value(scene.optimum)}")
     bar_width = width - value.cell_len - 2
     if width < _WIDE - _COLUMN:
         bar_width = max(0, width - 8)
@@ -248,13 +281,9 @@ def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
 
 def _bar(scene: Scene, width: int, signs: Signs) -> Text:
     """J so far, with marks where plan and optimum are."""
-    if scene.plan is None or width < 8:
-        return Text()
-    marks = [scene.plan.objective]
-    if scene.plan.optimum is not None:
-        marks.append(scene.plan.optimum)
-    largest = max(scene.objective, *marks, 0.0)
-    if largest <= 0.0:
+    marks = [mark for mark in (scene.planned_objective, scene.optimum) if mark is not None]
+    largest = max([scene.objective, *marks, 0.0])
+    if not marks or width < 8 or largest <= 0.0:
         return Text()
     cells = [signs.bar_empty] * width
     styles = ["dim"] * width

@@ -5,15 +5,19 @@ Leaves out: where and how they are shown (coordinator.view.live).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from coordinator.observer import Observer
 from coordinator.view.signs import short_names
-from swarm.model import Mission, Plan, TaskId, Uav, UavId
+from swarm.allocation.objective import evaluate
+from swarm.model import Mission, TaskId, Uav, UavId
+from swarm.model.ids import COORDINATOR
 from swarm.state.board import TaskState
-from swarm.wire.messages import ClaimPhase, EpochPhase, StatusPhase
+from swarm.state.commands import in_force
+from swarm.wire.messages import ClaimPhase, Command, CommandKind, Epoch, EpochPhase, StatusPhase
 
-__all__ = ["Scene", "TaskView", "UavView", "scene_of"]
+__all__ = ["LOST", "Scene", "TaskView", "UavView", "doing", "scene_of"]
 
 LOST = "lost"
 STARTING = "starting"
@@ -53,9 +57,13 @@ class UavView:
     flown: tuple[TaskId, ...]
     """Tasks it has done, in order."""
     planned: tuple[TaskId, ...]
-    """Tasks the offline plan has for it that are not over yet."""
+    """Tasks its list has for it that are not over yet."""
     battery_frac: float | None
     note: str
+    there: bool
+    """Whether it is believed to be there."""
+    silent_s: float | None
+    """How long it has said nothing, where that is long [s of the observer's clock]."""
     start_enu_m: tuple[float, float, float]
     position_enu_m: tuple[float, float, float]
 
@@ -88,7 +96,23 @@ class Scene:
     tasks: tuple[TaskView, ...]
     objective: float
     """J so far [value·s]."""
-    plan: Plan | None
+    planned_objective: float | None
+    """J of the offline plan; for who has none, of the lists in force, flown without delay."""
+    optimum: float | None
+    """The largest J there can be, where it is proven."""
+    cut_s: float | None
+    """For how long the own link to the bus has been down [s of the observer's clock]."""
+    coordinator: bool
+    """Whether it is there."""
+    commands: tuple[Command, ...]
+    """The operator's newest word to each whom there was any, in this flight."""
+    dropped: int
+    """Messages that all agents together have dropped."""
+
+    @property
+    def aborted(self) -> bool:
+        """Whether the operator has ended the mission."""
+        return any(command.kind is CommandKind.ABORT for command in self.commands)
 
     def count(self, state: TaskState, *, taken: bool = False) -> int:
         """Tasks in ``state``."""
@@ -110,6 +134,12 @@ def scene_of(observer: Observer, now_s: float) -> Scene:
     sequence = () if epoch is None else epoch.sequence
     if not sequence and plan is not None and plan.sequence is not None:
         sequence = plan.sequence
+    lists: Mapping[str, Sequence[str]] | Mapping[UavId, Sequence[TaskId]] = {}
+    if epoch is not None and any(epoch.routes.values()):
+        lists = epoch.routes
+    elif plan is not None:
+        lists = plan.routes
+    planned_objective = _worth_of(observer, epoch) if plan is None else plan.objective
     return Scene(
         mission=mission,
         phase=observer.phase,
@@ -123,19 +153,53 @@ def scene_of(observer: Observer, now_s: float) -> Scene:
                 short,
                 mission_s,
                 flown=result.executed_routes[uav.id],
-                planned=tuple(
-                    task
-                    for task in (() if plan is None else plan.routes.get(uav.id, ()))
-                    if task not in over
-                ),
+                planned=tuple(TaskId(t) for t in lists.get(uav.id, ()) if t not in over),
                 number=numbers[uav.id],
+                now_s=now_s,
             )
             for uav, short in zip(mission.uavs, shorts, strict=True)
         ),
         tasks=_task_views(observer, by, numbers),
         objective=result.executed_objective,
-        plan=plan,
+        planned_objective=planned_objective,
+        optimum=None if plan is None else plan.optimum,
+        cut_s=None if observer.cut_since_s is None else now_s - observer.cut_since_s,
+        coordinator=COORDINATOR in observer.present,
+        commands=tuple(in_force(observer.replica).values()),
+        dropped=sum(count.total() for count in observer.dropped.values()),
     )
+
+
+def doing(observer: Observer, uav: str) -> tuple[str, TaskId | None]:
+    """What ``uav`` does, as `UavView.does` has it, and the task it has taken."""
+    status = observer.statuses.get(uav)
+    claim = observer.replica.claims.get(uav)
+    does: str = STARTING if status is None else status.phase
+    task = None if claim is None or claim.task is None else TaskId(claim.task)
+    if uav in observer.lost and uav not in observer.present:
+        return LOST, None
+    if task is not None and does not in _BUSY:
+        does = StatusPhase.FLYING  # claims never lag, status may
+    elif claim is not None and does == STARTING:
+        does = _PHASES.get(claim.phase, StatusPhase.IDLE)
+    elif task is None and does in _BUSY:
+        does = StatusPhase.IDLE
+    return does, task
+
+
+def _worth_of(observer: Observer, epoch: Epoch | None) -> float | None:
+    """J of the lists in force, flown from the start as planned; None where there are none."""
+    problem = observer.board.problem
+    if problem is None or epoch is None or not any(epoch.routes.values()):
+        return None
+    index = {task: number for number, task in enumerate(problem.task_ids)}
+    lists = [
+        [index[TaskId(task)] for task in epoch.routes.get(uav, ()) if task in index]
+        for uav in problem.uav_ids
+    ]
+    tasks = [task for route in lists for task in route]
+    # What two have visited stands on two lists: such lists are no plan any more.
+    return evaluate(problem, lists)[0] if len(set(tasks)) == len(tasks) else None
 
 
 def _uav_view(
@@ -147,19 +211,11 @@ def _uav_view(
     flown: tuple[TaskId, ...],
     planned: tuple[TaskId, ...],
     number: int,
+    now_s: float,
 ) -> UavView:
     status = observer.statuses.get(uav.id)
     claim = observer.replica.claims.get(uav.id)
-    does: str = STARTING if status is None else status.phase
-    task = None if claim is None or claim.task is None else TaskId(claim.task)
-    if uav.id in observer.lost and uav.id not in observer.present:
-        does, task = LOST, None
-    elif task is not None and does not in _BUSY:
-        does = StatusPhase.FLYING  # claims never lag, status may
-    elif claim is not None and does == STARTING:
-        does = _PHASES.get(claim.phase, StatusPhase.IDLE)
-    elif task is None and does in _BUSY:
-        does = StatusPhase.IDLE
+    does, task = doing(observer, uav.id)
     eta_s = None
     if claim is not None and task is not None and mission_s is not None:
         eta_s = claim.completion_s - mission_s
@@ -175,6 +231,8 @@ def _uav_view(
         planned=planned,
         battery_frac=None if status is None else status.battery_frac,
         note="" if status is None else status.note,
+        there=uav.id in observer.present,
+        silent_s=observer.silent_s(uav.id, now_s),
         start_enu_m=uav.position_enu_m,
         position_enu_m=uav.position_enu_m if place is None else place,
     )

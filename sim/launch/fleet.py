@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from coordinator.dashboard.place import Place
 from sim.launch.autopilots import Autopilots, Running, Simulated
 from sim.launch.firmware import Firmware
 from sim.launch.handed_on import HandedOn
@@ -24,6 +25,7 @@ from swarm.model.ids import COORDINATOR
 
 __all__ = [
     "AUTO_MESH_LIMIT",
+    "DASHBOARD",
     "BusKind",
     "Defaults",
     "DialedLink",
@@ -41,6 +43,8 @@ OWN_AUTOPILOT_LIMIT = 20
 VEHICLES_PER_PROCESS = 25
 """Simulated autopilots in one process of a larger fleet."""
 ONLOOKER = "onlooker"
+DASHBOARD = "the dashboard"
+"""What its process is called; no UAV can be."""
 MAX_ROUTERS = 8
 
 
@@ -84,6 +88,8 @@ class LaunchOptions:
     """What agents and simulated autopilots are told besides."""
     log_format: LogFormat = LogFormat.AUTO
     """What a line of an agent's log looks like."""
+    dashboard: Place | None = None
+    """Where a page shows the run; nowhere if None."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -123,7 +129,8 @@ class Layout:
         self._options = options
         self._mission = mission
         self._seats = [COORDINATOR, *(uav.id for uav in mission.uavs)]
-        self._onlookers = [ONLOOKER, *onlookers]
+        pages = [] if options.dashboard is None else [DASHBOARD]
+        self._onlookers = [ONLOOKER, *pages, *onlookers]
         kind = options.bus.for_fleet(len(mission.uavs))
         count = options.routers if kind is BusKind.ROUTER else 0
         self.routers = tuple(f"router {number}" for number in range(1, count + 1))
@@ -186,6 +193,15 @@ class Layout:
             *self._memory(),
             *self._speed(),
             *self.seat_arguments(COORDINATOR),
+        ]
+
+    def dashboard(self, place: Place, folder: Path) -> list[str]:
+        """Arguments of the process that serves the page at ``place``; ``folder`` is its own."""
+        return [
+            *("dashboard", "--mission", self._mission.name, "--json"),
+            *place.arguments(folder),
+            *self._speed(),
+            *self.seat_arguments(DASHBOARD),
         ]
 
     def agent(self, uav: str, url: str, system_id: int) -> list[str]:

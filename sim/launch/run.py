@@ -1,7 +1,7 @@
 """Fly one mission with real processes on this machine, and tell how it went.
 
-Starts the processes, watches the bus as an onlooker, starts a router that dies anew,
-and ends every process whatever happens. Leaves out: what the processes do, single
+Starts the processes, watches the bus as an onlooker, starts a router or a dashboard that
+dies anew, and ends every process whatever happens. Leaves out: what the processes do, single
 processes (sim.launch.launch), and how the run is shown (coordinator.view).
 """
 
@@ -17,7 +17,7 @@ from typing import Any
 from coordinator.observer import Happening, MissionResult, Observer
 from coordinator.plan_report import plan_from_json
 from coordinator.recording.flight_recorder import FlightRecorder
-from sim.launch.fleet import LaunchOptions
+from sim.launch.fleet import DASHBOARD, LaunchOptions
 from sim.launch.launch import Launch, OnLog, Through
 from sim.launch.process import Child, ChildFailedError
 from swarm.bus.zenoh_bus import open_zenoh_bus
@@ -37,8 +37,8 @@ PATIENCE = 4.0
 """A mission may take this many times its planned time..."""
 PATIENCE_S = 60.0
 """...and this much longer, before it is given up [s of mission or wall, whichever is slower]."""
-MAX_ROUTER_DEATHS = 10
-"""A router that dies more often than this is not started again."""
+MAX_DEATHS = 10
+"""A router, or a dashboard, that dies more often than this is not started again."""
 CONDITION_S = 0.02
 """Wall time between two looks at a condition that is waited for."""
 
@@ -91,7 +91,7 @@ class Run:
         self._on_frame = on_frame or (lambda _observer, _now_s: None)
         self._zero_s: float | None = None
         self._told: set[Child] = set()
-        self._router_deaths: Counter[str] = Counter()
+        self._deaths: Counter[str] = Counter()
 
     def frame(self) -> None:
         """Look at everything once, and show it."""
@@ -125,6 +125,7 @@ class Run:
             if (reason := self._hopeless() or await self._mend_routers()) is not None:
                 self.fates.append(f"given up: {reason}")
                 return
+            await self._mend_dashboard()
             await asyncio.sleep(FRAME_S)
 
     def flight(self) -> Flight:
@@ -173,16 +174,30 @@ class Run:
             child = self.launch.child(name)
             if child.returncode is None or child.stopped:
                 continue
-            if self._router_deaths[name] >= MAX_ROUTER_DEATHS:
+            if self._deaths[name] >= MAX_DEATHS:
                 return f"{name} dies again and again"
-            self._router_deaths[name] += 1
-            mission_s = self.observer.mission_s(self.clock.now_s())
-            self.observer.story.append(Happening(mission_s, f"{name} {child.fate}; started again"))
             try:
-                await self.launch.restart(name)
+                await self._mend(child)
             except ChildFailedError as fault:
                 return str(fault)
         return None
+
+    async def _mend_dashboard(self) -> None:
+        """Start the dashboard anew if it has died; the run goes on without it, too."""
+        if self.launch.options.dashboard is None:
+            return
+        child = self.launch.child(DASHBOARD)
+        dead = child.returncode is not None and not child.stopped
+        if dead and self._deaths[DASHBOARD] < MAX_DEATHS:
+            await self._mend(child)
+
+    async def _mend(self, child: Child) -> None:
+        """Start it anew, and tell so."""
+        self._deaths[child.name] += 1
+        mission_s = self.observer.mission_s(self.clock.now_s())
+        text = f"{child.name} {child.fate}; started again"
+        self.observer.story.append(Happening(mission_s, text))
+        await self.launch.restart(child.name)
 
     def _hopeless(self) -> str | None:
         """Why there is nothing more to wait for, though agents run; None while there is."""

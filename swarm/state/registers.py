@@ -44,6 +44,7 @@ class Replica:
         """By writer, of its newest statement that is known."""
         self.brief: Brief | None = None
         self.epoch: Epoch | None = None
+        self.epoch_stamp: Stamp | None = None
         self.board: dict[str, Board] = {}
         """By task id, the entry that counts: of the operator's order about the flight that the
         brief tells of, where there is one, else the coordinator's."""
@@ -87,7 +88,7 @@ class Replica:
             case Brief() as brief:
                 self._take_brief(brief)
             case Epoch() as epoch:
-                self.epoch = epoch
+                self.epoch, self.epoch_stamp = epoch, message.stamp
             case Board(task=task) as entry:
                 self.posted[task] = entry
                 self._settle(task)

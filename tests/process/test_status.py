@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 
 from swarm.bus.endpoints import free_loopback_endpoints
-from tests.process.mission import SwarmRun
+from tests.process.mission import SwarmRun, wait_until
 from tests.process.router_processes import router
 
 pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
@@ -51,6 +53,44 @@ def test_a_running_mission_is_found_and_told(tmp_path: Path) -> None:
         assert all(uav["position_enu_m"] and uav["link_age_s"] < 3.0 for uav in told["uavs"])
         assert sum(told["tasks"][state] for state in ("open", "done", "failed")) == 60
         assert told["mission_s"] > 0.0
+
+
+def test_a_mission_is_watched_to_its_end(tmp_path: Path) -> None:
+    arguments = ["table-1", "--bus", "router", "--method", "greedy", "--speedup", "2"]
+    with SwarmRun(arguments, tmp_path) as run:
+        wait_until(lambda: any(w.startswith("coord") for w in run.children()), 30, "coordinator")
+        words = [sys.executable, "-m", "swarm", "status", "--watch", "--connect", router_of(run)]
+        with contextlib.ExitStack() as stack:
+            lines, story, stopped = (
+                stack.enter_context(
+                    subprocess.Popen(
+                        [*words, *more],
+                        stdin=subprocess.DEVNULL,
+                        stdout=subprocess.PIPE,
+                        stderr=subprocess.PIPE,
+                        text=True,
+                    )
+                )
+                for more in (["--json"], [], [])
+            )
+            run.wait_for_line("epoch 1")
+            stopped.send_signal(signal.SIGINT)
+            assert stopped.wait(20) == 130
+            status, _ = run.result()
+            told = [json.loads(line) for line in lines.communicate(timeout=30)[0].splitlines()]
+            text, complaints = story.communicate(timeout=30)
+
+        assert status == 0, run.story()
+        assert (lines.returncode, story.returncode, complaints) == (0, 0, "")
+        assert [each["tasks"]["done"] for each in told] == sorted(
+            each["tasks"]["done"] for each in told
+        )
+        assert (told[-1]["phase"], told[-1]["tasks"]["done"]) == ("ended", 8)
+        assert told[-1]["planned_objective"] == pytest.approx(118.4939, abs=5e-5)
+        # Nobody has told that the mission is flown twice as fast.
+        ended_s = float(text.split("  mission ends")[0].split()[-2])
+        assert 3.0 < ended_s < 9.0
+        assert text.splitlines()[-1] == "the mission is over, and everybody has left"
 
 
 def test_a_bus_without_a_mission_is_told_in_one_line() -> None:
