@@ -94,6 +94,8 @@ class MissionResult:
     took part again is none of them, however long it was gone."""
     epochs: int
     """Epochs in which the mission ran; one that a new coordinator restates is the same."""
+    added: tuple[TaskId, ...] = ()
+    """Tasks that the operator has added to the scenario's, whatever became of them."""
 
 
 class Observer:
@@ -149,6 +151,7 @@ class Observer:
         self._ask_at_s = 0.0
         self._problem = Problem.from_mission(mission)
         self._given = mission
+        self._scenario = {task.id for task in mission.tasks}
         self._added_s: dict[str, float] = {}
         """By task that the operator has added: when that was heard [s mission time]."""
 
@@ -305,6 +308,11 @@ class Observer:
             makespan_s=max(completion_s.values(), default=0.0),
             lost_uavs=tuple(self.lost),
             epochs=len(self._epochs),
+            added=tuple(
+                task.id
+                for task in self.mission.tasks
+                if task.id not in self._scenario and task.id not in self.replica.posted
+            ),
         )
 
     def _ask(self, now_s: float) -> list[Wish]:

@@ -310,7 +310,7 @@ def run(
             console.print("interrupted: the mission was given up and every process ended")
             raise
         told = MissionReport(
-            mission=mission,
+            mission=flight.observer.mission,
             plan=flight.plan,
             result=flight.result,
             story=tuple(flight.observer.story),

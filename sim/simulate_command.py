@@ -183,7 +183,7 @@ def simulate(
         typer.echo(f"broken: {verdict.broken}", err=True)
     world = verdict.world
     told = MissionReport(
-        mission=world.mission,
+        mission=world.observer.mission,
         plan=world.observer.plan,
         result=world.observer.result(),
         story=tuple(world.observer.story),
