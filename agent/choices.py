@@ -13,7 +13,7 @@ from swarm.allocation.lower_level import CompiledRule, Decision, Rule, TeamState
 from swarm.allocation.problem import IntArray, Problem
 from swarm.events import PublishLast
 from swarm.state.registers import Replica
-from swarm.wire.choice import MAX_CANDIDATES, Basis, Candidate
+from swarm.wire.choice import MAX_CANDIDATES, Basis, Candidate, choice_id
 from swarm.wire.digest import combined, fingerprint
 from swarm.wire.messages import Choice, Claim, Epoch, Message, Stamp
 
@@ -63,7 +63,7 @@ class Choices:
     @property
     def label(self) -> dict[str, object]:
         """For the log, which choice its lines are about: the last one, if there was any."""
-        return {"decision": f"{self._uav}-{self._number}"} if self._number else {}
+        return {"decision": choice_id(self._uav, self._number)} if self._number else {}
 
     def made(
         self,

@@ -282,7 +282,9 @@ class AgentCore:
         self._actions.append(Note("airborne"))
 
     def _give_up_order(self, order: object, reason: str, now_s: float) -> None:
-        self._actions.append(Note("vehicle refused", {"order": str(order), "reason": reason}))
+        label = self._tasking.label(order.leg) if isinstance(order, GoTo) else {}
+        fields = {"order": str(order), "reason": reason, **label}
+        self._actions.append(Note("vehicle refused", fields))
         if isinstance(order, GoTo):
             self._actions += self._tasking.refuse(order.leg, reason, now_s)
         elif isinstance(order, Prepare) and self._flew_before:

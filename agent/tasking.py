@@ -92,6 +92,10 @@ class Tasking:
         """Whether, being idle, it may yet find a task."""
         return self._to_decide or self._awaits_peers
 
+    def label(self, leg: int) -> dict[str, object]:
+        """For the log: which choice that leg came of, if it is the one being flown."""
+        return self._choices.label if leg == self._leg and self._task() is not None else {}
+
     def resume(self, claim: Claim, now_s: float) -> list[Action]:
         """An earlier life of this agent claimed so: stand by it, if it still counts.
 

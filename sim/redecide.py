@@ -3,7 +3,8 @@
 A `Choice` names the newest statement of each writer that its UAV knew. Of what is recorded up to
 there the UAV's registers are built again; where their digest is that of the choice they are the
 ones it decided from, and deciding again must give the same task, completion and score to the last
-bit. Leaves out: reading recordings (coordinator.recording).
+bit. Leaves out: reading recordings
+(coordinator.recording) and showing what came of it (sim.redecide_report).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from swarm.events import BusFact, Heard, Learned
 from swarm.state.board import TaskBoard
 from swarm.state.registers import Replica
 from swarm.state.team import rule_of
-from swarm.wire.choice import Basis
+from swarm.wire.choice import Basis, choice_id
 from swarm.wire.digest import combined
 from swarm.wire.messages import Choice, Epoch, Message, Stamp, Status
 
@@ -36,6 +37,11 @@ class Difference:
     """What the UAV takes now; None: nothing."""
     completion_s: float | None
     score: float | None
+
+    @property
+    def decision(self) -> str:
+        """The choice's id in logs."""
+        return choice_id(self.uav, self.choice.number)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ Leaves out: what it does (sim.simulate, sim.faults, sim.redecide) and how missio
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -34,13 +35,24 @@ from sim.uncertainty_options import (
     with_reattempts,
 )
 from swarm.errors import Fault, InputError
-from swarm.options import JsonOption, ScenarioArgument, SeedOption
+from swarm.options import JsonOption, OptionalScenarioArgument, SeedOption
 
 __all__ = ["simulate"]
 
 
 def simulate(
-    scenario: ScenarioArgument,
+    ctx: typer.Context,
+    scenario: OptionalScenarioArgument = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="FILE.mcap",
+            help="Instead of flying a scenario, make every decision in that recording again from "
+            "the same inputs, and tell of those that come out otherwise.",
+            show_default=False,
+        ),
+    ] = None,
     method: MethodOption = "greedy",
     seed: SeedOption = 0,
     loss: LossOption = None,
@@ -82,6 +94,8 @@ def simulate(
     With --faults the network and the clocks are like real ones, what goes wrong is told
     on standard error in lines that a file may hold, and the invariants of a fleet are watched.
     Exit status 0: every task was done, and no invariant broken.
+    With --from FILE.mcap, which takes no scenario and no other option but --json, exit status 0
+    says that decisions were made again and none came out otherwise.
 
     Examples:
         swarm simulate table-1
@@ -92,7 +106,15 @@ def simulate(
         swarm simulate valley-survey --message-loss 0.2 --delay-s 0.05 --jitter-s 0.05
         swarm simulate valley-survey --faults cut,crash --seed 7
         swarm simulate valley-survey --loss 0.3 --record flight.mcap
+        swarm simulate --from flight.mcap
     """
+    if recording is not None:
+        _refuse_all_but(ctx, "recording", "json")
+        return _redecide(recording, json=json)
+    if scenario is None:
+        remedy = "name a scenario, such as table-1, or a recording with --from"
+        raise InputError(Fault("swarm simulate", "", "nothing to simulate", remedy))
+
     from coordinator.planner.plan import check_online_method
     from coordinator.view.report import MissionReport, check_report_path
     from sim.faults.replay import fly_with_faults
@@ -168,3 +190,34 @@ def simulate(
     )
     status = tell(told, json=json, report=report)
     return status if verdict.broken is None else 1
+
+
+def _refuse_all_but(ctx: typer.Context, *names: str) -> None:
+    """What is said on the command line beside these parameters would have no effect."""
+    for parameter in ctx.command.params:
+        source = ctx.get_parameter_source(parameter.name or "")
+        if parameter.name in names or source is None or source.name != "COMMANDLINE":
+            continue
+        said = max(parameter.opts, key=len) if parameter.param_type_name == "option" else "SCENARIO"
+        problem, remedy = "has no meaning with --from, which flies nothing", "leave it out"
+        raise InputError(Fault(said, "", problem, remedy))
+
+
+def _redecide(path: Path, *, json: bool) -> int:
+    """Decide again what is recorded in ``path``; the exit status of the command."""
+    from json import dumps
+
+    from coordinator.recording.reader import read_recording
+    from sim.redecide import redecide
+    from sim.redecide_report import redecided_as_json, redecided_lines
+
+    recording = read_recording(path)
+    if recording.torn is not None:
+        typer.echo(recording.torn, err=True)
+    found = redecide(entry.fact for entry in recording.entries)
+    if json:
+        typer.echo(dumps(redecided_as_json(recording.mission, found), allow_nan=False))
+    else:
+        for line in redecided_lines(recording.mission, found):
+            typer.echo(line)
+    return 0 if found.ok else 1
