@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from coordinator.recording.records import SCHEMAS, Begun, UnreadableError, decode, encode, schema_of
 from swarm.events import BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Stop, Tick
 from swarm.model.ids import OPERATOR
-from swarm.wire.choice import Basis, Candidate
-from swarm.wire.messages import Choice, Message, Snapshot, Stamp, TaskOrder
-from tests.builders import MISSION, held, message
+from swarm.wire.messages import Message, Snapshot, TaskOrder
+from tests.builders import MISSION, done, held, message
 from tests.message_strategies import (
     counts,
     ids,
@@ -30,35 +29,6 @@ from tests.message_strategies import (
     uav_ids,
 )
 
-scores = st.floats(-1e30, 1e30)
-names = st.lists(uav_ids, max_size=3).map(tuple)
-bases = st.builds(
-    Basis,
-    numbers,
-    points,
-    not_negatives,
-    names,
-    names,
-    st.lists(task_ids, max_size=2).map(tuple),
-    st.dictionaries(uav_ids, st.tuples(counts, counts), max_size=3),
-    counts,
-)
-choices = st.builds(
-    Choice,
-    number=counts,
-    task=task_ids,
-    left=st.none() | task_ids,
-    chosen_s=numbers,
-    epoch=counts,
-    rule=st.just("guided"),
-    rank=counts,
-    score=scores,
-    second_score=st.none() | scores,
-    certificate=st.booleans(),
-    completion_s=numbers,
-    candidates=st.lists(st.builds(Candidate, task_ids, scores), max_size=5).map(tuple),
-    basis=bases,
-)
 orders = st.builds(
     TaskOrder,
     task=task_ids,
@@ -73,7 +43,6 @@ orders = st.builds(
 )
 everything = st.one_of(
     messages(),
-    st.builds(Message, st.just(MISSION), uav_ids, stamps, choices),
     st.builds(Message, st.just(MISSION), st.just(OPERATOR), stamps, orders),
 )
 snapshots = st.builds(
@@ -121,18 +90,12 @@ def test_all_schemas_are_objects_with_their_names() -> None:
 
 def test_topics_are_bus_keys_without_the_task() -> None:
     said = encode(Heard(message("u1", held("t1", 0.0))), MISSION, 0.0, None)
-    ended = encode(Heard(Message(MISSION, "u1", Stamp(1, 1), _outcome())), MISSION, 0.0, None)
+    ended = encode(Heard(message("u1", done("t1"))), MISSION, 0.0, None)
 
     assert said is not None
     assert ended is not None
     assert said.topic == "/swarm/test/uav/u1/claim"
     assert ended.topic == "/swarm/test/uav/u1/outcome"
-
-
-def _outcome() -> Any:
-    from tests.builders import done
-
-    return done("t1")
 
 
 def test_what_only_the_own_process_was_told_is_not_written() -> None:
