@@ -184,7 +184,7 @@ class Observer:
                 # What it said while one of us had no link has not come here.
                 ask |= self._membership.missing(writer)
                 if self._membership.seen(writer, now_s):
-                    ask |= self._welcome_back(writer, now_s)
+                    ask |= self._welcome_back(writer, now_s) or self._is_newcomer(writer)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
             case LinkChanged(up):
@@ -423,6 +423,11 @@ class Observer:
             self.lost.remove(UavId(writer))
             self._tell(f"{writer} is back", now_s)
         return missed
+
+    def _is_newcomer(self, writer: str) -> bool:
+        """Whether it is a UAV whose first words may have been said before they could be heard."""
+        brief, claims = self.replica.brief, self.replica.claims
+        return brief is not None and writer not in claims and writer in {u.id for u in brief.uavs}
 
     def _hear_epoch(self, epoch: Epoch, now_s: float) -> None:
         lists = tuple((uav, tasks) for uav, tasks in sorted(epoch.routes.items()))

@@ -49,6 +49,8 @@ _COMMANDS = {
     CommandKind.RETURN: "The operator sent {} home",
     CommandKind.ABORT: "The operator aborted the mission",
 }
+_SOON_S = 1.0
+"""Within this time the reason of a claim has followed it, unless it was lost."""
 _TRYING = (ClaimPhase.PROPOSED, ClaimPhase.HELD)
 
 
@@ -68,16 +70,11 @@ class Event:
     """Which tasks it concerns."""
 
 
-_NOTHING = Event(None, "", "", frozenset(), frozenset())
-"""In place of an event that turned out to be none."""
-
-
 @dataclass(slots=True)
 class _Release:
     """A UAV's claim that went away, maybe since its attempt had ended."""
 
-    place: int
-    """Of its event."""
+    event: Event
     claim: Claim
 
 
@@ -89,6 +86,8 @@ class Chronicle:
         self._onlooker = Onlooker(recording.mission, recording.timing, None)
         self._onlooker.start(recording.start_s)
         self._now_s = recording.start_s
+        self._untrue: set[int] = set()
+        """Ids of events that later ones have proved wrong."""
         self._posted: set[str] = set()
         self._releases: dict[tuple[str, str], _Release] = {}
         self._lost_s: dict[str, tuple[str, float]] = {}
@@ -101,7 +100,7 @@ class Chronicle:
         for entry in recording.entries:
             self._now_s = entry.now_s
             self._hear(entry.fact)
-        self.events = [event for event in self.events if event is not _NOTHING]
+        self.events = [event for event in self.events if id(event) not in self._untrue]
 
     @property
     def observer(self) -> Observer:
@@ -192,6 +191,7 @@ class Chronicle:
         self._turned[uav] = choice
         tasks = {choice.task} if choice.left is None else {choice.task, choice.left}
         self._tell("chosen", chosen(uav, choice), uavs=[uav], tasks=tasks)
+        self._put_before_claim(uav, choice.task)
         for candidate in choice.candidates:
             if candidate.task not in tasks:
                 score = value_in_words(candidate.score)
@@ -200,6 +200,17 @@ class Chronicle:
                     f"{uav} preferred {choice.task} (score {best}) to {candidate.task} ({score})."
                 )
                 self._tell("passed over", text, tasks=[candidate.task])
+
+    def _put_before_claim(self, uav: str, task: str) -> None:
+        """Agents say what they take first, and why afterwards; people want it the other way."""
+        told = self.events[-1]
+        for place in range(len(self.events) - 2, -1, -1):
+            event = self.events[place]
+            if (told.mission_s or 0.0) - (event.mission_s or 0.0) > _SOON_S:
+                return
+            if event.kind == "claimed" and uav in event.uavs and task in event.tasks:
+                self.events.insert(place, self.events.pop())
+                return
 
     def _tell_claim(self, uav: str, claim: Claim, before: Claim | None) -> None:
         left = before.task if before is not None and before.phase in _TRYING else None
@@ -233,7 +244,9 @@ class Chronicle:
                 text = f"Both {weaker[0]} and {strongest[0]} claimed {task}: "
                 text += keeps(strongest, weaker)
                 self._tell("contested", text, uavs=[uav, rival[0]], tasks=[task])
-        elif before is not None and before.phase is not claim.phase:
+        elif claim.phase is ClaimPhase.PROPOSED:
+            self._tell("claimed", f"{uav} claimed {task} once more.", uavs=[uav], tasks=[task])
+        elif before is not None and before.phase is ClaimPhase.PROPOSED:
             text = f"Nobody with a better claim objected: {uav} held {task}."
             self._tell("held", text, uavs=[uav], tasks=[task])
 
@@ -243,9 +256,9 @@ class Chronicle:
         outcome = self.observer.replica.outcomes.get((uav, task))
         if outcome is not None and outcome.completed_s >= before.decided_s:
             return
-        self._releases[uav, task] = _Release(len(self.events), before)
         why = self._why_released(uav, task, before, claim)
         self._tell("released", f"{uav} gave {task} up{why}.", uavs=[uav], tasks=[task])
+        self._releases[uav, task] = _Release(self.events[-1], before)
 
     def _why_released(self, uav: str, task: str, before: Claim, claim: Claim) -> str:
         observer = self.observer
@@ -280,7 +293,7 @@ class Chronicle:
         claim = self.observer.replica.claims.get(uav) if release is None else release.claim
         if release is not None:
             # It was no giving up: the end of the attempt was merely heard of later.
-            self.events[release.place] = _NOTHING
+            self._untrue.add(id(release.event))
         choice = self._turned.get(uav)
         predicted_s = None
         if claim is not None and claim.task == task:

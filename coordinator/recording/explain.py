@@ -23,7 +23,7 @@ from coordinator.view.signs import BAD
 from coordinator.view.story import clean, shown_s, shown_value
 from swarm.errors import Fault, InputError
 from swarm.state.board import TaskState
-from swarm.wire.messages import Result
+from swarm.wire.messages import Result, StatusPhase
 
 __all__ = ["Explanation", "explain_task", "explain_uav"]
 
@@ -147,6 +147,8 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
         state, how = "lost", "was lost"
     elif uav in observer.present:
         state, how = "there", "was there to the end"
+    elif (status := observer.statuses.get(uav)) and status.phase is StatusPhase.HOME:
+        state, how = "home", "came home"
     else:
         state, how = "gone", "had left by the end"
     did = f"did {_named(list(mine))}, worth {_share(worth, objective)}" if mine else "did no task"

@@ -26,7 +26,7 @@ from swarm.events import (
     Tick,
 )
 from swarm.model import Plan
-from swarm.wire.bounds import Count, Id, Instant
+from swarm.wire.bounds import Count, Flag, Id, Instant
 from swarm.wire.keys import Keys
 from swarm.wire.messages import (
     Board,
@@ -104,7 +104,7 @@ class _Presence:
 
     now_s: float
     writer: str
-    there: bool
+    there: Flag
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class _Link:
     __pydantic_config__ = _CHECKED
 
     now_s: float
-    up: bool
+    up: Flag
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from tests.builders import (
     MISSION,
     OUT,
     brief,
+    choice,
     done,
     entry,
     epoch,
@@ -284,6 +285,27 @@ def test_one_answers_for_what_an_earlier_life_of_somebody_said() -> None:
     replica.join_all([said_before, message("u1", IDLE, incarnation=2)])
 
     assert list(replica.answers("u0", {"u1"})) == [said_before]
+
+
+@given(crowds)
+def test_heads_are_the_newest_stamps_of_all_writers_whose_registers_are_known(
+    said: list[Message],
+) -> None:
+    replica = joined(said)
+    stamps: dict[str, list[Stamp]] = {}
+    for known in replica.messages():
+        stamps.setdefault(known.writer, []).append(known.stamp)
+
+    assert replica.heads == {writer: max(of_one) for writer, of_one in stamps.items()}
+
+
+def test_what_is_no_register_changes_nothing() -> None:
+    replica = joined([message("u0", held("t0", 1.0))])
+    before = replica.digest(), dict(replica.heads)
+
+    assert not replica.join(message("u0", choice("t0"), 9))
+    assert not replica.join(message("u0", status(), 10))
+    assert (replica.digest(), replica.heads) == before
 
 
 # -- the operator's word about tasks ------------------------------------------------------
