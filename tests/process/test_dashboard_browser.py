@@ -26,7 +26,7 @@ SIDE = 12
 MISSION = Mission(
     "watched",
     9000.0,
-    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 6.0) for n, u in enumerate(UAVS)),
+    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 3.0) for n, u in enumerate(UAVS)),
     tuple(
         Task(TaskId(f"t{n + 1}"), (10.0 * (n % SIDE - 4), 10.0 * (1 + n // SIDE), 0.0), 1.0)
         for n in range(SIDE * SIDE)
@@ -59,7 +59,7 @@ def confirm(page: Page, label: str) -> None:
 @pytest.fixture
 def flown(tmp_path: Path) -> Iterator[ByHand]:
     with contextlib.ExitStack() as stack:
-        yield ByHand(tmp_path, stack, MISSION)
+        yield ByHand(tmp_path, stack, MISSION, speedup=4)
 
 
 def test_an_operator_sees_and_commands_a_living_fleet_in_a_browser(flown: ByHand) -> None:
