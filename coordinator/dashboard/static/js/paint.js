@@ -4,8 +4,8 @@ import { uavColour } from "./colours.js";
 import { taskState } from "./words.js";
 
 const WIDE = 2 * Math.PI;
-/** Pixels per task from which on tasks are named. */
-const ROOM_FOR_NAMES = 1800;
+/** Pixels per letter of all names from which on tasks are named. */
+const ROOM_PER_LETTER = 330;
 
 /** The plane of one drawing: turns unit coordinates into pixels of the canvas. */
 export class View {
@@ -124,8 +124,8 @@ function paintTasks(canvas, view, picture, look, spots) {
   const weight = (task) => (task.state === "open" ? 2 : task.state === "failed" ? 1 : 0);
   inView.sort((one, other) => weight(one[0]) - weight(other[0]));
   for (const [task, spot] of inView) paintTask(canvas, task, spot, picture, look);
-  const room = (view.width * view.height) / Math.max(1, inView.length);
-  if (room < ROOM_FOR_NAMES) return;
+  const letters = inView.reduce((sum, [task]) => sum + task.id.length, 0);
+  if (view.width * view.height < letters * ROOM_PER_LETTER) return;
   canvas.font = `11px ${look.ink.font}`;
   canvas.textAlign = "center";
   const labels = inView.map(([task, [x, y]]) => ({
