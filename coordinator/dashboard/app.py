@@ -166,9 +166,8 @@ class Dashboard:
             if telling.done():
                 telling.result()
         finally:
-            for task in (leaving, telling):
-                task.cancel()
-            await asyncio.gather(leaving, telling, return_exceptions=True)
+            leaving.cancel()
+            telling.cancel()
 
     async def _tell_all(self, socket: WebSocket) -> None:
         feed, seen, mission = self.hub.feed, None, 0
