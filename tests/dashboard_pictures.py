@@ -36,7 +36,8 @@ def wait_for_done(page: Page, count: int) -> None:
 def keep(page: Page, file: Path) -> None:
     """Write what the page shows in 256 colours, which is a third of the size."""
     with Image.open(io.BytesIO(page.screenshot())) as picture:
-        picture.convert("RGB").quantize(256).save(file, optimize=True)
+        few = picture.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=4)
+        few.save(file, optimize=True)
 
 
 def take(folder: Path) -> None:

@@ -189,7 +189,12 @@ function paintByOperator(canvas, x, y, radius, ink) {
   canvas.strokeStyle = ink.muted;
   canvas.lineWidth = 1.25;
   canvas.beginPath();
-  for (const [across, down] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+  for (const [across, down] of [
+    [-1, -1],
+    [1, -1],
+    [1, 1],
+    [-1, 1],
+  ]) {
     canvas.moveTo(x + across * half, y + down * (half - 3.5));
     canvas.lineTo(x + across * half, y + down * half);
     canvas.lineTo(x + across * (half - 3.5), y + down * half);
@@ -217,7 +222,8 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
   }
   const labels = [];
   for (const [id, spot] of spots) {
-    if (view.holds(spot)) labels.push(paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look));
+    if (view.holds(spot))
+      labels.push(paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look));
   }
   paintLabels(canvas, labels, look, 1);
   for (const ghost of look.ghosts) paintGhost(canvas, view.spot(ghost.position), ghost.label, look);
