@@ -62,6 +62,8 @@ def onlooking(
     mission: str,
     name: str,
     answer_s: float = PRESETS[Link.NORMAL].answer_s,
+    *,
+    every_status: bool = False,
 ) -> Shell[BusFact, Wish]:
     """A shell that tells ``core`` all that is said on the bus; it shows no token.
 
@@ -72,6 +74,7 @@ def onlooking(
         mission: name of the mission.
         name: of this process, in logs and, where it speaks, as a writer.
         answer_s: how long a question waits for the slowest answer [wall s].
+        every_status: see `take_seat`.
     """
     shell: Shell[BusFact, Wish] = Shell(
         core,
@@ -84,5 +87,5 @@ def onlooking(
         snapshot=None,
         answer_s=answer_s,
     )
-    take_seat(bus, mission, None, status=True)
+    take_seat(bus, mission, None, status=True, every_status=every_status)
     return shell

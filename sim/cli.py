@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.recording.options import RecordOption, check_new_recording
 from sim.mission_command import MethodOption, ReportOption, tell
 from swarm.config import Link
 from swarm.errors import Fault, InputError
@@ -201,6 +202,7 @@ def run(
         ),
     ] = None,
     report: ReportOption = None,
+    record: RecordOption = None,
     json: JsonOption = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Show what every process logs, instead of a picture.")
@@ -231,6 +233,8 @@ def run(
 
     from coordinator.dashboard.place import parse_place
     from coordinator.planner.plan import check_online_method
+    from coordinator.recording.flight_recorder import recording_or_none, wall_ns
+    from coordinator.recording.recorder import About
     from coordinator.view.live import LiveView
     from coordinator.view.report import MissionReport, check_report_path
     from sim.launch.autopilots import check_speedup, parse_autopilots
@@ -238,6 +242,7 @@ def run(
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
     from sim.launch.run import fly
+    from swarm.config import preset
     from swarm.log import LogLevel, configure_logging
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
@@ -245,6 +250,8 @@ def run(
     check_online_method(method)
     if report is not None:
         check_report_path(report)
+    if record is not None:
+        check_new_recording(record)
     mission = load_scenario(scenario)
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
@@ -286,10 +293,18 @@ def run(
         console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     async def work() -> int:
+        about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))
         try:
-            with LiveView(console, speedup=speedup) as view:
+            with (
+                recording_or_none(record, about, wall_ns(), console.print) as recorder,
+                LiveView(console, speedup=speedup) as view,
+            ):
                 flight = await fly(
-                    mission, options, on_frame=view.update, on_log=log if verbose else None
+                    mission,
+                    options,
+                    on_frame=view.update,
+                    on_log=log if verbose else None,
+                    recorder=recorder,
                 )
         except asyncio.CancelledError:
             console.print("interrupted: the mission was given up and every process ended")
@@ -304,7 +319,8 @@ def run(
             speedup=speedup,
             fates=flight.fates,
         )
-        return tell(told, json=json, report=report)
+        status = tell(told, json=json, report=report)
+        return status or int(recorder is not None and recorder.fault is not None)
 
     return asyncio.run(run_until_stopped(work()))
 

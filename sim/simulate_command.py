@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from coordinator.recording.options import RecordOption, check_new_recording
 from sim.mission_command import MethodOption, ReportOption, tell
 from sim.uncertainty_options import (
     CoordinatorLostOption,
@@ -70,6 +71,7 @@ def simulate(
         ),
     ] = None,
     report: ReportOption = None,
+    record: RecordOption = None,
     json: JsonOption = False,
 ) -> int:
     """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
@@ -89,11 +91,13 @@ def simulate(
         swarm simulate valley-survey --speed-sd 0.1 --leg-sd 0.1 --wind 5
         swarm simulate valley-survey --message-loss 0.2 --delay-s 0.05 --jitter-s 0.05
         swarm simulate valley-survey --faults cut,crash --seed 7
+        swarm simulate valley-survey --loss 0.3 --record flight.mcap
     """
     from coordinator.planner.plan import check_online_method
     from coordinator.view.report import MissionReport, check_report_path
     from sim.faults.replay import fly_with_faults
     from sim.faults.schedule import format_schedule
+    from sim.recorded import recording_simulation
     from sim.simulate import simulate_mission
     from sim.uncertainty import Uncertainty
     from swarm.scenario import load_scenario
@@ -101,6 +105,8 @@ def simulate(
     check_online_method(method)
     if report is not None:
         check_report_path(report)
+    if record is not None:
+        check_new_recording(record)
     uncertainty = asked_for(Uncertainty(), loss=loss, popup=popup, popups_per_min=popup_rate)
     beside_faults = uncertainty
     uncertainty = asked_for(
@@ -120,24 +126,29 @@ def simulate(
     )
     mission = with_reattempts(load_scenario(scenario), reattempt=reattempt)
     if faults is None:
-        flown = simulate_mission(
-            mission,
-            method=method,
-            seed=seed,
-            uncertainty=uncertainty,
-            coordinator_lost_s=coordinator_lost_s,
-        )
-        if not flown.in_time:
-            typer.echo("broken off: somebody would have waited for ever", err=True)
-        told = MissionReport(
-            mission=flown.world.mission,
-            plan=flown.world.observer.plan,
-            result=flown.result,
-            story=tuple(flown.world.observer.story),
-            lost_because=flown.lost_because,
-            value=flown.value,
-        )
-        return tell(told, json=json, report=report)
+        with recording_simulation(mission.name, str(scenario), record) as looks_on:
+            flown = simulate_mission(
+                mission,
+                method=method,
+                seed=seed,
+                uncertainty=uncertainty,
+                coordinator_lost_s=coordinator_lost_s,
+                make_onlooker=looks_on,
+            )
+            if not flown.in_time:
+                typer.echo("broken off: somebody would have waited for ever", err=True)
+            told = MissionReport(
+                mission=flown.world.mission,
+                plan=flown.world.observer.plan,
+                result=flown.result,
+                story=tuple(flown.world.observer.story),
+                lost_because=flown.lost_because,
+                value=flown.value,
+            )
+            return tell(told, json=json, report=report)
+    if record is not None:
+        problem, remedy = "does not go with --faults", "leave one of them out"
+        raise InputError(Fault("--record", str(record), problem, remedy))
     if uncertainty != beside_faults or coordinator_lost_s is not None:
         problem = "goes with --loss, --popup and --popup-rate only"
         remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"

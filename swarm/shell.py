@@ -290,7 +290,9 @@ def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:
     return replace(snapshot, mission_s=snapshot.mission_s + age_s)
 
 
-def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None:
+def take_seat(
+    bus: Bus, mission: str, name: str | None, *, status: bool, every_status: bool = False
+) -> None:
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
     Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
@@ -302,6 +304,7 @@ def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None
         name: writer id: declares ``alive/<name>`` and serves ``state/<name>``; None for
             an onlooker.
         status: subscribe to ``uav/*/status`` too, newest first, and to ``uav/*/choice``.
+        every_status: of status keep all there is, for who records, not the newest alone.
     """
     keys = Keys(mission)
     for key_expr in (
@@ -315,7 +318,7 @@ def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None
     ):
         bus.subscribe(key_expr)
     if status:
-        bus.subscribe(keys.status("*"), latest=True)
+        bus.subscribe(keys.status("*"), latest=not every_status)
         bus.subscribe(keys.choice("*"))
     bus.watch_tokens(keys.alive("*"))
     if name is not None:

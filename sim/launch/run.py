@@ -16,6 +16,7 @@ from typing import Any
 
 from coordinator.observer import Happening, MissionResult, Observer
 from coordinator.plan_report import plan_from_json
+from coordinator.recording.flight_recorder import FlightRecorder
 from sim.launch.fleet import DASHBOARD, LaunchOptions
 from sim.launch.launch import Launch, OnLog, Through
 from sim.launch.process import Child, ChildFailedError
@@ -71,11 +72,13 @@ class Run:
         on_log: OnLog | None,
         through: Through | None,
         onlookers: Sequence[str],
+        recorder: FlightRecorder | None,
     ) -> None:
+        self.recorder = recorder
         self.launch = Launch(
             mission,
             options,
-            on_log=on_log,
+            on_log=on_log if recorder is None else self._recorded(on_log, recorder),
             on_plan=self._hear_plan,
             through=through,
             onlookers=onlookers,
@@ -141,6 +144,16 @@ class Run:
         # What is planned later, on the way, is in the epochs.
         if self.observer.phase is EpochPhase.PREPARING:
             self.observer.plan = plan_from_json(said)
+
+    def _recorded(self, on_log: OnLog | None, recorder: FlightRecorder) -> OnLog:
+        """Write down what the processes log, besides."""
+
+        def hear(name: str, line: str) -> None:
+            recorder.log(name, line, self.clock.now_s())
+            if on_log is not None:
+                on_log(name, line)
+
+        return hear
 
     def _note_fates(self) -> None:
         """Remember who ended against our will."""
@@ -217,6 +230,7 @@ async def open_run(
     on_log: OnLog | None = None,
     through: Through | None = None,
     onlookers: Sequence[str] = (),
+    recorder: FlightRecorder | None = None,
 ) -> AsyncIterator[Run]:
     """Start to fly ``mission``; all processes are gone when the context ends.
 
@@ -229,6 +243,7 @@ async def open_run(
         on_log: called with process name and line for everything the processes log.
         through: see `Launch`.
         onlookers: see `Launch`.
+        recorder: writes down what the onlooker hears; closed by whoever made it.
 
     Raises:
         ChildFailedError: a process could not be started.
@@ -241,6 +256,7 @@ async def open_run(
         on_log=on_log,
         through=through,
         onlookers=onlookers,
+        recorder=recorder,
     )
     launch = run.launch
     run.frame()
@@ -253,14 +269,21 @@ async def open_run(
 
 
 async def fly(
-    mission: Mission, options: LaunchOptions, *, on_frame: OnFrame, on_log: OnLog | None = None
+    mission: Mission,
+    options: LaunchOptions,
+    *,
+    on_frame: OnFrame,
+    on_log: OnLog | None = None,
+    recorder: FlightRecorder | None = None,
 ) -> Flight:
     """Fly ``mission`` to its end; see `open_run`.
 
     Returns:
         What came of it; processes are gone by then.
     """
-    async with open_run(mission, options, on_frame=on_frame, on_log=on_log) as run:
+    async with open_run(
+        mission, options, on_frame=on_frame, on_log=on_log, recorder=recorder
+    ) as run:
         await run.finish()
     return run.flight()
 
@@ -270,8 +293,9 @@ async def _watching(run: Run) -> AsyncIterator[None]:
     """Keep the observer informed from the bus."""
     mission = run.launch.mission.name
     bus = await open_zenoh_bus(run.launch.layout.seat_of_onlooker())
+    recorder = run.recorder
     shell: Shell[BusFact, Wish] = Shell(
-        run.observer,
+        run.observer if recorder is None else recorder.around(run.observer, run.observer),
         bus,
         run.clock,
         mission=mission,
@@ -280,7 +304,7 @@ async def _watching(run: Run) -> AsyncIterator[None]:
         execute=lambda _: None,
         snapshot=None,
     )
-    take_seat(bus, mission, None, status=True)
+    take_seat(bus, mission, None, status=True, every_status=recorder is not None)
     watch = asyncio.get_running_loop().create_task(shell.run())
     try:
         yield

@@ -96,7 +96,7 @@ function lead({ score, second_score: second }) {
 function body(choice, onSelect) {
   const go = (kind, id) => make("button", { type: "button", class: "link", click: () => onSelect(kind, id) }, id);
   const told = [make("p", {}, go("uav", choice.uav), ` took `, go("task", choice.task),
-    ` by the rule ${choice.rule}, rank ${choice.rank} of epoch ${choice.epoch}; it expected to be done at ${seconds(choice.completion_s)}.`)];
+    ` by the rule ${choice.rule}, rank ${choice.rank + 1} of epoch ${choice.epoch}; it expected to be done at ${seconds(choice.completion_s)}.`)];
   if (choice.left) told.push(make("p", {}, "It turned aside from ", go("task", choice.left), " in flight: the whole team gains by it."));
   told.push(make("p", {}, choice.second_score === null
     ? "There was no other task to take."

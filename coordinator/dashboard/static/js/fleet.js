@@ -10,6 +10,7 @@ const LONG_SILENCE_S = 3;
 
 export class FleetTable {
   constructor(panel, picture, onSelect) {
+    this.panel = panel;
     this.picture = picture;
     const done = (row) => picture.lists.get(row.id)?.flown.length ?? 0;
     this.grid = new Grid(panel, {
@@ -25,13 +26,14 @@ export class FleetTable {
         { id: "battery", title: "Battery", value: (row) => percent(row.battery), rank: (row) => row.battery, draw: drawBattery },
         { id: "heard", title: "Heard", hint: "How long ago it last said something", value: heard, rank: (row) => row.silent_s, draw: drawHeard },
         { id: "done", title: "Done", hint: "Tasks it has done", value: (row) => String(done(row)), rank: done },
-        { id: "place", title: "Place", hint: "Metres east and north", value: where, rank: (row) => row.position?.[0] ?? null },
         { id: "note", title: "Note", value: note, draw: drawNote },
+        { id: "place", title: "Place", hint: "Metres east and north", value: where, rank: (row) => row.position?.[0] ?? null },
       ],
     });
   }
 
   show() {
+    if (this.panel.hidden) return;
     const rank = new Map((this.picture.head?.sequence ?? []).map((id, index) => [id, index]));
     const last = rank.size;
     this.grid.show([...this.picture.uavs.values()].sort(

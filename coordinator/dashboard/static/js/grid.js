@@ -91,14 +91,18 @@ export class Grid {
     const most = Math.max(0, this.rows.length - fit);
     const first = Math.min(most, Math.max(0, Math.floor(this.scroller.scrollTop / this.rowHeight) - SPARE_ROWS));
     const shown = Math.min(fit, this.rows.length);
-    const held = this.body.contains(document.activeElement);
+    const held = this.slots.indexOf(document.activeElement);
     while (this.slots.length < shown) this.slots.push(this.#slot());
     while (this.slots.length > shown) this.slots.pop().remove();
+    // Who has scrolled away from the row that has the focus goes on from what is there now.
+    if (held >= 0 && (this.active < first || this.active >= first + shown)) {
+      this.active = first + Math.min(held, shown - 1);
+    }
     this.slots.forEach((slot, index) => this.#fill(slot, first + index));
     this.before.style.height = `${first * this.rowHeight}px`;
     this.after.style.height = `${(this.rows.length - first - shown) * this.rowHeight}px`;
     this.first = first;
-    if (held && this.#slotOf(this.active) !== document.activeElement) this.#slotOf(this.active)?.focus({ preventScroll: true });
+    if (held >= 0) this.#slotOf(this.active)?.focus({ preventScroll: true });
   }
 
   #slot() {

@@ -13,6 +13,7 @@ export class Header {
     this.parts = TASK_STATES.map((state) => make("i", { class: `task-${state}` }));
     byId("progress").append(...this.parts);
     this.state = "connecting";
+    byId("give-token").addEventListener("click", () => feed.introduceAgain());
     setInterval(() => this.showConnection(), 1000);
   }
 
@@ -78,14 +79,16 @@ export class Header {
     if (this.state === "lost") {
       const since = new Date(this.feed.lostSince);
       const age = Math.round((Date.now() - this.feed.lostSince) / 1000);
-      told.push(["lost", `Connection lost since ${since.toLocaleTimeString()} (${age} s). What you see is from then; trying again.`]);
+      told.push(this.feed.ended
+        ? ["note", `The dashboard has ended: ${this.feed.ended}. What you see is from ${since.toLocaleTimeString()}; looking whether it comes back.`]
+        : ["lost", `Connection lost since ${since.toLocaleTimeString()} (${age} s). What you see is from then; trying again.`]);
     } else if (head && !head.link && hello?.kind === "live") {
       told.push(["lost", "The dashboard has lost the bus: nothing new is heard, and commands reach nobody until it is back."]);
     }
     if (head && this.state === "open") {
       if (!head.coordinator && (head.phase === "running" || head.phase === "preparing")) {
         told.push(["warn", head.phase === "running"
-          ? `Coordinator lost. The fleet goes on with epoch ${head.epoch ?? NOTHING}; your commands still reach it.`
+          ? `Coordinator lost. The fleet goes on with epoch ${head.epoch ?? NOTHING}${hello?.kind === "live" ? "; your commands still reach it" : ""}.`
           : "No coordinator yet: the mission has not begun."]);
       }
       if (head.aborted && head.phase !== "ended") told.push(["warn", "The mission is aborted: every UAV flies home."]);
@@ -103,12 +106,14 @@ export class Header {
   }
 
   #nothing() {
-    const { mission, tasks } = this.picture;
+    const { head, hello, mission, tasks } = this.picture;
     const text = this.state === "connecting" ? "Connecting …"
+      : !mission && hello?.token && !head ? "Waiting for the token."
       : !mission ? (this.state === "lost" ? "No connection to the dashboard." : "No mission yet. It appears here as soon as somebody on the bus flies one.")
         : "";
     setText(byId("nothing-text"), text);
     byId("nothing").hidden = text === "";
+    byId("give-token").hidden = !(this.state === "open" && hello?.token && !head);
     document.body.classList.toggle("unheard", !mission);
     document.body.classList.toggle("empty", tasks.size === 0);
   }

@@ -8,6 +8,7 @@ import { NOTHING, byName, number, seconds } from "./words.js";
 
 export class Links {
   constructor(panel, picture, onSelect) {
+    this.panel = panel;
     this.picture = picture;
     this.values = {};
     const row = (key, title) => {
@@ -36,6 +37,7 @@ export class Links {
   }
 
   show() {
+    if (this.panel.hidden) return;
     const { head, uavs, hello } = this.picture;
     if (!head) return;
     const rows = [...uavs.values()].sort((one, other) =>

@@ -3,6 +3,7 @@
 import { Card } from "./card.js";
 import { ChoiceLog } from "./choices.js";
 import { themeSwitch } from "./colours.js";
+import { theToken } from "./dialogs.js";
 import { byId, isTyping, setText } from "./dom.js";
 import { Feed } from "./feed.js";
 import { Finder } from "./finder.js";
@@ -27,9 +28,9 @@ const picture = new Picture();
 const motion = new Motion();
 const feed = new Feed(hear, (state) => {
   header.connection = state;
-});
+}, theToken);
 const header = new Header(picture, feed);
-const tabs = new Tabs();
+const tabs = new Tabs(() => show(WHOLE));
 const map = new MissionMap(byId("map"), picture, motion, {
   select,
   place: (position) => tools.placed(position),
@@ -88,11 +89,11 @@ function show(changed) {
 /** Chooses a UAV or a task everywhere on the page; null chooses nothing. */
 function select(kind, id) {
   const of = kind && (kind === "uav" ? picture.uavs : picture.tasks).has(id) ? { kind, id } : null;
+  card.select(of); // first, as it takes room from the lists
   map.select(of?.id ?? null);
   fleet.grid.select(of?.kind === "uav" ? of.id : null, true);
   tasks.grid.select(of?.kind === "task" ? of.id : null, true);
   links.grid.select(of?.kind === "uav" ? of.id : null, true);
-  card.select(of);
   tools.show();
 }
 
@@ -137,4 +138,5 @@ themeSwitch(byId("theme"), () => {
   order.recolour();
   if (card.of) card.select(card.of);
 });
+tabs.open("fleet");
 feed.open();

@@ -9,7 +9,6 @@ import { number, place, taskState } from "./words.js";
 
 /** Least time between two pictures of what moves [ms]: 30 a second are smooth enough. */
 const BETWEEN_MS = 30;
-const LABELS_FOR = 40;
 
 export class MissionMap {
   /**
@@ -110,7 +109,7 @@ export class MissionMap {
     if (!places.length) return;
     const bounds = window.L.latLngBounds(places.map((position) => this.projection.toLeaflet(position)));
     this.map.invalidateSize({ animate: false });
-    this.map.fitBounds(bounds, { padding: [38, 38], maxZoom: this.projection === PLANE ? 6 : 20, animate: false });
+    this.map.fitBounds(bounds, { paddingTopLeft: [40, 56], paddingBottomRight: [40, this.picture.hello?.kind === "replay" ? 100 : 40], maxZoom: this.projection === PLANE ? 6 : 20, animate: false });
     this.fitted = this.picture.mission?.name ?? null;
     this.#measure();
   }
@@ -157,7 +156,6 @@ export class MissionMap {
     const room = (size.x * size.y) / Math.max(8, this.picture.tasks.size);
     this.taskSize = Math.min(10, Math.max(3, Math.sqrt(room) / 9));
     this.uavSize = this.picture.uavs.size > 40 ? 8 : 11;
-    this.labels = this.picture.uavs.size <= 4 * LABELS_FOR;
   }
 
   #run(wallMs) {
@@ -192,7 +190,6 @@ export class MissionMap {
       size: this.taskSize,
       mostValue: this.mostValue ?? 1,
       uavSize: this.uavSize,
-      labels: this.labels,
       selected: this.selected,
       ghosts: this.ghosts,
       showsList: (uav) => which === "all" || (which === "selected" && uav === this.selected),

@@ -131,7 +131,7 @@ export class Operator {
   }
 
   async #post(path, body, text, ghost = null) {
-    const n = await postWithToken(path, body, this.picture.hello.token);
+    const n = await postWithToken(path, body);
     this.sent.set(n, { toast: toast(text), ghost });
     this.#expect();
     const row = this.picture.commands.get(n);

@@ -67,7 +67,7 @@ export class Replay {
 
   async #say(body) {
     try {
-      await postWithToken("api/recording", body, false);
+      await postWithToken("api/recording", body);
     } catch (refusal) {
       this.onRefused(refusal.message);
     }

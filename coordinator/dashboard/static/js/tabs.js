@@ -15,14 +15,16 @@ const PANELS = [
 const ALWAYS_THERE = ["worth", "order", "story"];
 
 export class Tabs {
-  constructor() {
+  /** `onOpen` is called when another tab is shown. */
+  constructor(onOpen) {
+    this.onOpen = onOpen;
     this.missing = new Set();
     this.wide = window.matchMedia("(min-width: 1000px)");
     this.tabs = new Map(PANELS.map(([name, title], index) => [name, this.#tab(name, title, index)]));
     byId("tabs").append(...this.tabs.values());
     byId("tabs").addEventListener("keydown", (event) => this.#key(event));
     this.wide.addEventListener("change", () => this.open(this.shown));
-    this.open("fleet");
+    this.shown = "fleet";
   }
 
   /** Names of the tabs there are now. */
@@ -50,6 +52,7 @@ export class Tabs {
       setAttribute(panel, "role", always ? "region" : "tabpanel");
       setAttribute(panel, "aria-labelledby", always ? `head-${each}` : `tab-${each}`);
     }
+    this.onOpen();
   }
 
   #tab(name, title, index) {

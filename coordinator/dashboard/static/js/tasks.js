@@ -2,10 +2,11 @@
 
 import { make, setAttribute } from "./dom.js";
 import { Grid } from "./grid.js";
-import { NOTHING, TASK_SIGNS, TASK_STATES, byName, number, seconds, taskState } from "./words.js";
+import { NOTHING, TASK_SIGNS, TASK_STATES, number, seconds, taskState } from "./words.js";
 
 export class TaskTable {
   constructor(panel, picture, onSelect) {
+    this.panel = panel;
     this.picture = picture;
     this.only = null;
     this.filters = new Map();
@@ -36,8 +37,8 @@ export class TaskTable {
   }
 
   show(changed) {
-    if (!changed.whole && !changed.tasks.size) return;
-    const rows = [...this.picture.tasks.values()];
+    if (this.panel.hidden || (!changed.whole && !changed.tasks.size)) return;
+    const rows = this.picture.tasksInOrder;
     const counts = new Map();
     for (const row of rows) counts.set(taskState(row), (counts.get(taskState(row)) ?? 0) + 1);
     for (const [state, button] of this.filters) {
@@ -47,7 +48,7 @@ export class TaskTable {
       button.hidden = state !== null && many === 0 && this.only !== state;
     }
     const shown = this.only === null ? rows : rows.filter((row) => taskState(row) === this.only);
-    this.grid.show(shown.sort((one, other) => byName(one.id, other.id)));
+    this.grid.show(shown);
   }
 
   #filter(state) {

@@ -31,7 +31,7 @@ export class Worth {
           row("now", "━", "so far", "J of all tasks done so far"),
           row("share", " ", "of plan", "J so far over the plan's J"),
           row("plan", "╌", "plan", "J of the plan, if all goes as planned"),
-          row("bound", "┈", "bound", "No plan can be worth more"))),
+          row("bound", "─", "bound", "No plan can be worth more"))),
     );
   }
 

@@ -1,0 +1,148 @@
+"""Facts as JSON of published schemas, and back to the very same."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coordinator.recording.records import SCHEMAS, Begun, UnreadableError, decode, encode, schema_of
+from swarm.events import BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Stop, Tick
+from swarm.model.ids import OPERATOR
+from swarm.wire.choice import Basis, Candidate
+from swarm.wire.messages import Choice, Message, Snapshot, Stamp, TaskOrder
+from tests.builders import MISSION, held, message
+from tests.message_strategies import (
+    counts,
+    ids,
+    messages,
+    not_negatives,
+    notes,
+    numbers,
+    points,
+    stamps,
+    task_ids,
+    uav_ids,
+)
+
+scores = st.floats(-1e30, 1e30)
+names = st.lists(uav_ids, max_size=3).map(tuple)
+bases = st.builds(
+    Basis,
+    numbers,
+    points,
+    not_negatives,
+    names,
+    names,
+    st.lists(task_ids, max_size=2).map(tuple),
+    st.dictionaries(uav_ids, st.tuples(counts, counts), max_size=3),
+    counts,
+)
+choices = st.builds(
+    Choice,
+    number=counts,
+    task=task_ids,
+    left=st.none() | task_ids,
+    chosen_s=numbers,
+    epoch=counts,
+    rule=st.just("guided"),
+    rank=counts,
+    score=scores,
+    second_score=st.none() | scores,
+    certificate=st.booleans(),
+    completion_s=numbers,
+    candidates=st.lists(st.builds(Candidate, task_ids, scores), max_size=5).map(tuple),
+    basis=bases,
+)
+orders = st.builds(
+    TaskOrder,
+    task=task_ids,
+    number=counts,
+    position_enu_m=points,
+    value=not_negatives,
+    service_s=not_negatives,
+    kind=st.none() | ids,
+    withdrawn=st.booleans(),
+    run=counts,
+    reason=notes,
+)
+everything = st.one_of(
+    messages(),
+    st.builds(Message, st.just(MISSION), uav_ids, stamps, choices),
+    st.builds(Message, st.just(MISSION), st.just(OPERATOR), stamps, orders),
+)
+snapshots = st.builds(
+    Snapshot,
+    st.just(MISSION),
+    uav_ids,
+    counts,
+    st.none() | numbers,
+    st.lists(everything, max_size=3).map(tuple),
+)
+facts: st.SearchStrategy[BusFact | Begun] = st.one_of(
+    everything.map(Heard),
+    st.lists(snapshots, max_size=2).map(tuple).map(Learned),
+    uav_ids.map(PeerSeen),
+    uav_ids.map(PeerGone),
+    st.booleans().map(LinkChanged),
+    st.just(Tick()),
+    st.just(Begun()),
+)
+
+
+@cache
+def validator(schema: str) -> Any:
+    shape = json.loads(schema_of(schema))
+    jsonschema.Draft202012Validator.check_schema(shape)
+    return jsonschema.Draft202012Validator(shape)
+
+
+@given(facts, st.floats(0.0, 1e9), st.none() | numbers)
+def test_every_fact_comes_back_as_it_was_and_fits_its_schema(
+    fact: BusFact | Begun, now_s: float, mission_s: float | None
+) -> None:
+    line = encode(fact, MISSION, now_s, mission_s)
+
+    assert line is not None
+    assert decode(line.schema, line.data) == (now_s, fact)
+    validator(line.schema).validate(json.loads(line.data))
+
+
+def test_all_schemas_are_objects_with_their_names() -> None:
+    for name in SCHEMAS:
+        shape = json.loads(schema_of(name))
+        assert (shape["type"], shape["title"]) == ("object", name)
+
+
+def test_topics_are_bus_keys_without_the_task() -> None:
+    said = encode(Heard(message("u1", held("t1", 0.0))), MISSION, 0.0, None)
+    ended = encode(Heard(Message(MISSION, "u1", Stamp(1, 1), _outcome())), MISSION, 0.0, None)
+
+    assert said is not None
+    assert ended is not None
+    assert said.topic == "/swarm/test/uav/u1/claim"
+    assert ended.topic == "/swarm/test/uav/u1/outcome"
+
+
+def _outcome() -> Any:
+    from tests.builders import done
+
+    return done("t1")
+
+
+def test_what_only_the_own_process_was_told_is_not_written() -> None:
+    assert encode(Stop("enough"), MISSION, 0.0, None) is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"{}", b"[]", b"nonsense", b'{"now_s":1e999,"up":true}', b'{"now_s":1.0,"up":"no"}'],
+)
+def test_what_does_not_fit_is_refused(data: bytes) -> None:
+    with pytest.raises(UnreadableError):
+        decode("peckorder.Link", data)
