@@ -3,6 +3,8 @@
 import { make, setText } from "./dom.js";
 import { Refusal, post, token } from "./say.js";
 
+let asked = 0;
+
 /** A labelled field. */
 export function field(label, input, hint = null) {
   return make(
@@ -36,6 +38,8 @@ export function reasonField() {
  * @param send takes FormData.
  */
 export function ask({ title, text, fields = [], confirm, danger = false, send }) {
+  asked += 1;
+  const id = `dialog-${asked}`;
   return new Promise((resolve) => {
     const fault = make("p", { class: "fault", role: "alert" });
     // Fields are for who wants them: on a touch screen no keyboard covers half of the question.
@@ -49,13 +53,13 @@ export function ask({ title, text, fields = [], confirm, danger = false, send })
     const form = make(
       "form",
       { method: "dialog" },
-      make("h2", { id: "dialog-title" }, title),
+      make("h2", { id }, title),
       text ? make("p", {}, text) : null,
       ...fields,
       fault,
       make("menu", {}, no, yes),
     );
-    const dialog = make("dialog", { "aria-labelledby": "dialog-title" }, form);
+    const dialog = make("dialog", { "aria-labelledby": id }, form);
     let told = null;
     form.addEventListener("submit", async (event) => {
       event.preventDefault();

@@ -63,8 +63,10 @@ const finder = new Finder(picture, (kind, id) => {
   select(kind, id);
   card.element.focus();
 });
+// Everything is shown anew, though nothing new was told.
 const WHOLE = {
   whole: true,
+  again: true,
   mission: true,
   uavs: new Set(),
   tasks: new Set(),
@@ -142,7 +144,7 @@ document.addEventListener("keydown", (event) => {
   } else if (event.key === "Enter" && map.isPlacing && byId("map").contains(event.target)) {
     event.preventDefault();
     tools.placed(map.middle());
-  } else if (event.key === " " && event.target === document.body) {
+  } else if (event.key === " " && !event.target.closest("a, button, input, select, summary, tr")) {
     event.preventDefault();
     replay.toggle();
   } else if (event.key in KEYS) {

@@ -79,8 +79,8 @@ export class MapTools {
   /** Takes the place of a new task. */
   placed(position) {
     this.#mode(false);
-    this.map.expect([{ position, label: "new task" }]);
-    this.operator.addTask(position)?.then((n) => n === null && this.map.expect([]));
+    this.operator.expect({ position, label: "new task" });
+    this.operator.addTask(position)?.then((n) => n === null && this.operator.expect());
   }
 
   nextLists() {

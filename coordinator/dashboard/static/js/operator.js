@@ -40,7 +40,11 @@ export class Operator {
   }
 
   show(changed) {
-    if (changed.whole) this.#forgetFormer();
+    if (changed.hello) this.renewed = true;
+    if (changed.whole && this.renewed && !changed.again) {
+      this.renewed = false;
+      this.#forgetFormer();
+    }
     if (!changed.whole && !changed.commands.size) return;
     const rows = [...this.picture.commands.values()].sort((one, other) => other.n - one.n);
     this.empty.hidden = rows.length > 0;
@@ -195,7 +199,7 @@ export class Operator {
   async #post(path, body, text, ghost = null) {
     const n = await postWithToken(path, body);
     this.sent.set(n, { toast: toast(text), ghost });
-    this.#expect();
+    this.expect();
     const row = this.picture.commands.get(n);
     if (row) this.#follow(row);
     return n;
@@ -208,15 +212,16 @@ export class Operator {
     ours.toast.show(row);
     if (row.state === "pending") return;
     this.sent.delete(row.n);
-    this.#expect();
+    this.expect();
     setText(
       byId(row.state === "obeyed" ? "say-polite" : "say-trouble"),
       `${row.text}: ${row.result || row.state}`,
     );
   }
 
-  #expect() {
-    this.onExpect([...this.sent.values()].map((each) => each.ghost).filter(Boolean));
+  /** Shows on the map what was asked for and has not come, and what is being asked for. */
+  expect(...asked) {
+    this.onExpect([...asked, ...[...this.sent.values()].map((each) => each.ghost).filter(Boolean)]);
   }
 
   /** Commands of a server that has begun anew can't be followed any more. */
@@ -230,7 +235,7 @@ export class Operator {
       });
       this.sent.delete(n);
     }
-    this.#expect();
+    this.expect();
   }
 }
 
