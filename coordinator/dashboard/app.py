@@ -42,6 +42,8 @@ __all__ = ["STATIC", "Dashboard", "create_app"]
 STATIC = Path(__file__).parent / "static"
 MAX_BODY_BYTES = 16 * 1024
 MAX_CLIENTS = 64
+MAX_STRANGERS = 256
+"""Connections that have not given the token yet."""
 TOKEN_S = 120.0
 """Wall time a page may take to give the token: a person may have to look for it."""
 SEND_S = 20.0
@@ -82,6 +84,7 @@ class Dashboard:
         self._clock = clock
         self._static = static
         self._pace = Pace()
+        self._strangers = 0
         self._metrics = Metrics(source, self.hub)
         routes = [
             Route("/", self._page),
@@ -133,27 +136,27 @@ class Dashboard:
 
     async def _feed(self, socket: WebSocket) -> None:
         await socket.accept()
-        if self.hub.clients >= MAX_CLIENTS:
-            await socket.close(_FULL, "too many look on")
-            return
-        self.hub.enter()
-        try:
+        with contextlib.suppress(WebSocketDisconnect, TimeoutError):  # it is gone or does not read
             await _send(socket, self.hub.feed.hello())
-            if self._access.token is None or await self._hear_token(socket):
-                await self._tell(socket)
-            else:
+            if self._access.token is not None and not await self._hear_token(socket):
                 await socket.close(_WRONG_TOKEN, "the token is missing or wrong")
-        except (WebSocketDisconnect, TimeoutError):
-            pass  # it is gone, or does not read
-        finally:
-            self.hub.leave()
+            elif self.hub.clients >= MAX_CLIENTS:
+                await socket.close(_FULL, "too many look on")
+            else:
+                with self.hub.following():
+                    await self._tell(socket)
 
     async def _hear_token(self, socket: WebSocket) -> bool:
+        if self._strangers >= MAX_STRANGERS:
+            return False
+        self._strangers += 1
         try:
             async with asyncio.timeout(TOKEN_S):
                 said = json.loads(await socket.receive_text())
         except (TimeoutError, ValueError, KeyError, RecursionError):
             return False
+        finally:
+            self._strangers -= 1
         token = said.get("token") if isinstance(said, dict) else None
         return isinstance(token, str) and self._access.admits(token)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from coordinator.dashboard.feed import Feed
@@ -67,16 +68,17 @@ class Hub:
             if self._bounding is not None:
                 self._bounding.cancel()
 
-    def enter(self) -> None:
-        """Somebody begins to follow the feed."""
+    @contextlib.contextmanager
+    def following(self) -> Iterator[None]:
+        """Somebody follows the feed while the context lasts."""
         self.clients += 1
         self.deserted.clear()
-
-    def leave(self) -> None:
-        """Somebody has ceased to follow the feed."""
-        self.clients -= 1
-        if self.clients == 0:
-            self.deserted.set()
+        try:
+            yield
+        finally:
+            self.clients -= 1
+            if self.clients == 0:
+                self.deserted.set()
 
     def nudge(self) -> None:
         """Look soon: something has just happened."""

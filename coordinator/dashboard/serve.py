@@ -29,6 +29,7 @@ async def serving(app: ASGIApp, listening: socket.socket) -> AsyncIterator[None]
             log_level="error",
             access_log=False,
             server_header=False,
+            proxy_headers=False,
             lifespan="on",
             http="h11",
             ws="websockets-sansio",
