@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
@@ -85,6 +85,7 @@ class Dashboard:
         self._static = static
         self._pace = Pace()
         self._strangers = 0
+        self._looking: asyncio.Task[None] | None = None
         self._metrics = Metrics(source, self.hub)
         routes = [
             Route("/", self._page),
@@ -102,13 +103,30 @@ class Dashboard:
 
     @contextlib.asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        looking = asyncio.get_running_loop().create_task(self.hub.run())
+        self._looking = asyncio.get_running_loop().create_task(self.hub.run())
         try:
             yield
         finally:
             self.hub.end("the server has ended")
-            looking.cancel()
-            await asyncio.gather(looking, return_exceptions=True)
+            self._looking.cancel()
+            await asyncio.gather(self._looking, return_exceptions=True)
+
+    async def beside(self, work: Coroutine[None, None, None]) -> None:
+        """Do ``work`` while the application is served; a fault of the feed ends it, too.
+
+        Raises:
+            Exception: what went wrong, here or there.
+        """
+        working = asyncio.get_running_loop().create_task(work)
+        running = {working} if self._looking is None else {working, self._looking}
+        try:
+            await asyncio.wait(running, return_when=asyncio.FIRST_COMPLETED)
+            for task in running:
+                if task.done():
+                    task.result()
+        finally:
+            working.cancel()
+            await asyncio.gather(working, return_exceptions=True)
 
     async def end(self, reason: str) -> None:
         """Tell everyone who looks on that it is over, and let them leave."""

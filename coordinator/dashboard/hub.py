@@ -14,6 +14,7 @@ from coordinator.dashboard.feed import Feed
 from coordinator.dashboard.measure import Measure
 from coordinator.planner.stop import after_time
 from swarm.clock import SystemClock
+from swarm.log import get_logger
 from swarm.process import call_in_background
 
 __all__ = ["Hub"]
@@ -109,5 +110,8 @@ class Hub:
         stop = after_time(SystemClock(), BOUND_S)
         # On a thread that does not hold the process up when it is told to end.
         work = call_in_background(lambda: measure.work_out(stop), "bound")
-        measure.bound = await asyncio.wrap_future(work)
+        try:
+            measure.bound = await asyncio.wrap_future(work)
+        except ValueError as fault:  # the page does without
+            get_logger("dashboard").warning("no upper bound", problem=str(fault))
         self._bounding = None
