@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -128,6 +129,21 @@ def test_whoever_looks_on_is_told_of_the_end(play: DeskPlay, tmp_path: Path) -> 
 
     assert said == {"type": "end", "reason": "the run has ended"}
     assert closed.value.code == 1001
+
+
+def test_a_fault_of_the_feed_ends_what_is_done_beside_it(tmp_path: Path) -> None:
+    class BrokenPlay(DeskPlay):
+        def now_s(self) -> float:
+            raise RuntimeError("a bug")
+
+    async def nothing() -> None:
+        await asyncio.Event().wait()
+
+    made = create_app(BrokenPlay(), Access(NAMES, any_address=False, token=None), static=tmp_path)
+    with TestClient(made.app) as opened:
+        assert opened.portal is not None
+        with pytest.raises(RuntimeError, match="a bug"):
+            opened.portal.call(made.beside, nothing())
 
 
 @pytest.mark.parametrize(("path", "body"), POSTS)
