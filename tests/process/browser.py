@@ -53,9 +53,14 @@ def open_page(url: str) -> Iterator[Watched]:
         pytest.fail("no Chromium found: install one, on Debian by `apt-get install chromium`")
     with sync_playwright() as playwright:
         # Root may not have Chromium's sandbox; the page is our own.
-        browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(
+            executable_path=found, args=["--no-sandbox", "--disable-gpu"]
+        )
         try:
-            context = browser.new_context(viewport={"width": 1440, "height": 900})
+            # Without motion between frames the browser leaves the processors to the fleet.
+            context = browser.new_context(
+                viewport={"width": 1440, "height": 900}, reduced_motion="reduce"
+            )
             yield Watched(context, url)
         finally:
             browser.close()

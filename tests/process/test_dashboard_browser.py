@@ -26,7 +26,7 @@ SIDE = 12
 MISSION = Mission(
     "watched",
     9000.0,
-    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 6.0) for n, u in enumerate(UAVS)),
+    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 3.0) for n, u in enumerate(UAVS)),
     tuple(
         Task(TaskId(f"t{n + 1}"), (10.0 * (n % SIDE - 4), 10.0 * (1 + n // SIDE), 0.0), 1.0)
         for n in range(SIDE * SIDE)
@@ -35,6 +35,7 @@ MISSION = Mission(
 )
 SOON_MS = 30_000.0
 """For what takes a flight or a start of processes."""
+expect.set_options(timeout=15_000.0)
 
 
 def dashboard(by_hand: ByHand, name: str, port: int = 0) -> tuple[subprocess.Popen[str], str]:
@@ -51,6 +52,11 @@ def places(page: Page) -> dict[str, str]:
     return {uav: uav_row(page, uav).locator(".col-place").text_content() or "" for uav in UAVS}
 
 
+def painted(page: Page) -> str:
+    """What is drawn of the UAVs on the map."""
+    return str(page.evaluate("document.querySelector('canvas.moving').toDataURL()"))
+
+
 def confirm(page: Page, label: str) -> None:
     page.locator("dialog").get_by_role("button", name=label, exact=True).click()
     expect(page.locator("dialog")).to_have_count(0)
@@ -59,7 +65,7 @@ def confirm(page: Page, label: str) -> None:
 @pytest.fixture
 def flown(tmp_path: Path) -> Iterator[ByHand]:
     with contextlib.ExitStack() as stack:
-        yield ByHand(tmp_path, stack, MISSION)
+        yield ByHand(tmp_path, stack, MISSION, speedup=4)
 
 
 def test_an_operator_sees_and_commands_a_living_fleet_in_a_browser(flown: ByHand) -> None:
@@ -105,12 +111,13 @@ def test_an_operator_sees_and_commands_a_living_fleet_in_a_browser(flown: ByHand
 
 def all_uavs_move(page: Page) -> None:
     expect(page.locator("#panel-fleet tbody tr[data-id]")).to_have_count(len(UAVS))
-    before = places(page)
+    before, picture = places(page), painted(page)
     wait_until(
         lambda: all(now != before[uav] for uav, now in places(page).items()),
         20.0,
         "a move of every UAV",
     )
+    assert painted(page) != picture
 
 
 def add_a_task_by_a_click(page: Page) -> str:

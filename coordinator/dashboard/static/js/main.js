@@ -26,9 +26,13 @@ import { Worth } from "./worth.js";
 
 const picture = new Picture();
 const motion = new Motion();
-const feed = new Feed(hear, (state) => {
-  header.connection = state;
-}, theToken);
+const feed = new Feed(
+  hear,
+  (state) => {
+    header.connection = state;
+  },
+  theToken,
+);
 const header = new Header(picture, feed);
 const tabs = new Tabs(() => show(WHOLE));
 const map = new MissionMap(byId("map"), picture, motion, {
@@ -59,7 +63,18 @@ const finder = new Finder(picture, (kind, id) => {
   select(kind, id);
   card.element.focus();
 });
-const WHOLE = { whole: true, mission: true, uavs: new Set(), tasks: new Set(), lists: new Set(), commands: new Set(), story: [], choices: [] };
+// Everything is shown anew, though nothing new was told.
+const WHOLE = {
+  whole: true,
+  again: true,
+  mission: true,
+  uavs: new Set(),
+  tasks: new Set(),
+  lists: new Set(),
+  commands: new Set(),
+  story: [],
+  choices: [],
+};
 
 let serverVersion = null;
 let missedWhileHidden = false;
@@ -81,7 +96,21 @@ function hear(message) {
 }
 
 function show(changed) {
-  for (const part of [header, map, tools, fleet, tasks, choices, story, worth, order, operator, links, card, replay]) {
+  for (const part of [
+    header,
+    map,
+    tools,
+    fleet,
+    tasks,
+    choices,
+    story,
+    worth,
+    order,
+    operator,
+    links,
+    card,
+    replay,
+  ]) {
     part.show(changed);
   }
 }
@@ -103,7 +132,9 @@ const KEYS = {
   f: () => map.fit(),
   l: () => tools.nextLists(),
   n: () => tools.place(),
-  c: () => card.of && card.on.centre((card.of.kind === "uav" ? picture.uavs : picture.tasks).get(card.of.id)?.position),
+  c: () =>
+    card.of &&
+    card.on.centre((card.of.kind === "uav" ? picture.uavs : picture.tasks).get(card.of.id)?.position),
 };
 
 document.addEventListener("keydown", (event) => {
@@ -113,7 +144,7 @@ document.addEventListener("keydown", (event) => {
   } else if (event.key === "Enter" && map.isPlacing && byId("map").contains(event.target)) {
     event.preventDefault();
     tools.placed(map.middle());
-  } else if (event.key === " " && event.target === document.body) {
+  } else if (event.key === " " && !event.target.closest("a, button, input, select, summary, tr")) {
     event.preventDefault();
     replay.toggle();
   } else if (event.key in KEYS) {

@@ -4,8 +4,8 @@ import { uavColour } from "./colours.js";
 import { taskState } from "./words.js";
 
 const WIDE = 2 * Math.PI;
-/** Pixels per task from which on tasks are named. */
-const ROOM_FOR_NAMES = 1800;
+/** Pixels per letter of all names from which on tasks are named. */
+const ROOM_PER_LETTER = 330;
 
 /** The plane of one drawing: turns unit coordinates into pixels of the canvas. */
 export class View {
@@ -124,8 +124,8 @@ function paintTasks(canvas, view, picture, look, spots) {
   const weight = (task) => (task.state === "open" ? 2 : task.state === "failed" ? 1 : 0);
   inView.sort((one, other) => weight(one[0]) - weight(other[0]));
   for (const [task, spot] of inView) paintTask(canvas, task, spot, picture, look);
-  const room = (view.width * view.height) / Math.max(1, inView.length);
-  if (room < ROOM_FOR_NAMES) return;
+  const letters = inView.reduce((sum, [task]) => sum + task.id.length, 0);
+  if (view.width * view.height < letters * ROOM_PER_LETTER) return;
   canvas.font = `11px ${look.ink.font}`;
   canvas.textAlign = "center";
   const labels = inView.map(([task, [x, y]]) => ({
@@ -189,7 +189,12 @@ function paintByOperator(canvas, x, y, radius, ink) {
   canvas.strokeStyle = ink.muted;
   canvas.lineWidth = 1.25;
   canvas.beginPath();
-  for (const [across, down] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+  for (const [across, down] of [
+    [-1, -1],
+    [1, -1],
+    [1, 1],
+    [-1, 1],
+  ]) {
     canvas.moveTo(x + across * half, y + down * (half - 3.5));
     canvas.lineTo(x + across * half, y + down * half);
     canvas.lineTo(x + across * (half - 3.5), y + down * half);
@@ -217,7 +222,8 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
   }
   const labels = [];
   for (const [id, spot] of spots) {
-    if (view.holds(spot)) labels.push(paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look));
+    if (view.holds(spot))
+      labels.push(paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look));
   }
   paintLabels(canvas, labels, look, 1);
   for (const ghost of look.ghosts) paintGhost(canvas, view.spot(ghost.position), ghost.label, look);

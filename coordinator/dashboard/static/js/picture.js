@@ -10,6 +10,7 @@ const CURVE_POINTS = 600;
 function changes(whole = false) {
   return {
     whole,
+    again: false,
     hello: false,
     mission: false,
     uavs: new Set(),

@@ -29,7 +29,9 @@ export class Tabs {
 
   /** Names of the tabs there are now. */
   get names() {
-    return [...this.tabs.keys()].filter((name) => !this.missing.has(name) && !(this.wide.matches && ALWAYS_THERE.includes(name)));
+    return [...this.tabs.keys()].filter(
+      (name) => !this.missing.has(name) && !(this.wide.matches && ALWAYS_THERE.includes(name)),
+    );
   }
 
   /** Whether there is such a tab at all. */
@@ -56,7 +58,18 @@ export class Tabs {
   }
 
   #tab(name, title, index) {
-    return make("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "data-index": String(index), click: () => this.open(name) }, title);
+    return make(
+      "button",
+      {
+        type: "button",
+        role: "tab",
+        id: `tab-${name}`,
+        "aria-controls": `panel-${name}`,
+        "data-index": String(index),
+        click: () => this.open(name),
+      },
+      title,
+    );
   }
 
   #key(event) {

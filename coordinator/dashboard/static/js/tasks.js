@@ -12,7 +12,12 @@ export class TaskTable {
     this.filters = new Map();
     const bar = make("div", { class: "filters", role: "group", "aria-label": "Which tasks" });
     for (const state of [null, ...TASK_STATES]) {
-      const button = make("button", { type: "button", class: "pill", "aria-pressed": String(state === null), click: () => this.#filter(state) });
+      const button = make("button", {
+        type: "button",
+        class: "pill",
+        "aria-pressed": String(state === null),
+        click: () => this.#filter(state),
+      });
       this.filters.set(state, button);
       bar.append(button);
     }
@@ -24,13 +29,36 @@ export class TaskTable {
       decorate: (slot, row) => setAttribute(slot, "data-trouble", row.state === "failed" ? "" : null),
       columns: [
         { id: "task", title: "Task", value: (row) => row.id, rank: (row) => row.id },
-        { id: "state", title: "State", value: taskState, rank: (row) => TASK_STATES.indexOf(taskState(row)), draw: drawTaskState },
+        {
+          id: "state",
+          title: "State",
+          value: taskState,
+          rank: (row) => TASK_STATES.indexOf(taskState(row)),
+          draw: drawTaskState,
+        },
         { id: "uav", title: "UAV", value: (row) => row.uav ?? NOTHING, rank: (row) => row.uav },
         { id: "value", title: "Value", value: (row) => number(row.value), rank: (row) => row.value },
-        { id: "ended", title: "Done at", value: (row) => seconds(row.completed_s), rank: (row) => row.completed_s },
-        { id: "service", title: "Service", hint: "How long it takes there", value: (row) => (row.service_s ? seconds(row.service_s) : NOTHING), rank: (row) => row.service_s },
+        {
+          id: "ended",
+          title: "Done at",
+          value: (row) => seconds(row.completed_s),
+          rank: (row) => row.completed_s,
+        },
+        {
+          id: "service",
+          title: "Service",
+          hint: "How long it takes there",
+          value: (row) => (row.service_s ? seconds(row.service_s) : NOTHING),
+          rank: (row) => row.service_s,
+        },
         { id: "kind", title: "Kind", value: (row) => row.kind ?? NOTHING, rank: (row) => row.kind },
-        { id: "by", title: "By", hint: "Who put it on the board", value: (row) => row.by, rank: (row) => row.by },
+        {
+          id: "by",
+          title: "By",
+          hint: "Who put it on the board",
+          value: (row) => row.by,
+          rank: (row) => row.by,
+        },
       ],
     });
     this.show({ whole: true, tasks: new Set() });
@@ -61,5 +89,12 @@ export class TaskTable {
 /** Sign and word of a task's state. */
 export function drawTaskState(cell, row) {
   const state = taskState(row);
-  cell.replaceChildren(make("span", { class: `state task-${state}` }, make("i", { "aria-hidden": "true" }, TASK_SIGNS[state]), state));
+  cell.replaceChildren(
+    make(
+      "span",
+      { class: `state task-${state}` },
+      make("i", { "aria-hidden": "true" }, TASK_SIGNS[state]),
+      state,
+    ),
+  );
 }
