@@ -9,6 +9,7 @@ from coordinator.status.onlooker import Onlooker
 from swarm.config import Timing
 from swarm.deadline import earliest
 from swarm.events import BusFact, Finish, Wish
+from swarm.wire.messages import EpochPhase
 
 __all__ = ["Witness"]
 
@@ -31,7 +32,7 @@ class Witness:
         self._until_s = until_s
         self._stop_at_s: float | None = None
         self._empty_at_s: float | None = None
-        """Since when nobody of the fleet has been there, after somebody had."""
+        """Since when nobody has been there, after somebody had."""
         self._met = False
 
     def start(self, now_s: float) -> list[Wish]:
@@ -44,9 +45,13 @@ class Witness:
         """Take note of one fact."""
         wishes = self.onlooker.step(fact, now_s)
         observer = self.onlooker.observer
-        there = any(uav.id in observer.present for uav in observer.mission.uavs)
+        fleet = {uav.id for uav in observer.mission.uavs}
+        there = bool(observer.present & fleet if self.onlooker.known else observer.present)
         self._met |= there
-        if there or not self._met or observer.cut_since_s is not None:
+        if observer.cut_since_s is not None:
+            # Who is there cannot be seen; after the end nobody need be waited for.
+            there = self.onlooker.known and observer.phase is not EpochPhase.ENDED
+        if there or not self._met:
             self._empty_at_s = None
         elif self._empty_at_s is None:
             self._empty_at_s = now_s
