@@ -286,7 +286,7 @@ def _play(playback: Playback, port: int, *, json: bool, browser: bool) -> int:
         served = create_app(player, access)
         async with serving(served.app, taken):
             try:
-                await player.run()
+                await served.beside(player.run())
             finally:
                 await served.end("the replay has ended")
         return 0

@@ -200,7 +200,7 @@ def test_a_task_is_said_as_it_was_drawn(page: TestClient, play: DeskPlay) -> Non
         ("/api/task", {"position": [0, 0, 0], "value": "7"}, "value: "),
         ("/api/task", {"position": [0, 0, 0], "value": True}, "value: "),
         ("/api/task", {"position": [0, 0, 0], "id": "a/b"}, "id: "),
-        ("/api/task", {"position": [0, 0, 0], "id": "t1"}, "there is such a task already"),
+        ("/api/task", {"position": [0, 0, 0], "id": "t1"}, "that id is taken"),
         ("/api/task/withdraw", {"id": "t9"}, "no such task"),
         ("/api/task/withdraw", {}, "id: field required"),
     ],

@@ -108,7 +108,7 @@ def test_many_orders_are_under_way_at_once() -> None:
     [
         (CommandWish(CommandKind.HOLD, "u9"), "no such UAV: the fleet is u1, u2"),
         (Withdrawal("t9"), "no such task: "),
-        (NewTask((0.0, 0.0, 0.0), task="t1"), "there is such a task already: "),
+        (NewTask((0.0, 0.0, 0.0), task="t1"), "that id is taken: "),
     ],
 )
 def test_what_does_not_fit_the_mission_is_refused(
