@@ -51,6 +51,7 @@ from swarm.events import (
     PeerGone,
     PeerSeen,
     Publish,
+    PublishLast,
     Save,
     Stop,
     Tick,
@@ -281,7 +282,9 @@ class AgentCore:
         self._actions.append(Note("airborne"))
 
     def _give_up_order(self, order: object, reason: str, now_s: float) -> None:
-        self._actions.append(Note("vehicle refused", {"order": str(order), "reason": reason}))
+        label = self._tasking.label(order.leg) if isinstance(order, GoTo) else {}
+        fields = {"order": str(order), "reason": reason, **label}
+        self._actions.append(Note("vehicle refused", fields))
         if isinstance(order, GoTo):
             self._actions += self._tasking.refuse(order.leg, reason, now_s)
         elif isinstance(order, Prepare) and self._flew_before:
@@ -515,7 +518,7 @@ class AgentCore:
             actions.insert(0, Save())
         # The vehicle first: it waits, while keeping and telling take their time.
         if len(actions) > 1:
-            actions.sort(key=lambda action: not isinstance(action, Order))
+            actions.sort(key=_place)
         self._deadline_s = self._earliest_deadline_s()
         self._pulse.promise(self._deadline_s)
         return actions
@@ -528,3 +531,13 @@ class AgentCore:
         before, self._kept = self._kept, (plan, self.replica.board_version, commands)
         said = [action.message.body for action in actions if isinstance(action, Publish)]
         return before != self._kept or not all(isinstance(body, Status) for body in said)
+
+
+def _place(action: Action) -> int:
+    match action:
+        case Order():
+            return 0
+        case PublishLast():
+            return 2
+        case _:
+            return 1

@@ -12,6 +12,7 @@ from swarm.deadline import earliest
 from swarm.events import Publish
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
+from swarm.wire.keys import Keys
 from swarm.wire.messages import Body, Claim, Message, Outcome, Status
 
 __all__ = ["Speech"]
@@ -35,6 +36,7 @@ class Speech:
         self._voice = voice
         self._replica = replica
         self._timing = timing
+        self._claim_key = Keys(voice.mission).claim(voice.writer)
         self._turn = 0
         self._announce_at_s: float | None = None
         self._status_at_s: float | None = None
@@ -44,8 +46,13 @@ class Speech:
         """Of this life of the agent."""
         return self._voice.incarnation
 
+    @property
+    def claimed(self) -> Message | None:
+        """The own claim register."""
+        return self._replica.register(self._claim_key)
+
     def say(self, body: Body) -> Publish:
-        """State the new content of an own register, or the status."""
+        """State the new content of an own register, or what is none: status and choice."""
         message = self._voice.say(body)
         self._replica.join(message)
         return Publish(message)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from agent.choices import Choices, Witness
 from agent.deciding import Turn, decide, turn_aside
 from agent.events import Action, Order
 from agent.peers import Peers
@@ -60,6 +61,7 @@ class Tasking:
         self._peers = peers
         self._speech = speech
         self._timing = timing
+        self._choices = Choices(uav, replica, speech)
         self._rule: Rule | None = None
         self._rule_basis: object = None
         self._free_since_s = 0.0
@@ -89,6 +91,10 @@ class Tasking:
     def undecided(self) -> bool:
         """Whether, being idle, it may yet find a task."""
         return self._to_decide or self._awaits_peers
+
+    def label(self, leg: int) -> dict[str, object]:
+        """For the log: which choice that leg came of, if it is the one being flown."""
+        return self._choices.label if leg == self._leg and self._task() is not None else {}
 
     def resume(self, claim: Claim, now_s: float) -> list[Action]:
         """An earlier life of this agent claimed so: stand by it, if it still counts.
@@ -130,7 +136,7 @@ class Tasking:
         said = self._withdraw(ClaimPhase.PAUSED, now_s, handed_over=False)
         if task is None:
             return [said]
-        return [said, Note("released", {"task": task.task, "reason": "the operator holds the UAV"})]
+        return [said, self._note("released", task.task, reason="the operator holds the UAV")]
 
     def wake(self, now_s: float) -> None:
         """Decide anew when free; who found nothing before takes no precedence from that."""
@@ -213,7 +219,7 @@ class Tasking:
         self._become_free(mission_s)
         return [
             self._speech.say(outcome),
-            Note(f"task {result}", {"task": task.task, "mission_s": mission_s}),
+            self._note(f"task {result}", task.task, mission_s=mission_s),
         ]
 
     def _keep_or_lose_claim(self, now_s: float) -> list[Action]:
@@ -246,9 +252,9 @@ class Tasking:
         if decision is None:
             return actions
         self._become_free(turn.now_s)
-        why: dict[str, object] = {"task": claim.task, "for": problem.task_ids[decision.task]}
-        actions.append(Note("turns aside", why))
-        return actions + self._set_off(decision, problem, epoch, now_s)
+        return actions + self._set_off(
+            turn, problem, epoch, Witness(rule, decision.uav), decision, now_s, left=claim.task
+        )
 
     def _lost(self) -> str | None:
         """Why the claimed task is not this UAV's to do; None if it is."""
@@ -267,7 +273,7 @@ class Tasking:
         proposed = claim.phase is ClaimPhase.PROPOSED
         self._become_free(claim.decided_s if proposed else self._picture.mission_s(now_s))
         self._adrift = True
-        return [Note("released", {"task": claim.task, "reason": reason})]
+        return [self._note("released", str(claim.task), reason=reason)]
 
     def _become_free(self, free_since_s: float) -> None:
         self.phase, self._to_decide, self._idled = StatusPhase.IDLE, True, False
@@ -285,10 +291,11 @@ class Tasking:
         rule, actions = self._rule_of(epoch)
         if rule is None:
             return actions + self._stay_idle(now_s)
-        decision = decide(problem, self._picture.board, rule, turn)
+        witness = Witness(rule, problem.uav_ids.index(self._uav))
+        decision = decide(problem, self._picture.board, witness, turn)
         if decision is None:
             return self._stay_idle(now_s)
-        return self._set_off(decision, problem, epoch, now_s)
+        return self._set_off(turn, problem, epoch, witness, decision, now_s)
 
     def _turn(self, free_since_s: float, now_s: float) -> Turn | None:
         """The turn of this UAV, free since then; None as long as too little is known."""
@@ -318,7 +325,14 @@ class Tasking:
         return None, [Note("unknown rule", {"rule": epoch.rule})]
 
     def _set_off(
-        self, decision: Decision, problem: Problem, epoch: Epoch, now_s: float
+        self,
+        turn: Turn,
+        problem: Problem,
+        epoch: Epoch,
+        witness: Witness,
+        decision: Decision,
+        now_s: float,
+        left: str | None = None,
     ) -> list[Action]:
         task = self._replica.board[problem.task_ids[decision.task]]
         rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
@@ -328,18 +342,18 @@ class Tasking:
         claim = Claim(
             ClaimPhase.PROPOSED, task.task, self._free_since_s, rank, decision.completion_s
         )
-        why = {
-            "task": task.task,
-            "score": decision.score,
-            "second_score": decision.second_score,
-            "certificate": decision.certificate,
-            "completion_s": decision.completion_s,
-        }
-        return [
-            self._order_to(task, idled=self._idled),
-            self._speech.say(claim),
-            Note("decided", why),
-        ]
+        told = self._choices.made(turn, problem, epoch, witness, decision, claim, left)
+        turned = [] if left is None else [self._note("turns aside", left, **{"for": task.task})]
+        decided = self._note(
+            "decided",
+            task.task,
+            score=decision.score,
+            second_score=decision.second_score,
+            certificate=decision.certificate,
+            completion_s=decision.completion_s,
+        )
+        order = self._order_to(task, idled=self._idled)
+        return [*turned, order, self._speech.say(claim), decided, told]
 
     def _stay_idle(self, now_s: float) -> list[Action]:
         actions, telemetry = self._give_up_claim(), self._picture.telemetry
@@ -366,6 +380,10 @@ class Tasking:
         return [] if claim is None or claim.phase is ClaimPhase.IDLE else [self._say_idle()]
 
     # -- pieces ---------------------------------------------------------------------
+
+    def _note(self, text: str, task: str, **fields: object) -> Note:
+        """A line about a task this UAV claims, and the choice it came of in this life."""
+        return Note(text, {"task": task, **fields, **self._choices.label})
 
     def _withdraw(self, phase: ClaimPhase, now_s: float, *, handed_over: bool) -> Action:
         mission_s = self._picture.mission_s(now_s)

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.planner.methods import METHODS, ONLINE_METHODS
+from swarm.complete import among
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
@@ -53,6 +55,7 @@ def plan(
         str,
         typer.Option(
             metavar="METHOD",
+            autocompletion=among(*METHODS),
             help="greedy or lookahead: how UAVs decide; guided: optimised lists; exact: the proven "
             "best lists.",
         ),
@@ -208,7 +211,10 @@ def coordinator(
     method: Annotated[
         str,
         typer.Option(
-            "--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."
+            "--method",
+            metavar="METHOD",
+            help="Decision rule: greedy, lookahead or guided.",
+            autocompletion=among(*ONLINE_METHODS),
         ),
     ] = "guided",
     seed: SeedOption = 0,
@@ -254,12 +260,22 @@ def coordinator(
     link: LinkOption = Link.NORMAL,
     lease_s: LeaseOption = None,
     speedup: SpeedupOption = 1.0,
+    dashboard: Annotated[
+        str | None,
+        typer.Option(
+            "--dashboard",
+            metavar="[ADDRESS:]PORT",
+            help="Also show the mission in a browser, by a process of its own that ends with "
+            "this one; 0: any port that is free. See swarm dashboard.",
+            show_default=False,
+        ),
+    ] = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
 ) -> int:
-    """Plan a mission, brief the agents, start them together and tell them when it is over.
+    """Plan a mission, brief the agents, and start and end it.
 
     Once it has started, the fleet finishes without the coordinator. Started anew, it takes
     charge of the mission that is being flown, as far as agents or its own --state know it.
@@ -270,12 +286,15 @@ def coordinator(
         swarm coordinator table-1
         swarm coordinator valley-survey --connect tcp/192.168.1.2:7447 --state /var/lib/peckorder
         swarm coordinator valley-survey --connect tcp/192.168.1.2:7447 --standby
+        swarm coordinator valley-survey --dashboard 8080
     """
     import asyncio
     from json import dumps
 
     from coordinator.briefing import FlightLayers
     from coordinator.core import CoordinatorCore
+    from coordinator.dashboard.keeper import page_beside
+    from coordinator.dashboard.place import parse_place
     from coordinator.plan_report import plan_as_json
     from coordinator.planner.plan import check_online_method, make_plan
     from coordinator.service import Service
@@ -283,7 +302,7 @@ def coordinator(
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, SystemClock, incarnation
     from swarm.config import preset
-    from swarm.log import configure_logging
+    from swarm.log import configure_logging, identify
     from swarm.model.ids import COORDINATOR
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
@@ -302,12 +321,16 @@ def coordinator(
             print(dumps(plan_as_json(made), allow_nan=False), flush=True)
         return made
 
+    identify(mission=mission.name)
+
     def core(memory: Snapshot | None, memory_age_s: float) -> CoordinatorCore:
+        life = incarnation()
+        identify(incarnation=life)
         return CoordinatorCore(
             mission,
             method=method,
             seed=seed,
-            incarnation=incarnation(),
+            incarnation=life,
             timing=timing,
             start_timeout_s=start_timeout_s * max(1.0, speedup),
             layers=FlightLayers(lowest_layer_m, layer_spacing_m),
@@ -315,6 +338,18 @@ def coordinator(
             memory_age_s=memory_age_s,
         )
 
+    place = None if dashboard is None else parse_place(dashboard, must_be_free=False)
+    page = page_beside(
+        place,
+        mission.name,
+        bus=bus,
+        connect=connect or (),
+        link=link,
+        lease_s=lease_s,
+        speedup=speedup,
+    )
+    for line in () if place is None else place.lines:
+        print(line, file=sys.stderr)
     store = None if state is None else Store(state, mission.name, COORDINATOR, speedup=speedup)
     service = Service(
         mission=mission,
@@ -327,13 +362,17 @@ def coordinator(
         store=store,
     )
 
-    async def work() -> int:
+    async def coordinate() -> int:
         if standby:
             return await service.stand_by()
         status, stood_down = await service.coordinate()
         if stood_down is not None:
             print(f"{stood_down}; add --standby to wait for its loss", file=sys.stderr)
         return status
+
+    async def work() -> int:
+        async with page:
+            return await coordinate()
 
     try:
         return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
@@ -345,12 +384,12 @@ def coordinator(
 def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     """Refuse what cannot be done before any work is done."""
     from coordinator.export import Firmware
-    from coordinator.planner.plan import METHODS
     from coordinator.plot import PLOT_SUFFIXES
+    from swarm.suggest import instead
 
     faults = []
     if method not in METHODS:
-        remedy = f"choose one of {', '.join(METHODS)}"
+        remedy = instead(method, METHODS)
         faults.append(Fault("--method", method, "no such method", remedy))
     if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
@@ -358,7 +397,7 @@ def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
         faults.append(Fault("--plot", str(plot), problem, remedy))
     firmwares = [known.value for known in Firmware]
     if firmware not in firmwares:
-        remedy = f"choose one of {', '.join(firmwares)}"
+        remedy = instead(firmware, firmwares)
         faults.append(Fault("--firmware", firmware, "no such firmware", remedy))
     if faults:
         raise InputError(*faults)

@@ -13,6 +13,7 @@ from swarm.bus.config import BusConfig
 from swarm.bus.port import Bus
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.clock import Clock
+from swarm.config import PRESETS, Link
 from swarm.errors import Fault, InputError
 from swarm.events import BusFact, Wish
 from swarm.model.ids import ID_RULE, valid_id
@@ -55,7 +56,14 @@ async def joined(
 
 
 def onlooking(
-    core: Core[BusFact, Wish], bus: Bus, clock: Clock, mission: str, name: str
+    core: Core[BusFact, Wish],
+    bus: Bus,
+    clock: Clock,
+    mission: str,
+    name: str,
+    answer_s: float = PRESETS[Link.NORMAL].answer_s,
+    *,
+    every_status: bool = False,
 ) -> Shell[BusFact, Wish]:
     """A shell that tells ``core`` all that is said on the bus; it shows no token.
 
@@ -65,6 +73,8 @@ def onlooking(
         clock: gives ``now_s``.
         mission: name of the mission.
         name: of this process, in logs and, where it speaks, as a writer.
+        answer_s: how long a question waits for the slowest answer [wall s].
+        every_status: see `take_seat`.
     """
     shell: Shell[BusFact, Wish] = Shell(
         core,
@@ -75,6 +85,7 @@ def onlooking(
         from_bus=lambda fact: fact,
         execute=lambda _: None,
         snapshot=None,
+        answer_s=answer_s,
     )
-    take_seat(bus, mission, None, status=True)
+    take_seat(bus, mission, None, status=True, every_status=every_status)
     return shell

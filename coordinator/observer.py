@@ -6,7 +6,7 @@ how any of it is shown.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,7 @@ from swarm.state.registers import Replica
 from swarm.wire.messages import (
     Board,
     Brief,
+    Choice,
     Claim,
     ClaimPhase,
     Command,
@@ -43,7 +44,7 @@ from swarm.wire.messages import (
     TaskOrder,
 )
 
-__all__ = ["Happening", "MissionResult", "Observer"]
+__all__ = ["CHOICES_KEPT", "Happening", "MissionResult", "Observer"]
 
 _COMMANDED = {
     CommandKind.HOLD: "operator holds {}",
@@ -64,6 +65,10 @@ class Happening:
 
 _LEAVING = {StatusPhase.OUT: "gave its vehicle up", StatusPhase.RETURNING: "goes home"}
 """Parts of an agent's life in which it takes no tasks any more, in words."""
+
+
+CHOICES_KEPT = 2000
+"""What an onlooker remembers of why tasks were taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +124,11 @@ class Observer:
         self.lost: list[UavId] = []
         """UAVs that disappeared while they took part, and are not back."""
         self.story: list[Happening] = []
+        self.choices: deque[tuple[str, Stamp, Choice]] = deque(maxlen=CHOICES_KEPT)
+        """Why UAVs took tasks, in order of arrival; without `Basis.heads`, of which an onlooker
+        makes nothing."""
+        self._chosen: set[tuple[str, Stamp]] = set()
+        """Which those are."""
         self.cut_since_s: float | None = None
         """When the own link to the bus went down [s of ``now_s``]; None while it is up."""
         self.pace = 1.0
@@ -317,6 +327,9 @@ class Observer:
         if isinstance(message.body, Status):
             self._hear_status(message.writer, message.stamp, message.body, now_s)
             return
+        if isinstance(message.body, Choice):
+            self._hear_choice(message.writer, message.stamp, message.body, now_s)
+            return
         before = self.replica.claims.get(message.writer)
         earlier = self.replica.known(message)
         if not self.replica.join(message):
@@ -361,6 +374,17 @@ class Observer:
         if status.phase in _LEAVING and status.note and unfinished and uav not in self._left:
             self._left.add(uav)
             self._tell(f"{uav} {_LEAVING[status.phase]}: {status.note}", now_s)
+
+    def _hear_choice(self, uav: str, stamp: Stamp, choice: Choice, now_s: float) -> None:
+        if (uav, stamp) in self._chosen:
+            return
+        if len(self.choices) == CHOICES_KEPT:
+            self._chosen.discard(self.choices[0][:2])
+        self._chosen.add((uav, stamp))
+        slim = replace(choice, basis=replace(choice.basis, heads={}))
+        self.choices.append((uav, stamp, slim))
+        if choice.left is not None:
+            self._tell(f"{uav} turns aside from {choice.left} to {choice.task}", now_s)
 
     def _hear_outcome(
         self, uav: str, outcome: Outcome, earlier: Message | None, now_s: float

@@ -1,6 +1,6 @@
-"""The commands `swarm run` and `swarm simulate`.
+"""The command `swarm run`.
 
-Leaves out: what they do (sim.launch, sim.world) and how it is shown (coordinator.view).
+Leaves out: what it does (sim.launch) and how it is shown (coordinator.view).
 """
 
 from __future__ import annotations
@@ -10,51 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sim.uncertainty_options import (
-    CoordinatorLostOption,
-    DelayOption,
-    JitterOption,
-    LegSdOption,
-    LossOption,
-    MessageLossOption,
-    OutcomesOption,
-    PartitionLengthOption,
-    PartitionRateOption,
-    PopupOption,
-    PopupRateOption,
-    PositionErrorOption,
-    ReattemptOption,
-    SpeedSdOption,
-    SurvivalOption,
-    WindOption,
-    WithdrawRateOption,
-    asked_for,
-    with_reattempts,
-)
+from coordinator.recording.options import RecordOption, check_new_recording
+from sim.mission_command import MethodOption, ReportOption, tell
+from swarm.complete import among
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, LinkOption, ScenarioArgument, SeedOption, SpeedupOption
+from swarm.suggest import instead
 
 if TYPE_CHECKING:
-    from coordinator.view.report import MissionReport
     from sim.launch.fleet import BusKind
 
-__all__ = ["run", "simulate"]
-
-MethodOption = Annotated[
-    str,
-    typer.Option("--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."),
-]
-
-ReportOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--report",
-        metavar="FILE",
-        help="Also write the report, as .json or .md.",
-        show_default=False,
-    ),
-]
+__all__ = ["run"]
 
 
 def run(
@@ -67,6 +34,7 @@ def run(
         typer.Option(
             "--bus",
             metavar="auto|mesh|router",
+            autocompletion=among("auto", "mesh", "router"),
             help="How the processes reach each other; auto takes a mesh for small fleets.",
         ),
     ] = "auto",
@@ -87,6 +55,7 @@ def run(
         typer.Option(
             "--autopilot",
             metavar="sim|sim-px4|ardupilot|px4|URL,…",
+            autocompletion=among("sim", "sim-px4", "ardupilot", "px4"),
             help="What flies: an autopilot simulated like ArduCopter or like PX4, real firmware "
             "in software-in-the-loop (PX4 1.16 or newer), or vehicles that run already, one URL "
             "for each UAV in the scenario's order or as UAV=URL; #ID at its end is the vehicle's "
@@ -226,13 +195,33 @@ def run(
             show_default=False,
         ),
     ] = None,
+    dashboard: Annotated[
+        str | None,
+        typer.Option(
+            "--dashboard",
+            metavar="[ADDRESS:]PORT",
+            help="Also show the run in a browser, and let an operator step in there, until it "
+            "ends; 0: any port that is free. See swarm dashboard.",
+            show_default=False,
+        ),
+    ] = None,
     report: ReportOption = None,
+    record: RecordOption = None,
+    logs: Annotated[
+        Path | None,
+        typer.Option(
+            "--logs",
+            metavar="DIR",
+            help="Keep what every process logs: a file of JSON lines each, in that folder.",
+            show_default=False,
+        ),
+    ] = None,
     json: JsonOption = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Show what every process logs, instead of a picture.")
     ] = False,
 ) -> int:
-    """Fly a mission with real processes on this machine and report how it went.
+    """Fly a mission with real processes on this machine, and report.
 
     Starts the bus, the coordinator and, for every UAV, an agent and a simulated autopilot;
     shows the mission live and ends with a report. Exit status 0: every task was done.
@@ -240,7 +229,8 @@ def run(
 
     Examples:
         swarm run table-1
-        swarm run valley-survey --speedup 20 --report flight.md
+        swarm run valley-survey --speedup 20 --report flight.md --logs logs
+        swarm run valley-survey --dashboard 8080
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
         swarm run meadow --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
@@ -249,26 +239,34 @@ def run(
         swarm run table-1 --json
     """
     import asyncio
+    import contextlib
     import os
     import sys
 
     from rich.console import Console
 
+    from coordinator.dashboard.place import parse_place
     from coordinator.planner.plan import check_online_method
+    from coordinator.recording.flight_recorder import recording_or_none, wall_ns
+    from coordinator.recording.recorder import About
     from coordinator.view.live import LiveView
     from coordinator.view.report import MissionReport, check_report_path
     from sim.launch.autopilots import check_speedup, parse_autopilots
     from sim.launch.fence import fence_around
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
+    from sim.launch.kept_logs import KeptLogs
     from sim.launch.run import fly
-    from swarm.log import LogLevel, configure_logging
+    from swarm.config import preset
+    from swarm.log import LogFormat, LogLevel, configure_logging
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
 
     check_online_method(method)
     if report is not None:
         check_report_path(report)
+    if record is not None:
+        check_new_recording(record)
     mission = load_scenario(scenario)
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
@@ -297,19 +295,38 @@ def run(
         link=link,
         autopilots=autopilots,
         handed_on=handed_on,
+        dashboard=None if dashboard is None else parse_place(dashboard),
+        log_format=LogFormat.AUTO if logs is None else LogFormat.JSON,
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.
     console = Console(stderr=True, force_terminal=False if verbose else None)
 
+    kept = None if logs is None else KeptLogs(logs, console.print)
+
     def log(name: str, line: str) -> None:
-        print(f"{name}: {line}", file=sys.stderr)
+        if kept is not None:
+            kept.write(name, line)
+        if verbose:
+            print(f"{name}: {line}", file=sys.stderr)
+
+    for line in () if options.dashboard is None else options.dashboard.lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     async def work() -> int:
+        about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))
         try:
-            with LiveView(console, speedup=speedup) as view:
+            with (
+                kept or contextlib.nullcontext(),
+                recording_or_none(record, about, wall_ns(), console.print) as recorder,
+                LiveView(console, speedup=speedup) as view,
+            ):
                 flight = await fly(
-                    mission, options, on_frame=view.update, on_log=log if verbose else None
+                    mission,
+                    options,
+                    on_frame=view.update,
+                    on_log=log if verbose or kept else None,
+                    recorder=recorder,
                 )
         except asyncio.CancelledError:
             console.print("interrupted: the mission was given up and every process ended")
@@ -324,132 +341,10 @@ def run(
             speedup=speedup,
             fates=flight.fates,
         )
-        return _tell(told, json=json, report=report)
+        status = tell(told, json=json, report=report)
+        return status or int(recorder is not None and recorder.fault is not None)
 
     return asyncio.run(run_until_stopped(work()))
-
-
-def simulate(
-    scenario: ScenarioArgument,
-    method: MethodOption = "greedy",
-    seed: SeedOption = 0,
-    loss: LossOption = None,
-    popup: PopupOption = None,
-    popup_rate: PopupRateOption = None,
-    withdraw_rate: WithdrawRateOption = None,
-    outcomes: OutcomesOption = None,
-    reattempt: ReattemptOption = None,
-    survival: SurvivalOption = None,
-    speed_sd: SpeedSdOption = None,
-    leg_sd: LegSdOption = None,
-    wind: WindOption = None,
-    position_error_m: PositionErrorOption = None,
-    message_loss: MessageLossOption = None,
-    delay_s: DelayOption = None,
-    jitter_s: JitterOption = None,
-    partition_rate: PartitionRateOption = None,
-    partition_s: PartitionLengthOption = None,
-    coordinator_lost_s: CoordinatorLostOption = None,
-    faults: Annotated[
-        str | None,
-        typer.Option(
-            "--faults",
-            metavar="KINDS|FILE",
-            help="Let more go wrong: kinds of fault with commas between, all, or a file with a "
-            "schedule of them.",
-            show_default=False,
-        ),
-    ] = None,
-    report: ReportOption = None,
-    json: JsonOption = False,
-) -> int:
-    """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
-
-    Unless told otherwise nothing is uncertain: vehicles and network are ideal, and the lists flown
-    are exactly those planned. Each kind of uncertainty is drawn from the seed by itself, so asking
-    for one leaves what the others draw as it was.
-    With --faults the network and the clocks are like real ones, what goes wrong is told
-    on standard error in lines that a file may hold, and the invariants of a fleet are watched.
-    Exit status 0: every task was done, and no invariant broken.
-
-    Examples:
-        swarm simulate table-1
-        swarm simulate valley-survey --loss 0.3 --popup 0.3 --seed 7
-        swarm simulate valley-survey --method guided --loss 0.3 --coordinator-lost-s 0
-        swarm simulate table-1 --outcomes --reattempt --seed 1
-        swarm simulate valley-survey --speed-sd 0.1 --leg-sd 0.1 --wind 5
-        swarm simulate valley-survey --message-loss 0.2 --delay-s 0.05 --jitter-s 0.05
-        swarm simulate valley-survey --faults cut,crash --seed 7
-    """
-    import sys
-
-    from coordinator.planner.plan import check_online_method
-    from coordinator.view.report import MissionReport, check_report_path
-    from sim.faults.replay import fly_with_faults
-    from sim.faults.schedule import format_schedule
-    from sim.simulate import simulate_mission
-    from sim.uncertainty import Uncertainty
-    from swarm.scenario import load_scenario
-
-    check_online_method(method)
-    if report is not None:
-        check_report_path(report)
-    uncertainty = asked_for(Uncertainty(), loss=loss, popup=popup, popups_per_min=popup_rate)
-    beside_faults = uncertainty
-    uncertainty = asked_for(
-        uncertainty,
-        withdrawals_per_min=withdraw_rate,
-        outcomes=outcomes,
-        survival=survival,
-        speed_sd_frac=speed_sd,
-        leg_sd_frac=leg_sd,
-        wind_m_s=wind,
-        position_error_m=position_error_m,
-        message_loss=message_loss,
-        delay_s=delay_s,
-        jitter_s=jitter_s,
-        partitions_per_min=partition_rate,
-        partition_s=partition_s,
-    )
-    mission = with_reattempts(load_scenario(scenario), reattempt=reattempt)
-    if faults is None:
-        flown = simulate_mission(
-            mission,
-            method=method,
-            seed=seed,
-            uncertainty=uncertainty,
-            coordinator_lost_s=coordinator_lost_s,
-        )
-        if not flown.in_time:
-            print("broken off: somebody would have waited for ever", file=sys.stderr)
-        told = MissionReport(
-            mission=flown.world.mission,
-            plan=flown.world.observer.plan,
-            result=flown.result,
-            story=tuple(flown.world.observer.story),
-            lost_because=flown.lost_because,
-            value=flown.value,
-        )
-        return _tell(told, json=json, report=report)
-    if uncertainty != beside_faults or coordinator_lost_s is not None:
-        problem = "goes with --loss, --popup and --popup-rate only"
-        remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"
-        raise InputError(Fault("--faults", faults, problem, remedy))
-    verdict = fly_with_faults(
-        mission, method=method, seed=seed, uncertainty=uncertainty, faults=faults
-    )
-    print(format_schedule(verdict.case.schedule), end="", file=sys.stderr)
-    if verdict.broken is not None:
-        print(f"broken: {verdict.broken}", file=sys.stderr)
-    world = verdict.world
-    told = MissionReport(
-        mission=world.observer.mission,
-        plan=world.observer.plan,
-        result=world.observer.result(),
-        story=tuple(world.observer.story),
-    )
-    status = _tell(told, json=json, report=report)
-    return status if verdict.broken is None else 1
 
 
 def _bus_kind(text: str) -> BusKind:
@@ -458,22 +353,5 @@ def _bus_kind(text: str) -> BusKind:
     try:
         return BusKind(text)
     except ValueError:
-        remedy = f"choose one of {', '.join(BusKind)}"
+        remedy = instead(text, BusKind)
         raise InputError(Fault("--bus", text, "no such bus", remedy)) from None
-
-
-def _tell(told: MissionReport, *, json: bool, report: Path | None) -> int:
-    """Print and write the report; the exit status of the command."""
-    from json import dumps
-
-    from rich.console import Console
-
-    from coordinator.view.report import mission_ok, write_report
-
-    if json:
-        print(dumps(told.as_json(), allow_nan=False))
-    else:
-        told.render(Console(highlight=False))
-    if report is not None:  # last: a full disk must not hide the result
-        write_report(told, report)
-    return 0 if mission_ok(told.result) else 1

@@ -18,6 +18,7 @@ import numpy as np
 
 from agent.core import AgentCore
 from agent.vehicle import GoTo, Report
+from coordinator.observer import Observer
 from coordinator.operator.task_seat import TaskSeat
 from sim.event_queue import EventQueue
 from sim.fate import Fate, Partition
@@ -29,12 +30,13 @@ from sim.uncertainty import Uncertainty
 from sim.virtual_vehicle import SimulatedVehicle, VirtualVehicle
 from sim.world import QUIET, Planner, Setting, Watch, World
 from swarm.config import PRESETS, Link, LinkPreset, Timing
-from swarm.events import Note
+from swarm.events import BusFact, Note, Wish
 from swarm.model import Mission, Task, Uav, UavId
 from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.shell import Core
 from swarm.wire.messages import Epoch, EpochPhase, Message, Outcome
 
-__all__ = ["FatedWorld"]
+__all__ = ["FatedWorld", "OnlookerMaker"]
 
 _HEARD_S = 0.1
 """How often it is looked whether the start of the mission has been heard of."""
@@ -51,7 +53,12 @@ _WIRED = replace(
 )
 """Where nothing is lost nothing need be said twice: who was cut off asks when it is back."""
 _STATUS_S = 60.0
-"""Nobody looks on while a mission is flown in virtual time."""
+"""Nobody looks on while a mission is flown in virtual time..."""
+_WATCHED_STATUS_S = 0.5
+"""...unless it is recorded."""
+
+OnlookerMaker = Callable[[Observer, Timing], Core[BusFact, Wish]]
+"""Makes the core of an onlooker."""
 
 
 class FatedWorld:
@@ -65,6 +72,7 @@ class FatedWorld:
         coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
         watch: is told all that happens.
         make_agent: makes the core of an agent.
+        make_onlooker: makes the core of the onlooker around its observer, given the timers.
     """
 
     def __init__(
@@ -77,6 +85,7 @@ class FatedWorld:
         coordinator_lost_s: float | None = None,
         watch: Watch | None = None,
         make_agent: Callable[..., AgentCore] = AgentCore,
+        make_onlooker: OnlookerMaker | None = None,
     ) -> None:
         self.fate = fate
         self.lost: dict[UavId, str] = {}
@@ -88,6 +97,10 @@ class FatedWorld:
         self._told_s = 0.0
         """How long an operator repeats what they say."""
         self._timing = self._timing_of(fate.uncertainty)
+        if make_onlooker is not None and fate.uncertainty.ideal_communication:
+            # There nobody's decision hangs on it, and nothing is drawn for each message.
+            self._timing = replace(self._timing, status_s=_WATCHED_STATUS_S)
+        timing = self._timing
         self._next: Watch | None = watch
         self._outcomes: set[tuple[str, str, int]] = set()
         self._begun = False
@@ -102,6 +115,9 @@ class FatedWorld:
                 start_timeout_s=_START_S,
                 vehicle=partial(_vehicle, fate),
                 agent=make_agent,
+                onlooker=lambda observer: (
+                    observer if make_onlooker is None else make_onlooker(observer, timing)
+                ),
             ),
             watch=self,
         )

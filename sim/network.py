@@ -12,7 +12,7 @@ from typing import Protocol
 
 from sim.event_queue import EventQueue
 from swarm.events import BusFact, Heard, Learned, PeerGone, PeerSeen
-from swarm.wire.messages import Message, Snapshot, Status
+from swarm.wire.messages import Choice, Message, Snapshot, Status
 
 __all__ = ["IdealNetwork", "Network", "Seat"]
 
@@ -95,8 +95,9 @@ class IdealNetwork:
         self._tell_all(PeerSeen(writer), seat)
 
     def publish(self, sender: Seat, message: Message) -> None:
-        """Tell everyone; status goes to onlookers only."""
-        self._tell_all(Heard(message), sender, onlookers_only=isinstance(message.body, Status))
+        """Tell everyone; status and choices go to onlookers only."""
+        for_onlookers = isinstance(message.body, Status | Choice)
+        self._tell_all(Heard(message), sender, onlookers_only=for_onlookers)
 
     def ask(self, asker: Seat) -> None:
         """All answer at one instant."""

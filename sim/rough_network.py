@@ -22,7 +22,7 @@ from sim.network import Seat
 from sim.streams import stream, uniforms
 from swarm.config import PRESETS, Link
 from swarm.events import BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen
-from swarm.wire.messages import Message, Snapshot, Status
+from swarm.wire.messages import Choice, Message, Snapshot, Status
 
 __all__ = ["Conditions", "RoughNetwork", "Topology"]
 
@@ -157,10 +157,10 @@ class RoughNetwork:
                 self._queue.after(self._conditions.latency_s, partial(self._show, viewer, seat))
 
     def publish(self, sender: Seat, message: Message) -> None:
-        """Tell everyone it reaches; status goes to onlookers only."""
-        is_status, fact = isinstance(message.body, Status), Heard(message)
+        """Tell everyone it reaches; status and choices go to onlookers only."""
+        for_onlookers, fact = isinstance(message.body, Status | Choice), Heard(message)
         for seat in self._seats:
-            if seat is not sender and not (is_status and seat.writer is not None):
+            if seat is not sender and not (for_onlookers and seat.writer is not None):
                 self._send(sender, seat, fact)
 
     def ask(self, asker: Seat) -> None:

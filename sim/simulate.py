@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from coordinator.observer import MissionResult
 from coordinator.planner.plan import make_plan
-from sim.fated_world import FatedWorld
+from sim.fated_world import FatedWorld, OnlookerMaker
 from sim.study.flight import value_of
 from sim.study.tally import Tally
 from sim.uncertainty import Uncertainty
@@ -42,6 +42,7 @@ def simulate_mission(
     seed: int,
     uncertainty: Uncertainty,
     coordinator_lost_s: float | None = None,
+    make_onlooker: OnlookerMaker | None = None,
 ) -> SimulatedMission:
     """Fly ``mission`` in virtual time to its end.
 
@@ -51,6 +52,8 @@ def simulate_mission(
         seed: of the planner and of all that is uncertain.
         uncertainty: what may go wrong; moments are spread over the time the scenario's plan takes.
         coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
+        make_onlooker: makes the core that looks on, as for a recording; nothing that is flown
+            depends on it.
     """
     clock = SystemClock()
     made: list[tuple[Mission, Plan]] = []
@@ -74,6 +77,7 @@ def simulate_mission(
         seed=seed,
         coordinator_lost_s=coordinator_lost_s,
         watch=tally,
+        make_onlooker=make_onlooker,
     )
     in_time = flown.run()
     return SimulatedMission(

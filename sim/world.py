@@ -34,7 +34,7 @@ from sim.network import IdealNetwork, Network
 from sim.processes import LocalClock, Process
 from sim.virtual_vehicle import SimulatedVehicle, VehicleFactory, VirtualVehicle
 from swarm.config import Timing
-from swarm.events import Ask, Finish, Note, Publish, Save
+from swarm.events import Ask, BusFact, Finish, Note, Publish, PublishLast, Save, Wish
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.shell import Core
@@ -166,6 +166,8 @@ class Setting:
     """Makes the vehicle of a UAV."""
     agent: Callable[..., AgentCore] = AgentCore
     """Makes the core of an agent, from the arguments of `AgentCore`."""
+    onlooker: Callable[[Observer], Core[BusFact, Wish]] = lambda observer: observer
+    """Makes the core of the onlooker, around its observer."""
 
 
 class World:
@@ -326,6 +328,8 @@ class World:
         match action:
             case Publish(message):
                 self._publish(process, message)
+            case PublishLast(make):
+                self._publish(process, make())
             case Order(order):
                 self._order(process, order)
             case Ask():
@@ -416,7 +420,7 @@ class World:
     ) -> Process:
         new = partial(Process, name, clock=self._clocks[name], queue=self.queue, owner=self)
         if name == ONLOOKER:
-            return new(None, self.observer)
+            return new(None, self._setting.onlooker(self.observer))
         age_s, known = self._recall(kept, memory)
         if name == COORDINATOR:
             coordinator = self._coordinator(incarnation, known, age_s)

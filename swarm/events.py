@@ -5,6 +5,7 @@ Leaves out: what only one kind of process knows (agent.events, coordinator.event
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from swarm.wire.messages import Message, Snapshot
@@ -20,6 +21,7 @@ __all__ = [
     "PeerGone",
     "PeerSeen",
     "Publish",
+    "PublishLast",
     "Save",
     "Stop",
     "Tick",
@@ -85,6 +87,17 @@ class Publish:
 
 
 @dataclass(frozen=True, slots=True)
+class PublishLast:
+    """Say what ``make`` gives, once all else that a step wants is done: nobody waits for it.
+
+    It is put together only then, and before the core's next step; nothing follows from leaving
+    it out.
+    """
+
+    make: Callable[[], Message]
+
+
+@dataclass(frozen=True, slots=True)
 class Ask:
     """Ask everyone for the registers they answer for; ends in `Learned`."""
 
@@ -109,4 +122,4 @@ class Finish:
     status: int
 
 
-Wish = Publish | Ask | Save | Note | Finish
+Wish = Publish | PublishLast | Ask | Save | Note | Finish

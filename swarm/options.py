@@ -6,11 +6,11 @@ parameter::
     def plan(scenario: ScenarioArgument, json: JsonOption = False, seed: SeedOption = 0) -> int: ...
 
 Names: `ScenarioArgument` (a `pathlib.Path`; give it to
-`swarm.scenario.load_scenario`), `JsonOption` (bool), `SeedOption` (int),
-`TimeLimitOption` (float or None), `LogLevelOption` and `LogFormatOption` (for
-`swarm.log.configure_logging`; defaults `LogLevel.INFO`, `LogFormat.AUTO`), the
-hidden `LifelineOption` (bool), `SpeedupOption`, `MissionOption` and, for those that can find
-the mission, `SomeMissionOption` (str or None); `BusOption`,
+`swarm.scenario.load_scenario`), `OptionalScenarioArgument` (that or None), `JsonOption`
+(bool), `SeedOption` (int), `TimeLimitOption` (float or None), `LogLevelOption` and
+`LogFormatOption` (for `swarm.log.configure_logging`; defaults `LogLevel.INFO`,
+`LogFormat.AUTO`), the hidden `LifelineOption` (bool), `SpeedupOption`, `MissionOption` and,
+for those that can find the mission, `SomeMissionOption` (str or None); `BusOption`,
 `ListenOption` and `ConnectOption` (for `swarm.bus.config.bus_config`); `LinkOption` and
 `LeaseOption` (for `swarm.config.preset`; defaults `Link.NORMAL` and None); `StateOption`
 (a folder or None, for `swarm.store.Store`).
@@ -20,10 +20,11 @@ Leaves out: what a single command alone has.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from swarm.complete import among
 from swarm.config import Link
 from swarm.log import LogFormat, LogLevel
 from swarm.scenario.shipped import resolve_scenario, shipped_scenarios
@@ -39,6 +40,7 @@ __all__ = [
     "LogFormatOption",
     "LogLevelOption",
     "MissionOption",
+    "OptionalScenarioArgument",
     "ScenarioArgument",
     "SeedOption",
     "SomeMissionOption",
@@ -67,17 +69,21 @@ def _complete_scenario(incomplete: str) -> list[tuple[str, str]]:
     return names
 
 
-ScenarioArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="SCENARIO",
+def _scenario_argument(metavar: str) -> Any:
+    return typer.Argument(
+        metavar=metavar,
         help="Scenario file, or the name of a shipped one such as table-1.",
         parser=resolve_scenario,
         autocompletion=_complete_scenario,
         show_default=False,
-    ),
-]
+    )
+
+
+ScenarioArgument = Annotated[Path, _scenario_argument("SCENARIO")]
 """Path of an existing scenario file; shipped names are resolved already."""
+
+OptionalScenarioArgument = Annotated[Path | None, _scenario_argument("[SCENARIO]")]
+"""The same for commands that can do without; None without one."""
 
 JsonOption = Annotated[
     bool,
@@ -144,6 +150,7 @@ BusOption = Annotated[
     typer.Option(
         "--bus",
         metavar="mesh|router|FILE",
+        autocompletion=among("mesh", "router"),
         help="How processes reach each other: as peers, through routers, or as a Zenoh "
         "configuration file says.",
     ),

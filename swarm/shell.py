@@ -38,6 +38,7 @@ from swarm.events import (
     PeerGone,
     PeerSeen,
     Publish,
+    PublishLast,
     Save,
     Tick,
 )
@@ -45,7 +46,7 @@ from swarm.log import get_logger
 from swarm.wire.codec import Codec, encode, fit
 from swarm.wire.digest import decode_digest, encode_digest, unknown
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Snapshot, Status
+from swarm.wire.messages import Choice, Message, Snapshot, Status
 
 __all__ = ["Core", "Shell", "take_seat"]
 
@@ -87,6 +88,7 @@ class Shell(Generic[E, A]):
             its own answers what the asker knows.
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
+        context: what every note of the core is logged with, besides its own fields.
     """
 
     def __init__(
@@ -103,6 +105,7 @@ class Shell(Generic[E, A]):
         known: Callable[[], Mapping[str, int]] = dict,
         save: Callable[[float], None] | None = None,
         answer_s: float = PRESETS[Link.NORMAL].answer_s,
+        context: Callable[[], Mapping[str, object]] = dict,
     ) -> None:
         self._core = core
         self._bus = bus
@@ -117,6 +120,7 @@ class Shell(Generic[E, A]):
         self._known = known
         self._save = save
         self._answer_s = answer_s
+        self._context = context
         self._loop = asyncio.get_running_loop()
         self._done: asyncio.Future[int] = self._loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
@@ -182,8 +186,9 @@ class Shell(Generic[E, A]):
     def _carry_out(self, action: A) -> None:
         match action:
             case Publish(message):
-                reliable = not isinstance(message.body, Status)
-                self._bus.publish(message.key, encode(message), reliable=reliable)
+                self._publish(message)
+            case PublishLast(make):
+                self._publish(make())
             case Ask():
                 task = self._loop.create_task(self._ask())
                 self._asking.add(task)
@@ -193,12 +198,16 @@ class Shell(Generic[E, A]):
                 if self._save is not None:
                     self._save(self._clock.now_s())
             case Note(text, fields):
-                self._log.info(text, **fields)
+                self._log.info(text, **{**self._context(), **fields})
             case Finish(status):
                 if not self._done.done():
                     self._done.set_result(status)
             case _:
                 self._execute(action)
+
+    def _publish(self, message: Message) -> None:
+        reliable = not isinstance(message.body, Status | Choice)
+        self._bus.publish(message.key, encode(message), reliable=reliable)
 
     def _reschedule(self) -> None:
         if self._timer is not None:
@@ -284,7 +293,9 @@ def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:
     return replace(snapshot, mission_s=snapshot.mission_s + age_s)
 
 
-def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None:
+def take_seat(
+    bus: Bus, mission: str, name: str | None, *, status: bool, every_status: bool = False
+) -> None:
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
     Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
@@ -296,6 +307,7 @@ def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None
         name: writer id: declares ``alive/<name>`` and serves ``state/<name>``; None for
             an onlooker.
         status: subscribe to ``uav/*/status`` too, newest first, and to ``uav/*/choice``.
+        every_status: of status keep all there is, for who records, not the newest alone.
     """
     keys = Keys(mission)
     for key_expr in (
@@ -309,7 +321,7 @@ def take_seat(bus: Bus, mission: str, name: str | None, *, status: bool) -> None
     ):
         bus.subscribe(key_expr)
     if status:
-        bus.subscribe(keys.status("*"), latest=True)
+        bus.subscribe(keys.status("*"), latest=not every_status)
         bus.subscribe(keys.choice("*"))
     bus.watch_tokens(keys.alive("*"))
     if name is not None:

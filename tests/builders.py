@@ -11,10 +11,12 @@ from swarm.config import Timing
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.wire.bounds import Point
+from swarm.wire.choice import Basis, Candidate
 from swarm.wire.messages import (
     Board,
     Body,
     Brief,
+    Choice,
     Claim,
     ClaimPhase,
     Epoch,
@@ -143,6 +145,34 @@ def failed(name: str, completed_s: float = 1.0, attempt: int = 1) -> Outcome:
 
 def status(phase: StatusPhase = StatusPhase.IDLE, position_enu_m: Point | None = None) -> Status:
     return Status(phase, None, position_enu_m, None, None, None, {}, "")
+
+
+def choice(name: str, left: str | None = None, number: int = 1) -> Choice:
+    """Why a UAV took the task of that name, or turned to it."""
+    return Choice(
+        number=number,
+        task=name,
+        left=left,
+        chosen_s=1.0,
+        epoch=1,
+        rule="greedy",
+        rank=0,
+        score=2.0,
+        second_score=1.5,
+        certificate=False,
+        completion_s=9.0,
+        candidates=(Candidate(name, 2.0), Candidate("other", 1.5)),
+        basis=Basis(
+            decided_s=1.0,
+            place_enu_m=(0.0, 0.0, 0.0),
+            patience_s=0.5,
+            credible=("u1",),
+            awaited=(),
+            excluded=("t9",),
+            heads={"coordinator": (1, 12), "u0": (1, 3)},
+            digest=5,
+        ),
+    )
 
 
 def posts(*entries: Board) -> list[Message]:

@@ -14,11 +14,11 @@ from sim.processes import Process
 from sim.world import QUIET, Faults, Planner, World
 from swarm.clock import SystemClock
 from swarm.config import Timing
-from swarm.events import Publish
+from swarm.events import Ask, BusFact, Publish
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
 from swarm.wire.messages import Claim
 
-__all__ = ["WatchedWorld", "able_uavs", "plan_for", "random_mission"]
+__all__ = ["Ear", "WatchedWorld", "able_uavs", "plan_for", "random_mission"]
 
 
 def random_mission(
@@ -79,6 +79,23 @@ def plan_for(mission: Mission, method: str, seed: int) -> Plan:
 def able_uavs(mission: Mission, task: Task, uavs: Collection[str]) -> list[str]:
     """Those of ``uavs`` that are capable of ``task``."""
     return [u.id for u in mission.uavs if u.id in uavs and mission.success(u, task) > 0.0]
+
+
+class Ear:
+    """Somebody who takes down what is heard on the bus; to be admitted to a world."""
+
+    def __init__(self) -> None:
+        self.facts: list[BusFact] = []
+
+    def start(self, now_s: float) -> list[Ask]:
+        return [Ask()]
+
+    def step(self, fact: BusFact, now_s: float) -> list[Ask]:
+        self.facts.append(fact)
+        return []
+
+    def next_deadline_s(self) -> float | None:
+        return None
 
 
 class WatchedWorld(World):

@@ -10,7 +10,17 @@ from agent.core import AgentCore
 from agent.events import Action, Event, Order
 from agent.vehicle import Arrived, GoTo, Orders, Telemetry, VehicleReady
 from swarm.config import Timing
-from swarm.events import Finish, Heard, Learned, Note, PeerGone, PeerSeen, Publish, Tick
+from swarm.events import (
+    Finish,
+    Heard,
+    Learned,
+    Note,
+    PeerGone,
+    PeerSeen,
+    Publish,
+    PublishLast,
+    Tick,
+)
 from swarm.model import Uav
 from swarm.model.ids import COORDINATOR
 from swarm.wire.bounds import Point
@@ -71,6 +81,8 @@ class LoneAgent:
         self.brief = brief(*uavs, reattempt_failed=reattempt_failed)
         self.log: list[Action] = []
         """Every action so far."""
+        self.choices: list[Message] = []
+        """What it said of its choices."""
         self._counters: Counter[str] = Counter()
         self._there: set[str] = set()
         self._do(self.core.start(self.now_s))
@@ -219,6 +231,7 @@ class LoneAgent:
 
     def _do(self, actions: Sequence[Action]) -> list[Action]:
         self.log += actions
+        self.choices += [action.make() for action in actions if isinstance(action, PublishLast)]
         return list(actions)
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
+from swarm.wire.choice import MAX_CANDIDATES, Basis, Candidate
 from swarm.wire.messages import (
     MAX_COUNT,
     Board,
     Brief,
+    Choice,
     Claim,
     ClaimPhase,
     Command,
@@ -101,6 +103,35 @@ statuses = st.builds(
     st.dictionaries(st.sampled_from(["malformed", "stale", "too many"]), counts),
     notes,
 )
+scores = st.floats(-1e30, 1e30)
+choices = st.builds(
+    Choice,
+    number=counts,
+    task=task_ids,
+    left=st.none() | task_ids,
+    chosen_s=numbers,
+    epoch=counts,
+    rule=ids,
+    rank=counts,
+    score=scores,
+    second_score=st.none() | scores,
+    certificate=st.booleans(),
+    completion_s=numbers,
+    candidates=st.lists(
+        st.builds(Candidate, task_ids, scores), max_size=MAX_CANDIDATES, unique_by=lambda c: c.task
+    ).map(tuple),
+    basis=st.builds(
+        Basis,
+        decided_s=numbers,
+        place_enu_m=points,
+        patience_s=not_negatives,
+        credible=st.lists(uav_ids, unique=True).map(tuple),
+        awaited=st.lists(uav_ids, unique=True).map(tuple),
+        excluded=st.lists(task_ids, unique=True).map(tuple),
+        heads=st.dictionaries(uav_ids, st.tuples(counts, counts)),
+        digest=counts,
+    ),
+)
 commands = st.one_of(
     st.builds(
         Command,
@@ -124,14 +155,19 @@ task_orders = st.builds(
     notes,
 )
 by_coordinator = briefs | epochs | boards
-by_uav = claims | outcomes | statuses
+by_uav = claims | outcomes | statuses | choices
 
 
 def messages(
-    stamped: st.SearchStrategy[Stamp] = stamps, *, statuses_too: bool = True
+    stamped: st.SearchStrategy[Stamp] = stamps, *, all_kinds: bool = True
 ) -> st.SearchStrategy[Message]:
-    """Statements of the mission `MISSION`, each by a writer who may say it."""
-    said = by_uav if statuses_too else claims | outcomes
+    """Statements of the mission `MISSION`, each by a writer who may say it.
+
+    Args:
+        stamped: their stamps.
+        all_kinds: also what is no register.
+    """
+    said = by_uav if all_kinds else claims | outcomes
     return st.one_of(
         st.builds(Message, st.just(MISSION), st.just(COORDINATOR), stamped, by_coordinator),
         st.builds(Message, st.just(MISSION), uav_ids, stamped, said),

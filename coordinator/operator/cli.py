@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.operator.completing import complete_uav
 from swarm.config import Link
 from swarm.errors import Fault, InputError, SwarmError
 from swarm.options import (
@@ -33,7 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = ["abort", "hold", "resume", "return_home", "task"]
 
-UavArgument = Annotated[str, typer.Argument(metavar="UAV", help="Id of the UAV.")]
+UavArgument = Annotated[
+    str, typer.Argument(metavar="UAV", help="Id of the UAV.", autocompletion=complete_uav)
+]
 ReasonOption = Annotated[
     str,
     typer.Option(
@@ -78,12 +81,13 @@ def _of_one_uav(kind: str, help_text: str) -> Callable[..., int]:
 
 hold = _of_one_uav(
     "hold",
-    """Stop one UAV where it is: it gives its task up, takes no other and hovers.
+    """Stop one UAV where it is.
 
-    Before take-off it stays on the ground. The others go on, and take over what it leaves.
-    It goes on after `swarm resume`, and comes home after `swarm return`; its battery's
-    reserve or the end of its own process bring it home in any case. Works without a
-    coordinator. Exit status 1: it was not seen to obey, and the line says why.
+    It gives its task up, takes no other and hovers. Before take-off it stays on the ground. The
+    others go on, and take over what it leaves. It goes on after `swarm resume`, and comes home
+    after `swarm return`; its battery's reserve or the end of its own process bring it home in any
+    case. Works without a coordinator. Exit status 1: it was not seen to obey, and the line says
+    why.
 
     Examples:
         swarm hold uav2
@@ -93,9 +97,9 @@ hold = _of_one_uav(
 
 resume = _of_one_uav(
     "resume",
-    """Let a UAV go on that was stopped by `swarm hold`: it takes part in the mission again.
+    """Let a UAV go on that was stopped by `swarm hold`.
 
-    One that was stopped on its way home goes on home.
+    It takes part in the mission again. One that was stopped on its way home goes on home.
 
     Examples:
         swarm resume uav2
@@ -104,10 +108,11 @@ resume = _of_one_uav(
 
 return_home = _of_one_uav(
     "return",
-    """Send one UAV home: it gives its task up, lands, and its agent ends with 0.
+    """Send one UAV home for good.
 
-    The others take over what it leaves. It takes no further part in this flight of the
-    mission, unless its agent is started anew with --rejoin.
+    It gives its task up, lands, and its agent ends with 0. The others take over what it leaves.
+    It takes no further part in this flight of the mission, unless its agent is started anew with
+    --rejoin.
 
     Examples:
         swarm return uav2 --reason "camera failed"

@@ -17,7 +17,7 @@ from swarm.state.board import TaskState
 from swarm.state.commands import in_force
 from swarm.wire.messages import ClaimPhase, Command, CommandKind, Epoch, EpochPhase, StatusPhase
 
-__all__ = ["Scene", "TaskView", "UavView", "scene_of"]
+__all__ = ["LOST", "Scene", "TaskView", "UavView", "doing", "scene_of"]
 
 LOST = "lost"
 STARTING = "starting"
@@ -170,6 +170,23 @@ def scene_of(observer: Observer, now_s: float) -> Scene:
     )
 
 
+def doing(observer: Observer, uav: str) -> tuple[str, TaskId | None]:
+    """What ``uav`` does, as `UavView.does` has it, and the task it has taken."""
+    status = observer.statuses.get(uav)
+    claim = observer.replica.claims.get(uav)
+    does: str = STARTING if status is None else status.phase
+    task = None if claim is None or claim.task is None else TaskId(claim.task)
+    if uav in observer.lost and uav not in observer.present:
+        return LOST, None
+    if task is not None and does not in _BUSY:
+        does = StatusPhase.FLYING  # claims never lag, status may
+    elif claim is not None and does == STARTING:
+        does = _PHASES.get(claim.phase, StatusPhase.IDLE)
+    elif task is None and does in _BUSY:
+        does = StatusPhase.IDLE
+    return does, task
+
+
 def _worth_of(observer: Observer, epoch: Epoch | None) -> float | None:
     """J of the lists in force, flown from the start as planned; None where there are none."""
     problem = observer.board.problem
@@ -198,16 +215,7 @@ def _uav_view(
 ) -> UavView:
     status = observer.statuses.get(uav.id)
     claim = observer.replica.claims.get(uav.id)
-    does: str = STARTING if status is None else status.phase
-    task = None if claim is None or claim.task is None else TaskId(claim.task)
-    if uav.id in observer.lost and uav.id not in observer.present:
-        does, task = LOST, None
-    elif task is not None and does not in _BUSY:
-        does = StatusPhase.FLYING  # claims never lag, status may
-    elif claim is not None and does == STARTING:
-        does = _PHASES.get(claim.phase, StatusPhase.IDLE)
-    elif task is None and does in _BUSY:
-        does = StatusPhase.IDLE
+    does, task = doing(observer, uav.id)
     eta_s = None
     if claim is not None and task is not None and mission_s is not None:
         eta_s = claim.completion_s - mission_s

@@ -22,6 +22,7 @@ from sim.bench.words import each, size_of
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, SeedOption
 from swarm.scenario.shipped import resolve_scenario
+from swarm.suggest import instead
 
 if TYPE_CHECKING:
     from sim.bench.worker import Source
@@ -42,7 +43,9 @@ Examples:
     swarm bench plan valley-survey --methods guided,cbba,exact --json
     swarm bench plan --scaling --out scaling.md
 """
-_DECIDE_HELP = """Time one online decision of each rule, over a whole random mission.
+_DECIDE_HELP = """Time one online decision of each rule.
+
+A whole random mission is decided, task by task, and each decision timed.
 
 \b
 Examples:
@@ -265,7 +268,7 @@ def _method(flag: str, word: str) -> str:
     from sim.bench.methods import METHODS
 
     if word not in METHODS:
-        remedy = f"choose among {', '.join(METHODS)}"
+        remedy = instead(word, METHODS, "choose among")
         raise InputError(Fault(flag, word, "no such method", remedy))
     return word
 

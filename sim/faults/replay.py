@@ -1,6 +1,6 @@
 """A scenario flown with faults: drawn from kinds and a seed, or read from a file.
 
-Leaves out: what faults do (sim.faults.director) and how the flight is shown (sim.cli).
+Leaves out: what faults do (sim.faults.director) and how the flight is shown (sim.simulate_command).
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from coordinator.dashboard.place import Place
 from sim.launch.autopilots import Autopilots, Running, Simulated
 from sim.launch.firmware import Firmware
 from sim.launch.handed_on import HandedOn
@@ -24,6 +25,7 @@ from swarm.model.ids import COORDINATOR
 
 __all__ = [
     "AUTO_MESH_LIMIT",
+    "DASHBOARD",
     "BusKind",
     "Defaults",
     "DialedLink",
@@ -41,6 +43,8 @@ OWN_AUTOPILOT_LIMIT = 20
 VEHICLES_PER_PROCESS = 25
 """Simulated autopilots in one process of a larger fleet."""
 ONLOOKER = "onlooker"
+DASHBOARD = "the dashboard"
+"""What its process is called; no UAV can be."""
 MAX_ROUTERS = 8
 
 
@@ -83,7 +87,9 @@ class LaunchOptions:
     handed_on: HandedOn = field(default_factory=HandedOn)
     """What agents and simulated autopilots are told besides."""
     log_format: LogFormat = LogFormat.AUTO
-    """What a line of an agent's log looks like."""
+    """What a line of a process's log looks like."""
+    dashboard: Place | None = None
+    """Where a page shows the run; nowhere if None."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -123,7 +129,8 @@ class Layout:
         self._options = options
         self._mission = mission
         self._seats = [COORDINATOR, *(uav.id for uav in mission.uavs)]
-        self._onlookers = [ONLOOKER, *onlookers]
+        pages = [] if options.dashboard is None else [DASHBOARD]
+        self._onlookers = [ONLOOKER, *pages, *onlookers]
         kind = options.bus.for_fleet(len(mission.uavs))
         count = options.routers if kind is BusKind.ROUTER else 0
         self.routers = tuple(f"router {number}" for number in range(1, count + 1))
@@ -160,7 +167,8 @@ class Layout:
     def router(self, name: str) -> list[str]:
         """Arguments of a router's process."""
         dialed = _repeated("--connect", self._dialed(name))
-        return ["router", "--json", "--listen", self._endpoints[name], *dialed, *self._link()]
+        listen = ["--listen", self._endpoints[name]]
+        return ["router", "--json", *listen, *dialed, *self._link(), *self._log()]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
@@ -172,6 +180,7 @@ class Layout:
             *("--listen", "tcp:127.0.0.1:0"),
             *self._flavour(),
             *options.handed_on.to_autopilot(uavs),
+            *self._log(),
             *self._speed(),
         ]
 
@@ -183,9 +192,20 @@ class Layout:
             str(options.scenario),
             *("--method", options.method, "--seed", str(options.seed), "--json"),
             *("--start-timeout-s", repr(options.start_timeout_s)),
+            *self._log(),
             *self._memory(),
             *self._speed(),
             *self.seat_arguments(COORDINATOR),
+        ]
+
+    def dashboard(self, place: Place, folder: Path) -> list[str]:
+        """Arguments of the process that serves the page at ``place``; ``folder`` is its own."""
+        return [
+            *("dashboard", "--mission", self._mission.name, "--json"),
+            *place.arguments(folder),
+            *self._log(),
+            *self._speed(),
+            *self.seat_arguments(DASHBOARD),
         ]
 
     def agent(self, uav: str, url: str, system_id: int) -> list[str]:
@@ -199,7 +219,7 @@ class Layout:
             *("--position-rate-hz", repr(rate_hz)),
             *("--acceptance-radius-m", repr(options.acceptance_radius_m)),
             *options.handed_on.to_agent(uav),
-            *("--log-format", options.log_format),
+            *self._log(),
             *self._memory(),
             *self._speed(),
             *self.seat_arguments(uav),
@@ -208,6 +228,10 @@ class Layout:
     def _flavour(self) -> list[str]:
         autopilots = self._options.autopilots
         return ["--flavour", autopilots.flavour] if isinstance(autopilots, Simulated) else []
+
+    def _log(self) -> list[str]:
+        form = self._options.log_format
+        return [] if form is LogFormat.AUTO else ["--log-format", form]
 
     def _speed(self) -> list[str]:
         return ["--speedup", repr(self._options.speedup)]

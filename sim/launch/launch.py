@@ -16,7 +16,13 @@ import numpy as np
 
 from sim.launch.autopilots import Running, Simulated, VehiclePlace
 from sim.launch.firmware import Firmware
-from sim.launch.fleet import DialedLink, LaunchOptions, Layout, autopilot_groups
+from sim.launch.fleet import (
+    DASHBOARD,
+    DialedLink,
+    LaunchOptions,
+    Layout,
+    autopilot_groups,
+)
 from sim.launch.process import Child, Setting
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
@@ -32,8 +38,9 @@ Through = Callable[[DialedLink, str], Awaitable[str]]
 class Launch:
     """The processes of one run.
 
-    They are called ``router 1`` and so on, ``coordinator``, ``autopilot of …``, and by the
-    id of their UAV. Use from one asyncio loop; `stop` in ``finally`` ends whatever is left::
+    They are called ``router 1`` and so on, ``the dashboard``, ``coordinator``, ``autopilot of
+    …``, and by the id of their UAV. Use from one asyncio loop; `stop` in ``finally`` ends
+    whatever is left::
 
         launch = Launch(mission, options)
         try:
@@ -80,7 +87,7 @@ class Launch:
         Returns when all have been started; routers and autopilots serve by then.
 
         Raises:
-            ChildFailedError: a router or an autopilot did not come up.
+            ChildFailedError: a router, the dashboard or an autopilot did not come up.
         """
         layout = self.layout
         # A process's memory is for its next life in this run, and for nobody after that.
@@ -92,6 +99,10 @@ class Launch:
         for router in layout.routers:
             await self._start(router, layout.router(router))
             await self.child(router).ready()
+        if self.options.dashboard is not None:
+            arguments = layout.dashboard(self.options.dashboard, layout.state)
+            await self._start(DASHBOARD, arguments)
+            await self.child(DASHBOARD).ready()
         match self.options.autopilots:
             case Simulated():
                 vehicles = await self._start_simulated()

@@ -1,7 +1,7 @@
 """Fly one mission with real processes on this machine, and tell how it went.
 
-Starts the processes, watches the bus as an onlooker, starts a router that dies anew,
-and ends every process whatever happens. Leaves out: what the processes do, single
+Starts the processes, watches the bus as an onlooker, starts a router or a dashboard that
+dies anew, and ends every process whatever happens. Leaves out: what the processes do, single
 processes (sim.launch.launch), and how the run is shown (coordinator.view).
 """
 
@@ -17,7 +17,8 @@ from typing import Any
 
 from coordinator.observer import Happening, MissionResult, Observer
 from coordinator.plan_report import plan_from_json
-from sim.launch.fleet import LaunchOptions
+from coordinator.recording.flight_recorder import FlightRecorder
+from sim.launch.fleet import DASHBOARD, LaunchOptions
 from sim.launch.launch import Launch, OnLog, Through
 from sim.launch.process import Child, ChildFailedError
 from swarm.bus.zenoh_bus import open_zenoh_bus
@@ -37,8 +38,8 @@ PATIENCE = 4.0
 """A mission may take this many times its planned time..."""
 PATIENCE_S = 60.0
 """...and this much longer, before it is given up [s of mission or wall, whichever is slower]."""
-MAX_ROUTER_DEATHS = 10
-"""A router that dies more often than this is not started again."""
+MAX_DEATHS = 10
+"""A router, or a dashboard, that dies more often than this is not started again."""
 CONDITION_S = 0.02
 """Wall time between two looks at a condition that is waited for."""
 
@@ -72,11 +73,13 @@ class Run:
         on_log: OnLog | None,
         through: Through | None,
         onlookers: Sequence[str],
+        recorder: FlightRecorder | None,
     ) -> None:
+        self.recorder = recorder
         self.launch = Launch(
             mission,
             options,
-            on_log=on_log,
+            on_log=on_log if recorder is None else self._recorded(on_log, recorder),
             on_plan=self._hear_plan,
             through=through,
             onlookers=onlookers,
@@ -89,7 +92,7 @@ class Run:
         self._on_frame = on_frame or (lambda _observer, _now_s: None)
         self._zero_s: float | None = None
         self._told: set[Child] = set()
-        self._router_deaths: Counter[str] = Counter()
+        self._deaths: Counter[str] = Counter()
 
     def frame(self) -> None:
         """Look at everything once, and show it."""
@@ -123,6 +126,7 @@ class Run:
             if (reason := self._hopeless() or await self._mend_routers()) is not None:
                 self.fates.append(f"given up: {reason}")
                 return
+            await self._mend_dashboard()
             await asyncio.sleep(FRAME_S)
 
     def flight(self) -> Flight:
@@ -141,6 +145,16 @@ class Run:
         # What is planned later, on the way, is in the epochs.
         if self.observer.phase is EpochPhase.PREPARING:
             self.observer.plan = plan_from_json(said)
+
+    def _recorded(self, on_log: OnLog | None, recorder: FlightRecorder) -> OnLog:
+        """Write down what the processes log, besides."""
+
+        def hear(name: str, line: str) -> None:
+            recorder.log(name, line, self.clock.now_s())
+            if on_log is not None:
+                on_log(name, line)
+
+        return hear
 
     def _note_fates(self) -> None:
         """Remember who ended against our will."""
@@ -161,16 +175,30 @@ class Run:
             child = self.launch.child(name)
             if child.returncode is None or child.stopped:
                 continue
-            if self._router_deaths[name] >= MAX_ROUTER_DEATHS:
+            if self._deaths[name] >= MAX_DEATHS:
                 return f"{name} dies again and again"
-            self._router_deaths[name] += 1
-            mission_s = self.observer.mission_s(self.clock.now_s())
-            self.observer.story.append(Happening(mission_s, f"{name} {child.fate}; started again"))
             try:
-                await self.launch.restart(name)
+                await self._mend(child)
             except ChildFailedError as fault:
                 return str(fault)
         return None
+
+    async def _mend_dashboard(self) -> None:
+        """Start the dashboard anew if it has died; the run goes on without it, too."""
+        if self.launch.options.dashboard is None:
+            return
+        child = self.launch.child(DASHBOARD)
+        dead = child.returncode is not None and not child.stopped
+        if dead and self._deaths[DASHBOARD] < MAX_DEATHS:
+            await self._mend(child)
+
+    async def _mend(self, child: Child) -> None:
+        """Start it anew, and tell so."""
+        self._deaths[child.name] += 1
+        mission_s = self.observer.mission_s(self.clock.now_s())
+        text = f"{child.name} {child.fate}; started again"
+        self.observer.story.append(Happening(mission_s, text))
+        await self.launch.restart(child.name)
 
     def _hopeless(self) -> str | None:
         """Why there is nothing more to wait for, though agents run; None while there is."""
@@ -209,6 +237,7 @@ async def open_run(
     on_log: OnLog | None = None,
     through: Through | None = None,
     onlookers: Sequence[str] = (),
+    recorder: FlightRecorder | None = None,
 ) -> AsyncIterator[Run]:
     """Start to fly ``mission``; all processes are gone when the context ends.
 
@@ -221,6 +250,7 @@ async def open_run(
         on_log: called with process name and line for everything the processes log.
         through: see `Launch`.
         onlookers: see `Launch`.
+        recorder: writes down what the onlooker hears; closed by whoever made it.
 
     Raises:
         ChildFailedError: a process could not be started.
@@ -233,6 +263,7 @@ async def open_run(
         on_log=on_log,
         through=through,
         onlookers=onlookers,
+        recorder=recorder,
     )
     launch = run.launch
     run.frame()
@@ -245,14 +276,21 @@ async def open_run(
 
 
 async def fly(
-    mission: Mission, options: LaunchOptions, *, on_frame: OnFrame, on_log: OnLog | None = None
+    mission: Mission,
+    options: LaunchOptions,
+    *,
+    on_frame: OnFrame,
+    on_log: OnLog | None = None,
+    recorder: FlightRecorder | None = None,
 ) -> Flight:
     """Fly ``mission`` to its end; see `open_run`.
 
     Returns:
         What came of it; processes are gone by then.
     """
-    async with open_run(mission, options, on_frame=on_frame, on_log=on_log) as run:
+    async with open_run(
+        mission, options, on_frame=on_frame, on_log=on_log, recorder=recorder
+    ) as run:
         await run.finish()
     return run.flight()
 
@@ -262,8 +300,9 @@ async def _watching(run: Run) -> AsyncIterator[None]:
     """Keep the observer informed from the bus."""
     mission = run.launch.mission.name
     bus = await open_zenoh_bus(run.launch.layout.seat_of_onlooker())
+    recorder = run.recorder
     shell: Shell[BusFact, Wish] = Shell(
-        run.observer,
+        run.observer if recorder is None else recorder.around(run.observer, run.observer),
         bus,
         run.clock,
         mission=mission,
@@ -272,7 +311,7 @@ async def _watching(run: Run) -> AsyncIterator[None]:
         execute=lambda _: None,
         snapshot=None,
     )
-    take_seat(bus, mission, None, status=True)
+    take_seat(bus, mission, None, status=True, every_status=recorder is not None)
     watch = asyncio.get_running_loop().create_task(shell.run())
     try:
         yield

@@ -15,6 +15,7 @@ from swarm.model import TaskId, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import (
     Board,
+    Choice,
     Claim,
     Epoch,
     EpochPhase,
@@ -43,8 +44,8 @@ class Tally:
         self._epoch: Epoch | None = None
 
     def said(self, process: Process, message: Message) -> None:
-        """Count a message, and what it tells for the first time."""
-        self.messages += 1
+        """Count a message, unless it is for onlookers alone, and what it tells that is new."""
+        self.messages += not isinstance(message.body, Choice)
         match message.body:
             case Claim(task=task):
                 self._claimed[message.writer] = process, task

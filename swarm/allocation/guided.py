@@ -74,6 +74,7 @@ class GuidedRule:
             second_score=choice.second_worth,
             certificate=False,
             exact=False,
+            valued=choice.valued,
         )
 
     def worth(self, problem: Problem, state: TeamState, rank: IntArray, uav: int) -> float:

@@ -112,6 +112,9 @@ class Decision:
     """Theorem 5 proves that greedy and lookahead agree on this decision."""
     exact: bool
     """The choice is proven to be the rule's own maximum, not a heuristic's guess at it."""
+    valued: tuple[tuple[int, float], ...] = ()
+    """Tasks the rule compared on the way, with their scores: this one, then the others, best first.
+    Empty where comparing them one by one would take longer than deciding; see `CompiledRule`."""
 
 
 class Rule(Protocol):
@@ -136,6 +139,12 @@ class CompiledRule(Rule, Protocol):
     @property
     def code(self) -> RuleCode:
         """Its name to them."""
+        ...
+
+    def valued(
+        self, problem: Problem, state: TeamState, uav: int, most: int
+    ) -> tuple[tuple[int, float], ...]:
+        """`Decision.valued` of what it would decide; so many tasks at the most."""
         ...
 
 

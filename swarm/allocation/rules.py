@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from swarm.allocation.lower_level import Decision, Rule, TeamState
 from swarm.allocation.problem import IntArray, Problem
-from swarm.kernels.lower_level import EXACT_TASKS, GREEDY, LOOKAHEAD, RuleCode, decide
+from swarm.kernels.lower_level import EXACT_TASKS, GREEDY, LOOKAHEAD, RuleCode, decide, valued
 
 __all__ = ["EXACT_TASKS", "RULE_NAMES", "KernelRule", "Rule", "rule_by_name"]
 
@@ -38,6 +38,12 @@ class KernelRule:
         del rank
         fields = decide(problem.kernel, state, uav, self.code)
         return None if fields is None else Decision(*fields)
+
+    def valued(
+        self, problem: Problem, state: TeamState, uav: int, most: int
+    ) -> tuple[tuple[int, float], ...]:
+        """Tasks with their scores, the one it decides on first; so many at the most."""
+        return tuple(valued(problem.kernel, state, uav, self.code, most))
 
 
 def rule_by_name(name: str) -> KernelRule:

@@ -113,6 +113,24 @@ def decide(
     uav: int,
     rule: int,
 ) -> tuple[int, int, float, float, float, float | None, bool, bool] | None: ...
+def valued(
+    problem: KernelProblem,
+    free_s: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    place_enu_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    survived: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    open: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    uav: int,
+    rule: int,
+    most: int,
+) -> list[tuple[int, float]]: ...
 def run(
     problem: KernelProblem,
     free_s: Annotated[
@@ -220,7 +238,7 @@ def guided_choice(
     ],
     uav: int,
     iterations: int,
-) -> tuple[int, float, float, int]: ...
+) -> tuple[int, float, float, int, list[tuple[int, float]]]: ...
 
 class RouteInstance:
     def __init__(

@@ -2,7 +2,9 @@
 #include "lower_level.hpp"
 
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <memory>
@@ -72,9 +74,11 @@ struct Team {  // as Python passes it
 // The decision of one UAV whose turn it is, as the fields of swarm.allocation.Decision; or None.
 using Fields = std::tuple<int, int, double, double, double, std::optional<double>, bool, bool>;
 
-std::optional<Fields> decide(const Problem& problem, In<double, 1> free_s,
-                             In<double, 2> place_enu_m, In<double, 1> survived, In<bool, 1> open,
-                             int uav, int rule_code) {
+// Decide, and let `look` see the workspace before another decision borrows it; false: no decision.
+template <typename Look>
+bool decide_once(const Problem& problem, const In<double, 1>& free_s,
+                 const In<double, 2>& place_enu_m, const In<double, 1>& survived,
+                 const In<bool, 1>& open, int uav, int rule_code, const Look& look) {
     const RuleCode rule = checked_rule(rule_code);
     if (uav < 0 || uav >= problem.n_uav) refuse("uav must be an index of a UAV");
     const Size n_uav = static_cast<Size>(problem.n_uav);
@@ -85,7 +89,7 @@ std::optional<Fields> decide(const Problem& problem, In<double, 1> free_s,
     const TeamView team{free_s.data(), place_enu_m.data(), survived.data(), bytes_of(open), nullptr};
     const Decider decider = team.decider(uav);
     if (!(decider.free_s > -HUGE_VAL)) refuse("free_s must be a time, not NaN or -infinity");
-    if (decider.free_s == HUGE_VAL) return std::nullopt;
+    if (decider.free_s == HUGE_VAL) return false;
     require_finite("place_enu_m", decider.place_m, 3);
     require_within("survived", decider.survived, 0.0, 1.0, "within 0..1");
     Choice choice;
@@ -95,6 +99,7 @@ std::optional<Fields> decide(const Problem& problem, In<double, 1> free_s,
             Workspace& workspace = *lease;
             workspace.open.assign(problem, team.open);
             choice = workspace.decide(problem, workspace.open, decider, rule, false);
+            if (choice.task >= 0) look(decider, choice, workspace);
         };
         if (rule == RuleCode::kGreedy && problem.n_task < kBriefTasks) {
             work();
@@ -103,11 +108,34 @@ std::optional<Fields> decide(const Problem& problem, In<double, 1> free_s,
             work();
         }
     }
-    if (choice.task < 0) return std::nullopt;
-    std::optional<double> second;
-    if (choice.has_second) second = choice.second;
-    return Fields{uav,          choice.task, decider.free_s,     choice.completion_s,
-                  choice.score, second,      choice.certificate, choice.exact};
+    return choice.task >= 0;
+}
+
+std::optional<Fields> decide(const Problem& problem, In<double, 1> free_s,
+                             In<double, 2> place_enu_m, In<double, 1> survived, In<bool, 1> open,
+                             int uav, int rule_code) {
+    Fields fields;
+    const bool decided = decide_once(
+        problem, free_s, place_enu_m, survived, open, uav, rule_code,
+        [&](const Decider& decider, const Choice& choice, const Workspace&) {
+            std::optional<double> second;
+            if (choice.has_second) second = choice.second;
+            fields = {uav,          choice.task, decider.free_s,     choice.completion_s,
+                      choice.score, second,      choice.certificate, choice.exact};
+        });
+    return decided ? std::optional<Fields>(fields) : std::nullopt;
+}
+
+std::vector<std::pair<int, double>> valued(const Problem& problem, In<double, 1> free_s,
+                                           In<double, 2> place_enu_m, In<double, 1> survived,
+                                           In<bool, 1> open, int uav, int rule_code, int most) {
+    if (most < 1) refuse("most must be >= 1");
+    std::vector<std::pair<int, double>> found;
+    decide_once(problem, free_s, place_enu_m, survived, open, uav, rule_code,
+                [&](const Decider&, const Choice& choice, const Workspace& workspace) {
+                    found = workspace.valued(choice, static_cast<Size>(most));
+                });
+    return found;
 }
 
 using Run = std::tuple<Out<std::int64_t, 1>, Out<std::int64_t, 1>, Out<double, 1>, Out<double, 1>>;
@@ -223,6 +251,8 @@ void bind_lower_level(nb::module_& module) {
     module.attr("EXACT_TASKS") = kExactTasks;
     module.def("decide", &decide, nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(),
                nb::arg("survived").noconvert(), nb::arg("open").noconvert(), nb::arg("uav"), nb::arg("rule"));
+    module.def("valued", &valued, nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(),
+               nb::arg("survived").noconvert(), nb::arg("open").noconvert(), nb::arg("uav"), nb::arg("rule"), nb::arg("most"));
     module.def(
         "run",
         [](const Problem& problem, In<double, 1> free_s, In<double, 2> place_enu_m,

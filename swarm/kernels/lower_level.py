@@ -28,6 +28,7 @@ __all__ = [
     "evaluate_sequences",
     "first_rounds",
     "run",
+    "valued",
 ]
 
 _Floats = npt.NDArray[np.float64]
@@ -90,6 +91,28 @@ def decide(problem: KernelProblem, team: Team, uav: int, rule: RuleCode) -> Fiel
         )
     except TypeError:  # not arrays as they should be: convert or refuse them by name
         return _kernels.decide(problem, *_converted(team)[:4], uav, rule)
+
+
+def valued(
+    problem: KernelProblem, team: Team, uav: int, rule: RuleCode, most: int
+) -> list[tuple[int, float]]:
+    """What ``rule`` makes of the tasks that `decide` chooses from [value·s].
+
+    Args:
+        problem: the prepared mission.
+        team: as for `decide`.
+        uav: index of the deciding UAV.
+        rule: `GREEDY` or `LOOKAHEAD`.
+        most: so many tasks at the most; >= 1.
+
+    Returns:
+        Tasks and their scores, the one that `decide` takes first, then the others from the best on.
+        Lookahead beyond `EXACT_TASKS` tasks values that one alone.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
+    return _kernels.valued(problem, *_converted(team)[:4], uav, rule, most)
 
 
 def run(

@@ -3,7 +3,9 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <cmath>
@@ -107,19 +109,24 @@ GuidedChoice guided_choice(const Instance& instance, const Start& start,
   const Route& own = solution.route(uav);
   choice.planned = choice.task = own.empty() ? -1 : own.front();
   choice.worth = total;
-  choice.second = std::numeric_limits<double>::quiet_NaN();
+  if (choice.planned >= 0) choice.valued.emplace_back(choice.planned, total);
   const double enough = total + kTie * std::abs(total);
   for (const int task : candidates(solution, open, uav)) {
     if (task == choice.planned) continue;
     const double worth = worth_with_first(solution, uav, task, total);
+    choice.valued.emplace_back(task, worth);
     if (worth > enough && worth > choice.worth) {
-      if (choice.task >= 0) choice.second = choice.worth;
       choice.task = task;
       choice.worth = worth;
-    } else if (!(worth <= choice.second)) {
-      choice.second = worth;
     }
   }
+  std::stable_sort(choice.valued.begin(), choice.valued.end(), [&](const auto& a, const auto& b) {
+    if ((a.first == choice.task) != (b.first == choice.task)) return a.first == choice.task;
+    return a.second > b.second;
+  });
+  const std::size_t others = choice.task >= 0 ? 1 : 0;
+  choice.second = choice.valued.size() > others ? choice.valued[others].second
+                                                : std::numeric_limits<double>::quiet_NaN();
   return choice;
 }
 
@@ -137,7 +144,8 @@ void bind_rollout(nb::module_& module) {
           choice = guided_choice(instance, arrays.start(instance), lists, open_tasks(open), uav,
                                  iterations);
         }
-        return std::make_tuple(choice.task, choice.worth, choice.second, choice.planned);
+        return std::make_tuple(choice.task, choice.worth, choice.second, choice.planned,
+                               choice.valued);
       },
       nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"), nb::arg("flat"), nb::arg("offsets"), nb::arg("open"), nb::arg("uav"),

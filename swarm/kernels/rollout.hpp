@@ -1,6 +1,7 @@
 // One online decision of the rule `guided` (a fortified rollout, see swarm/kernels/rollout.py).
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "routes_solution.hpp"
@@ -12,6 +13,7 @@ struct GuidedChoice {
   double worth = 0.0;   // J to go of the whole team with it
   double second = 0.0;  // the same for the best other candidate; NaN if there is none
   int planned = -1;     // what the lists, repaired, had the UAV do
+  std::vector<std::pair<int, double>> valued;  // tasks with their worth: that one, then best first
 };
 
 // Lists name open tasks only. `iterations` > 0 searches around the deciding UAV; otherwise the

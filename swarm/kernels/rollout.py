@@ -33,6 +33,8 @@ class GuidedChoice:
     """The same for the best other candidate; None without one."""
     planned: int | None
     """What the lists, repaired, had the UAV take."""
+    valued: tuple[tuple[int, float], ...]
+    """Candidates and J to go with each [value·s]: the chosen one, then the others, best first."""
 
 
 def guided_choice(
@@ -58,7 +60,7 @@ def guided_choice(
         raise ValueError(f"uav must be the index of an active UAV, not {uav}")
     if iterations < 0:
         raise ValueError(f"iterations must be >= 0, not {iterations}")
-    task, worth, second, planned = _kernels.guided_choice(
+    task, worth, second, planned, valued = _kernels.guided_choice(
         team.mission.kernel,
         *team.arguments(),
         *open_lists(team, lists),
@@ -71,4 +73,5 @@ def guided_choice(
         worth,
         None if np.isnan(second) else second,
         planned if planned >= 0 else None,
+        tuple(valued),
     )

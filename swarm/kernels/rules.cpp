@@ -194,6 +194,7 @@ Choice Workspace::decide_briefly(const Problem& problem, const Decider& decider)
 
 Choice Workspace::decide_greedily(const Problem& problem, const Decider& decider) {
     const Size n = tasks_->size(), best = argmax(score_, n);
+    values_ = &score_;
     Choice choice;
     choice.task = tasks_->task[best];
     choice.completion_s = completion_s_[best];
@@ -219,6 +220,7 @@ Choice Workspace::look_ahead(const Problem& problem, const Decider& decider) {
     known.tours->first_values(mask, completion_s, values);
     std::vector<double>& worth = tour_completion_s_;
     worth.resize(n);
+    values_ = &worth;
     for (Size i = 0; i < n; ++i) worth[i] = values[place[i]] * decider.survived;
     const Size greedy = argmax(score_, n);
     Choice choice;
@@ -235,6 +237,7 @@ Choice Workspace::look_ahead(const Problem& problem, const Decider& decider) {
 
 Choice Workspace::look_ahead_far(const Problem& problem, const Decider& decider) {
     const OpenTasks& tasks = *tasks_;
+    values_ = nullptr;
     picked_.resize(tasks.size());
     std::iota(picked_.begin(), picked_.end(), 0);
     if (picked_.size() > kLongestTour) {  // those worth most per time spent, in ascending order
@@ -286,6 +289,20 @@ Choice Workspace::look_ahead_far(const Problem& problem, const Decider& decider)
     choice.has_second = true;
     choice.exact = choice.certificate;
     return choice;
+}
+
+std::vector<std::pair<int, double>> Workspace::valued(const Choice& choice, Size most) const {
+    std::vector<std::pair<int, double>> found{{choice.task, choice.score}};
+    if (!values_) return found;
+    for (Size i = 0; i < tasks_->size(); ++i) {
+        if (tasks_->task[i] != choice.task) found.emplace_back(tasks_->task[i], (*values_)[i]);
+    }
+    const auto last = found.begin() + static_cast<std::ptrdiff_t>(std::min(most, found.size()));
+    std::partial_sort(found.begin() + 1, last, found.end(), [](const auto& a, const auto& b) {
+        return a.second != b.second ? a.second > b.second : a.first < b.first;
+    });
+    found.erase(last, found.end());
+    return found;
 }
 
 // Theorem 5: p̄ <= (1 − λ)/(2 − λ), and some tour that begins greedily is worth its first task.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "problem.hpp"
@@ -55,6 +56,10 @@ class Workspace {
     Choice decide(const Problem& problem, const OpenTasks& open, const Decider& decider,
                   RuleCode rule, bool brief);
 
+    // After a decision that was not brief: tasks and what the rule makes of them, the one taken
+    // first, then the others from the best on. A long tour values the task it begins with alone.
+    std::vector<std::pair<int, double>> valued(const Choice& choice, std::size_t most) const;
+
     OpenTasks open;  // of the simulation that borrows this
 
   private:
@@ -73,6 +78,7 @@ class Workspace {
     const Table& table(const Problem& problem, int uav);
 
     const OpenTasks* tasks_ = nullptr;  // those the decider is capable of
+    const std::vector<double>* values_ = nullptr;  // of each by the rule; none for a long tour
     OpenTasks capable_;
     std::vector<double> completion_s_, score_, weight_;
     std::vector<double> leg_s_, tour_completion_s_, tour_survival_;

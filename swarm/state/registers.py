@@ -40,8 +40,8 @@ class Replica:
         """Fingerprint of each register, as far as the digest has been asked for."""
         self._changed: set[str] = set()
         """Keys of registers that have changed since."""
-        self._lives: dict[str, int] = {}
-        """By writer, the latest life of which anything is known."""
+        self.heads: dict[str, Stamp] = {}
+        """By writer, of its newest statement that is known."""
         self.brief: Brief | None = None
         self.epoch: Epoch | None = None
         self.epoch_stamp: Stamp | None = None
@@ -80,9 +80,9 @@ class Replica:
             return False
         self._registers[key] = message
         self._changed.add(key)
-        life = message.stamp.incarnation
-        if life > self._lives.get(message.writer, -1):
-            self._lives[message.writer] = life
+        head = self.heads.get(message.writer)
+        if head is None or message.stamp > head:
+            self.heads[message.writer] = message.stamp
         self.task_version += isinstance(message.body, Outcome)
         match message.body:
             case Brief() as brief:
@@ -157,13 +157,13 @@ class Replica:
             own: who answers.
             steady: writers that are there and remember all they ever said.
         """
-        lives = self._lives
+        heads = self.heads
         answered = [
             (key, message)
             for key, message in self._registers.items()
             if (writer := message.writer) == own
             or writer not in steady
-            or message.stamp.incarnation < lives[writer]
+            or message.stamp.incarnation < heads[writer].incarnation
         ]
         for _, message in sorted(answered):
             yield message
@@ -181,11 +181,15 @@ class Replica:
 
     def writers(self) -> set[str]:
         """Everyone who has said something."""
-        return set(self._lives)
+        return set(self.heads)
 
     def known(self, message: Message) -> Message | None:
         """What is known of the register that ``message`` is about."""
-        return self._registers.get(message.key)
+        return self.register(message.key)
+
+    def register(self, key: str) -> Message | None:
+        """What is known of the register of that key."""
+        return self._registers.get(key)
 
 
 def _entry_of(order: TaskOrder) -> Board:

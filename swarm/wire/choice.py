@@ -15,7 +15,7 @@ from annotated_types import Len
 
 from swarm.wire.bounds import CHECKED, Count, Duration, Flag, Id, Instant, Point, Score
 
-__all__ = ["MAX_CANDIDATES", "Basis", "Candidate", "Choice"]
+__all__ = ["MAX_CANDIDATES", "Basis", "Candidate", "Choice", "choice_id"]
 
 MAX_CANDIDATES = 5
 """How many tasks a choice tells of, the one taken among them."""
@@ -82,3 +82,11 @@ class Choice:
     candidates: Annotated[tuple[Candidate, ...], Len(0, MAX_CANDIDATES)]
     """Best first, as far as the rule values them one by one; may be empty."""
     basis: Basis
+
+
+def choice_id(uav: str, number: int) -> str:
+    """What a choice is called in logs, where lines about its task name it.
+
+    Unique in one life of the agent.
+    """
+    return f"{uav}-{number}"

@@ -18,6 +18,7 @@ import msgpack
 from pydantic import TypeAdapter, ValidationError
 
 from swarm.model.ids import COORDINATOR, OPERATOR, valid_id
+from swarm.wire.choice import Basis, Candidate
 from swarm.wire.keys import Keys
 from swarm.wire.messages import (
     LATEST_S,
@@ -30,6 +31,7 @@ from swarm.wire.messages import (
     Claim,
     Command,
     Epoch,
+    Fleet,
     Message,
     Outcome,
     Snapshot,
@@ -64,12 +66,17 @@ _KINDS: Final[dict[str, type[Body]]] = {
     "task": TaskOrder,
 }
 _NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in _KINDS.items()}
+_FIELDS: Final[dict[type, tuple[str, ...]]] = {
+    part: tuple(field.name for field in dataclasses.fields(part))
+    for part in (*_KINDS.values(), Fleet, Basis, Candidate)
+}
+"""Of everything that a message is made of."""
 _LARGE: Final = frozenset({"brief", "choice", "epoch"})
 
 
 def encode(message: Message | Snapshot) -> bytes:
     """The bytes of a message or snapshot."""
-    packed: bytes = msgpack.packb(_packable(message))
+    packed: bytes = msgpack.packb(_packable(message), default=_fields_of)
     return packed
 
 
@@ -107,18 +114,18 @@ def _packable(message: Message | Snapshot) -> list[Any]:
         message.stamp.incarnation,
         message.stamp.counter,
         _NAMES[type(message.body)],
-        dataclasses.asdict(message.body),
+        message.body,
     ]
+
+
+def _fields_of(part: object) -> dict[str, object]:
+    """A body, or a dataclass within one, by the names of its fields."""
+    return {name: getattr(part, name) for name in _FIELDS[type(part)]}
 
 
 @cache
 def _bodies(kind: str) -> TypeAdapter[Body]:
     return TypeAdapter(_KINDS[kind])
-
-
-@cache
-def _field_names(kind: str) -> frozenset[str]:
-    return frozenset(field.name for field in dataclasses.fields(_KINDS[kind]))
 
 
 @cache
@@ -185,7 +192,7 @@ class Codec:
         if not isinstance(kind, str) or kind not in _KINDS:
             raise _UnacceptableError("unknown kind")
         # Defaults are for those who write messages: on the wire every field is needed.
-        complete = isinstance(fields, dict) and fields.keys() == _field_names(kind)
+        complete = isinstance(fields, dict) and fields.keys() == set(_FIELDS[_KINDS[kind]])
         _require(complete, "malformed")
         try:
             stamp = _stamps().validate_python({"incarnation": incarnation, "counter": counter})

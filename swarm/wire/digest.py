@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from functools import reduce
 from itertools import islice
+from operator import xor
 from typing import Any, Final
 
 import msgpack
 
 from swarm.wire.codec import encode
-from swarm.wire.messages import Message
+from swarm.wire.messages import MAX_COUNT, Message
 
-__all__ = ["decode_digest", "encode_digest", "fingerprint", "unknown"]
+__all__ = ["combined", "decode_digest", "encode_digest", "fingerprint", "unknown"]
 
 
 MOST_WRITERS: Final = 10_000
@@ -27,6 +29,11 @@ MOST_WRITERS: Final = 10_000
 def fingerprint(message: Message) -> int:
     """64 bits of a statement; those of a writer's registers are combined by exclusive or."""
     return int.from_bytes(hashlib.blake2b(encode(message), digest_size=8).digest(), "big")
+
+
+def combined(numbers: Iterable[int]) -> int:
+    """Digests of several writers, or of any statements, as one; in any order."""
+    return reduce(xor, numbers, 0) % MAX_COUNT
 
 
 def unknown(

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from sim import uncertainty_options
-from sim.cli import simulate
+from sim.simulate_command import simulate
 from swarm.cli import main
 
 FIXED_KEYS = [

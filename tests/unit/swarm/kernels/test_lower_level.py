@@ -17,6 +17,7 @@ from swarm.kernels.lower_level import (
     decide,
     evaluate_sequences,
     first_rounds,
+    valued,
 )
 from swarm.kernels.lower_level import run as run_compiled
 from tests.problems import any_problem, line_of_tasks, random_problem, table_1
@@ -66,6 +67,34 @@ def test_single_decisions_equal_the_definition(
         assert found[5] == pytest.approx(second, abs=1e-9)
         assert found[6] == reference.certificate(problem, state, uav)
         assert found[7]
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=SEEDS, n_task=st.integers(0, 16), code=RULES, most=st.integers(1, 20))
+def test_values_begin_with_what_is_taken_and_the_second_best(
+    seed: int, n_task: int, code: RuleCode, most: int
+) -> None:
+    problem = any_problem(seed, 2, n_task)
+    state = any_state(problem, seed)
+    found = decide(problem.kernel, state, 0, code)
+
+    values = valued(problem.kernel, state, 0, code, most)
+
+    if found is None:
+        assert values == []
+        return
+    able = np.flatnonzero(state.open & problem.capable[0])
+    one_by_one = code == GREEDY or len(able) <= EXACT_TASKS
+    assert values[0] == (found[1], found[4])
+    assert len(values) == (min(most, len(able)) if one_by_one else 1)
+    if len(values) > 1:
+        assert values[1][1] == found[5]
+        assert values[1:] == sorted(values[1:], key=lambda value: (-value[1], value[0]))
+    if code == GREEDY:
+        travel_s = problem.travel_s(0, state.place_enu_m[0])
+        completion_s = (state.free_s[0] + travel_s) + problem.service_s
+        plain = (problem.horizon_s - completion_s) * (state.survived[0] * problem.weight[0])
+        assert [score for _, score in values] == [plain[task] for task, _ in values]
 
 
 @settings(deadline=None, max_examples=100)

@@ -87,6 +87,14 @@ def test_a_choice_is_worth_what_the_whole_team_then_flies(
     assert choice.worth >= before - 1e-9 * scale
     if choice.task != planned:
         assert choice.worth > before
+    values = choice.valued if choice.task is None else choice.valued[1:]
+    assert choice.valued[:1] == ((choice.task, choice.worth),) or choice.task is None
+    assert list(values) == sorted(values, key=lambda value: -value[1])
+    assert choice.second_worth == (values[0][1] if values else None)
+    for task, worth in choice.valued:
+        first = [[t for t in route if t != task] for route in lists]
+        first[0].insert(0, task)
+        assert abs(team_worth(problem, state, first) - worth) <= 1e-9 * scale
 
 
 @settings(deadline=None, max_examples=60)

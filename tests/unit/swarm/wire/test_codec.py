@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import msgpack
@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from swarm.bus.port import MAX_PAYLOAD_BYTES
 from swarm.model.ids import COORDINATOR, OPERATOR, RESERVED
+from swarm.wire.choice import MAX_CANDIDATES
 from swarm.wire.codec import (
     LARGE_LIMIT_BYTES,
     SMALL_LIMIT_BYTES,
@@ -35,6 +36,7 @@ from swarm.wire.messages import (
 from tests.builders import (
     MISSION,
     brief,
+    choice,
     done,
     entry,
     epoch,
@@ -52,7 +54,8 @@ CLAIM = message("u0", held("t0", 1.0))
 OUTCOME = message("u0", done("t0"))
 STATUS = message("u0", status())
 COMMAND = message(OPERATOR, Command("u0", CommandKind.HOLD, 1, ""))
-EVERY_KIND = [BRIEF, EPOCH, BOARD, CLAIM, OUTCOME, STATUS, COMMAND]
+CHOICE = message("u0", choice("t0", left="t1"))
+EVERY_KIND = [BRIEF, EPOCH, BOARD, CLAIM, OUTCOME, STATUS, COMMAND, CHOICE]
 EVERY_KIND_IDS = [type(said.body).__name__ for said in EVERY_KIND]
 
 Parts = list[Any]
@@ -109,9 +112,11 @@ def test_whole_numbers_are_taken_for_measures() -> None:
     assert Codec(MISSION).decode(said.key, encode(said)) == said
 
 
-def test_a_fleet_of_a_thousand_fits_into_brief_and_epoch() -> None:
+def test_a_fleet_of_a_thousand_fits_into_brief_epoch_and_choice() -> None:
     names = [f"uav-{n}" for n in range(1000)]
+    basis = replace(choice("t0").basis, credible=tuple(names), heads=dict.fromkeys(names, (9, 9)))
     for said in (
+        message("uav-0", replace(choice("t0"), basis=basis)),
         message(COORDINATOR, brief(*(uav(name, t0=0.5, t1=0.5) for name in names))),
         message(COORDINATOR, epoch(*names)),
     ):
@@ -309,6 +314,18 @@ def test_task_ids_that_are_none_are_malformed(said: Message, text: object) -> No
         (OUTCOME, "attempt", 0),
         (OUTCOME, "attempt", 2**64 - 1),
         (OUTCOME, "attempt", MAX_COUNT + 1),
+        (CHOICE, "number", -1),
+        (CHOICE, "task", None),
+        (CHOICE, "left", ""),
+        (CHOICE, "score", 1e31),
+        (CHOICE, "second_score", math.nan),
+        (CHOICE, "certificate", 1),
+        (CHOICE, "candidates", [{"task": "t0", "score": 1.0}] * (MAX_CANDIDATES + 1)),
+        (CHOICE, "candidates", [{"task": "t0", "score": 1.0, "more": 1}]),
+        (CHOICE, "basis", {}),
+        (CHOICE, "basis", {**asdict(choice("t0").basis), "heads": {"u0": [1]}}),
+        (CHOICE, "basis", {**asdict(choice("t0").basis), "digest": MAX_COUNT + 1}),
+        (CHOICE, "basis", {**asdict(choice("t0").basis), "credible": ["no id"]}),
         (STATUS, "battery_frac", 1.5),
         (STATUS, "note", "x" * 201),
         (STATUS, "dropped", 1),

@@ -10,12 +10,19 @@ from hypothesis import strategies as st
 from swarm.bus.port import MAX_PAYLOAD_BYTES
 from swarm.model.ids import COORDINATOR
 from swarm.state.registers import Replica
-from swarm.wire.digest import MOST_WRITERS, decode_digest, encode_digest, unknown
-from swarm.wire.messages import Message
+from swarm.wire.digest import (
+    MOST_WRITERS,
+    combined,
+    decode_digest,
+    encode_digest,
+    fingerprint,
+    unknown,
+)
+from swarm.wire.messages import MAX_COUNT, Message
 from tests.builders import IDLE, brief, done, entry, held, message, uav
 from tests.message_strategies import messages
 
-crowds = st.lists(messages(statuses_too=False), max_size=5)
+crowds = st.lists(messages(all_kinds=False), max_size=5)
 
 
 def replica_of(*said: Message) -> Replica:
@@ -44,6 +51,17 @@ def test_who_knows_the_same_is_told_nothing(said: list[Message]) -> None:
 
     assert one.digest() == other.digest()
     assert news(one, other) == ()
+
+
+@given(crowds)
+def test_the_digest_of_all_writers_is_that_of_all_statements_in_any_order(
+    said: list[Message],
+) -> None:
+    replica = replica_of(*said)
+    one_by_one = [fingerprint(message) for message in replica.messages()]
+
+    assert combined(replica.digest().values()) == combined(reversed(one_by_one))
+    assert 0 <= combined(one_by_one) < MAX_COUNT
 
 
 @given(crowds)

@@ -1,0 +1,163 @@
+"""Who may look, and who may command: names of this server, other pages, token, and how often.
+
+A page of another origin that a person has open may send requests here; a browser tells its
+`Origin`. A name that an attacker's DNS turns to this machine makes that page one of ours; the
+`Host` tells. Leaves out: reading requests (coordinator.dashboard.app).
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import os
+import secrets
+import stat
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from swarm.errors import Fault, InputError
+
+__all__ = ["TOKEN_VARIABLE", "Access", "Pace", "access_for", "is_loopback", "read_token"]
+
+TOKEN_VARIABLE = "SWARM_DASHBOARD_TOKEN"  # noqa: S105 - a variable's name
+LEAST_TOKEN = 16
+"""Characters of a token; fewer could be guessed."""
+_LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """What a request has to show."""
+
+    names: frozenset[str]
+    """Hosts under which this server may be asked for, in lower case."""
+    any_address: bool
+    """Whether it may be asked for under any IP address, too: no attacker's DNS makes those."""
+    token: str | None
+    """Needed for everything that tells of a mission or commands it; None for nothing."""
+
+    def knows_host(self, host: str | None) -> bool:
+        """Whether the header ``Host`` names this server."""
+        name = _name_of(host or "")
+        return name in self.names or (self.any_address and _is_address(name))
+
+    def same_origin(self, origin: str | None, host: str | None) -> bool:
+        """Whether a request comes from a page of this server, or from no page at all."""
+        if origin is None:
+            return True
+        scheme, _, authority = origin.partition("://")
+        return scheme in ("http", "https") and authority.lower() == (host or "").lower()
+
+    def admits(self, token: str | None) -> bool:
+        """Whether ``token`` is the one, or none is needed; takes as long for any."""
+        if self.token is None:
+            return True
+        return token is not None and hmac.compare_digest(
+            token.encode(errors="replace"), self.token.encode()
+        )
+
+
+@dataclass(slots=True)
+class Pace:
+    """How often each client may ask for something: a burst, and so many a second on average.
+
+    Args:
+        burst: at once.
+        per_s: later on.
+        clients: at most so many are remembered; the longest unheard of is forgotten.
+    """
+
+    burst: float = 20.0
+    per_s: float = 4.0
+    clients: int = 1000
+    _left: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """Client -> what it has left, and since when [s]."""
+
+    def allows(self, client: str, now_s: float) -> bool:
+        """Whether ``client`` may ask now; counts as asking if it may."""
+        left, since_s = self._left.pop(client, (self.burst, now_s))
+        left = min(self.burst, left + (now_s - since_s) * self.per_s)
+        allowed = left >= 1.0
+        self._left[client] = (left - allowed, now_s)
+        if len(self._left) > self.clients:
+            self._left.pop(next(iter(self._left)))
+        return allowed
+
+
+def access_for(host: str, allowed: Sequence[str], token: str | None) -> tuple[Access, bool]:
+    """What requests to a server at ``host`` have to show, and whether the token is a new one.
+
+    Args:
+        host: where it listens.
+        allowed: other names under which it may be asked for.
+        token: None for one of its own where it can be reached from elsewhere.
+    """
+    names = {_bracketed(name).lower() for name in allowed}
+    if is_loopback(host):
+        return Access(frozenset(names | _LOOPBACK_NAMES), any_address=False, token=token), False
+    names.add(_bracketed(host).lower())
+    made = secrets.token_urlsafe(18) if token is None else token
+    known = frozenset(names | _LOOPBACK_NAMES)
+    return Access(known, any_address=True, token=made), token is None
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches a server at ``host``."""
+    if host.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def read_token(file: Path | None, environment: Mapping[str, str]) -> str | None:
+    """The token that a file or the environment holds, the file first; None without any.
+
+    Raises:
+        InputError: the file cannot be read or others may read it, or the token is too short or
+            not made of printable ASCII signs.
+    """
+    if file is None:
+        text, where = environment.get(TOKEN_VARIABLE, ""), TOKEN_VARIABLE
+        return _checked(text, where) if text else None
+    where = f"--token-file {file}"
+    try:
+        with file.open(encoding="ascii", errors="replace") as opened:
+            mode = os.fstat(opened.fileno()).st_mode
+            text = opened.read(4096)
+    except OSError as error:
+        problem = f"cannot be read: {error.strerror or error}"
+        raise InputError(Fault(where, "", problem, "name a file with a token")) from None
+    if stat.S_ISREG(mode) and mode & (stat.S_IRGRP | stat.S_IROTH):
+        raise InputError(Fault(where, "", "others may read it", f"run: chmod 600 {file}"))
+    return _checked(text, where)
+
+
+def _checked(text: str, where: str) -> str:
+    token = text.strip()
+    if len(token) < LEAST_TOKEN or not (token.isascii() and token.isprintable()) or " " in token:
+        problem = f"no token: it must be one word of at least {LEAST_TOKEN} ASCII signs"
+        remedy = "make one by: python3 -c 'import secrets; print(secrets.token_urlsafe())'"
+        raise InputError(Fault(where, "", problem, remedy))
+    return token
+
+
+def _name_of(host: str) -> str:
+    """``Host`` without its port, in lower case."""
+    if host.startswith("["):
+        return host.partition("]")[0].lower() + "]"
+    return host.partition(":")[0].lower()
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name.strip("[]"))
+    except ValueError:
+        return False
+    return True
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host and not host.startswith("[") else host

@@ -1,0 +1,187 @@
+"""The command `swarm dashboard`.
+
+Leaves out: everything it serves (coordinator.dashboard.app).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm.config import Link
+from swarm.errors import Fault, InputError
+from swarm.log import LogFormat, LogLevel
+from swarm.options import (
+    BusOption,
+    ConnectOption,
+    JsonOption,
+    LeaseOption,
+    LifelineOption,
+    LinkOption,
+    ListenOption,
+    LogFormatOption,
+    LogLevelOption,
+    SomeMissionOption,
+    SpeedupOption,
+)
+
+if TYPE_CHECKING:
+    from coordinator.dashboard.feed import Display
+    from swarm.bus.port import Bus
+
+__all__ = ["dashboard"]
+
+
+def dashboard(
+    mission: SomeMissionOption = None,
+    host: Annotated[
+        str,
+        typer.Option(
+            "--host",
+            metavar="ADDRESS",
+            help="Where to listen. Beyond this machine everyone needs the token.",
+        ),
+    ] = "127.0.0.1",
+    port: Annotated[
+        int,
+        typer.Option("--port", min=0, max=65535, metavar="PORT", help="0: any that is free."),
+    ] = 8080,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--token-file",
+            metavar="FILE",
+            help="File that holds the token, readable by its owner alone; else "
+            "SWARM_DASHBOARD_TOKEN. Default: none on loopback, elsewhere a new one, which is "
+            "printed.",
+            show_default=False,
+        ),
+    ] = None,
+    allow_host: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--allow-host",
+            metavar="NAME",
+            help="Another name under which browsers ask for this server; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    tiles: Annotated[
+        str,
+        typer.Option(
+            "--tiles",
+            metavar="URL",
+            help="Map tiles to draw under the mission, such as "
+            "https://tile.example.org/{z}/{x}/{y}.png; browsers fetch them from there. Default: "
+            "none, and nothing is fetched from elsewhere.",
+            show_default=False,
+        ),
+    ] = "",
+    tiles_credit: Annotated[
+        str,
+        typer.Option(
+            "--tiles-credit",
+            metavar="TEXT",
+            help="Whom the map names as the tiles' author.",
+            show_default=False,
+        ),
+    ] = "",
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+    connect: ConnectOption = None,
+    link: LinkOption = Link.NORMAL,
+    lease_s: LeaseOption = None,
+    speedup: SpeedupOption = 1.0,
+    json: JsonOption = False,
+    lifeline: LifelineOption = False,
+    log_level: LogLevelOption = LogLevel.INFO,
+    log_format: LogFormatOption = LogFormat.AUTO,
+) -> int:
+    """Show a mission in a browser, and let an operator step in.
+
+    Joins a mission as an onlooker, or waits for one, and serves a page with map, UAVs, tasks
+    and decisions; tasks are added and withdrawn there, and UAVs stopped or brought home, with
+    or without a coordinator. Nobody flies any differently while nobody asks for it. It needs
+    no internet. Ctrl-C ends it, and nothing else.
+
+    Examples:
+        swarm dashboard
+        swarm dashboard --mission valley-survey --connect tcp/192.168.1.2:7447
+        swarm dashboard --host 0.0.0.0 --port 80 --token-file /etc/peckorder/token
+        swarm dashboard --tiles https://tile.example.org/{z}/{x}/{y}.png
+    """
+    import asyncio
+    import os
+    from json import dumps
+
+    from coordinator.dashboard.access import access_for, read_token
+    from coordinator.dashboard.app import create_app
+    from coordinator.dashboard.listening import listen as take_port
+    from coordinator.dashboard.listening import url_of
+    from coordinator.dashboard.live import LiveMission
+    from coordinator.dashboard.serve import serving
+    from coordinator.joining import check_mission
+    from coordinator.status.watch import FOREVER_S
+    from swarm.bus.config import bus_config
+    from swarm.bus.zenoh_bus import open_zenoh_bus
+    from swarm.clock import ScaledClock
+    from swarm.config import preset
+    from swarm.log import configure_logging
+    from swarm.process import run_until_stopped
+
+    configure_logging(log_level, log_format)
+    network = preset(link, lease_s)
+    config = bus_config(bus, listen, connect or (), network.lease_s)
+    check_mission(mission)
+    token = read_token(token_file, os.environ)
+    access, made = access_for(host, allow_host or (), token)
+    display = _display(access.token is not None, tiles, tiles_credit)
+    taken = take_port(host, port)
+    url = url_of(host, taken.getsockname()[1])
+    if json:
+        print(dumps({"url": url, "token": access.token if made else None}), flush=True)
+    else:
+        print(f"dashboard: {url}", flush=True)
+        if made:
+            print(f"token: {access.token}", flush=True)
+    clock = ScaledClock(speedup)
+
+    async def open_bus() -> Bus:
+        return await open_zenoh_bus(config, timeout_s=FOREVER_S)
+
+    source = LiveMission(mission, open_bus, network, clock, speedup)
+
+    async def work() -> int:
+        served = create_app(source, access, display)
+        async with serving(served.app, taken):
+            try:
+                await source.run()
+            finally:
+                await served.end("the dashboard has ended")
+        return 0
+
+    return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
+
+
+def _display(token: bool, tiles: str, tiles_credit: str) -> Display:
+    from urllib.parse import urlsplit
+
+    from coordinator.dashboard.feed import Display
+
+    if not tiles:
+        if tiles_credit:
+            raise InputError(Fault("--tiles-credit", "", "there are no tiles", "give --tiles, too"))
+        return Display(token=token)
+    try:
+        parts = urlsplit(tiles)
+        host = parts.hostname or ""
+    except ValueError:
+        host = ""
+    strange = not tiles.isascii() or any(sign in tiles for sign in " ;,'\"")
+    whole = all(mark in tiles for mark in ("{z}", "{x}", "{y}"))
+    if strange or not host or not whole or parts.scheme not in ("http", "https"):
+        remedy = "write https://HOST/{z}/{x}/{y}.png"
+        raise InputError(Fault("--tiles", "", f"{tiles!r} is no URL of map tiles", remedy))
+    return Display(token, tiles, tiles_credit)

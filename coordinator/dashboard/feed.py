@@ -1,0 +1,414 @@
+"""What is told to a page: whole at first, then what has changed; README.md has the words.
+
+`Feed.look` takes in what its source knows, `Feed.frame` tells it to a client that has seen all
+up to some look, however long ago; clients that are in step share one text. Leaves out: when
+to look and how a text gets to a client (coordinator.dashboard.hub).
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import takewhile
+
+import swarm
+from coordinator.dashboard.measure import Measure, measure_of
+from coordinator.dashboard.progress import Progress, progress_of
+from coordinator.dashboard.rows import Growing, RowTable, as_text
+from coordinator.dashboard.source import CommandRow, Source
+from coordinator.observer import Observer
+from coordinator.view.scene import LOST, doing
+from coordinator.view.signs import short_names
+from coordinator.view.story import clean, is_trouble
+from swarm.allocation.problem import Problem
+from swarm.model.ids import COORDINATOR
+from swarm.state.board import TaskState
+from swarm.state.commands import aborted, in_force
+from swarm.wire.messages import Brief, Choice, Fleet, StatusPhase
+
+__all__ = ["PROTOCOL", "Display", "Feed"]
+
+PROTOCOL = 1
+_STORY, _CHOICES, _CURVE, _COMMANDS = 500, 300, 600, 200
+_QUIET_LOOKS = 5
+"""A row of which only the silence has grown is sent after so many looks."""
+_GONE = (StatusPhase.HOME, StatusPhase.RETURNING, StatusPhase.OUT)
+"""What a UAV still does for all we know once its agent has left in order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Display:
+    """What the page is told of itself."""
+
+    token: bool = False
+    """Whether it needs a token."""
+    tiles: str | None = None
+    """URL of map tiles."""
+    tiles_credit: str = ""
+
+
+class Feed:
+    """Tells clients what a source knows.
+
+    Args:
+        source: knows it.
+        display: what the page is told of itself.
+    """
+
+    def __init__(self, source: Source, display: Display) -> None:
+        self._source = source
+        self._display = display
+        self.seq = 0
+        """Number of the newest look."""
+        self.mission: str | None = None
+        """The ``mission`` message; None while there is none."""
+        self.mission_seq = 0
+        """As of which look."""
+        self._whole_since = 1
+        """Who has seen nothing since that look is told everything."""
+        self._observer: Observer | None = None
+        self._brief: Brief | None = None
+        self._head: dict[str, object] = {}
+        self._uavs, self._tasks, self._lists = RowTable(), RowTable(), RowTable()
+        self._story = Growing(_STORY)
+        self._told = 0
+        self._choices = Growing(_CHOICES)
+        self._chosen = 0
+        self._last_choice: object = None
+        self._progress: Progress | None = None
+        self._progress_version = (-1, -1)
+        self._curve_seqs: list[int] = []
+        """As of which look each point is there."""
+        self._measures: dict[tuple[str, int], Measure] = {}
+        """By mission and run."""
+        self._commands = RowTable()
+        self._frames: dict[int | None, str] = {}
+        """Of the newest look, by what the client has seen."""
+
+    # -- what is told -----------------------------------------------------------------
+
+    def hello(self) -> str:
+        """The first message to everyone."""
+        player = self._source.player
+        return as_text(
+            {
+                "type": "hello",
+                "protocol": PROTOCOL,
+                "version": swarm.__version__,
+                "kind": "live" if player is None else "replay",
+                "commands": self._source.orders is not None,
+                "token": self._display.token,
+                "tiles": self._display.tiles,
+                "tiles_credit": self._display.tiles_credit,
+                "duration_s": None if player is None else player.duration_s,
+            }
+        )
+
+    def frame(self, since: int | None) -> str:
+        """All that has changed after look number ``since``; everything for None."""
+        if since is not None and since < self._whole_since:
+            since = None
+        if since not in self._frames:
+            self._frames[since] = self._frame(since)
+        return self._frames[since]
+
+    @property
+    def progress(self) -> Progress | None:
+        """What had been done at the newest look."""
+        return self._progress
+
+    @property
+    def measure(self) -> Measure | None:
+        """What the mission is measured by; None where nothing is known of its beginning."""
+        if self._observer is None or self._brief is None:
+            return None
+        return self._measures.get((self._observer.mission.name, self._brief.run))
+
+    def _frame(self, since: int | None) -> str:
+        after = -1 if since is None else since
+        head = as_text({"type": "frame", "whole": since is None, "seq": self.seq, **self._head})
+        parts = {
+            "uavs": self._uavs.after(after),
+            "tasks": self._tasks.after(after),
+            "lists": self._lists.after(after),
+            "story": self._story.after(after),
+            "choices": self._choices.after(after),
+            "objective_curve": self._curve_after(after),
+            "commands": self._commands.after(after)[-_COMMANDS:],
+        }
+        body = ",".join(f'"{name}":[{",".join(rows)}]' for name, rows in parts.items())
+        return f"{head[:-1]},{body}}}"
+
+    def _curve_after(self, seq: int) -> list[str]:
+        if self._progress is None:
+            return []
+        curve = self._progress.curve
+        first = next((n for n, at in enumerate(self._curve_seqs) if at > seq), len(curve))
+        points = curve[first:]
+        step = -(-len(points) // _CURVE) or 1
+        thinned = points[::-step][::-1]  # the newest is always there
+        return [f"[{time_s:.3f},{objective:.4f}]" for time_s, objective in thinned]
+
+    # -- what is known ----------------------------------------------------------------
+
+    def look(self) -> None:
+        """Take in what the source knows now."""
+        self.seq += 1
+        self._frames.clear()
+        now_s = self._source.now_s()
+        for given in self._source.commands:
+            self._commands.put(given.n, _command_row(given), self.seq)
+        observer = self._source.observer
+        brief = None if observer is None else observer.replica.brief
+        if observer is not self._observer or brief is not self._brief:
+            self._begin(observer, brief)
+        self._head = self._head_of(observer, now_s)
+        if observer is None:
+            return
+        for number, happening in enumerate(observer.story[self._told :], self._told + 1):
+            row = {
+                "n": number,
+                "mission_s": _rounded(happening.mission_s, 3),
+                "text": clean(happening.text),
+                "trouble": is_trouble(happening),
+            }
+            self._story.add(as_text(row), self.seq)
+        self._told = len(observer.story)
+        self._look_at_choices(observer)
+        if brief is not None:
+            self._look_at_uavs(observer, brief, now_s)
+
+    def _begin(self, observer: Observer | None, brief: Brief | None) -> None:
+        """Another mission, or the same in other words: everything is told anew."""
+        if observer is not self._observer:
+            self._story.clear()
+            self._choices.clear()
+            self._told, self._chosen, self._last_choice = 0, 0, None
+        self._observer, self._brief = observer, brief
+        for table in (self._uavs, self._tasks, self._lists):
+            table.clear()
+        self._progress, self._progress_version, self._curve_seqs = None, (-1, -1), []
+        self._whole_since, self.mission_seq = self.seq, self.seq
+        self.mission = None
+        if observer is not None and brief is not None:
+            self.mission = _mission_text(observer.mission.name, brief)
+
+    def _look_at_choices(self, observer: Observer) -> None:
+        """Take in those that have come since: the observer forgets old ones."""
+        new = list(
+            takewhile(lambda told: told is not self._last_choice, reversed(observer.choices))
+        )
+        for told in reversed(new):
+            self._chosen += 1
+            uav, _, choice = told
+            self._choices.add(as_text(_choice_row(self._chosen, uav, choice)), self.seq)
+            self._last_choice = told
+
+    def _head_of(self, observer: Observer | None, now_s: float) -> dict[str, object]:
+        head: dict[str, object] = {"mission_s": None, "phase": None, "link": self._source.link}
+        epoch = plan = None
+        counts = dict.fromkeys(("open", "taken", *list(TaskState)[1:]), 0)
+        dropped = Counter[str]()
+        present = set[str]()
+        if observer is not None and observer.replica.brief is not None:
+            self._look_at_tasks(observer, observer.replica.brief, counts)
+            epoch = observer.replica.epoch
+            plan = self._look_at_plan(observer)
+            present = observer.present
+            dropped = sum(observer.dropped.values(), dropped)
+            head["mission_s"] = _rounded(observer.mission_s(now_s), 3)
+            head["phase"] = observer.phase
+        fleet = () if self._brief is None else (uav.id for uav in self._brief.uavs)
+        player = self._source.player
+        return head | {
+            "epoch": None if epoch is None else epoch.number,
+            "reason": "" if epoch is None else clean(epoch.reason),
+            "rule": None if epoch is None else epoch.rule,
+            "sequence": [] if epoch is None else epoch.sequence,
+            "objective": _rounded(0.0 if self._progress is None else self._progress.objective, 4),
+            "plan": {
+                "objective": None if plan is None else _rounded(plan.objective, 4),
+                "bound": None if plan is None else _rounded(plan.bound, 4),
+            },
+            "coordinator": COORDINATOR in present,
+            "aborted": observer is not None and aborted(observer.replica) is not None,
+            "counts": counts,
+            "dropped": dict(dropped.most_common()),
+            "others": sorted(present - {COORDINATOR, *fleet}),
+            "recording": None
+            if player is None
+            else {
+                "t_s": _rounded(player.state.t_s, 2),
+                "playing": player.state.playing,
+                "speed": player.state.speed,
+            },
+        }
+
+    def _look_at_plan(self, observer: Observer) -> Measure | None:
+        measure = self.measure
+        if measure is None and self._brief is not None:
+            measure = measure_of(observer.replica, observer.mission.name)
+            if measure is not None:
+                self._measures[observer.mission.name, self._brief.run] = measure
+        return measure
+
+    def _look_at_tasks(self, observer: Observer, brief: Brief, counts: dict[str, int]) -> None:
+        replica, board = observer.replica, observer.board
+        version = replica.board_version, replica.task_version
+        problem = board.problem
+        if problem is not None and version != self._progress_version:
+            self._look_at_progress(problem, observer)
+            self._progress_version = version
+        completed = {} if self._progress is None else self._progress.completed
+        holders = observer.holders
+        for task, state in board.states.items():
+            holder = holders.get(task)
+            done = completed.get(task)
+            taken = holder is not None
+            counts["taken" if taken and state is TaskState.OPEN else state] += 1
+            entry = replica.board[task]
+            self._tasks.put(
+                task,
+                {
+                    "id": task,
+                    "position": entry.position_enu_m,
+                    "value": entry.value,
+                    "service_s": entry.service_s,
+                    "kind": entry.kind,
+                    "state": state,
+                    "taken": taken,
+                    "uav": holder if done is None else done[0],
+                    "completed_s": None if done is None else _rounded(done[1], 3),
+                    "by": "scenario" if replica.ordered(task) is None else "operator",
+                },
+                self.seq,
+            )
+        epoch = replica.epoch
+        planned = {} if epoch is None else epoch.routes
+        flown = {} if self._progress is None else self._progress.flown
+        for uav in brief.uavs:
+            row = {
+                "uav": uav.id,
+                "planned": planned.get(uav.id, ()),
+                "flown": tuple(flown.get(uav.id, ())),
+            }
+            self._lists.put(uav.id, row, self.seq)
+
+    def _look_at_progress(self, problem: Problem, observer: Observer) -> None:
+        before = [] if self._progress is None else self._progress.curve
+        self._progress = progress_of(problem, observer.replica.outcomes)
+        curve = self._progress.curve
+        if curve[: len(before)] != before:
+            # Somebody has told late of what was done early: the page draws it all again.
+            self._whole_since, before = self.seq, []
+        self._curve_seqs[len(before) :] = [self.seq] * (len(curve) - len(before))
+
+    def _look_at_uavs(self, observer: Observer, brief: Brief, now_s: float) -> None:
+        commands, dropped = in_force(observer.replica), observer.dropped
+        mission_s = observer.mission_s(now_s)
+        for uav in brief.uavs:
+            command = commands.get(uav.id)
+            row = _uav_row(
+                observer,
+                uav,
+                None if command is None else command.kind,
+                dropped.get(uav.id, {}),
+                now_s,
+                mission_s,
+                self._source.speedup,
+            )
+            self._uavs.put(uav.id, row, self.seq, but="silent_s")
+            self._uavs.touch(uav.id, row, self.seq, _QUIET_LOOKS)
+
+
+def _uav_row(
+    observer: Observer,
+    uav: Fleet,
+    command: str | None,
+    dropped: Mapping[str, int],
+    now_s: float,
+    mission_s: float | None,
+    speedup: float,
+) -> dict[str, object]:
+    status, claim = observer.statuses.get(uav.id), observer.replica.claims.get(uav.id)
+    heard_s, present = observer.heard_s.get(uav.id), uav.id in observer.present
+    does, task = doing(observer, uav.id)
+    eta_s = None
+    if not (present or does == LOST):
+        does, task = (does if does in _GONE else "absent"), None
+    elif task is not None and claim is not None and mission_s is not None:
+        eta_s = claim.completion_s - mission_s
+    return {
+        "id": uav.id,
+        "does": does,
+        "task": task,
+        "claim": None if claim is None else claim.phase,
+        "eta_s": _rounded(eta_s, 1),
+        "position": None if status is None else _point(status.position_enu_m),
+        "velocity": None if status is None else _point(status.velocity_enu_m_s),
+        "battery": None if status is None else _rounded(status.battery_frac, 3),
+        "silent_s": None if heard_s is None else _rounded((now_s - heard_s) / speedup, 1),
+        "lost": does == LOST,
+        "present": present,
+        "note": "" if status is None else clean(status.note),
+        "command": command,
+        "dropped": dict(dropped),
+    }
+
+
+def _mission_text(name: str, brief: Brief) -> str:
+    shorts = short_names([uav.id for uav in brief.uavs])
+    uavs = [
+        {
+            "id": uav.id,
+            "short": short,
+            "start": uav.position_enu_m,
+            "speed_m_s": uav.speed_m_s,
+            "kind": uav.kind,
+            "layer_m": uav.layer_m,
+        }
+        for uav, short in zip(brief.uavs, shorts, strict=True)
+    ]
+    return json.dumps(
+        {
+            "type": "mission",
+            "name": name,
+            "horizon_s": brief.horizon_s,
+            "origin": brief.origin,
+            "uavs": uavs,
+        },
+        allow_nan=False,
+    )
+
+
+def _choice_row(n: int, uav: str, choice: Choice) -> dict[str, object]:
+    return {
+        "n": n,
+        "id": f"{uav}-{choice.number}",
+        "uav": uav,
+        "task": choice.task,
+        "left": choice.left,
+        "mission_s": _rounded(choice.chosen_s, 3),
+        "rule": choice.rule,
+        "epoch": choice.epoch,
+        "rank": choice.rank,
+        "score": choice.score,
+        "second_score": choice.second_score,
+        "certificate": choice.certificate,
+        "completion_s": _rounded(choice.completion_s, 3),
+        "candidates": [{"task": each.task, "score": each.score} for each in choice.candidates],
+    }
+
+
+def _command_row(row: CommandRow) -> dict[str, object]:
+    return {"n": row.n, "text": clean(row.text), "state": row.state, "result": clean(row.result)}
+
+
+def _point(place: tuple[float, float, float] | None) -> list[float] | None:
+    return None if place is None else [round(each, 3) for each in place]
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)

@@ -1,0 +1,145 @@
+"""The desk in its process: it finds a mission on the bus and looks on, again and again.
+
+Publishes ``operator/<target>`` and ``operator/task/<task>`` when the operator wants something;
+subscribes to all that is said, watches ``alive/*`` and shows no token. Leaves out: every
+decision (coordinator.dashboard.desk), and telling a page (coordinator.dashboard.feed).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Awaitable, Callable, Sequence
+
+from coordinator.dashboard.desk import KEPT_ROWS, Desk
+from coordinator.dashboard.source import CommandRow, Player, Refusal, RefusedError
+from coordinator.joining import onlooking
+from coordinator.observer import Observer
+from coordinator.operator.errands import OperatorWish
+from coordinator.status.onlooker import only_mission
+from swarm.bus.port import Bus
+from swarm.clock import Clock, incarnation
+from swarm.config import LinkPreset
+from swarm.events import BusFact, Tick, Wish
+from swarm.log import get_logger
+from swarm.model.ids import OPERATOR
+from swarm.shell import Shell
+
+__all__ = ["LiveMission"]
+
+EFFECT_S = 10.0
+"""Wall time in which an order shows its effect, or it has not been obeyed."""
+
+
+class LiveMission:
+    """A source that is a mission on the bus, or will be.
+
+    Args:
+        mission: its name; None for the only one there is, and after it for the next.
+        open_bus: takes a seat on the bus, however long that takes.
+        network: timers.
+        clock: gives ``now_s``.
+        speedup: of that clock.
+    """
+
+    def __init__(
+        self,
+        mission: str | None,
+        open_bus: Callable[[], Awaitable[Bus]],
+        network: LinkPreset,
+        clock: Clock,
+        speedup: float,
+    ) -> None:
+        self._mission = mission
+        self._open_bus = open_bus
+        self._network = network
+        self._clock = clock
+        self._speedup = speedup
+        self._linked = False
+        self._desk: Desk | None = None
+        self._shell: Shell[BusFact, Wish] | None = None
+        self._before: deque[CommandRow] = deque(maxlen=KEPT_ROWS)
+        """What was ordered at earlier desks."""
+        self._log = get_logger("dashboard")
+
+    async def run(self) -> None:
+        """Look on until cancelled.
+
+        Raises:
+            InputError: no mission is named, and there are several.
+        """
+        while True:
+            bus = await self._open_bus()
+            try:
+                self._linked = True
+                mission = self._mission or await only_mission(bus, None)
+                await self._look_on(bus, mission)
+            finally:
+                self._shell, self._linked = None, False
+                bus.close()
+
+    async def _look_on(self, bus: Bus, mission: str) -> None:
+        first = 1
+        if self._desk is not None:
+            self._before.extend(self._desk.rows)
+            first = self._before[-1].n + 1 if self._before else 1
+        self._desk = Desk(
+            mission,
+            self._network.timing.scaled(self._speedup),
+            incarnation=incarnation(),
+            patience_s=EFFECT_S * self._speedup,
+            stays=self._mission is not None,
+            first=first,
+        )
+        self._shell = onlooking(
+            self._desk, bus, self._clock, mission, OPERATOR, self._network.answer_s
+        )
+        self._log.info("looking on", mission=mission)
+        await self._shell.run()
+
+    # -- what a page is fed from --------------------------------------------------------
+
+    @property
+    def observer(self) -> Observer | None:
+        """What is known."""
+        return None if self._desk is None else self._desk.observer
+
+    @property
+    def link(self) -> bool:
+        """Whether the link to the bus is up."""
+        return self._linked and (self.observer is None or self.observer.cut_since_s is None)
+
+    @property
+    def speedup(self) -> float:
+        """Of the clock."""
+        return self._speedup
+
+    def now_s(self) -> float:
+        """Now."""
+        return self._clock.now_s()
+
+    @property
+    def commands(self) -> Sequence[CommandRow]:
+        """What was ordered here."""
+        return [*self._before, *(() if self._desk is None else self._desk.rows)]
+
+    @property
+    def orders(self) -> LiveMission:
+        """Takes orders."""
+        return self
+
+    @property
+    def player(self) -> Player | None:
+        """There is none: this is no recording."""
+        return None
+
+    def give(self, wish: OperatorWish, who: str) -> int:
+        """Give an order; its number.
+
+        Raises:
+            RefusedError: it was not said.
+        """
+        if self._desk is None or self._shell is None:
+            raise RefusedError(Refusal.TOO_EARLY, "nobody on the bus flies a mission")
+        n = self._desk.give(wish, who, self._clock.now_s())
+        self._shell.step(Tick())
+        return n

@@ -1,0 +1,80 @@
+"""Rows of a feed: what has changed since when, each made into text once.
+
+Leaves out: what the rows say (coordinator.dashboard.feed).
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Hashable, Mapping
+from itertools import takewhile
+
+__all__ = ["Growing", "RowTable", "as_text"]
+
+
+def as_text(row: Mapping[str, object]) -> str:
+    """``row`` as JSON without a needless sign."""
+    return json.dumps(row, separators=(",", ":"), allow_nan=False)
+
+
+class RowTable:
+    """Rows that change and never vanish."""
+
+    def __init__(self) -> None:
+        self._rows: dict[Hashable, tuple[object, int, str]] = {}
+        """By key: what the row is made from, when it changed, its text."""
+
+    def put(
+        self, key: Hashable, row: Mapping[str, object], seq: int, but: str | None = None
+    ) -> None:
+        """Take ``row`` in, as of ``seq``.
+
+        Args:
+            key: the row's own.
+            row: all of it.
+            seq: grows from call to call.
+            but: a field whose change alone is none.
+        """
+        heart = row if but is None else {name: row[name] for name in row if name != but}
+        known = self._rows.get(key)
+        if known is None or known[0] != heart:
+            self._rows[key] = heart, seq, as_text(row)
+
+    def touch(self, key: Hashable, row: Mapping[str, object], seq: int, every: int) -> None:
+        """Send ``row`` again if it was last sent ``every`` or more calls ago."""
+        heart, since, _ = self._rows[key]
+        if seq - since >= every:
+            self._rows[key] = heart, seq, as_text(row)
+
+    def after(self, seq: int) -> list[str]:
+        """Rows that have changed after ``seq``."""
+        return [text for _, changed, text in self._rows.values() if changed > seq]
+
+    def clear(self) -> None:
+        """Forget all rows."""
+        self._rows.clear()
+
+
+class Growing:
+    """Rows that are added and never change; the newest are kept.
+
+    Args:
+        keep: how many.
+    """
+
+    def __init__(self, keep: int) -> None:
+        self._rows: deque[tuple[int, str]] = deque(maxlen=keep)
+
+    def add(self, text: str, seq: int) -> None:
+        """Add a row's text as of ``seq``."""
+        self._rows.append((seq, text))
+
+    def after(self, seq: int) -> list[str]:
+        """Rows that have been added after ``seq``, oldest first."""
+        new = [text for _, text in takewhile(lambda row: row[0] > seq, reversed(self._rows))]
+        return new[::-1]
+
+    def clear(self) -> None:
+        """Forget all rows."""
+        self._rows.clear()

@@ -1,0 +1,103 @@
+"""What a page may say, field by field; what does not fit is told in one sentence.
+
+Leaves out: how it arrives (coordinator.dashboard.app).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from annotated_types import Ge, Gt, Le, Len
+from pydantic import Strict, ValidationError
+
+from coordinator.operator.commanding import CommandWish
+from coordinator.operator.task_orders import NewTask, Withdrawal
+from swarm.model.ids import FLEET
+from swarm.wire.bounds import CHECKED, Duration, Flag, Id, Point, Value
+from swarm.wire.messages import CommandKind
+
+__all__ = ["CommandSaid", "PlayerSaid", "TaskSaid", "WithdrawalSaid", "fault_of"]
+
+Reason = Annotated[str, Strict(), Len(0, 150)]
+"""What is told of a command has to have room in a status."""
+Rate = Annotated[float, Strict(), Gt(0.0), Le(1000.0)]
+Moment = Annotated[float, Strict(), Ge(0.0), Le(1e9)]
+
+
+@dataclass(frozen=True, slots=True)
+class CommandSaid:
+    """Body of ``/api/command``."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    command: CommandKind
+    uav: Id | None = None
+    """None for abort alone."""
+    reason: Reason = ""
+
+    def __post_init__(self) -> None:
+        if (self.command is CommandKind.ABORT) != (self.uav is None):
+            one = self.command is not CommandKind.ABORT
+            raise ValueError(f"{self.command} concerns {'one UAV: name it' if one else 'all UAVs'}")
+
+    @property
+    def wish(self) -> CommandWish:
+        """What the operator wants."""
+        return CommandWish(self.command, self.uav or FLEET, self.reason)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSaid:
+    """Body of ``/api/task``."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    position: Point
+    """East, north, up [m; mission origin]."""
+    value: Value | None = None
+    """None for the median of the board's."""
+    id: Id | None = None
+    service_s: Duration = 0.0
+    kind: Id | None = None
+    reason: Reason = ""
+
+    @property
+    def wish(self) -> NewTask:
+        """What the operator wants."""
+        return NewTask(self.position, self.id, self.value, self.service_s, self.kind, self.reason)
+
+
+@dataclass(frozen=True, slots=True)
+class WithdrawalSaid:
+    """Body of ``/api/task/withdraw``."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    id: Id
+    reason: Reason = ""
+
+    @property
+    def wish(self) -> Withdrawal:
+        """What the operator wants."""
+        return Withdrawal(self.id, self.reason)
+
+
+@dataclass(frozen=True, slots=True)
+class PlayerSaid:
+    """Body of ``/api/recording``."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    playing: Flag | None = None
+    speed: Rate | None = None
+    t_s: Moment | None = None
+
+
+def fault_of(error: ValidationError) -> str:
+    """The first thing that is wrong, in one sentence."""
+    first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+    place = ".".join(map(str, first["loc"]))
+    problem = first["msg"].removeprefix("Value error, ")
+    problem = problem[:1].lower() + problem[1:]
+    return f"{place}: {problem}" if place else problem

@@ -1,0 +1,149 @@
+"""What a page is fed from: a living mission, or a recording that is played.
+
+Leaves out: the living mission (coordinator.dashboard.live), and how any of it is told to a
+page (coordinator.dashboard.feed).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from coordinator.observer import Observer
+from coordinator.operator.errands import OperatorWish
+from swarm.errors import SwarmError
+
+__all__ = [
+    "CommandRow",
+    "CommandState",
+    "Orders",
+    "Player",
+    "PlayerState",
+    "Refusal",
+    "RefusedError",
+    "Source",
+]
+
+
+class CommandState(StrEnum):
+    """What has come of something the operator said."""
+
+    PENDING = "pending"
+    OBEYED = "obeyed"
+    NOT_OBEYED = "not obeyed"
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRow:
+    """Something the operator said here, and what came of it."""
+
+    n: int
+    """Counts from 1 as long as the source lives."""
+    text: str
+    """What, in words: ``hold uav1``."""
+    state: CommandState
+    result: str
+    """What came of it, in words; empty as long as that is open."""
+
+
+class Refusal(StrEnum):
+    """Why nothing was said on the bus."""
+
+    WRONG = "wrong"
+    """What was asked for makes no sense in this mission."""
+    TOO_EARLY = "too early"
+    """There is no mission yet."""
+
+
+class RefusedError(SwarmError):
+    """An order was not given; the text is one sentence for a person."""
+
+    def __init__(self, why: Refusal, text: str) -> None:
+        super().__init__(text)
+        self.why = why
+
+
+class Orders(Protocol):
+    """Takes what an operator wants said."""
+
+    def give(self, wish: OperatorWish, who: str) -> int:
+        """Say it on the bus; the number of its `CommandRow`.
+
+        Args:
+            wish: what the operator wants.
+            who: asks for it, for the log.
+
+        Raises:
+            RefusedError: it was not said.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PlayerState:
+    """How far a recording is played."""
+
+    t_s: float
+    """In the recording's own time, from 0."""
+    playing: bool
+    speed: float
+    """Recorded seconds per wall second."""
+
+
+class Player(Protocol):
+    """Plays a recording."""
+
+    @property
+    def duration_s(self) -> float:
+        """Of the recording, in its own time."""
+        ...
+
+    @property
+    def state(self) -> PlayerState:
+        """How far it is."""
+        ...
+
+    def control(self, *, playing: bool | None, speed: float | None, t_s: float | None) -> None:
+        """Play or stop, at that speed, from there; None leaves a thing as it is."""
+        ...
+
+
+class Source(Protocol):
+    """What a page is fed from."""
+
+    @property
+    def observer(self) -> Observer | None:
+        """What is known; None before there is a mission. Another one when it begins anew, or
+        when a recording is wound back."""
+        ...
+
+    @property
+    def link(self) -> bool:
+        """Whether the own link to the bus is up."""
+        ...
+
+    def now_s(self) -> float:
+        """Now, in the seconds of the observer."""
+        ...
+
+    @property
+    def speedup(self) -> float:
+        """Seconds of the observer per wall second, of then in a recording."""
+        ...
+
+    @property
+    def commands(self) -> Sequence[CommandRow]:
+        """What was said here, oldest first; an old row may be gone, its number is not reused."""
+        ...
+
+    @property
+    def orders(self) -> Orders | None:
+        """Takes orders; None where there is nobody to give them to."""
+        ...
+
+    @property
+    def player(self) -> Player | None:
+        """Of a recording; None for a living mission."""
+        ...

@@ -1,0 +1,371 @@
+// Drawing the mission on two canvases: what changes with frames below, what moves above.
+
+import { uavColour } from "./colours.js";
+import { taskState } from "./words.js";
+
+const WIDE = 2 * Math.PI;
+/** Pixels per task from which on tasks are named. */
+const ROOM_FOR_NAMES = 1800;
+
+/** The plane of one drawing: turns unit coordinates into pixels of the canvas. */
+export class View {
+  constructor(projection, scale, left, top, width, height) {
+    Object.assign(this, { projection, scale, left, top, width, height });
+  }
+
+  /** Pixels of a place in metres. */
+  spot(position) {
+    const [u, v] = this.projection.unit(position);
+    return [u * this.scale - this.left, v * this.scale - this.top];
+  }
+
+  /** Whether a spot is on the canvas, or nearly. */
+  holds([x, y], margin = 30) {
+    return x > -margin && y > -margin && x < this.width + margin && y < this.height + margin;
+  }
+}
+
+/** Radius of a task of that value [px]. */
+export function taskRadius(value, look) {
+  return look.size * (0.55 + 0.75 * Math.sqrt(Math.max(0, value) / look.mostValue));
+}
+
+/** Everything below the UAVs: grid, lists, trails, tasks. Fills `spots` with where tasks are. */
+export function paintGround(canvas, view, picture, motion, look, spots) {
+  canvas.clearRect(0, 0, view.width, view.height);
+  if (look.grid) paintGrid(canvas, view, look);
+  paintLists(canvas, view, picture, motion, look);
+  paintTrails(canvas, view, picture, motion, look);
+  paintTasks(canvas, view, picture, look, spots);
+}
+
+/** A round distance of at least `metres`. */
+export function roundDistance(metres) {
+  const power = 10 ** Math.floor(Math.log10(metres));
+  return power * [1, 2, 5, 10].find((step) => step * power >= metres);
+}
+
+function paintGrid(canvas, view, look) {
+  const step = roundDistance(90 / view.scale);
+  const { ink } = look;
+  canvas.strokeStyle = ink.faint;
+  canvas.fillStyle = ink.muted;
+  canvas.lineWidth = 1;
+  canvas.font = `10px ${ink.font}`;
+  canvas.textAlign = "left";
+  const [west, north] = [view.left / view.scale, -view.top / view.scale];
+  const decimals = step < 1 ? 1 : 0;
+  for (let east = Math.ceil(west / step) * step; ; east += step) {
+    const x = Math.round(east * view.scale - view.left) + 0.5;
+    if (x > view.width) break;
+    line(canvas, x, 0, x, view.height);
+    canvas.fillText(`${(east || 0).toFixed(decimals)} m`, x + 3, 11);
+  }
+  for (let up = Math.floor(north / step) * step; ; up -= step) {
+    const y = Math.round(-up * view.scale - view.top) + 0.5;
+    if (y > view.height) break;
+    line(canvas, 0, y, view.width, y);
+    if (y > 22 && y < view.height - 34) canvas.fillText(`${(up || 0).toFixed(decimals)} m`, 3, y - 3);
+  }
+}
+
+function paintLists(canvas, view, picture, motion, look) {
+  for (const [id, { planned, flown }] of picture.lists) {
+    if (!look.showsList(id)) continue;
+    const strong = look.selected === id;
+    const described = picture.described(id);
+    canvas.strokeStyle = uavColour(described.number, look.ink.dark);
+    const visited = flown.map((task) => picture.tasks.get(task)?.position).filter(Boolean);
+    canvas.globalAlpha = strong ? 0.9 : 0.5;
+    canvas.lineWidth = strong ? 2.5 : 1.5;
+    if (visited.length && described.start) path(canvas, view, [described.start, ...visited]);
+    const uav = picture.uavs.get(id);
+    if (uav?.lost || uav?.claim === "out") continue;
+    const ahead = planned
+      .map((task) => picture.tasks.get(task))
+      .filter((task) => task && task.state === "open" && task.id !== uav?.task);
+    if (!ahead.length) continue;
+    const from = picture.tasks.get(uav?.task)?.position ?? motion.shown.get(id)?.told ?? described.start;
+    canvas.globalAlpha = strong ? 0.95 : 0.6;
+    canvas.lineWidth = strong ? 1.75 : 1;
+    canvas.setLineDash(strong ? [6, 5] : [3, 5]);
+    path(canvas, view, [...(from ? [from] : []), ...ahead.map((task) => task.position)]);
+    canvas.setLineDash([]);
+  }
+  canvas.globalAlpha = 1;
+}
+
+function paintTrails(canvas, view, picture, motion, look) {
+  canvas.lineCap = "round";
+  for (const [id, { trail }] of motion.shown) {
+    if (trail.length < 2) continue;
+    canvas.strokeStyle = uavColour(picture.described(id).number, look.ink.dark);
+    canvas.lineWidth = look.selected === id ? 4 : 3;
+    // The older the fainter, in three parts.
+    const third = Math.ceil(trail.length / 3);
+    for (let part = 0; part < 3; part += 1) {
+      canvas.globalAlpha = [0.07, 0.16, 0.3][part];
+      path(canvas, view, trail.slice(part * third, (part + 1) * third + 1));
+    }
+  }
+  canvas.globalAlpha = 1;
+}
+
+function paintTasks(canvas, view, picture, look, spots) {
+  spots.clear();
+  const inView = [];
+  for (const task of picture.tasks.values()) {
+    const spot = view.spot(task.position);
+    if (!view.holds(spot)) continue;
+    spots.set(task.id, spot);
+    inView.push([task, spot]);
+  }
+  // What is over lies below what is still to do.
+  const weight = (task) => (task.state === "open" ? 2 : task.state === "failed" ? 1 : 0);
+  inView.sort((one, other) => weight(one[0]) - weight(other[0]));
+  for (const [task, spot] of inView) paintTask(canvas, task, spot, picture, look);
+  const room = (view.width * view.height) / Math.max(1, inView.length);
+  if (room < ROOM_FOR_NAMES) return;
+  canvas.font = `11px ${look.ink.font}`;
+  canvas.textAlign = "center";
+  const labels = inView.map(([task, [x, y]]) => ({
+    text: task.id,
+    weight: weight(task) + (look.selected === task.id ? 10 : 0),
+    x,
+    y: y + taskRadius(task.value, look) + 12,
+    colour: task.state === "open" ? look.ink.text : look.ink.muted,
+  }));
+  paintLabels(canvas, labels, look, 10);
+}
+
+/** One task: hollow when open, with a core when taken, full when done, crossed when failed. */
+function paintTask(canvas, task, [x, y], picture, look) {
+  const { ink } = look;
+  const state = taskState(task);
+  const colour = task.uav ? uavColour(picture.described(task.uav).number, ink.dark) : ink.text;
+  let radius = taskRadius(task.value, look);
+  canvas.lineWidth = radius > 5 ? 2 : 1.5;
+  canvas.fillStyle = ink.ground;
+  canvas.strokeStyle = colour;
+  if (state === "open") {
+    canvas.strokeStyle = ink.text;
+    disc(canvas, x, y, radius);
+  } else if (state === "taken") {
+    canvas.lineWidth += 0.5;
+    disc(canvas, x, y, radius + 1);
+    canvas.fillStyle = colour;
+    canvas.beginPath();
+    canvas.arc(x, y, radius * 0.45, 0, WIDE);
+    canvas.fill();
+  } else if (state === "done") {
+    radius *= 0.85;
+    canvas.globalAlpha = 0.75;
+    canvas.fillStyle = colour;
+    canvas.beginPath();
+    canvas.arc(x, y, radius, 0, WIDE);
+    canvas.fill();
+    canvas.globalAlpha = 1;
+    if (radius >= 5) tick(canvas, x, y, radius, ink.ground);
+  } else if (state === "failed") {
+    canvas.strokeStyle = ink.trouble;
+    canvas.lineWidth = 2.5;
+    cross(canvas, x, y, Math.max(4, radius * 0.7));
+  } else {
+    canvas.strokeStyle = ink.muted;
+    canvas.lineWidth = 1.25;
+    canvas.beginPath();
+    canvas.arc(x, y, radius * 0.75, 0, WIDE);
+    canvas.moveTo(x - radius, y + radius);
+    canvas.lineTo(x + radius, y - radius);
+    canvas.stroke();
+  }
+  if (task.by === "operator") paintByOperator(canvas, x, y, radius, ink);
+  if (look.selected === task.id) ring(canvas, x, y, radius + 6, ink.accent);
+}
+
+/** Corners around a task that the operator added. */
+function paintByOperator(canvas, x, y, radius, ink) {
+  const half = radius + 3.5;
+  canvas.strokeStyle = ink.muted;
+  canvas.lineWidth = 1.25;
+  canvas.beginPath();
+  for (const [across, down] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+    canvas.moveTo(x + across * half, y + down * (half - 3.5));
+    canvas.lineTo(x + across * half, y + down * half);
+    canvas.lineTo(x + across * (half - 3.5), y + down * half);
+  }
+  canvas.stroke();
+}
+
+/** Everything that moves: target lines, UAVs and their labels. Fills `spots` with where UAVs are. */
+export function paintUavs(canvas, view, picture, motion, look, spots) {
+  canvas.clearRect(0, 0, view.width, view.height);
+  spots.clear();
+  canvas.font = `600 11px ${look.ink.font}`;
+  canvas.textAlign = "left";
+  for (const [id, { at }] of motion.shown) {
+    const row = picture.uavs.get(id);
+    const spot = view.spot(at);
+    if (!row || !view.holds(spot, 400)) continue;
+    spots.set(id, spot);
+    const target = row.task && !row.lost ? picture.tasks.get(row.task) : null;
+    if (!target) continue;
+    canvas.strokeStyle = uavColour(picture.described(id).number, look.ink.dark);
+    canvas.lineWidth = look.selected === id ? 2 : 1.25;
+    const [x, y] = view.spot(target.position);
+    line(canvas, spot[0], spot[1], x, y);
+  }
+  const labels = [];
+  for (const [id, spot] of spots) {
+    if (view.holds(spot)) labels.push(paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look));
+  }
+  paintLabels(canvas, labels, look, 1);
+  for (const ghost of look.ghosts) paintGhost(canvas, view.spot(ghost.position), ghost.label, look);
+}
+
+function paintUav(canvas, picture, motion, row, [x, y], look) {
+  const { ink } = look;
+  const described = picture.described(row.id);
+  const colour = uavColour(described.number, ink.dark);
+  const troubled = row.lost || row.does === "out" || row.does === "absent";
+  const size = look.uavSize;
+  canvas.save();
+  canvas.translate(x, y);
+  if (troubled) {
+    canvas.strokeStyle = ink.trouble;
+    canvas.fillStyle = ink.ground;
+    canvas.lineWidth = 2;
+    arrow(canvas, size, Math.PI);
+    canvas.fill();
+    canvas.stroke();
+    cross(canvas, 0, 0, size * 0.35);
+  } else {
+    canvas.fillStyle = colour;
+    canvas.strokeStyle = ink.ground;
+    canvas.lineWidth = 1.5;
+    arrow(canvas, size, motion.heading);
+    canvas.fill();
+    canvas.stroke();
+    if (row.does === "holding") bars(canvas, size, ink);
+  }
+  if (look.selected === row.id) ring(canvas, 0, 0, size + 6, ink.accent);
+  canvas.restore();
+  const chosen = look.selected === row.id;
+  return {
+    text: chosen ? told(row, picture) : described.short,
+    weight: chosen ? 2 : Number(troubled),
+    x: x + size + 3,
+    y: y + 4,
+    colour: troubled ? ink.trouble : ink.text,
+  };
+}
+
+/** Labels that have room, the weightiest first; those of weight `always` or more in any case. */
+function paintLabels(canvas, labels, look, always) {
+  const taken = [];
+  const centred = canvas.textAlign === "center" ? 0.5 : 0;
+  for (const each of labels.sort((one, other) => other.weight - one.weight)) {
+    const width = canvas.measureText(each.text).width;
+    const [left, right] = [each.x - centred * width, each.x + (1 - centred) * width];
+    const hits = ([from, to, y]) => left < to && right > from && Math.abs(each.y - y) < 12;
+    if (each.weight < always && taken.some(hits)) continue;
+    taken.push([left, right, each.y]);
+    label(canvas, each.text, each.x, each.y, each.colour, look);
+  }
+}
+
+/** Id, target and rule of the UAV that is selected. */
+function told(row, picture) {
+  const target = row.task ? ` → ${row.task}` : ` ${row.does}`;
+  return `${row.id}${target}${picture.head.rule ? ` · ${picture.head.rule}` : ""}`;
+}
+
+function paintGhost(canvas, [x, y], text, look) {
+  canvas.strokeStyle = look.ink.accent;
+  canvas.lineWidth = 2;
+  canvas.setLineDash([3, 3]);
+  canvas.beginPath();
+  canvas.arc(x, y, 9, 0, WIDE);
+  canvas.stroke();
+  canvas.setLineDash([]);
+  label(canvas, text, x + 13, y + 4, look.ink.accent, look);
+}
+
+function path(canvas, view, positions) {
+  canvas.beginPath();
+  positions.forEach((position, index) => {
+    const [x, y] = view.spot(position);
+    if (index) canvas.lineTo(x, y);
+    else canvas.moveTo(x, y);
+  });
+  canvas.stroke();
+}
+
+function line(canvas, fromX, fromY, toX, toY) {
+  canvas.beginPath();
+  canvas.moveTo(fromX, fromY);
+  canvas.lineTo(toX, toY);
+  canvas.stroke();
+}
+
+function disc(canvas, x, y, radius) {
+  canvas.beginPath();
+  canvas.arc(x, y, radius, 0, WIDE);
+  canvas.fill();
+  canvas.stroke();
+}
+
+function ring(canvas, x, y, radius, colour) {
+  canvas.strokeStyle = colour;
+  canvas.lineWidth = 2;
+  canvas.beginPath();
+  canvas.arc(x, y, radius, 0, WIDE);
+  canvas.stroke();
+}
+
+function tick(canvas, x, y, radius, colour) {
+  canvas.strokeStyle = colour;
+  canvas.lineWidth = 1.75;
+  canvas.beginPath();
+  canvas.moveTo(x - radius * 0.45, y + radius * 0.05);
+  canvas.lineTo(x - radius * 0.1, y + radius * 0.4);
+  canvas.lineTo(x + radius * 0.5, y - radius * 0.4);
+  canvas.stroke();
+}
+
+function cross(canvas, x, y, half) {
+  canvas.beginPath();
+  canvas.moveTo(x - half, y - half);
+  canvas.lineTo(x + half, y + half);
+  canvas.moveTo(x + half, y - half);
+  canvas.lineTo(x - half, y + half);
+  canvas.stroke();
+}
+
+function arrow(canvas, size, heading) {
+  const turned = (across, ahead) => [
+    across * Math.cos(heading) + ahead * Math.sin(heading),
+    across * Math.sin(heading) - ahead * Math.cos(heading),
+  ];
+  canvas.beginPath();
+  canvas.moveTo(...turned(0, size));
+  canvas.lineTo(...turned(0.75 * size, -0.8 * size));
+  canvas.lineTo(...turned(0, -0.4 * size));
+  canvas.lineTo(...turned(-0.75 * size, -0.8 * size));
+  canvas.closePath();
+}
+
+function bars(canvas, size, ink) {
+  canvas.fillStyle = ink.text;
+  canvas.fillRect(-size - 7, -5, 3, 10);
+  canvas.fillRect(-size - 2, -5, 3, 10);
+}
+
+function label(canvas, text, x, y, colour, look) {
+  canvas.lineJoin = "round";
+  canvas.lineWidth = 3;
+  canvas.strokeStyle = look.ink.ground;
+  canvas.strokeText(text, x, y);
+  canvas.fillStyle = colour;
+  canvas.fillText(text, x, y);
+}

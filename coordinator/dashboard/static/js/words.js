@@ -1,0 +1,78 @@
+// Numbers, states and signs as people read them. States differ in sign and word, never in colour alone.
+
+export const NOTHING = "–";
+
+/** What a UAV does: its sign, and whether that is trouble, activity or rest. */
+export const DOES = {
+  starting: ["◌", "rest"],
+  learning: ["◌", "rest"],
+  preparing: ["◌", "rest"],
+  idle: ["○", "rest"],
+  flying: ["▲", "busy"],
+  serving: ["◆", "busy"],
+  holding: ["‖", "held"],
+  returning: ["◁", "held"],
+  home: ["⌂", "rest"],
+  out: ["⊘", "trouble"],
+  lost: ["▽", "trouble"],
+  absent: ["▽", "trouble"],
+};
+
+/** Task states in the order of a mission; "taken" is open with a UAV on its way. */
+export const TASK_STATES = ["open", "taken", "done", "failed", "withdrawn"];
+export const TASK_SIGNS = { open: "○", taken: "◎", done: "●", failed: "×", withdrawn: "⊘" };
+export const COMMAND_SIGNS = { pending: "◌", obeyed: "✓", "not obeyed": "×" };
+
+/** State of a task as the page shows it. */
+export function taskState(task) {
+  return task.state === "open" && task.taken ? "taken" : task.state;
+}
+
+/** A number with at most that many digits behind the point, thousands apart. */
+export function number(value, digits = 1) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
+  const size = Math.abs(value);
+  if (size >= 1e7) return value.toExponential(3).replace("e+", "e");
+  const shown = value.toFixed(size >= 1000 ? 0 : digits);
+  const [whole, part] = shown.split(".");
+  const apart = whole.replace(/(\d)(?=(\d{3})+$)/g, "$1\u202f");
+  return part === undefined || /^0*$/.test(part) ? apart : `${apart}.${part}`;
+}
+
+/** Seconds, from 100 on as minutes and seconds. */
+export function seconds(value) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
+  if (Math.abs(value) < 100) return `${value.toFixed(1)} s`;
+  const sign = value < 0 ? "−" : "";
+  const whole = Math.floor(Math.abs(value));
+  const pad = (part) => String(part).padStart(2, "0");
+  const [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  return sign + (hours ? `${hours}:${pad(minutes)}:${pad(rest)}` : `${minutes}:${pad(rest)}`);
+}
+
+/** A share of 1 in percent. */
+export function percent(fraction, digits = 0) {
+  if (fraction === null || fraction === undefined || !Number.isFinite(fraction)) return NOTHING;
+  return `${(100 * fraction).toFixed(digits)} %`;
+}
+
+/** East, north (and up) in metres. */
+export function place(position) {
+  if (!position) return NOTHING;
+  const [east, north, up] = position.map((metres) => number(metres, 1));
+  return `E ${east}  N ${north}${position[2] ? `  U ${up}` : ""} m`;
+}
+
+/** Degrees as chart makers write them. */
+export function degrees([lat, lon]) {
+  const side = (value, plus, minus) => `${Math.abs(value).toFixed(6)}° ${value < 0 ? minus : plus}`;
+  return `${side(lat, "N", "S")}, ${side(lon, "E", "W")}`;
+}
+
+/** "3 tasks", "1 task". */
+export function count(many, what) {
+  return `${many} ${what}${many === 1 ? "" : "s"}`;
+}
+
+/** Ids in the order people count: uav2 before uav10. */
+export const byName = new Intl.Collator("en", { numeric: true }).compare;

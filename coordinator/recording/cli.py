@@ -1,0 +1,295 @@
+"""The commands `swarm record`, `swarm replay` and `swarm explain`.
+
+Leaves out: everything they do (the other modules here, and coordinator.dashboard).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm.config import Link
+from swarm.errors import Fault, InputError
+from swarm.options import (
+    BusOption,
+    ConnectOption,
+    JsonOption,
+    LeaseOption,
+    LinkOption,
+    ListenOption,
+    SomeMissionOption,
+    SpeedupOption,
+)
+
+if TYPE_CHECKING:
+    from coordinator.recording.playback import Playback
+    from coordinator.recording.reader import Recording
+
+__all__ = ["explain", "record", "replay"]
+
+NewFileArgument = Annotated[
+    Path, typer.Argument(metavar="FILE.mcap", help="File to be made.", show_default=False)
+]
+FileArgument = Annotated[
+    Path, typer.Argument(metavar="FILE.mcap", help="A recording.", show_default=False)
+]
+LEFT_S = 5.0
+"""Wall time after which a mission whose UAVs have all left is over."""
+
+
+def record(
+    file: NewFileArgument,
+    mission: SomeMissionOption = None,
+    duration_s: Annotated[
+        float | None,
+        typer.Option(
+            "--duration-s",
+            min=0.1,
+            metavar="S",
+            help="Stop after so many wall seconds. Default: when the mission is over.",
+            show_default=False,
+        ),
+    ] = None,
+    timeout_s: Annotated[
+        float,
+        typer.Option(
+            "--timeout-s",
+            min=0.1,
+            max=86400.0,
+            metavar="S",
+            help="How long to wait for the bus, and then for a mission; wall seconds.",
+        ),
+    ] = 60.0,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+    connect: ConnectOption = None,
+    link: LinkOption = Link.NORMAL,
+    lease_s: LeaseOption = None,
+    speedup: SpeedupOption = 1.0,
+) -> int:
+    """Record a mission that is flown elsewhere.
+
+    Joins as an onlooker, until the mission is over or Ctrl-C; nobody flies any differently for
+    it. Everything that is said goes into the file, with a map, a scene and curves for Foxglove.
+    After every second the file is whole, whatever happens then. Exit status 1: nobody flies a
+    mission, or not everything could be written.
+
+    Examples:
+        swarm record flight.mcap
+        swarm record flight.mcap --mission table-1 --connect tcp/192.168.1.2:7447
+        swarm record ten-minutes.mcap --duration-s 600
+    """
+    import asyncio
+
+    from coordinator.joining import check_mission, joined, onlooking
+    from coordinator.recording.flight_recorder import recording_to, wall_ns
+    from coordinator.recording.options import check_new_recording
+    from coordinator.recording.recorder import About
+    from coordinator.recording.watching import Witness
+    from swarm.bus.config import bus_config
+    from swarm.clock import ScaledClock
+    from swarm.config import preset
+    from swarm.log import LogLevel, configure_logging
+    from swarm.process import EXIT_INTERRUPTED, run_until_stopped
+
+    configure_logging(LogLevel.ERROR)
+    check_mission(mission)
+    check_new_recording(file)
+    network = preset(link, lease_s)
+    config = bus_config(bus, listen, connect or (), network.lease_s)
+    timing = network.timing.scaled(speedup)
+
+    async def work() -> int:
+        async with joined(mission, config, timeout_s) as (name, seat):
+            clock = ScaledClock(speedup)
+            witness = Witness(
+                name,
+                timing,
+                linger_s=LEFT_S * speedup,
+                until_s=None if duration_s is None else duration_s * speedup,
+            )
+            about = About(name, timing, speedup)
+            with recording_to(file, about, wall_ns(), _warn) as recorder:
+                print(f"recording {name} in {file}", file=sys.stderr)
+                core = recorder.around(witness, witness.onlooker.observer)
+                shell = onlooking(
+                    core, seat, clock, name, "record", network.answer_s, every_status=True
+                )
+                try:
+                    await shell.run()
+                finally:
+                    recorder.close()
+                    print(f"{file}: {recorder.told}", file=sys.stderr)
+            return 0 if recorder.fault is None else 1
+
+    status = asyncio.run(run_until_stopped(work()))
+    # Ctrl-C is how a recording is ended; before it began there is none.
+    return 0 if status == EXIT_INTERRUPTED and file.exists() else status
+
+
+def replay(
+    file: FileArgument,
+    speed: Annotated[
+        float,
+        typer.Option(
+            "--speed",
+            min=0.01,
+            max=1000.0,
+            metavar="X",
+            help="Mission seconds per wall second; the page changes it at any time.",
+        ),
+    ] = 1.0,
+    at_s: Annotated[
+        float,
+        typer.Option(
+            "--at-s", min=0.0, metavar="T", help="Begin T seconds after the recording does."
+        ),
+    ] = 0.0,
+    final: Annotated[
+        bool,
+        typer.Option(
+            "--final", help="Only print how the mission stood in the end, as swarm status does."
+        ),
+    ] = False,
+    json: JsonOption = False,
+    port: Annotated[
+        int,
+        typer.Option("--port", min=0, max=65535, metavar="PORT", help="0: any that is free."),
+    ] = 0,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Only print the page's address.")
+    ] = False,
+) -> int:
+    """Play a recording in the dashboard, or print how it ended.
+
+    At any speed, back and forth. The page is served on this machine alone, until Ctrl-C.
+
+    Examples:
+        swarm replay flight.mcap
+        swarm replay flight.mcap --speed 20 --port 8080 --no-browser
+        swarm replay flight.mcap --final
+        swarm replay flight.mcap --final --json
+    """
+    from coordinator.recording.playback import Playback
+
+    playback = Playback(_read(file), speed)
+    if final:
+        _print_final(playback, json=json)
+        return 0
+    playback.seek(at_s)
+    return _play(playback, port, json=json, browser=not no_browser)
+
+
+def explain(
+    file: FileArgument,
+    task: Annotated[
+        str | None,
+        typer.Option("--task", metavar="TASK", help="Tell its story.", show_default=False),
+    ] = None,
+    uav: Annotated[
+        str | None,
+        typer.Option("--uav", metavar="UAV", help="Tell its story.", show_default=False),
+    ] = None,
+    json: JsonOption = False,
+) -> int:
+    """Tell a task's or a UAV's story from a recording.
+
+    In sentences, event by event, with the reason of each choice.
+
+    Examples:
+        swarm explain flight.mcap --task t7
+        swarm explain flight.mcap --uav uav3
+        swarm explain flight.mcap --task t7 --json
+    """
+    from json import dumps
+
+    from rich.console import Console
+
+    from coordinator.recording.explain import explain_task, explain_uav
+
+    match task, uav:
+        case str(), None:
+            told = explain_task(_read(file), task)
+        case None, str():
+            told = explain_uav(_read(file), uav)
+        case _:
+            problem = "neither is given" if task is None else "both are given"
+            remedy = "give one of them, such as --task t1"
+            raise InputError(Fault("--task, --uav", "", problem, remedy))
+    if json:
+        print(dumps(told.as_json(), allow_nan=False))
+    else:
+        told.render(Console(highlight=False))
+    return 0
+
+
+def _read(file: Path) -> Recording:
+    """The recording, with a word if it is not whole."""
+    from coordinator.recording.reader import read_recording
+
+    recording = read_recording(file)
+    if recording.torn is not None:
+        print(f"swarm: {recording.torn}; what comes before is whole", file=sys.stderr)
+    return recording
+
+
+def _warn(line: str) -> None:
+    print(f"swarm: {line}", file=sys.stderr)
+
+
+def _print_final(playback: Playback, *, json: bool) -> None:
+    from json import dumps
+
+    from rich.console import Console
+
+    from coordinator.status.table import mission_status, status_as_json, status_table
+    from coordinator.view.signs import signs_for
+
+    playback.seek(playback.duration_s)
+    found = mission_status(playback.observer, playback.now_s)
+    if json:
+        print(dumps(status_as_json(found), allow_nan=False))
+        return
+    console = Console(highlight=False)
+    console.print(status_table(found, console.width, signs_for(console.options.ascii_only)))
+
+
+def _play(playback: Playback, port: int, *, json: bool, browser: bool) -> int:
+    """Serve the page until told to stop."""
+    import asyncio
+    import webbrowser
+    from json import dumps
+
+    from coordinator.dashboard.access import access_for
+    from coordinator.dashboard.app import create_app
+    from coordinator.dashboard.listening import listen, url_of
+    from coordinator.dashboard.serve import serving
+    from coordinator.recording.player import Player
+    from swarm.clock import SystemClock
+    from swarm.log import LogLevel, configure_logging
+    from swarm.process import EXIT_INTERRUPTED, run_until_stopped
+
+    configure_logging(LogLevel.WARNING)
+    host = "127.0.0.1"
+    access, _ = access_for(host, (), None)
+    taken = listen(host, port)
+    url = url_of(host, taken.getsockname()[1])
+    print(dumps({"url": url}) if json else f"replay: {url} (Ctrl-C ends it)", flush=True)
+    if browser and not json:
+        webbrowser.open(url)
+
+    async def work() -> int:
+        player = Player(playback, SystemClock())
+        served = create_app(player, access)
+        async with serving(served.app, taken):
+            try:
+                await player.run()
+            finally:
+                await served.end("the replay has ended")
+        return 0
+
+    status = asyncio.run(run_until_stopped(work()))
+    return 0 if status == EXIT_INTERRUPTED else status

@@ -1,0 +1,108 @@
+"""A recording as a source of the dashboard: it plays by itself, and obeys the page.
+
+Leaves out: playing (coordinator.recording.playback) and serving (coordinator.dashboard.app).
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+from coordinator.dashboard.source import CommandRow, Orders, PlayerState
+from coordinator.observer import Observer
+from coordinator.recording.playback import MAX_SPEED, Playback
+from swarm.clock import Clock
+
+__all__ = ["Player"]
+
+FRAME_S = 0.1
+"""Wall time between two steps of a recording that plays."""
+
+
+class Player:
+    """A source that plays a recording, and the recording's controls.
+
+    Args:
+        playback: plays.
+        clock: of the wall.
+    """
+
+    def __init__(self, playback: Playback, clock: Clock) -> None:
+        self._playback = playback
+        self._clock = clock
+        self._advanced_s = clock.now_s()
+
+    async def run(self) -> None:
+        """Play until cancelled."""
+        while True:
+            self._catch_up()
+            await asyncio.sleep(FRAME_S)
+
+    # -- what a page is fed from --------------------------------------------------------
+
+    @property
+    def observer(self) -> Observer:
+        """What was known at the moment that is shown."""
+        return self._playback.observer
+
+    @property
+    def link(self) -> bool:
+        """Whether the recorder's link was up."""
+        return self.observer.cut_since_s is None
+
+    @property
+    def speedup(self) -> float:
+        """Of the recorder's clock."""
+        return self._playback.recording.speedup
+
+    def now_s(self) -> float:
+        """The moment that is shown."""
+        return self._playback.now_s
+
+    @property
+    def commands(self) -> tuple[CommandRow, ...]:
+        """None: what was ordered is in the story."""
+        return ()
+
+    @property
+    def orders(self) -> Orders | None:
+        """Nobody flies here."""
+        return None
+
+    @property
+    def player(self) -> Player:
+        """The controls."""
+        return self
+
+    # -- the controls -------------------------------------------------------------------
+
+    @property
+    def duration_s(self) -> float:
+        """Of the recording, in its own time."""
+        return self._playback.duration_s
+
+    @property
+    def state(self) -> PlayerState:
+        """How far it is."""
+        playback = self._playback
+        return PlayerState(playback.t_s, playback.playing, playback.speed)
+
+    def control(self, *, playing: bool | None, speed: float | None, t_s: float | None) -> None:
+        """Play or stop, at that speed, from there; None leaves a thing as it is.
+
+        Who plays on from the very end begins anew.
+        """
+        self._catch_up()
+        playback = self._playback
+        if speed is not None:
+            playback.speed = min(max(speed, 1e-3), MAX_SPEED)
+        if t_s is not None:
+            playback.seek(t_s)
+        if playing is not None:
+            if playing and t_s is None and playback.t_s >= playback.duration_s:
+                playback.seek(0.0)
+            playback.playing = playing
+
+    def _catch_up(self) -> None:
+        now_s = self._clock.now_s()
+        self._playback.advance(now_s - self._advanced_s)
+        self._advanced_s = now_s

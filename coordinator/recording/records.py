@@ -1,0 +1,333 @@
+"""What a recording holds besides pictures: every fact its core got, as JSON of a published schema.
+
+Facts are written so that reading gives back the very same: numbers digit by digit, messages
+field by field. A recording is made of *lines*; a line knows its topic, schema and JSON.
+Leaves out: what is drawn from the facts for other tools (coordinator.recording.pictures).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, make_dataclass
+from functools import cache
+from typing import Annotated, Any, Final, Literal, get_args
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from coordinator.plan_report import plan_as_json, plan_from_json
+from swarm.events import (
+    BusFact,
+    Heard,
+    Learned,
+    LinkChanged,
+    PeerGone,
+    PeerSeen,
+    Tick,
+)
+from swarm.model import Plan
+from swarm.wire.bounds import Count, Id, Instant
+from swarm.wire.keys import Keys
+from swarm.wire.messages import (
+    Board,
+    Body,
+    Command,
+    Message,
+    Outcome,
+    Snapshot,
+    Stamp,
+    TaskOrder,
+)
+
+__all__ = [
+    "FORMAT",
+    "SCHEMAS",
+    "Begun",
+    "Line",
+    "Recorded",
+    "UnreadableError",
+    "decode",
+    "encode",
+    "schema_of",
+    "topics_of",
+]
+
+FORMAT: Final = "1"
+"""Version of all schemas here; grows when what was written before cannot be read any more."""
+
+_BODIES: Final[dict[str, type[Body]]] = {body.__name__: body for body in get_args(Body)}
+"""By the second part of their schemas' names."""
+_CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
+
+
+class UnreadableError(Exception):
+    """A line that does not say what its schema promises."""
+
+
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """The recording core started: the first thing in every recording."""
+
+
+Recorded = BusFact | Begun | Plan
+"""What can be written down, each with the core's time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One message of the file."""
+
+    topic: str
+    schema: str
+    data: bytes
+
+
+# -- shapes of the JSON ------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """The recording process itself: its core began, or stepped because a deadline had come."""
+
+    __pydantic_config__ = _CHECKED
+
+    now_s: float
+    """Of the recording core's clock [s]."""
+    what: Literal["begun", "tick"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Presence:
+    """A liveliness token came or went."""
+
+    __pydantic_config__ = _CHECKED
+
+    now_s: float
+    writer: str
+    there: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Link:
+    """The recording process's own link to the bus came up or went down."""
+
+    __pydantic_config__ = _CHECKED
+
+    now_s: float
+    up: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """A plan the coordinator made: lists, sequence, value and bound, as `swarm plan --json`."""
+
+    __pydantic_config__ = _CHECKED
+
+    now_s: float
+    plan: dict[str, Any]
+
+
+def _said(name: str, body: type[Body], *, kind: bool) -> type[Any]:
+    """Shape of a message: on a topic of its own, or with its kind in an answer."""
+    fields: list[Any] = [
+        ("mission", Id),
+        ("writer", Id),
+        ("incarnation", Count),
+        ("counter", Count),
+        ("body", body),
+    ]
+    if kind:
+        fields.insert(0, ("kind", Literal[name]))
+    else:
+        fields += [("now_s", float), ("mission_s", float | None)]
+    shape = make_dataclass(f"{'Known' if kind else ''}{name}", fields, frozen=True, slots=True)
+    shape.__doc__ = body.__doc__
+    shape.__pydantic_config__ = _CHECKED  # type: ignore[attr-defined]  # read by pydantic alone
+    return shape
+
+
+_SAID: Final = {name: _said(name, body, kind=False) for name, body in _BODIES.items()}
+_KNOWN: Final = {name: _said(name, body, kind=True) for name, body in _BODIES.items()}
+
+
+def _any_known() -> Any:
+    shapes = tuple(_KNOWN.values())
+    union: Any = shapes[0]
+    for shape in shapes[1:]:
+        union = union | shape
+    return Annotated[union, Field(discriminator="kind")]
+
+
+_Answer: Final = make_dataclass(
+    "_Answer",
+    [
+        ("mission", Id),
+        ("writer", Id),
+        ("incarnation", Count),
+        ("mission_s", Instant | None),
+        ("messages", tuple[_any_known(), ...]),  # type: ignore[misc]  # made at run time
+    ],
+    frozen=True,
+    slots=True,
+)
+_Answers: Final = make_dataclass(
+    "_Answers",
+    [("now_s", float), ("snapshots", tuple[_Answer, ...])],  # type: ignore[valid-type]  # likewise
+    frozen=True,
+    slots=True,
+)
+_Answers.__doc__ = "All answers to a question of the recording core, maybe none."
+_Answers.__pydantic_config__ = _CHECKED  # type: ignore[attr-defined]  # read by pydantic alone
+
+_SHAPES: Final[Mapping[str, Any]] = {
+    "peckorder.Moment": _Moment,
+    "peckorder.Presence": _Presence,
+    "peckorder.Link": _Link,
+    "peckorder.Answers": _Answers,
+    "peckorder.Plan": _Plan,
+    **{f"peckorder.{name}": shape for name, shape in _SAID.items()},
+}
+SCHEMAS: Final = tuple(_SHAPES)
+"""Names of all schemas of facts."""
+
+
+def schema_of(name: str) -> bytes:
+    """The JSON schema by that name."""
+    schema = _adapter(name).json_schema()
+    schema["title"] = name
+    return json.dumps(schema, separators=(",", ":")).encode()
+
+
+@cache
+def _adapter(name: str) -> TypeAdapter[Any]:
+    return TypeAdapter(_SHAPES[name])
+
+
+# -- writing -----------------------------------------------------------------------------
+
+
+def topics_of(mission: str) -> Mapping[str, str]:
+    """Topics of what is no message, by schema; `Presence` has one per writer below its own."""
+    root = f"/{Keys(mission).root}"
+    return {
+        "peckorder.Moment": f"{root}/recorder/moment",
+        "peckorder.Link": f"{root}/recorder/link",
+        "peckorder.Answers": f"{root}/recorder/answers",
+        "peckorder.Plan": f"{root}/recorder/plan",
+        "peckorder.Presence": f"{root}/alive",
+    }
+
+
+def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) -> Line | None:
+    """The line that says ``what``; None for what only the recorder's own process was told.
+
+    Args:
+        what: a fact, or a plan.
+        mission: its name.
+        now_s: of the recording core's clock [s].
+        mission_s: mission time, for people [s].
+    """
+    match what:
+        case Heard(message):
+            name = type(message.body).__name__
+            said = _SAID[name](
+                message.mission,
+                message.writer,
+                message.stamp.incarnation,
+                message.stamp.counter,
+                message.body,
+                now_s,
+                mission_s,
+            )
+            return _line(_topic(message), f"peckorder.{name}", said)
+        case Learned(snapshots):
+            schema, shape = "peckorder.Answers", _Answers(now_s, tuple(map(_answer, snapshots)))
+        case PeerSeen(writer):
+            schema, shape = "peckorder.Presence", _Presence(now_s, writer, True)
+        case PeerGone(writer):
+            schema, shape = "peckorder.Presence", _Presence(now_s, writer, False)
+        case LinkChanged(up):
+            schema, shape = "peckorder.Link", _Link(now_s, up)
+        case Tick():
+            schema, shape = "peckorder.Moment", _Moment(now_s, "tick")
+        case Begun():
+            schema, shape = "peckorder.Moment", _Moment(now_s, "begun")
+        case Plan():
+            schema, shape = "peckorder.Plan", _Plan(now_s, plan_as_json(what))
+        case _:
+            return None
+    return _line(topics_of(mission)[schema], schema, shape)
+
+
+def _line(topic: str, schema: str, shape: Any) -> Line:
+    return Line(topic, schema, _adapter(schema).dump_json(shape))
+
+
+def _topic(message: Message) -> str:
+    """Its bus key, without the task where there is one: a topic for each would be too many."""
+    key = f"/{message.key}"
+    match message.body:
+        case Board() | Outcome() | TaskOrder() | Command():
+            return key.rpartition("/")[0]
+        case _:
+            return key
+
+
+def _answer(snapshot: Snapshot) -> Any:
+    messages = tuple(
+        _KNOWN[name](
+            name,
+            message.mission,
+            message.writer,
+            message.stamp.incarnation,
+            message.stamp.counter,
+            message.body,
+        )
+        for message in snapshot.messages
+        if (name := type(message.body).__name__)
+    )
+    return _Answer(
+        snapshot.mission, snapshot.writer, snapshot.incarnation, snapshot.mission_s, messages
+    )
+
+
+# -- reading -----------------------------------------------------------------------------
+
+
+def decode(schema: str, data: bytes) -> tuple[float, Recorded]:
+    """What a line says, and the core's time [s]; inverse of `encode`.
+
+    Raises:
+        UnreadableError: it is not what its schema says.
+    """
+    try:
+        shape = _adapter(schema).validate_json(data)
+        return shape.now_s, _meant(schema, shape)
+    except (ValidationError, ValueError, KeyError, TypeError) as fault:
+        raise UnreadableError(str(fault)) from None
+
+
+def _meant(schema: str, shape: Any) -> Recorded:
+    match schema:
+        case "peckorder.Moment":
+            return Begun() if shape.what == "begun" else Tick()
+        case "peckorder.Presence":
+            return PeerSeen(shape.writer) if shape.there else PeerGone(shape.writer)
+        case "peckorder.Link":
+            return LinkChanged(shape.up)
+        case "peckorder.Plan":
+            return plan_from_json(shape.plan)
+        case "peckorder.Answers":
+            return Learned(tuple(map(_snapshot, shape.snapshots)))
+        case _:
+            return Heard(_message(shape))
+
+
+def _message(shape: Any) -> Message:
+    stamp = Stamp(shape.incarnation, shape.counter)
+    return Message(shape.mission, shape.writer, stamp, shape.body)
+
+
+def _snapshot(shape: Any) -> Snapshot:
+    messages = tuple(map(_message, shape.messages))
+    return Snapshot(shape.mission, shape.writer, shape.incarnation, shape.mission_s, messages)
