@@ -1,11 +1,12 @@
-# Everything sets itself up: all that is needed is python3 (3.11 or newer), a C++ compiler and make.
+# Everything sets itself up: all that is needed is python3 (3.11 or newer), a C++ compiler and make;
+# for the tests of the dashboard also Chromium, which root gets by itself on Debian.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
-.PHONY: demo test lint format kernels sanitize soak chaos fuzz clean help
+.PHONY: demo test browser lint format kernels sanitize soak chaos fuzz clean help
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
@@ -22,9 +23,22 @@ help:
 demo: $(VENV)/.installed
 	$(BIN)/swarm run table-1 --method greedy
 
-test: lint
+test: lint browser
 	$(BIN)/python -m pytest -n 2 tests/unit tests/contract tests/faults
 	$(BIN)/python -m pytest -n 3 --dist worksteal tests/process tests/sitl
+
+# The dashboard is tested in a real browser: Chromium under one of these names.
+CHROMIUM := chromium chromium-browser google-chrome
+browser:
+	@for name in $(CHROMIUM); do command -v $$name >/dev/null && exit 0; done; \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		echo "installing chromium for the tests of the dashboard"; \
+		apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
+			apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
+	else \
+		echo "make test: no Chromium found; install one of $(CHROMIUM), on Debian: sudo apt-get install chromium" >&2; \
+		exit 1; \
+	fi
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .

@@ -200,7 +200,9 @@ def agent(
     from swarm.process import stop_requests
     from swarm.store import Store
 
-    configure_logging(log_level, log_format)
+    # A life begins with its process: of two agents of one UAV the one started last counts.
+    life = incarnation()
+    configure_logging(log_level, log_format, mission=mission, uav=uav, incarnation=life)
     network = preset(link, lease_s)
     config = bus_config(bus, listen, connect or (), network.lease_s)
     _check_ids(mission, uav)
@@ -209,7 +211,7 @@ def agent(
         parse_forward(url)
     own_system_id, own_component_id = _ground_ids(ground_id)
     key = None if signing_key is None else load_signing_key(signing_key)
-    log = get_logger(uav, mission=mission)
+    log = get_logger(uav)
 
     async def run() -> int:
         clock = ScaledClock(speedup)
@@ -242,7 +244,7 @@ def agent(
             core = AgentCore(
                 mission,
                 uav,
-                incarnation(),
+                life,
                 network.timing.scaled(speedup),
                 None if memory is None else memory.snapshot,
                 0.0 if memory is None else memory.age_s,

@@ -1,6 +1,6 @@
 """The agent's process: its core between a bus and a vehicle.
 
-Publishes ``uav/<id>/claim``, ``…/outcome/<task>`` and ``…/status``, holds
+Publishes ``uav/<id>/claim``, ``…/outcome/<task>``, ``…/status`` and ``…/choice``, holds
 ``alive/<id>`` and answers on ``state/<id>``; subscribes to ``brief``, ``plan``,
 ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and ``operator/*`` and watches
 ``alive/*``. Leaves out: every decision (agent.core) and flying (agent.mavlink).

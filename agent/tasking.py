@@ -343,7 +343,7 @@ class Tasking:
             ClaimPhase.PROPOSED, task.task, self._free_since_s, rank, decision.completion_s
         )
         told = self._choices.made(turn, problem, epoch, witness, decision, claim, left)
-        turned = [] if left is None else [self._note("turns aside", left, **{"for": task.task})]
+        turns: dict[str, object] = {"task": left, "for": task.task, **self._choices.label}
         decided = self._note(
             "decided",
             task.task,
@@ -353,7 +353,8 @@ class Tasking:
             completion_s=decision.completion_s,
         )
         order = self._order_to(task, idled=self._idled)
-        return [*turned, order, self._speech.say(claim), decided, told]
+        actions = [order, self._speech.say(claim), decided, told]
+        return actions if left is None else [Note("turns aside", turns), *actions]
 
     def _stay_idle(self, now_s: float) -> list[Action]:
         actions, telemetry = self._give_up_claim(), self._picture.telemetry

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.planner.methods import METHODS, ONLINE_METHODS
+from swarm.complete import among
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
@@ -53,6 +55,7 @@ def plan(
         str,
         typer.Option(
             metavar="METHOD",
+            autocompletion=among(*METHODS),
             help="greedy or lookahead: how UAVs decide; guided: optimised lists; exact: the proven "
             "best lists.",
         ),
@@ -208,7 +211,10 @@ def coordinator(
     method: Annotated[
         str,
         typer.Option(
-            "--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."
+            "--method",
+            metavar="METHOD",
+            help="Decision rule: greedy, lookahead or guided.",
+            autocompletion=among(*ONLINE_METHODS),
         ),
     ] = "guided",
     seed: SeedOption = 0,
@@ -269,7 +275,7 @@ def coordinator(
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
 ) -> int:
-    """Plan a mission, brief the agents, start them together and tell them when it is over.
+    """Plan a mission, brief the agents, and start and end it.
 
     Once it has started, the fleet finishes without the coordinator. Started anew, it takes
     charge of the mission that is being flown, as far as agents or its own --state know it.
@@ -296,7 +302,7 @@ def coordinator(
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, SystemClock, incarnation
     from swarm.config import preset
-    from swarm.log import configure_logging
+    from swarm.log import configure_logging, identify
     from swarm.model.ids import COORDINATOR
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
@@ -315,12 +321,16 @@ def coordinator(
             print(dumps(plan_as_json(made), allow_nan=False), flush=True)
         return made
 
+    identify(mission=mission.name)
+
     def core(memory: Snapshot | None, memory_age_s: float) -> CoordinatorCore:
+        life = incarnation()
+        identify(incarnation=life)
         return CoordinatorCore(
             mission,
             method=method,
             seed=seed,
-            incarnation=incarnation(),
+            incarnation=life,
             timing=timing,
             start_timeout_s=start_timeout_s * max(1.0, speedup),
             layers=FlightLayers(lowest_layer_m, layer_spacing_m),
@@ -374,12 +384,12 @@ def coordinator(
 def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     """Refuse what cannot be done before any work is done."""
     from coordinator.export import Firmware
-    from coordinator.planner.plan import METHODS
     from coordinator.plot import PLOT_SUFFIXES
+    from swarm.suggest import instead
 
     faults = []
     if method not in METHODS:
-        remedy = f"choose one of {', '.join(METHODS)}"
+        remedy = instead(method, METHODS)
         faults.append(Fault("--method", method, "no such method", remedy))
     if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
@@ -387,7 +397,7 @@ def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
         faults.append(Fault("--plot", str(plot), problem, remedy))
     firmwares = [known.value for known in Firmware]
     if firmware not in firmwares:
-        remedy = f"choose one of {', '.join(firmwares)}"
+        remedy = instead(firmware, firmwares)
         faults.append(Fault("--firmware", firmware, "no such firmware", remedy))
     if faults:
         raise InputError(*faults)

@@ -141,7 +141,7 @@ class CoordinatorCore:
             return []
         if self._pulse.late(now_s):
             self._membership.held_up(now_s)
-            self._ending.wait_until(now_s + self._timing.relink_grace_s)
+            self._ending.wait_until(now_s + self._timing.relink_grace_s, was_away=True)
             self._inquiry.want(now_s, before_deciding=True)
             self._actions.append(Note("was held up"))
         self._handle(event, now_s)
@@ -199,6 +199,8 @@ class CoordinatorCore:
                 news = self.replica.join(message)
                 if isinstance(message.body, Claim):
                     self._membership.spoke(message.writer)
+                    if self._in_charge and self._ending.somebody_knows_more:
+                        self._inquiry.want(now_s)
                 elif news and isinstance(message.body, TaskOrder):
                     self._note_order(message.body)
                 if self._standing is Standing.BRIEFED and self._beginning.is_forestalled:
@@ -216,7 +218,7 @@ class CoordinatorCore:
                 self._membership.link(up, now_s)
                 self._linked = up
                 if up and self._inquiry.ever:
-                    self._ending.wait_until(now_s + self._timing.relink_grace_s)
+                    self._ending.wait_until(now_s + self._timing.relink_grace_s, was_away=True)
                     self._inquiry.want(now_s, before_deciding=True)
             case PlanMade(request, plan) if self._beginning.expects(request):
                 self._beginning.plan = plan
@@ -358,6 +360,10 @@ class CoordinatorCore:
             self._replanning.begin(None, {}, now_s)
             epoch = replace(epoch, mission_s=self._mission_s(now_s))
         self._speech.outdo(theirs)
+        brief, own = heritage.replica.brief, self.replica.brief
+        if brief is not None and own is not None and own.run != brief.run:
+            # Before others take the one that it began for that of who is in charge.
+            self._say(brief)
         bodies = [message.body for message in theirs if not isinstance(message.body, Epoch)]
         self._actions += self._speech.restate(bodies if epoch is None else [epoch, *bodies])
         self._actions.append(Note("resumes the mission", {"mission_s": self._mission_s(now_s)}))

@@ -119,6 +119,10 @@ async def run_coordinator(
     def known() -> Mapping[str, int]:
         return core.replica.digest()  # of another one once it has taken over
 
+    def context() -> Mapping[str, object]:
+        epoch = core.replica.epoch
+        return {} if epoch is None else {"epoch": epoch.number}
+
     def as_event(fact: Event) -> Event:
         return fact
 
@@ -134,6 +138,7 @@ async def run_coordinator(
         known=known,
         save=None if save is None else lambda now_s: save(core.memory(now_s)),
         answer_s=answer_s,
+        context=context,
     )
     watches = isinstance(core, StandbyCore)
     take_seat(bus, mission.name, None if watches else COORDINATOR, status=False)

@@ -31,11 +31,20 @@ class Ending:
         self._membership = membership
         self._timing = timing
         self._grace_until_s = 0.0
+        self._ignorant_until_s = 0.0
         self._prospect: str | None = None
         self._over_at_s: float | None = None
 
-    def wait_until(self, grace_until_s: float) -> None:
-        """Nobody is missed before then: they need the time to show themselves."""
+    def wait_until(self, grace_until_s: float, *, was_away: bool = False) -> None:
+        """Nobody is missed before then: they need the time to show themselves.
+
+        Args:
+            grace_until_s: when.
+            was_away: whether the operator may have added tasks of which is not known here, and
+                will not be before then.
+        """
+        if was_away:
+            self._ignorant_until_s = max(self._ignorant_until_s, grace_until_s)
         self._grace_until_s = max(self._grace_until_s, grace_until_s)
         if self._over_at_s is not None:
             self._over_at_s = max(self._over_at_s, grace_until_s)
@@ -48,14 +57,24 @@ class Ending:
             more_to_come: whether tasks will yet be posted.
         """
         prospect, patience_s = self._outlook(more_to_come=more_to_come)
-        if prospect is None or prospect == ALL_ENDED:
+        if prospect is None:
             self._prospect = self._over_at_s = None
-            return prospect
-        at_s = max(now_s + patience_s, self._grace_until_s)
+            return None
+        grace_s = self._ignorant_until_s if prospect == ALL_ENDED else self._grace_until_s
+        at_s = max(now_s + patience_s, grace_s)
         if prospect != self._prospect or self._over_at_s is None:
             self._prospect, self._over_at_s = prospect, at_s
         self._over_at_s = min(self._over_at_s, at_s)
         return prospect if self._over_at_s <= now_s else None
+
+    @property
+    def somebody_knows_more(self) -> bool:
+        """Whether somebody who is there claims a task that is not known here."""
+        board, present = self._board.replica.board, self._membership.present
+        return any(
+            claim.task is not None and claim.task not in board and uav in present
+            for uav, claim in self._board.replica.claims.items()
+        )
 
     def settle(self) -> None:
         """The mission has ended: nothing more to find out."""
@@ -78,6 +97,8 @@ class Ending:
             idle = all(claims[uav].phase is ClaimPhase.IDLE for uav in here - paused)
             # Every UAV may refuse a task for reasons of its own, such as a geofence.
             return (NOBODY_WILL if idle and not more_to_come else None), self._timing.stalemate_s
+        if self.somebody_knows_more:
+            return None, 0.0
         if TaskState.OPEN not in self._board.states.values() and not more_to_come:
             return ALL_ENDED, 0.0
         # Who was lost and never said that it is out may have been cut off, and come back.

@@ -95,6 +95,8 @@ class MissionResult:
     took part again is none of them, however long it was gone."""
     epochs: int
     """Epochs in which the mission ran; one that a new coordinator restates is the same."""
+    added: tuple[TaskId, ...] = ()
+    """Tasks that the operator has added to the scenario's, whatever became of them."""
 
 
 class Observer:
@@ -153,6 +155,7 @@ class Observer:
         self._problem: Problem | None = None
         """Of the mission, as far as it has been wanted."""
         self._given = mission
+        self._scenario = {task.id for task in mission.tasks}
         self._added_s: dict[str, float] = {}
         """By task that the operator has added: when that was heard [s mission time]."""
 
@@ -185,7 +188,7 @@ class Observer:
                 # What it said while one of us had no link has not come here.
                 ask |= self._membership.missing(writer)
                 if self._membership.seen(writer, now_s):
-                    ask |= self._welcome_back(writer, now_s)
+                    ask |= self._welcome_back(writer, now_s) or self._is_newcomer(writer)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
             case LinkChanged(up):
@@ -322,6 +325,11 @@ class Observer:
             makespan_s=max(completion_s.values(), default=0.0),
             lost_uavs=tuple(self.lost),
             epochs=len(self._epochs),
+            added=tuple(
+                task.id
+                for task in self.mission.tasks
+                if task.id not in self._scenario and task.id not in self.replica.posted
+            ),
         )
 
     def _ask(self, now_s: float) -> list[Wish]:
@@ -432,6 +440,11 @@ class Observer:
             self.lost.remove(UavId(writer))
             self._tell(f"{writer} is back", now_s)
         return missed
+
+    def _is_newcomer(self, writer: str) -> bool:
+        """Whether it is a UAV whose first words may have been said before they could be heard."""
+        brief, claims = self.replica.brief, self.replica.claims
+        return brief is not None and writer not in claims and writer in {u.id for u in brief.uavs}
 
     def _hear_epoch(self, epoch: Epoch, now_s: float) -> None:
         lists = tuple((uav, tasks) for uav, tasks in sorted(epoch.routes.items()))

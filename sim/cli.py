@@ -12,9 +12,11 @@ import typer
 
 from coordinator.recording.options import RecordOption, check_new_recording
 from sim.mission_command import MethodOption, ReportOption, tell
+from swarm.complete import among
 from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, LinkOption, ScenarioArgument, SeedOption, SpeedupOption
+from swarm.suggest import instead
 
 if TYPE_CHECKING:
     from sim.launch.fleet import BusKind
@@ -32,6 +34,7 @@ def run(
         typer.Option(
             "--bus",
             metavar="auto|mesh|router",
+            autocompletion=among("auto", "mesh", "router"),
             help="How the processes reach each other; auto takes a mesh for small fleets.",
         ),
     ] = "auto",
@@ -52,6 +55,7 @@ def run(
         typer.Option(
             "--autopilot",
             metavar="sim|sim-px4|ardupilot|px4|URL,…",
+            autocompletion=among("sim", "sim-px4", "ardupilot", "px4"),
             help="What flies: an autopilot simulated like ArduCopter or like PX4, real firmware "
             "in software-in-the-loop (PX4 1.16 or newer), or vehicles that run already, one URL "
             "for each UAV in the scenario's order or as UAV=URL; #ID at its end is the vehicle's "
@@ -203,12 +207,21 @@ def run(
     ] = None,
     report: ReportOption = None,
     record: RecordOption = None,
+    logs: Annotated[
+        Path | None,
+        typer.Option(
+            "--logs",
+            metavar="DIR",
+            help="Keep what every process logs: a file of JSON lines each, in that folder.",
+            show_default=False,
+        ),
+    ] = None,
     json: JsonOption = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Show what every process logs, instead of a picture.")
     ] = False,
 ) -> int:
-    """Fly a mission with real processes on this machine and report how it went.
+    """Fly a mission with real processes on this machine, and report.
 
     Starts the bus, the coordinator and, for every UAV, an agent and a simulated autopilot;
     shows the mission live and ends with a report. Exit status 0: every task was done.
@@ -216,7 +229,7 @@ def run(
 
     Examples:
         swarm run table-1
-        swarm run valley-survey --speedup 20 --report flight.md
+        swarm run valley-survey --speedup 20 --report flight.md --logs logs
         swarm run valley-survey --dashboard 8080
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
@@ -226,6 +239,7 @@ def run(
         swarm run table-1 --json
     """
     import asyncio
+    import contextlib
     import os
     import sys
 
@@ -241,9 +255,10 @@ def run(
     from sim.launch.fence import fence_around
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
+    from sim.launch.kept_logs import KeptLogs
     from sim.launch.run import fly
     from swarm.config import preset
-    from swarm.log import LogLevel, configure_logging
+    from swarm.log import LogFormat, LogLevel, configure_logging
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
 
@@ -281,13 +296,19 @@ def run(
         autopilots=autopilots,
         handed_on=handed_on,
         dashboard=None if dashboard is None else parse_place(dashboard),
+        log_format=LogFormat.AUTO if logs is None else LogFormat.JSON,
     )
     configure_logging(LogLevel.WARNING)
     # With every process's log on the screen, a picture would only be torn apart.
     console = Console(stderr=True, force_terminal=False if verbose else None)
 
+    kept = None if logs is None else KeptLogs(logs, console.print)
+
     def log(name: str, line: str) -> None:
-        print(f"{name}: {line}", file=sys.stderr)
+        if kept is not None:
+            kept.write(name, line)
+        if verbose:
+            print(f"{name}: {line}", file=sys.stderr)
 
     for line in () if options.dashboard is None else options.dashboard.lines:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
@@ -296,6 +317,7 @@ def run(
         about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))
         try:
             with (
+                kept or contextlib.nullcontext(),
                 recording_or_none(record, about, wall_ns(), console.print) as recorder,
                 LiveView(console, speedup=speedup) as view,
             ):
@@ -303,14 +325,14 @@ def run(
                     mission,
                     options,
                     on_frame=view.update,
-                    on_log=log if verbose else None,
+                    on_log=log if verbose or kept else None,
                     recorder=recorder,
                 )
         except asyncio.CancelledError:
             console.print("interrupted: the mission was given up and every process ended")
             raise
         told = MissionReport(
-            mission=mission,
+            mission=flight.observer.mission,
             plan=flight.plan,
             result=flight.result,
             story=tuple(flight.observer.story),
@@ -331,5 +353,5 @@ def _bus_kind(text: str) -> BusKind:
     try:
         return BusKind(text)
     except ValueError:
-        remedy = f"choose one of {', '.join(BusKind)}"
+        remedy = instead(text, BusKind)
         raise InputError(Fault("--bus", text, "no such bus", remedy)) from None

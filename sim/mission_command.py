@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.planner.methods import ONLINE_METHODS
+from swarm.complete import among
+
 if TYPE_CHECKING:
     from coordinator.view.report import MissionReport
 
@@ -18,7 +21,12 @@ __all__ = ["MethodOption", "ReportOption", "tell"]
 
 MethodOption = Annotated[
     str,
-    typer.Option("--method", metavar="METHOD", help="Decision rule: greedy, lookahead or guided."),
+    typer.Option(
+        "--method",
+        metavar="METHOD",
+        help="Decision rule: greedy, lookahead or guided.",
+        autocompletion=among(*ONLINE_METHODS),
+    ),
 ]
 
 ReportOption = Annotated[

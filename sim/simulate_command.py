@@ -86,16 +86,16 @@ def simulate(
     record: RecordOption = None,
     json: JsonOption = False,
 ) -> int:
-    """Fly a mission in virtual time: the agents' and the coordinator's real code, no sockets.
+    """Fly a mission in virtual time, by the agents' real code.
 
-    Unless told otherwise nothing is uncertain: vehicles and network are ideal, and the lists flown
-    are exactly those planned. Each kind of uncertainty is drawn from the seed by itself, so asking
-    for one leaves what the others draw as it was.
-    With --faults the network and the clocks are like real ones, what goes wrong is told
-    on standard error in lines that a file may hold, and the invariants of a fleet are watched.
-    Exit status 0: every task was done, and no invariant broken.
-    With --from FILE.mcap, which takes no scenario and no other option but --json, exit status 0
-    says that decisions were made again and none came out otherwise.
+    The coordinator's code is the real one as well; there are no sockets. Unless told otherwise
+    nothing is uncertain: vehicles and network are ideal, and the lists flown are exactly those
+    planned. Each kind of uncertainty is drawn from the seed by itself, so asking for one leaves
+    what the others draw as it was. With --faults the network and the clocks are like real ones,
+    what goes wrong is told on standard error in lines that a file may hold, and the invariants of
+    a fleet are watched. Exit status 0: every task was done, and no invariant broken. With --from
+    FILE.mcap, which takes no scenario and no other option but --json, decisions that were recorded
+    are made again; exit status 0: none came out otherwise.
 
     Examples:
         swarm simulate table-1
@@ -183,7 +183,7 @@ def simulate(
         typer.echo(f"broken: {verdict.broken}", err=True)
     world = verdict.world
     told = MissionReport(
-        mission=world.mission,
+        mission=world.observer.mission,
         plan=world.observer.plan,
         result=world.observer.result(),
         story=tuple(world.observer.story),

@@ -4,8 +4,7 @@ A subcommand is an entry point of the group ``peckorder.commands``: a plain
 function written for typer (annotated parameters, result an exit status or
 None), or a ``typer.Typer`` for a family such as ``swarm task add``. Only the
 one asked for is imported; ``--help`` imports all. Its docstring becomes its
-help: summary and description as they are, an ``Examples:`` section line by
-line, every other section (``Args:``, ``Raises:`` …) left to readers of code.
+help (swarm.help).
 
 Exit status: 0 done; 1 the mission or check failed, or an error at run time;
 2 wrong usage or input, one line each on standard error; 130 interrupted. An
@@ -30,12 +29,15 @@ import typer.main
 
 import swarm
 from swarm.errors import Fault, InputError, SwarmError
+from swarm.help import Panels, explain_family, help_text
 
 __all__ = ["COMMAND_GROUP", "console_main", "main"]
 
 COMMAND_GROUP = "peckorder.commands"
+_COMPLETE = "_SWARM_COMPLETE"
+"""Environment variable by which shells, and the library, ask for completions."""
 _DONE, _FAILED, _WRONG_USAGE, _INTERRUPTED = 0, 1, 2, 130
-_SECTION = re.compile(r"(Args|Arguments|Examples?|Notes?|Raises|Returns|Yields):")
+_CHOICE = re.compile(r"'([^']*)' is not one of (.+)")
 _HELP = """Task allocation for fleets of UAVs: plan, simulate and fly.
 
 Examples:
@@ -106,12 +108,17 @@ def _installed_commands() -> dict[str, EntryPoint]:
 
 
 def _run(arguments: list[str], commands: Mapping[str, EntryPoint]) -> int:
+    if len(arguments) == 2 and arguments[0] == "--show-completion":
+        # The library knows the shell it runs in, and takes no name of another one.
+        os.environ[_COMPLETE] = f"source_{arguments.pop()}"
+    completing = _COMPLETE in os.environ
     name = next((word for word in arguments if not word.startswith("-")), None)
     if name is not None and name not in commands:
         raise InputError(_unknown_command(name, commands))
-    completing = "_SWARM_COMPLETE" in os.environ
+    if completing:
+        name = next((word for word in _typed() if word in commands), None)
     app = _application()
-    if name is not None and not completing:
+    if name is not None:
         _register(app, name, commands[name].load())
     else:
         for other, entry in commands.items():
@@ -132,13 +139,21 @@ def _run(arguments: list[str], commands: Mapping[str, EntryPoint]) -> int:
     return int(result)
 
 
+def _typed() -> list[str]:
+    """Words behind ``swarm`` on the line that a shell wants completed."""
+    environment = os.environ
+    line = environment.get("_TYPER_COMPLETE_ARGS") or environment.get("COMP_WORDS") or ""
+    return line.split()[1:]
+
+
 def _application() -> typer.Typer:
     app = typer.Typer(
         name="swarm",
+        cls=Panels,
         rich_markup_mode=None,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    app.callback(help=_help_text(_HELP))(_root)
+    app.callback(help=help_text(_HELP))(_root)
     return app
 
 
@@ -159,9 +174,10 @@ def _root(
 
 def _register(app: typer.Typer, name: str, loaded: object) -> None:
     if isinstance(loaded, typer.Typer):
+        explain_family(loaded)
         app.add_typer(loaded, name=name)
     elif callable(loaded):
-        text = _help_text(inspect.getdoc(loaded) or "")
+        text = help_text(inspect.getdoc(loaded) or "")
         app.command(name, help=text, short_help=text.partition("\n")[0])(loaded)
     else:
         raise TypeError(f"command {name} must be a function or a typer.Typer, not {loaded!r}")
@@ -181,22 +197,6 @@ def _load_or_explain(entry: EntryPoint) -> object:
     return unavailable
 
 
-def _help_text(docstring: str) -> str:
-    """Help of a command from its docstring; ``\\b`` keeps the lines of examples apart."""
-    described: list[str] = []
-    examples: list[str] = []
-    section = ""
-    for line in inspect.cleandoc(docstring).splitlines():
-        if _SECTION.fullmatch(line):
-            section = line.rstrip(":")
-        elif not section:
-            described.append(line)
-        elif section.startswith("Example") and line.strip():
-            examples.append(line)
-    text = "\n".join(described).strip()
-    return f"{text}\n\n\b\nExamples:\n" + "\n".join(examples) if examples else text
-
-
 def _unknown_command(name: str, commands: Mapping[str, object]) -> Fault:
     close = get_close_matches(name, commands, n=1)
     remedy = f"did you mean {close[0]!r}?" if close else f"the commands are {', '.join(commands)}"
@@ -208,10 +208,18 @@ def _usage_fault(error: typer.TyperException, name: str | None) -> Fault:
     path = f"swarm {name}" if name else "swarm"
     if context is not None:
         path = context.command_path  # also names the member of a family: swarm task add
+    see = f"see '{path} --help'"
     if type(error).__name__ == "NoArgsIsHelpError":  # its message is the whole help
-        return Fault(path, "", "missing command", f"see '{path} --help'")
+        return Fault(path, "", "missing command", see)
     problem = " ".join(error.format_message().split()).rstrip(".").replace("Value error, ", "")
-    return Fault(path, "", problem[:1].lower() + problem[1:], f"see '{path} --help'")
+    # The words of the library; where it guesses what was meant, that is the remedy.
+    problem, _, close = problem.partition(" (Possible options: ")
+    if not close:
+        problem, _, close = problem.removesuffix("?").partition(". Did you mean ")
+    if not close and (choice := _CHOICE.search(problem)) is not None:
+        close = ", ".join(map(repr, get_close_matches(choice[1], choice[2].split("'")[1::2], n=1)))
+    remedy = f"did you mean {close.rstrip(')')}? {see[:1].upper()}{see[1:]}" if close else see
+    return Fault(path, "", problem[:1].lower() + problem[1:], remedy)
 
 
 def _complain(text: str) -> None:

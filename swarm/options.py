@@ -24,6 +24,7 @@ from typing import Annotated, Any
 
 import typer
 
+from swarm.complete import among
 from swarm.config import Link
 from swarm.log import LogFormat, LogLevel
 from swarm.scenario.shipped import resolve_scenario, shipped_scenarios
@@ -149,6 +150,7 @@ BusOption = Annotated[
     typer.Option(
         "--bus",
         metavar="mesh|router|FILE",
+        autocompletion=among("mesh", "router"),
         help="How processes reach each other: as peers, through routers, or as a Zenoh "
         "configuration file says.",
     ),

@@ -88,6 +88,7 @@ class Shell(Generic[E, A]):
             its own answers what the asker knows.
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
+        context: what every note of the core is logged with, besides its own fields.
     """
 
     def __init__(
@@ -104,6 +105,7 @@ class Shell(Generic[E, A]):
         known: Callable[[], Mapping[str, int]] = dict,
         save: Callable[[float], None] | None = None,
         answer_s: float = PRESETS[Link.NORMAL].answer_s,
+        context: Callable[[], Mapping[str, object]] = dict,
     ) -> None:
         self._core = core
         self._bus = bus
@@ -118,6 +120,7 @@ class Shell(Generic[E, A]):
         self._known = known
         self._save = save
         self._answer_s = answer_s
+        self._context = context
         self._loop = asyncio.get_running_loop()
         self._done: asyncio.Future[int] = self._loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
@@ -195,7 +198,7 @@ class Shell(Generic[E, A]):
                 if self._save is not None:
                     self._save(self._clock.now_s())
             case Note(text, fields):
-                self._log.info(text, **fields)
+                self._log.info(text, **{**self._context(), **fields})
             case Finish(status):
                 if not self._done.done():
                     self._done.set_result(status)

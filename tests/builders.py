@@ -28,6 +28,7 @@ from swarm.wire.messages import (
     Stamp,
     Status,
     StatusPhase,
+    TaskOrder,
 )
 
 MISSION = "test"
@@ -84,6 +85,12 @@ def brief(*uavs: Uav, reattempt_failed: bool = False, layer_m: float = 10.0) -> 
 def entry(name: str, east_m: float = 0.0, number: int = 0, **more: object) -> Board:
     posted = Board(name, number, (east_m, 0.0, 0.0), 1.0, 0.0, None, False)
     return replace(posted, **more)  # type: ignore[arg-type]  # each test names real fields
+
+
+def order(name: str, east_m: float = 0.0, number: int = 9, **more: object) -> TaskOrder:
+    """What the operator says of a task, for the run of `brief`."""
+    said = TaskOrder(name, number, (east_m, 0.0, 0.0), 1.0, 0.0, None, False, 1, "")
+    return replace(said, **more)  # type: ignore[arg-type]  # each test names real fields
 
 
 def brief_of(flown: Mission) -> Brief:

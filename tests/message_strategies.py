@@ -24,6 +24,7 @@ from swarm.wire.messages import (
     Stamp,
     Status,
     StatusPhase,
+    TaskOrder,
 )
 from tests.builders import MISSION
 
@@ -141,6 +142,18 @@ commands = st.one_of(
     ),
     st.builds(Command, st.just(FLEET), st.just(CommandKind.ABORT), counts, notes),
 )
+task_orders = st.builds(
+    TaskOrder,
+    task_ids,
+    counts,
+    points,
+    not_negatives,
+    not_negatives,
+    st.none() | ids,
+    st.booleans(),
+    counts,
+    notes,
+)
 by_coordinator = briefs | epochs | boards
 by_uav = claims | outcomes | statuses | choices
 
@@ -158,5 +171,5 @@ def messages(
     return st.one_of(
         st.builds(Message, st.just(MISSION), st.just(COORDINATOR), stamped, by_coordinator),
         st.builds(Message, st.just(MISSION), uav_ids, stamped, said),
-        st.builds(Message, st.just(MISSION), st.just(OPERATOR), stamped, commands),
+        st.builds(Message, st.just(MISSION), st.just(OPERATOR), stamped, commands | task_orders),
     )

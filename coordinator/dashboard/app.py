@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
@@ -42,6 +42,8 @@ __all__ = ["STATIC", "Dashboard", "create_app"]
 STATIC = Path(__file__).parent / "static"
 MAX_BODY_BYTES = 16 * 1024
 MAX_CLIENTS = 64
+MAX_STRANGERS = 256
+"""Connections that have not given the token yet."""
 TOKEN_S = 120.0
 """Wall time a page may take to give the token: a person may have to look for it."""
 SEND_S = 20.0
@@ -82,6 +84,8 @@ class Dashboard:
         self._clock = clock
         self._static = static
         self._pace = Pace()
+        self._strangers = 0
+        self._looking: asyncio.Task[None] | None = None
         self._metrics = Metrics(source, self.hub)
         routes = [
             Route("/", self._page),
@@ -99,13 +103,30 @@ class Dashboard:
 
     @contextlib.asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        looking = asyncio.get_running_loop().create_task(self.hub.run())
+        self._looking = asyncio.get_running_loop().create_task(self.hub.run())
         try:
             yield
         finally:
             self.hub.end("the server has ended")
-            looking.cancel()
-            await asyncio.gather(looking, return_exceptions=True)
+            self._looking.cancel()
+            await asyncio.gather(self._looking, return_exceptions=True)
+
+    async def beside(self, work: Coroutine[None, None, None]) -> None:
+        """Do ``work`` while the application is served; a fault of the feed ends it, too.
+
+        Raises:
+            Exception: what went wrong, here or there.
+        """
+        working = asyncio.get_running_loop().create_task(work)
+        running = {working} if self._looking is None else {working, self._looking}
+        try:
+            await asyncio.wait(running, return_when=asyncio.FIRST_COMPLETED)
+            for task in running:
+                if task.done():
+                    task.result()
+        finally:
+            working.cancel()
+            await asyncio.gather(working, return_exceptions=True)
 
     async def end(self, reason: str) -> None:
         """Tell everyone who looks on that it is over, and let them leave."""
@@ -133,27 +154,27 @@ class Dashboard:
 
     async def _feed(self, socket: WebSocket) -> None:
         await socket.accept()
-        if self.hub.clients >= MAX_CLIENTS:
-            await socket.close(_FULL, "too many look on")
-            return
-        self.hub.enter()
-        try:
+        with contextlib.suppress(WebSocketDisconnect, TimeoutError):  # it is gone or does not read
             await _send(socket, self.hub.feed.hello())
-            if self._access.token is None or await self._hear_token(socket):
-                await self._tell(socket)
-            else:
+            if self._access.token is not None and not await self._hear_token(socket):
                 await socket.close(_WRONG_TOKEN, "the token is missing or wrong")
-        except (WebSocketDisconnect, TimeoutError):
-            pass  # it is gone, or does not read
-        finally:
-            self.hub.leave()
+            elif self.hub.clients >= MAX_CLIENTS:
+                await socket.close(_FULL, "too many look on")
+            else:
+                with self.hub.following():
+                    await self._tell(socket)
 
     async def _hear_token(self, socket: WebSocket) -> bool:
+        if self._strangers >= MAX_STRANGERS:
+            return False
+        self._strangers += 1
         try:
             async with asyncio.timeout(TOKEN_S):
                 said = json.loads(await socket.receive_text())
         except (TimeoutError, ValueError, KeyError, RecursionError):
             return False
+        finally:
+            self._strangers -= 1
         token = said.get("token") if isinstance(said, dict) else None
         return isinstance(token, str) and self._access.admits(token)
 
@@ -166,9 +187,8 @@ class Dashboard:
             if telling.done():
                 telling.result()
         finally:
-            for task in (leaving, telling):
-                task.cancel()
-            await asyncio.gather(leaving, telling, return_exceptions=True)
+            leaving.cancel()
+            telling.cancel()
 
     async def _tell_all(self, socket: WebSocket) -> None:
         feed, seen, mission = self.hub.feed, None, 0

@@ -157,7 +157,7 @@ def dashboard(
         served = create_app(source, access, display)
         async with serving(served.app, taken):
             try:
-                await source.run()
+                await served.beside(source.run())
             finally:
                 await served.end("the dashboard has ended")
         return 0

@@ -82,6 +82,7 @@ class Desk:
         self._given: list[_Given] = []
         self._notes: list[Wish] = []
         self._deserted_at_s: float | None = None
+        self._finished = False
         self._onlooker, self._errands = self._begin()
 
     @property
@@ -95,6 +96,8 @@ class Desk:
 
     def step(self, fact: BusFact, now_s: float) -> list[Wish]:
         """Take note of one fact."""
+        if self._finished:
+            return []
         match fact:
             case PeerSeen(writer):
                 self._tokens.add(writer)
@@ -107,11 +110,14 @@ class Desk:
         wishes += self._notes
         self._notes = []
         if self._is_over(now_s):
+            self._finished = True
             wishes.append(Finish(0))
         return wishes
 
     def next_deadline_s(self) -> float | None:
-        """When `step` wants a tick."""
+        """When `step` wants a tick; None when it has finished."""
+        if self._finished:
+            return None
         return earliest(
             self._onlooker.next_deadline_s(), self._errands.next_deadline_s(), self._deserted_at_s
         )

@@ -83,7 +83,7 @@ class Feed:
         """As of which look each point is there."""
         self._measures: dict[tuple[str, int], Measure] = {}
         """By mission and run."""
-        self._commands = RowTable()
+        self._commands = RowTable(_COMMANDS)
         self._frames: dict[int | None, str] = {}
         """Of the newest look, by what the client has seen."""
 
@@ -136,7 +136,7 @@ class Feed:
             "story": self._story.after(after),
             "choices": self._choices.after(after),
             "objective_curve": self._curve_after(after),
-            "commands": self._commands.after(after)[-_COMMANDS:],
+            "commands": self._commands.after(after),
         }
         body = ",".join(f'"{name}":[{",".join(rows)}]' for name, rows in parts.items())
         return f"{head[:-1]},{body}}}"
@@ -158,7 +158,7 @@ class Feed:
         self.seq += 1
         self._frames.clear()
         now_s = self._source.now_s()
-        for given in self._source.commands:
+        for given in list(self._source.commands)[-_COMMANDS:]:
             self._commands.put(given.n, _command_row(given), self.seq)
         observer = self._source.observer
         brief = None if observer is None else observer.replica.brief

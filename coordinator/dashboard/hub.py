@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from coordinator.dashboard.feed import Feed
 from coordinator.dashboard.measure import Measure
 from coordinator.planner.stop import after_time
 from swarm.clock import SystemClock
+from swarm.log import get_logger
 from swarm.process import call_in_background
 
 __all__ = ["Hub"]
@@ -67,16 +69,17 @@ class Hub:
             if self._bounding is not None:
                 self._bounding.cancel()
 
-    def enter(self) -> None:
-        """Somebody begins to follow the feed."""
+    @contextlib.contextmanager
+    def following(self) -> Iterator[None]:
+        """Somebody follows the feed while the context lasts."""
         self.clients += 1
         self.deserted.clear()
-
-    def leave(self) -> None:
-        """Somebody has ceased to follow the feed."""
-        self.clients -= 1
-        if self.clients == 0:
-            self.deserted.set()
+        try:
+            yield
+        finally:
+            self.clients -= 1
+            if self.clients == 0:
+                self.deserted.set()
 
     def nudge(self) -> None:
         """Look soon: something has just happened."""
@@ -107,5 +110,8 @@ class Hub:
         stop = after_time(SystemClock(), BOUND_S)
         # On a thread that does not hold the process up when it is told to end.
         work = call_in_background(lambda: measure.work_out(stop), "bound")
-        measure.bound = await asyncio.wrap_future(work)
+        try:
+            measure.bound = await asyncio.wrap_future(work)
+        except ValueError as fault:  # the page does without
+            get_logger("dashboard").warning("no upper bound", problem=str(fault))
         self._bounding = None

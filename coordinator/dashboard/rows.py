@@ -19,9 +19,14 @@ def as_text(row: Mapping[str, object]) -> str:
 
 
 class RowTable:
-    """Rows that change and never vanish."""
+    """Rows that change; none vanishes but the oldest where there are too many.
 
-    def __init__(self) -> None:
+    Args:
+        keep: how many; None for all.
+    """
+
+    def __init__(self, keep: int | None = None) -> None:
+        self._keep = keep
         self._rows: dict[Hashable, tuple[object, int, str]] = {}
         """By key: what the row is made from, when it changed, its text."""
 
@@ -40,6 +45,8 @@ class RowTable:
         known = self._rows.get(key)
         if known is None or known[0] != heart:
             self._rows[key] = heart, seq, as_text(row)
+            if self._keep is not None and len(self._rows) > self._keep:
+                self._rows.pop(next(iter(self._rows)))
 
     def touch(self, key: Hashable, row: Mapping[str, object], seq: int, every: int) -> None:
         """Send ``row`` again if it was last sent ``every`` or more calls ago."""

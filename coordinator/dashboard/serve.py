@@ -29,6 +29,7 @@ async def serving(app: ASGIApp, listening: socket.socket) -> AsyncIterator[None]
             log_level="error",
             access_log=False,
             server_header=False,
+            proxy_headers=False,
             lifespan="on",
             http="h11",
             ws="websockets-sansio",
@@ -39,10 +40,13 @@ async def serving(app: ASGIApp, listening: socket.socket) -> AsyncIterator[None]
             timeout_graceful_shutdown=END_S,
         )
     )
-    running = asyncio.get_running_loop().create_task(server.serve([listening]))
+    loop = asyncio.get_running_loop()
+    running, up = loop.create_task(server.serve([listening])), loop.create_task(server.up.wait())
     try:
+        await asyncio.wait((running, up), return_when=asyncio.FIRST_COMPLETED)
         yield
     finally:
+        up.cancel()
         server.should_exit = True
         try:
             await running
@@ -51,7 +55,16 @@ async def serving(app: ASGIApp, listening: socket.socket) -> AsyncIterator[None]
 
 
 class _Server(uvicorn.Server):
-    """Leaves signals to whoever runs the loop."""
+    """Leaves signals to whoever runs the loop, and tells when it serves."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self.up = asyncio.Event()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start to serve."""
+        await super().startup(sockets)
+        self.up.set()
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:

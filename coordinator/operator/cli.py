@@ -1,6 +1,6 @@
-"""The commands `swarm hold`, `resume`, `return` and `abort`.
+"""The commands `swarm hold`, `resume`, `return` and `abort`, and `swarm task add|withdraw`.
 
-Leaves out: giving a command on the bus and seeing what comes of it (coordinator.operator.seat).
+Leaves out: saying so on the bus and seeing what comes of it (coordinator.operator.session).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.operator.completing import complete_uav
 from swarm.config import Link
 from swarm.errors import Fault, InputError, SwarmError
 from swarm.options import (
@@ -25,15 +26,17 @@ from swarm.options import (
 )
 
 if TYPE_CHECKING:
-    from coordinator.operator.errands import OperatorWish
     from coordinator.operator.seat import OperatorSeat
-    from swarm.bus.config import BusConfig
-    from swarm.clock import ScaledClock
-    from swarm.config import Timing
+    from coordinator.operator.session import Reach
+    from coordinator.operator.task_orders import NewTask, Wgs84, Withdrawal
+    from coordinator.operator.verdict import Verdict
+    from swarm.wire.bounds import Point
 
-__all__ = ["abort", "hold", "resume", "return_home"]
+__all__ = ["abort", "hold", "resume", "return_home", "task"]
 
-UavArgument = Annotated[str, typer.Argument(metavar="UAV", help="Id of the UAV.")]
+UavArgument = Annotated[
+    str, typer.Argument(metavar="UAV", help="Id of the UAV.", autocompletion=complete_uav)
+]
 ReasonOption = Annotated[
     str,
     typer.Option(
@@ -51,8 +54,6 @@ TimeoutOption = Annotated[
         "wall seconds.",
     ),
 ]
-LONGEST_REASON = 150
-"""What is told of a command has to have room in a status."""
 
 
 def _of_one_uav(kind: str, help_text: str) -> Callable[..., int]:
@@ -71,17 +72,8 @@ def _of_one_uav(kind: str, help_text: str) -> Callable[..., int]:
         speedup: SpeedupOption = 1.0,
         json: JsonOption = False,
     ) -> int:
-        return _give(
-            kind,
-            uav,
-            reason,
-            mission,
-            timeout_s,
-            _bus_config(bus, listen, connect, link, lease_s),
-            link,
-            speedup,
-            json=json,
-        )
+        reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
+        return _give(kind, uav, reason, reach, json=json)
 
     command.__doc__ = help_text
     return command
@@ -89,12 +81,13 @@ def _of_one_uav(kind: str, help_text: str) -> Callable[..., int]:
 
 hold = _of_one_uav(
     "hold",
-    """Stop one UAV where it is: it gives its task up, takes no other and hovers.
+    """Stop one UAV where it is.
 
-    Before take-off it stays on the ground. The others go on, and take over what it leaves.
-    It goes on after `swarm resume`, and comes home after `swarm return`; its battery's
-    reserve or the end of its own process bring it home in any case. Works without a
-    coordinator. Exit status 1: it was not seen to obey, and the line says why.
+    It gives its task up, takes no other and hovers. Before take-off it stays on the ground. The
+    others go on, and take over what it leaves. It goes on after `swarm resume`, and comes home
+    after `swarm return`; its battery's reserve or the end of its own process bring it home in any
+    case. Works without a coordinator. Exit status 1: it was not seen to obey, and the line says
+    why.
 
     Examples:
         swarm hold uav2
@@ -104,9 +97,9 @@ hold = _of_one_uav(
 
 resume = _of_one_uav(
     "resume",
-    """Let a UAV go on that was stopped by `swarm hold`: it takes part in the mission again.
+    """Let a UAV go on that was stopped by `swarm hold`.
 
-    One that was stopped on its way home goes on home.
+    It takes part in the mission again. One that was stopped on its way home goes on home.
 
     Examples:
         swarm resume uav2
@@ -115,10 +108,11 @@ resume = _of_one_uav(
 
 return_home = _of_one_uav(
     "return",
-    """Send one UAV home: it gives its task up, lands, and its agent ends with 0.
+    """Send one UAV home for good.
 
-    The others take over what it leaves. It takes no further part in this flight of the
-    mission, unless its agent is started anew with --rejoin.
+    It gives its task up, lands, and its agent ends with 0. The others take over what it leaves.
+    It takes no further part in this flight of the mission, unless its agent is started anew with
+    --rejoin.
 
     Examples:
         swarm return uav2 --reason "camera failed"
@@ -150,114 +144,244 @@ def abort(
     """
     from swarm.model.ids import FLEET
 
-    config = _bus_config(bus, listen, connect, link, lease_s)
+    reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
     asks = not yes and sys.stdin is not None and sys.stdin.isatty()
     what = "the mission" if mission is None else f"mission {mission}"
     if asks and not typer.confirm(f"Bring every UAV home and end {what}?", err=True):
         raise SwarmError("nothing was aborted")
-    return _give("abort", FLEET, reason, mission, timeout_s, config, link, speedup, json=json)
+    return _give("abort", FLEET, reason, reach, json=json)
 
 
-def _bus_config(
-    bus: str, listen: str, connect: list[str] | None, link: Link, lease_s: float | None
-) -> BusConfig:
-    from swarm.bus.config import bus_config
-    from swarm.config import preset
+_ADD_HELP = """Add a task to a running mission: the fleet takes it up like any other.
 
-    return bus_config(bus, listen, connect or (), preset(link, lease_s).lease_s)
+It is worth as much as the board's middle task unless told otherwise, and gets the next free id
+of op1, op2, … (an id in the scenario's manner might be one that is yet to appear there). Works
+without a coordinator. Exit status 1: nobody was seen to know of it, or nobody is left to do it.
+
+\b
+Examples:
+    swarm task add --position 120,80
+    swarm task add leak --position=-40,65,10 --value 8 --service-s 20 --kind inspect
+    swarm task add --lat-deg 47.3981 --lon-deg 8.5470 --reason "smoke reported"
+"""
+_WITHDRAW_HELP = """Take a task off the board of a running mission.
+
+Who flies to it gives it up and takes another. Works without a coordinator. Exit status 1:
+it is done or withdrawn already, or somebody was not seen to give it up.
+
+\b
+Examples:
+    swarm task withdraw t7
+    swarm task withdraw op1 --reason "seen from the ground"
+"""
+task = typer.Typer(
+    help="Add a task to a running mission, or withdraw one.",
+    rich_markup_mode=None,
+    no_args_is_help=True,
+)
+LatOption = Annotated[
+    float | None,
+    typer.Option(
+        "--lat-deg", min=-90.0, max=90.0, metavar="DEG", help="WGS84.", show_default=False
+    ),
+]
+LonOption = Annotated[
+    float | None,
+    typer.Option(
+        "--lon-deg", min=-180.0, max=180.0, metavar="DEG", help="WGS84.", show_default=False
+    ),
+]
+AltOption = Annotated[
+    float | None,
+    typer.Option(
+        "--alt-m",
+        min=-1e7,
+        max=1e7,
+        metavar="M",
+        help="Height above mean sea level. Default: that of the mission's origin.",
+        show_default=False,
+    ),
+]
 
 
-def _give(
-    name: str,
-    target: str,
-    reason: str,
+@task.command("add", help=_ADD_HELP, short_help="Add a task.")
+def add(
+    name: Annotated[
+        str | None, typer.Argument(metavar="ID", help="Default: the next free one.")
+    ] = None,
+    position: Annotated[
+        str | None,
+        typer.Option(
+            "--position",
+            metavar="E,N[,U]",
+            help="Metres east, north and up of the mission's origin.",
+            show_default=False,
+        ),
+    ] = None,
+    lat_deg: LatOption = None,
+    lon_deg: LonOption = None,
+    alt_m: AltOption = None,
+    value: Annotated[
+        float | None,
+        typer.Option(
+            "--value",
+            min=0.0,
+            max=1e12,
+            metavar="V",
+            help="What a visit is worth. Default: the median of the board's.",
+            show_default=False,
+        ),
+    ] = None,
+    service_s: Annotated[
+        float,
+        typer.Option("--service-s", min=0.0, max=1e9, metavar="S", help="Time on the spot."),
+    ] = 0.0,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--kind",
+            metavar="KIND",
+            help="By which UAVs have their success, as in the scenario.",
+            show_default=False,
+        ),
+    ] = None,
+    reason: ReasonOption = "",
+    mission: SomeMissionOption = None,
+    timeout_s: TimeoutOption = 10.0,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+    connect: ConnectOption = None,
+    link: LinkOption = Link.NORMAL,
+    lease_s: LeaseOption = None,
+    speedup: SpeedupOption = 1.0,
+    json: JsonOption = False,
+) -> int:
+    """Add a task to a running mission."""
+    from coordinator.operator.session import check_words
+    from coordinator.operator.task_orders import NewTask
+
+    check_words(reason, ("--mission", mission), ("ID", name), ("--kind", kind))
+    place = _place(position, lat_deg, lon_deg, alt_m)
+    wish = NewTask(place, name, value, service_s, kind, reason)
+    reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
+    return _order("add", wish, reach, json=json)
+
+
+@task.command("withdraw", help=_WITHDRAW_HELP, short_help="Take a task off the board.")
+def withdraw(
+    name: Annotated[str, typer.Argument(metavar="ID", help="Id of the task.")],
+    reason: ReasonOption = "",
+    mission: SomeMissionOption = None,
+    timeout_s: TimeoutOption = 10.0,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+    connect: ConnectOption = None,
+    link: LinkOption = Link.NORMAL,
+    lease_s: LeaseOption = None,
+    speedup: SpeedupOption = 1.0,
+    json: JsonOption = False,
+) -> int:
+    """Take a task off the board of a running mission."""
+    from coordinator.operator.session import check_words
+    from coordinator.operator.task_orders import Withdrawal
+
+    check_words(reason, ("--mission", mission), ("ID", name))
+    reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
+    return _order("withdraw", Withdrawal(name, reason), reach, json=json)
+
+
+def _place(
+    position: str | None, lat_deg: float | None, lon_deg: float | None, alt_m: float | None
+) -> Point | Wgs84:
+    """The place that the options tell of.
+
+    Raises:
+        InputError: they tell of none, or of two.
+    """
+    from coordinator.operator.task_orders import FARTHEST_M, Wgs84
+
+    remedy = "give either --position, or --lat-deg and --lon-deg"
+    if position is None:
+        if lat_deg is None or lon_deg is None:
+            raise InputError(Fault("swarm task add", "", "no place was given", remedy))
+        return Wgs84(lat_deg, lon_deg, alt_m)
+    if (lat_deg, lon_deg, alt_m) != (None, None, None):
+        raise InputError(Fault("swarm task add", "", "two places were given", remedy))
+    try:
+        metres = [float(part) for part in position.split(",")]
+    except ValueError:
+        metres = []
+    if len(metres) not in (2, 3):
+        example = "give metres east, north and maybe up, such as 120,80 or 120,80,15"
+        raise InputError(Fault("--position", "", f"{position!r} is no place", example))
+    if not all(abs(each) <= FARTHEST_M for each in metres):
+        bound = f"give metres within ±{FARTHEST_M:g}"
+        raise InputError(Fault("--position", "", f"{position!r} is too far away", bound))
+    return metres[0], metres[1], metres[2] if len(metres) == 3 else 0.0
+
+
+def _reach(
     mission: str | None,
     timeout_s: float,
-    config: BusConfig,
+    bus: str,
+    listen: str,
+    connect: list[str] | None,
     link: Link,
+    lease_s: float | None,
     speedup: float,
-    *,
-    json: bool,
-) -> int:
+) -> Reach:
+    from coordinator.operator.session import Reach
+
+    return Reach(mission, timeout_s, bus, listen, connect or (), link, lease_s, speedup)
+
+
+def _give(name: str, target: str, reason: str, reach: Reach, *, json: bool) -> int:
     """Give the command of that name, and say what came of it."""
-    import asyncio
     from json import dumps
 
     from coordinator.operator.commanding import CommandWish
-    from coordinator.operator.verdict import Result
-    from swarm.clock import ScaledClock
-    from swarm.config import preset
-    from swarm.log import LogLevel, configure_logging
-    from swarm.model.ids import ID_RULE, valid_id
-    from swarm.process import run_until_stopped
+    from coordinator.operator.session import check_words, fulfil
     from swarm.wire.messages import CommandKind
 
-    configure_logging(LogLevel.ERROR)
-    timing = preset(link).timing.scaled(speedup)
-    given = (("--mission", mission), ("UAV", target))
-    faults = [
-        Fault(where, "", f"{text!r} is no id", f"give {ID_RULE}")
-        for where, text in given
-        if text is not None and not valid_id(text)
-    ]
-    if len(reason) > LONGEST_REASON:
-        problem = f"it has {len(reason)} characters"
-        faults.append(Fault("--reason", "", problem, f"give at most {LONGEST_REASON}"))
-    if faults:
-        raise InputError(*faults)
-    wish = CommandWish(CommandKind(name), target, reason)
+    check_words(reason, ("--mission", reach.mission), ("UAV", target))
 
-    async def work() -> int:
-        clock = ScaledClock(speedup)
-        of, seat = await sit(mission, wish, config, timing, clock, timeout_s)
-        verdict = seat.verdict
-        if verdict is None:
-            raise SwarmError("the command was not given")
-        if verdict.result is Result.UNKNOWN_UAV:
-            problem = f"{target!r} is not in mission {of}"
-            raise InputError(Fault("UAV", "", problem, verdict.text))
-        obeyed = verdict.result is Result.OBEYED
+    def tell(mission: str, seat: OperatorSeat, verdict: Verdict) -> None:
         if json:
             told = {
-                "mission": of,
+                "mission": mission,
                 "command": name,
                 "target": target,
                 "reason": reason,
-                "obeyed": obeyed,
+                "obeyed": seat.obeyed,
                 "text": verdict.text,
                 "uavs": seat.does,
             }
             print(dumps(told))
-        elif obeyed:
+        elif seat.obeyed:
             print(verdict.text)
-        if not obeyed:
-            raise SwarmError(verdict.text)
-        return 0
 
-    return asyncio.run(run_until_stopped(work()))
+    wish = CommandWish(CommandKind(name), target, reason)
+    return fulfil(wish, reach, source="UAV", tell=tell)
 
 
-async def sit(
-    name: str | None,
-    wish: OperatorWish,
-    config: BusConfig,
-    timing: Timing,
-    clock: ScaledClock,
-    patience_s: float,
-) -> tuple[str, OperatorSeat]:
-    """Take a seat on the bus and say what is wanted; the mission's name, and the seat."""
-    from coordinator.joining import joined, onlooking
-    from coordinator.operator.seat import OperatorSeat
-    from swarm.clock import incarnation
-    from swarm.model.ids import OPERATOR
+def _order(name: str, wish: NewTask | Withdrawal, reach: Reach, *, json: bool) -> int:
+    """Give the order about a task, and say what came of it."""
+    from json import dumps
 
-    async with joined(name, config, patience_s) as (mission, bus):
-        seat = OperatorSeat(
-            mission,
-            wish,
-            incarnation=incarnation(),
-            timing=timing,
-            patience_s=patience_s * clock.speedup,
-        )
-        await onlooking(seat, bus, clock, mission, OPERATOR).run()
-        return mission, seat
+    from coordinator.operator.session import fulfil
+
+    def tell(mission: str, seat: OperatorSeat, verdict: Verdict) -> None:
+        if json:
+            told = {
+                "mission": mission,
+                "command": f"task {name}",
+                **seat.ordered,
+                "reason": wish.reason,
+                "obeyed": seat.obeyed,
+                "text": verdict.text,
+            }
+            print(dumps(told))
+        elif seat.obeyed:
+            print(verdict.text)
+
+    return fulfil(wish, reach, source="ID", tell=tell)

@@ -12,6 +12,7 @@ import math
 
 from coordinator.operator.commanding import Commanding
 from coordinator.operator.errands import Errand, Errands, OperatorWish
+from coordinator.operator.task_orders import Ordering
 from coordinator.operator.verdict import Result, Verdict
 from coordinator.status.onlooker import Onlooker
 from swarm.config import Timing
@@ -78,7 +79,7 @@ class OperatorSeat:
         if self.errand is None and self._leave_at_s <= now_s:
             self._gave_up = Verdict(Result.UNKNOWN_MISSION, self._onlooker.lack)
         if self.verdict is not None:
-            wishes.append(Finish(0 if self.verdict.result is Result.OBEYED else 1))
+            wishes.append(Finish(0 if self.obeyed else 1))
         return wishes
 
     def next_deadline_s(self) -> float | None:
@@ -88,6 +89,32 @@ class OperatorSeat:
         own_s = min(self._leave_at_s, self._ask_at_s) if self.errand is None else None
         looks_s = self._onlooker.next_deadline_s()
         return earliest(own_s, looks_s, self._errands.next_deadline_s())
+
+    @property
+    def obeyed(self) -> bool:
+        """Whether it was seen to take effect."""
+        return self.verdict is not None and self.verdict.result is Result.OBEYED
+
+    @property
+    def ordered(self) -> dict[str, object]:
+        """What a task order says of its task, who has confirmed it, and who has taken it."""
+        deed = None if self.errand is None else self.errand.deed
+        if not isinstance(deed, Ordering):
+            return {}
+        entry = deed.entry
+        told: dict[str, object] = {
+            "task": deed.task,
+            "uav": deed.uav,
+            "known_to": sorted(deed.known_to),
+        }
+        if entry is None:
+            return told
+        return told | {
+            "position": list(entry.position_enu_m),
+            "value": entry.value,
+            "service_s": entry.service_s,
+            "kind": entry.kind,
+        }
 
     @property
     def does(self) -> dict[str, str]:

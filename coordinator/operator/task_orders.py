@@ -25,7 +25,7 @@ from swarm.model.ids import COORDINATOR, ID_RULE, valid_id
 from swarm.state.board import TaskState
 from swarm.state.commands import aborted
 from swarm.wire.bounds import MAX_COUNT, Point
-from swarm.wire.messages import Board, Brief, ClaimPhase, EpochPhase, Message, TaskOrder
+from swarm.wire.messages import Board, Brief, ClaimPhase, EpochPhase, Message, Stamp, TaskOrder
 
 __all__ = ["NewTask", "Ordering", "Wgs84", "Withdrawal", "order_of"]
 
@@ -137,7 +137,10 @@ class Ordering:
         self._look_s = 2.0 * timing.patience_s
         """How long to look for who takes a new task, once all know of it."""
         self._look_until_s = math.inf
-        self._order: TaskOrder | None = None
+        self.entry: TaskOrder | None = None
+        """What is said; None when nothing could be."""
+        self._stamp: Stamp | None = None
+        """Of the statement that `known_to` is about."""
 
     # -- what to say --------------------------------------------------------------------
 
@@ -151,8 +154,8 @@ class Ordering:
             found = self._withdrawal(self._wish)
         if isinstance(found, Verdict):
             return found
-        self._order = order_of(found, brief.run, self._wish.reason)
-        return self._order
+        self.entry = order_of(found, brief.run, self._wish.reason)
+        return self.entry
 
     def _addition(self, wish: NewTask, brief: Brief) -> Board | Verdict:
         replica = self._observer.replica
@@ -160,7 +163,8 @@ class Ordering:
         if wish.task is not None and (wish.task in board or wish.task in scenario):
             states = self._observer.board.states
             state = states[wish.task].value if wish.task in board else "yet to appear"
-            return Verdict(Result.TAKEN_ID, f"it is {state}: give another id, or none")
+            text = f"{wish.task} is {state}: give another id, or none"
+            return Verdict(Result.TAKEN_ID, text)
         taken = board.keys() | scenario | replica.task_orders.keys()
         values = [entry.value for entry in board.values() if not entry.withdrawn]
         place = wish.place
@@ -194,6 +198,9 @@ class Ordering:
 
     def heed(self, fact: BusFact, said: Message) -> None:
         """See who knows of the order."""
+        if said.stamp != self._stamp:
+            self._stamp = said.stamp
+            self.known_to.clear()
         if isinstance(fact, Learned):
             for snapshot in fact.snapshots:
                 for message in snapshot.messages:
@@ -206,19 +213,16 @@ class Ordering:
 
     def judge(self, said: Message, now_s: float, *, late: bool) -> Verdict | None:
         """What has come of it by now; None as long as that is open, and it is not ``late``."""
-        order, known = self._order, self._observer.replica.known(said)
+        order, known = self.entry, self._observer.replica.known(said)
         if order is None or known is None:
             return None
         if known.stamp != said.stamp:
             other = known.body
-            done = isinstance(other, TaskOrder) and other.withdrawn
-            text = (
-                f"another operator has {'withdrawn' if done else 'changed'} {order.task} meanwhile"
-            )
-            return Verdict(Result.NOT_OBEYED, text)
-        if self._is_over:
-            text = f"the mission has ended meanwhile: nothing more comes of {order.task}"
-            return Verdict(Result.NOT_OBEYED, text)
+            gone = isinstance(other, TaskOrder) and other.withdrawn
+            did = f"{'withdrawn' if gone else 'changed'} {order.task}"
+            return Verdict(Result.NOT_OBEYED, f"another operator has {did} meanwhile")
+        if self._is_over and (verdict := self._in_the_end(order)) is not None:
+            return verdict
         silent = sorted(self._expected - self.known_to)
         everyone = not silent and bool(self.known_to)
         if not (everyone or late):
@@ -235,6 +239,15 @@ class Ordering:
             return verdict
         unsure = f"{', '.join(silent)} {'have' if len(silent) > 1 else 'has'} not confirmed it yet"
         return Verdict(verdict.result, f"{verdict.text}; {unsure}")
+
+    def _in_the_end(self, order: TaskOrder) -> Verdict | None:
+        """What is told when the mission has ended, maybe for what was ordered."""
+        if order.withdrawn:
+            return self._gone(order)
+        if self._observer.board.states.get(order.task) is TaskState.DONE:
+            return Verdict(Result.OBEYED, f"{order.task} was added and is done")
+        text = f"the mission has ended meanwhile: nothing more comes of {order.task}"
+        return Verdict(Result.NOT_OBEYED, text)
 
     def _taken(self, order: TaskOrder, now_s: float, late: bool) -> Verdict | None:
         """What is told of a task that is on the board; None to look a little longer."""
@@ -267,7 +280,7 @@ class Ordering:
     @property
     def task(self) -> str | None:
         """Id of the task; None as long as it has none."""
-        return self._wish.task if self._order is None else self._order.task
+        return self._wish.task if self.entry is None else self.entry.task
 
     @property
     def uav(self) -> str | None:

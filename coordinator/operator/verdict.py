@@ -18,7 +18,7 @@ class Result(Enum):
     NOT_OBEYED = "not obeyed"
     UNKNOWN_UAV = "no such UAV"
     UNKNOWN_TASK = "no such task"
-    TAKEN_ID = "there is such a task already"
+    TAKEN_ID = "that id is taken"
     UNKNOWN_MISSION = "nothing known of the mission"
 
     @property

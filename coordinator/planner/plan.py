@@ -12,6 +12,7 @@ import numpy as np
 
 from coordinator.planner.bound import upper_bound
 from coordinator.planner.exact import estimated_s, optimum
+from coordinator.planner.methods import METHODS, ONLINE_METHODS
 from coordinator.planner.routes import Progress, guided_plan
 from coordinator.planner.sequence import EXHAUSTIVE_UAVS, SearchLimits, best_sequence
 from coordinator.planner.stop import Limit, ShouldStop, after_time, never
@@ -20,12 +21,9 @@ from swarm.allocation.rules import EXACT_TASKS
 from swarm.clock import Clock
 from swarm.errors import Fault, InputError
 from swarm.model import Mission, Plan
+from swarm.suggest import instead
 
 __all__ = ["METHODS", "ONLINE_METHODS", "check_online_method", "make_plan"]
-
-METHODS = ("greedy", "lookahead", "guided", "exact")
-ONLINE_METHODS = ("greedy", "lookahead", "guided")
-"""Those whose rule agents can follow by themselves."""
 
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""
@@ -143,7 +141,7 @@ def check_online_method(method: str) -> None:
     """
     if method not in ONLINE_METHODS:
         problem = "has no decision rule to fly by" if method in METHODS else "no such method"
-        remedy = f"choose one of {', '.join(ONLINE_METHODS)}"
+        remedy = instead(method, ONLINE_METHODS)
         raise InputError(Fault("--method", method, problem, remedy))
 
 

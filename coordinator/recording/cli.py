@@ -70,12 +70,12 @@ def record(
     lease_s: LeaseOption = None,
     speedup: SpeedupOption = 1.0,
 ) -> int:
-    """Record a mission that is flown elsewhere, until it is over or Ctrl-C is pressed.
+    """Record a mission that is flown elsewhere.
 
-    Joins as an onlooker; nobody flies any differently for it. Everything that is said goes
-    into the file, with a map, a scene and curves for Foxglove. After every second the file is
-    whole, whatever happens then. Exit status 1: nobody flies a mission, or not everything
-    could be written.
+    Joins as an onlooker, until the mission is over or Ctrl-C; nobody flies any differently for
+    it. Everything that is said goes into the file, with a map, a scene and curves for Foxglove.
+    After every second the file is whole, whatever happens then. Exit status 1: nobody flies a
+    mission, or not everything could be written.
 
     Examples:
         swarm record flight.mcap
@@ -163,9 +163,9 @@ def replay(
         bool, typer.Option("--no-browser", help="Only print the page's address.")
     ] = False,
 ) -> int:
-    """Play a recording in the dashboard, at any speed, back and forth; or print how it ended.
+    """Play a recording in the dashboard, or print how it ended.
 
-    The page is served on this machine alone, until Ctrl-C.
+    At any speed, back and forth. The page is served on this machine alone, until Ctrl-C.
 
     Examples:
         swarm replay flight.mcap
@@ -195,7 +195,9 @@ def explain(
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """Tell the story of one task, or of one UAV, of a recorded mission, and why it went so.
+    """Tell a task's or a UAV's story from a recording.
+
+    In sentences, event by event, with the reason of each choice.
 
     Examples:
         swarm explain flight.mcap --task t7

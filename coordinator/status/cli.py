@@ -71,14 +71,14 @@ def status(
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
-    """Show how a running mission stands: phase, tasks, and what each UAV does.
+    """Show how a running mission stands, once or live.
 
-    Joins the mission as an onlooker, learns, prints and leaves; nobody flies any
-    differently for it. Exit status 1: nobody flies the mission.
-    With --watch it waits for the mission, shows it live as `swarm run` does, and ends with 0
-    when the mission is over and nobody is there any more. It goes on when processes, the
-    coordinator or its own link to the bus are lost, and shows that. At which speed-up the
-    mission is flown it sees by itself.
+    That is its phase, its tasks, what each UAV does and what went wrong. Joins the mission as an
+    onlooker, learns, prints and leaves; nobody flies any differently for it. Exit status 1:
+    nobody flies the mission. With --watch it waits for the mission, shows it live as `swarm run`
+    does, and ends with 0 when the mission is over and nobody is there any more. It goes on when
+    processes, the coordinator or its own link to the bus are lost, and shows that. At which
+    speed-up the mission is flown it sees by itself.
 
     Examples:
         swarm status

@@ -27,6 +27,7 @@ __all__ = ["Shows", "deserted", "watch"]
 FRAME_S = 0.2
 """Wall time between two pictures."""
 FOREVER_S = 1e9
+"""As long as it takes."""
 _ENDS = (StatusPhase.HOME, StatusPhase.OUT)
 """Where an agent's part ends."""
 

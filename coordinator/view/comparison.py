@@ -171,7 +171,10 @@ def facts(mission: Mission, result: MissionResult) -> list[Fact]:
     withdrawn = tuple(task.id for task in mission.tasks if task.id not in known)
     if withdrawn:
         found.append(Fact("withdrawn", _count(withdrawn, "task"), withdrawn))
-    popups = tuple(task.id for task in mission.tasks if task.appears_s > 0.0)
+    if result.added:
+        found.append(Fact("by the operator", _count(result.added, "task"), result.added))
+    later = (task.id for task in mission.tasks if task.appears_s > 0.0)
+    popups = tuple(task for task in later if task not in result.added)
     if popups:
         text = f"{_count(popups, 'task')} unknown to the plan"
         found.append(Fact("pop-ups", text, popups))

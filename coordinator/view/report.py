@@ -88,6 +88,7 @@ class MissionReport:
             "makespan_s": result.makespan_s,
             "lost_uavs": list(result.lost_uavs),
             "epochs": result.epochs,
+            "added": list(result.added),
             "takeoff_s": self.takeoff_s,
             "wall_s": self.wall_s,
             "speedup": self.speedup,

@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sim.autopilot.flavours import FlavourName
+from swarm.log import LogFormat, LogLevel, configure_logging, get_logger
 from swarm.options import (
     JsonOption,
     LifelineOption,
+    LogFormatOption,
+    LogLevelOption,
     ScenarioArgument,
     SeedOption,
     SpeedupOption,
 )
+from swarm.suggest import instead
 
 if TYPE_CHECKING:
     from agent.mavlink.signing import SigningKey
@@ -136,11 +140,14 @@ def autopilot(
     ] = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
+    log_level: LogLevelOption = LogLevel.INFO,
+    log_format: LogFormatOption = LogFormat.AUTO,
 ) -> int:
-    """Simulate the autopilots of a scenario's UAVs, speaking MAVLink 2 like ArduCopter or PX4.
+    """Simulate autopilots that speak MAVLink 2 as firmwares do.
 
-    Prints one JSON object per vehicle with the address to connect to, then runs
-    until interrupted. With --json nothing else is printed.
+    They are those of a scenario's UAVs, like ArduCopter's or PX4's. Prints one JSON object per
+    vehicle with the address to connect to, then runs until interrupted. With --json nothing else
+    is printed.
 
     Examples:
         swarm autopilot table-1
@@ -162,11 +169,12 @@ def autopilot(
     from swarm.scenario import load_scenario
 
     mission = load_scenario(scenario)
+    configure_logging(log_level, log_format, mission=mission.name)
     known = [member.id for member in mission.uavs]
     unknown = [name for name in uav or () if name not in known]
     if unknown:
-        remedy = f"the scenario has {', '.join(known)}"
-        raise InputError(*(Fault("--uav", "", f"no UAV {name!r}", remedy) for name in unknown))
+        told = ((name, instead(name, known, "the scenario has")) for name in unknown)
+        raise InputError(*(Fault("--uav", "", f"no UAV {name!r}", what) for name, what in told))
     try:
         endpoint = parse_endpoint(listen)
     except ValueError as error:
@@ -213,7 +221,6 @@ async def _serve(
     """Serve every vehicle until cancelled."""
     import asyncio
     import json
-    import sys
 
     from sim.autopilot.faulty_vehicle import FaultyVehicle
     from sim.autopilot.flavours import flavour_of
@@ -245,7 +252,9 @@ async def _serve(
             print(json.dumps(line), flush=True)
         if not quiet:
             flown = f"{len(fleet)} simulated vehicle{'s' if len(fleet) > 1 else ''}"
-            print(f"{flown} at {speedup:g} times wall speed; Ctrl-C ends.", file=sys.stderr)
+            names = ", ".join(member.uav for member in fleet)
+            text = f"{flown} at {speedup:g} times wall speed; Ctrl-C ends"
+            get_logger("autopilot").info(text, uavs=names)
         await asyncio.Event().wait()
     finally:
         for server in servers:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from sim.autopilot.faults import FAULT_RULE, VehicleFault, parse_fault
 from sim.autopilot.fleet import FleetMember
 from swarm.errors import Fault, InputError
+from swarm.suggest import instead
 
 __all__ = ["check_wind", "faults_by_uav", "parse_wind", "require_finite"]
 
@@ -90,7 +91,7 @@ def faults_by_uav(
             faults.append(Fault("--fault", text, str(error), FAULT_RULE))
             continue
         if uav not in known:
-            remedy = f"the scenario has {', '.join(known)}"
+            remedy = instead(uav, known, "the scenario has")
             faults.append(Fault("--fault", text, f"no UAV {uav!r}", remedy))
             continue
         found[uav] = (*found.get(uav, ()), fault)

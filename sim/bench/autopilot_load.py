@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import os
 import struct
 import tempfile
 from collections import Counter
@@ -27,7 +26,7 @@ from rich.text import Text
 
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.flavours.ardupilot import ArduCopter
-from sim.bench.machine import Machine, this_machine
+from sim.bench.machine import Machine, cpu_s, this_machine
 from sim.bench.trouble import survey
 from sim.launch.process import Child
 from swarm.clock import Clock, SystemClock
@@ -240,10 +239,10 @@ async def measure_load(
         try:
             await asyncio.sleep(SETTLE_S)
             rtts_s.clear()
-            began_s, before, cpu_s = clock.now_s(), _heard(clients), _cpu_s(pid)
+            began_s, before, spent_s = clock.now_s(), _heard(clients), cpu_s(pid)
             await asyncio.sleep(seconds)
             passed_s = clock.now_s() - began_s
-            heard, cpu_s = _heard(clients), _cpu_s(pid) - cpu_s
+            heard, spent_s = _heard(clients), cpu_s(pid) - spent_s
         finally:
             for task in timing:
                 task.cancel()
@@ -258,7 +257,7 @@ async def measure_load(
         streams=stream_rates(heard, asked_hz, vehicles, passed_s),
         messages_per_s=sum(heard.values()) / passed_s,
         delivered_frac=n_heard / (sum(asked_hz.values()) * vehicles * passed_s),
-        cores=cpu_s / passed_s,
+        cores=spent_s / passed_s,
         latency_p50_s=float(np.median(times_s)) if times_s.size else None,
         latency_p99_s=float(np.quantile(times_s, 0.99)) if times_s.size else None,
         latency_largest_s=float(times_s.max()) if times_s.size else None,
@@ -341,12 +340,6 @@ def load_as_json(load: AutopilotLoad) -> dict[str, object]:
 
 def _heard(clients: list[_Client]) -> Counter[int]:
     return sum((client.frames.counts for client in clients), Counter[int]())
-
-
-def _cpu_s(pid: int) -> float:
-    """Processor time a process has used, in user and system mode [s]."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 @contextlib.contextmanager

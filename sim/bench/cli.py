@@ -1,9 +1,10 @@
 """The commands of the family `swarm bench`.
 
 Leaves out: the commands about fleets that fly (`sim.bench.trouble_commands`,
-`sim.bench.turnaround_command`, `sim.bench.missions_command`) and about simulated vehicles
-(`sim.bench.autopilot_commands`), what the others do (`sim.bench.plan_bench`, `sim.bench.decide`)
-and how it is shown (`sim.bench.plan_report`, `sim.bench.plan_plot`).
+`sim.bench.turnaround_command`, `sim.bench.missions_command`), about simulated vehicles
+(`sim.bench.autopilot_commands`) and about the dashboard (`sim.bench.dashboard_command`), what
+the others do (`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown
+(`sim.bench.plan_report`, `sim.bench.plan_plot`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sim.bench.autopilot_commands import AUTOPILOT_HELP, autopilot
+from sim.bench.dashboard_command import DASHBOARD_HELP, dashboard
 from sim.bench.missions_command import MISSIONS_HELP, missions
 from sim.bench.trouble_commands import FAILOVER_HELP, FLOOD_HELP, failover, flood
 from sim.bench.turnaround_command import TURNAROUND_HELP, turnaround
@@ -22,6 +24,7 @@ from sim.bench.words import each, size_of
 from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, SeedOption
 from swarm.scenario.shipped import resolve_scenario
+from swarm.suggest import instead
 
 if TYPE_CHECKING:
     from sim.bench.worker import Source
@@ -42,7 +45,9 @@ Examples:
     swarm bench plan valley-survey --methods guided,cbba,exact --json
     swarm bench plan --scaling --out scaling.md
 """
-_DECIDE_HELP = """Time one online decision of each rule, over a whole random mission.
+_DECIDE_HELP = """Time one online decision of each rule.
+
+A whole random mission is decided, task by task, and each decision timed.
 
 \b
 Examples:
@@ -223,6 +228,9 @@ bench.command("flood", help=FLOOD_HELP, short_help="Fly while a hostile peer flo
 bench.command("missions", help=MISSIONS_HELP, short_help="Fly many missions in virtual time.")(
     missions
 )
+bench.command("dashboard", help=DASHBOARD_HELP, short_help="Measure what a dashboard costs.")(
+    dashboard
+)
 bench.command("autopilot", help=AUTOPILOT_HELP, short_help="Measure simulated vehicles.")(autopilot)
 bench.command(
     "turnaround", help=TURNAROUND_HELP, short_help="Time from each arrival to the next target."
@@ -265,7 +273,7 @@ def _method(flag: str, word: str) -> str:
     from sim.bench.methods import METHODS
 
     if word not in METHODS:
-        remedy = f"choose among {', '.join(METHODS)}"
+        remedy = instead(word, METHODS, "choose among")
         raise InputError(Fault(flag, word, "no such method", remedy))
     return word
 

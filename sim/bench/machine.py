@@ -17,7 +17,7 @@ import numpy as np
 
 import swarm
 
-__all__ = ["Machine", "peak_memory_bytes", "this_machine"]
+__all__ = ["Machine", "cpu_s", "memory_bytes", "peak_memory_bytes", "this_machine"]
 
 _CPU_INFO = Path("/proc/cpuinfo")
 _STATUS = Path("/proc/self/status")
@@ -80,6 +80,18 @@ def peak_memory_bytes() -> int:
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024
+
+
+def cpu_s(pid: int) -> float:
+    """Processor time a process has used, in user and system mode [s]; Linux alone tells it."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def memory_bytes(pid: int) -> int:
+    """What a process holds in RAM; Linux alone tells it."""
+    pages = Path(f"/proc/{pid}/statm").read_text().split()[1]
+    return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
 def _cpu_model() -> str:

@@ -118,8 +118,9 @@ class Traffic:
 
     @property
     def received_bytes_per_uav_s(self) -> float:
-        """Payload that each agent hears: everything but status [bytes/s]."""
-        heard = sum(size for kind, size in self.payload_bytes.items() if kind != "Status")
+        """Payload that each agent hears: everything but status and choices [bytes/s]."""
+        unheard = ("Status", "Choice")
+        heard = sum(size for kind, size in self.payload_bytes.items() if kind not in unheard)
         return heard / self.watched_s
 
 

@@ -14,7 +14,7 @@ from sim.chaos.recorder import Entry
 from sim.faults.transcript import Transcript
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.registers import Replica
-from swarm.wire.messages import Claim, Message, Status
+from swarm.wire.messages import Choice, Claim, Message, Status
 
 __all__ = [
     "AGREE_WITHIN_S",
@@ -157,7 +157,7 @@ def _claims(
         match each:
             case Fate(writer=writer):
                 claims.pop(writer, None)
-            case Entry(what=Message(body=Status())):
+            case Entry(what=Message(body=Status() | Choice())):
                 continue
             case Entry(what=Message(writer=writer, body=body) as message):
                 news = replica.join(message)

@@ -162,7 +162,8 @@ class ChaosFlight:
     def _broken_rules(self, told: list[Transcript]) -> set[str]:
         """Broken rules of the messages; who has not heard all knows not why a task was left.
 
-        Nor is it said on the bus that a UAV turned aside for what had opened; its log says so.
+        That a UAV turned aside for what had opened is sure to be in its log; its choice, which
+        says so too, may be lost.
         """
         turned = {
             f"{who} left {m[1]} " for who, line in self.lines if (m := TURN_LINE.search(line))

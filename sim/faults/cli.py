@@ -59,10 +59,11 @@ def soak(
     json: JsonOption = False,
     bug: Annotated[str, typer.Option("--bug", hidden=True)] = "",
 ) -> int:
-    """Play random missions with random faults in virtual time, until an invariant breaks.
+    """Play missions with random faults until an invariant breaks.
 
-    Every case follows from its seed. One that fails is made as small as possible, printed, and
-    written to a file that --replay plays again. Exit status 0: every invariant held.
+    They are random themselves, and played in virtual time. Every case follows from its seed. One
+    that fails is made as small as possible, printed, and written to a file that --replay plays
+    again. Exit status 0: every invariant held.
 
     Examples:
         swarm soak --seeds 10000

@@ -19,6 +19,7 @@ from swarm.errors import Fault as InputFault
 from swarm.errors import InputError
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
+from swarm.suggest import instead
 
 __all__ = ["kinds_of", "random_case", "random_schedule"]
 
@@ -37,7 +38,7 @@ def kinds_of(text: str, source: str) -> tuple[Kind, ...]:
     kinds = []
     for word in text.split(","):
         if word not in list(Kind):
-            remedy = f"write all, a file, or some of {','.join(Kind)}"
+            remedy = instead(word, Kind, "write all, a file, or some of")
             raise InputError(InputFault(source, word, "no kind of fault", remedy))
         kinds.append(Kind(word))
     return tuple(kinds)

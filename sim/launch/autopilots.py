@@ -13,6 +13,7 @@ from agent.mavlink.link_address import parse_link
 from sim.autopilot.flavours import FlavourName
 from sim.launch.firmware import Firmware, FirmwareKind, find_firmware
 from swarm.errors import Fault, InputError
+from swarm.suggest import instead
 
 __all__ = [
     "Autopilots",
@@ -118,7 +119,7 @@ def _places(text: str, uavs: Sequence[str]) -> tuple[VehiclePlace, ...]:
         if uav is None:
             raise InputError(Fault(_SOURCE, text, f"more URLs than UAVs ({len(uavs)})", _REMEDY))
         if uav not in uavs:
-            remedy = f"the scenario has {', '.join(uavs)}"
+            remedy = instead(uav, uavs, "the scenario has")
             raise InputError(Fault(_SOURCE, part, f"no UAV {uav!r}", remedy))
         if uav in found:
             raise InputError(Fault(_SOURCE, part, f"{uav} has a URL already", _REMEDY))

@@ -87,7 +87,7 @@ class LaunchOptions:
     handed_on: HandedOn = field(default_factory=HandedOn)
     """What agents and simulated autopilots are told besides."""
     log_format: LogFormat = LogFormat.AUTO
-    """What a line of an agent's log looks like."""
+    """What a line of a process's log looks like."""
     dashboard: Place | None = None
     """Where a page shows the run; nowhere if None."""
 
@@ -167,7 +167,8 @@ class Layout:
     def router(self, name: str) -> list[str]:
         """Arguments of a router's process."""
         dialed = _repeated("--connect", self._dialed(name))
-        return ["router", "--json", "--listen", self._endpoints[name], *dialed, *self._link()]
+        listen = ["--listen", self._endpoints[name]]
+        return ["router", "--json", *listen, *dialed, *self._link(), *self._log()]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
@@ -179,6 +180,7 @@ class Layout:
             *("--listen", "tcp:127.0.0.1:0"),
             *self._flavour(),
             *options.handed_on.to_autopilot(uavs),
+            *self._log(),
             *self._speed(),
         ]
 
@@ -190,6 +192,7 @@ class Layout:
             str(options.scenario),
             *("--method", options.method, "--seed", str(options.seed), "--json"),
             *("--start-timeout-s", repr(options.start_timeout_s)),
+            *self._log(),
             *self._memory(),
             *self._speed(),
             *self.seat_arguments(COORDINATOR),
@@ -200,6 +203,7 @@ class Layout:
         return [
             *("dashboard", "--mission", self._mission.name, "--json"),
             *place.arguments(folder),
+            *self._log(),
             *self._speed(),
             *self.seat_arguments(DASHBOARD),
         ]
@@ -215,7 +219,7 @@ class Layout:
             *("--position-rate-hz", repr(rate_hz)),
             *("--acceptance-radius-m", repr(options.acceptance_radius_m)),
             *options.handed_on.to_agent(uav),
-            *("--log-format", options.log_format),
+            *self._log(),
             *self._memory(),
             *self._speed(),
             *self.seat_arguments(uav),
@@ -224,6 +228,10 @@ class Layout:
     def _flavour(self) -> list[str]:
         autopilots = self._options.autopilots
         return ["--flavour", autopilots.flavour] if isinstance(autopilots, Simulated) else []
+
+    def _log(self) -> list[str]:
+        form = self._options.log_format
+        return [] if form is LogFormat.AUTO else ["--log-format", form]
 
     def _speed(self) -> list[str]:
         return ["--speedup", repr(self._options.speedup)]

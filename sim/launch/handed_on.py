@@ -17,6 +17,7 @@ from sim.autopilot.options import faults_by_uav
 from sim.launch.autopilots import Autopilots, Simulated
 from sim.launch.fence import Fence
 from swarm.errors import Fault, InputError
+from swarm.suggest import instead
 
 __all__ = ["HandedOn", "check_handed_on", "parse_command_styles"]
 
@@ -79,7 +80,7 @@ def parse_command_styles(text: str | None, uavs: Sequence[str]) -> dict[str, Com
             remedy = "give one style for all UAVs, or UAV=STYLE with commas between"
             raise InputError(Fault(_COMMAND, text, f"{part.strip()!r} names no UAV", remedy))
         if uav not in uavs:
-            remedy = f"the scenario has {', '.join(uavs)}"
+            remedy = instead(uav, uavs, "the scenario has")
             raise InputError(Fault(_COMMAND, text, f"no UAV {uav!r}", remedy))
         if uav in found:
             raise InputError(Fault(_COMMAND, text, f"{uav} is named twice", "name each UAV once"))
@@ -91,7 +92,7 @@ def _style(text: str) -> CommandStyle:
     try:
         return CommandStyle(text)
     except ValueError:
-        remedy = f"choose one of {', '.join(CommandStyle)}"
+        remedy = instead(text, CommandStyle)
         raise InputError(Fault(_COMMAND, text, "no such way to command", remedy)) from None
 
 

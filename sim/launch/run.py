@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
@@ -216,8 +217,14 @@ class Run:
         patience_s = PATIENCE_S * fast
         if self._zero_s is None or plan is None:
             return options.start_timeout_s * fast + patience_s
-        latest_s = max((task.appears_s for task in self.launch.mission.tasks), default=0.0)
+        flown = self.observer.mission  # with what the operator has added to it
+        latest_s = max((task.appears_s for task in flown.tasks), default=0.0)
         planned_s = max(plan.completion_s.values(), default=0.0)
+        slowest_m_s = min(uav.speed_m_s for uav in flown.uavs)
+        for task in flown.tasks:
+            if task.id not in plan.completion_s:
+                away_m = max(math.dist(task.position_enu_m, u.position_enu_m) for u in flown.uavs)
+                planned_s += task.service_s + away_m / slowest_m_s
         return self._zero_s + latest_s + PATIENCE * planned_s + patience_s
 
 

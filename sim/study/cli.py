@@ -42,11 +42,11 @@ def reproduce(
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """Compute the paper's tables and figures again, beside what it prints.
+    """Compute the paper's tables and figures again.
 
-    Tables I and II, random problems, relative times, and the theorems against brute force;
-    differences are explained. The same seed gives the same results, times apart. Exit status 1:
-    a figure or a theorem did not come out as it must.
+    They are shown beside what it prints: tables I and II, random problems, relative times, and
+    the theorems against brute force; differences are explained. The same seed gives the same
+    results, times apart. Exit status 1: a figure or a theorem did not come out as it must.
 
     Examples:
         swarm reproduce

@@ -201,11 +201,11 @@ def study(
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """Compare policies over many missions in which UAVs are lost, tasks pop up and so on.
+    """Compare policies over many missions in which much goes wrong.
 
-    In every trial all policies meet the same drawn future, so that their differences show with
-    few trials. Numbers come with 95 % confidence intervals. Everything follows from the seed;
-    wall times of decisions alone differ from run to run.
+    UAVs are lost, tasks pop up and so on. In every trial all policies meet the same drawn future,
+    so that their differences show with few trials. Numbers come with 95 % confidence intervals.
+    Everything follows from the seed; wall times of decisions alone differ from run to run.
 
     Examples:
         swarm study valley-survey --loss 0.3 --popup 0.3

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import json as json_format
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,7 +14,15 @@ import typer
 
 from swarm.bus.config import DEFAULT_ROUTER
 from swarm.config import Link, preset
-from swarm.options import JsonOption, LeaseOption, LifelineOption, LinkOption
+from swarm.log import LogFormat, LogLevel
+from swarm.options import (
+    JsonOption,
+    LeaseOption,
+    LifelineOption,
+    LinkOption,
+    LogFormatOption,
+    LogLevelOption,
+)
 
 if TYPE_CHECKING:
     from swarm.bus.config import RouterConfig
@@ -53,11 +60,13 @@ def router(
     lease_s: LeaseOption = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
+    log_level: LogLevelOption = LogLevel.INFO,
+    log_format: LogFormatOption = LogFormat.AUTO,
 ) -> int:
-    """Serve a fleet whose agents and coordinator are clients of one place.
+    """Be the place that a fleet's processes reach each other by.
 
-    Prints one JSON line with the endpoints it really listens on, then serves until
-    SIGTERM (exit status 0) or Ctrl-C (130).
+    Agents and coordinator are clients of it. Prints one JSON line with the endpoints it really
+    listens on, then serves until SIGTERM (exit status 0) or Ctrl-C (130).
 
     Examples:
         swarm router
@@ -65,8 +74,10 @@ def router(
     """
     from swarm.bus.config import RouterConfig
     from swarm.errors import Fault, InputError
+    from swarm.log import configure_logging
     from swarm.process import run_until_stopped
 
+    configure_logging(log_level, log_format)
     listens = tuple(listen or (() if config else (DEFAULT_ROUTER,)))
     try:
         lease_s = preset(link, lease_s).lease_s
@@ -81,12 +92,13 @@ def router(
 
 async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
     from swarm.bus.router import open_router
+    from swarm.log import get_logger
 
     serving = await open_router(settings)
     try:
         print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
         if not quiet:
-            print(f"router ready at {', '.join(serving.endpoints)}", file=sys.stderr, flush=True)
+            get_logger("router").info(f"router ready at {', '.join(serving.endpoints)}")
         await asyncio.Event().wait()
         return 0
     finally:

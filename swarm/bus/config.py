@@ -12,6 +12,7 @@ from pathlib import Path
 
 from swarm.config import PRESETS, Link
 from swarm.errors import Fault, InputError
+from swarm.suggest import instead
 
 __all__ = [
     "DEFAULT_LEASE_S",
@@ -135,7 +136,9 @@ def bus_config(
         if listen or connect:
             raise ValueError("--listen and --connect are for --bus mesh or router only")
         if not Path(kind).is_file():
-            raise ValueError(f"no such Zenoh configuration file: {kind}")
+            remedy = instead(kind, ("mesh", "router"), "give a file that is there, or one of")
+            problem = f"no such Zenoh configuration file: {kind}"
+            raise InputError(Fault("command line", "--bus", problem, remedy))
     except ValueError as fault:
         remedy = "see --help"
         raise InputError(Fault("command line", "--bus", str(fault), remedy)) from None

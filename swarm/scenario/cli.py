@@ -1,7 +1,7 @@
-"""The command ``swarm import``.
+"""The commands ``swarm import`` and ``swarm new``.
 
 Leaves out: reading files of tasks (swarm.scenario.task_files), and the text of
-the scenario (swarm.scenario.draft).
+the scenario (swarm.scenario.draft, swarm.scenario.blank).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from swarm.model import Origin
     from swarm.scenario.task_files import TaskFile
 
-__all__ = ["import_tasks"]
+__all__ = ["import_tasks", "new"]
 
 
 def import_tasks(
@@ -112,11 +112,12 @@ def import_tasks(
         ),
     ] = None,
 ) -> int:
-    """Make a scenario of tasks in a QGroundControl plan, a waypoint file, GeoJSON or CSV.
+    """Make a scenario of a plan's waypoints, or of GeoJSON or CSV.
 
-    Every waypoint or point becomes a task, also those within surveys and corridor scans; hold
-    times become service times. Take-off, landing, cameras and the like are left out, and told.
-    The scenario is commented, to be looked over and flown.
+    Reads QGroundControl plans and waypoint files, too. Every waypoint or point becomes a task,
+    also those within surveys and corridor scans; hold times become service times. Take-off,
+    landing, cameras and the like are left out, and told. The scenario is commented, to be looked
+    over and flown.
 
     A CSV has columns lat_deg, lon_deg and maybe alt_m, or east_m, north_m and maybe up_m, and
     any of id, value, service_s, kind and appears_s; GeoJSON has the latter as properties.
@@ -145,16 +146,81 @@ def import_tasks(
     return 0
 
 
-def _origin(text: str) -> Origin:
+def new(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE.toml",
+            help="File to write; one that is there is left alone.",
+            show_default=False,
+        ),
+    ],
+    uavs: Annotated[
+        int, typer.Option("--uavs", min=1, max=1000, metavar="N", help="Size of the fleet.")
+    ] = 3,
+    tasks: Annotated[
+        int, typer.Option("--tasks", min=0, max=10_000, metavar="M", help="Number of tasks.")
+    ] = 6,
+    origin: Annotated[
+        str | None,
+        typer.Option(
+            "--origin",
+            metavar="LAT,LON[,ALT]",
+            help="Where the UAVs start: degrees, and height above mean sea level, by default 0. "
+            "Default: where simulators usually fly.",
+            show_default=False,
+        ),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name",
+            metavar="NAME",
+            help="Name of the mission. Default: that of the file.",
+            show_default=False,
+        ),
+    ] = None,
+) -> int:
+    """Write a new scenario in which every field is explained.
+
+    It flies as it is. UAVs stand side by side at the origin, tasks lie around them. Change what
+    you like: `swarm plan FILE` tells every fault at its place.
+
+    Examples:
+        swarm new field.toml
+        swarm new field.toml --uavs 5 --tasks 20 --origin 47.3977,8.5456,488
+        swarm new field.toml && swarm plan field.toml && swarm run field.toml --speedup 5
+    """
+    from swarm.errors import Fault, InputError
+    from swarm.model.frames import DEFAULT_ORIGIN
+    from swarm.model.ids import ID_RULE, valid_id
+    from swarm.scenario.blank import Blank, blank_scenario
+
+    if name is not None and not valid_id(name):
+        raise InputError(Fault("--name", "", f"{name!r} is not an id", f"give {ID_RULE}"))
+    if file.suffix != ".toml":
+        remedy = f"end it in .toml, such as {file.name or 'field'}.toml"
+        raise InputError(Fault("FILE.toml", str(file), "is no name of a scenario file", remedy))
+    place = DEFAULT_ORIGIN if origin is None else _origin(origin, "--origin", alt_m=0.0)
+    _write(file, blank_scenario(Blank(name or _id_of(file.stem), uavs, tasks, place)), "FILE.toml")
+    print(f"fly it with: swarm run {file}", file=sys.stderr)
+    return 0
+
+
+def _origin(text: str, option: str = "--home", *, alt_m: float | None = None) -> Origin:
+    """The place that ``text`` names; ``alt_m`` is its height where it names none."""
     from swarm.errors import Fault, InputError
     from swarm.model import Origin
 
     try:
-        lat_deg, lon_deg, alt_m = (float(part) for part in text.split(","))
-        return Origin(lat_deg, lon_deg, alt_m)
+        numbers = [float(part) for part in text.split(",")]
+        if alt_m is not None and len(numbers) == 2:
+            numbers.append(alt_m)
+        lat_deg, lon_deg, height_m = numbers
+        return Origin(lat_deg, lon_deg, height_m)
     except ValueError as error:
         remedy = "give LAT,LON,ALT in degrees and metres, such as 47.397742,8.545594,488"
-        raise InputError(Fault("--home", "", f"{text!r} is no place", remedy)) from error
+        raise InputError(Fault(option, "", f"{text!r} is no place", remedy)) from error
 
 
 def _id_of(stem: str) -> str:
@@ -163,7 +229,7 @@ def _id_of(stem: str) -> str:
     return words[:64] or "mission"
 
 
-def _write(path: Path, text: str) -> None:
+def _write(path: Path, text: str, option: str = "--output") -> None:
     """Write a new file; one that is there may have been worked on."""
     from swarm.errors import Fault, InputError
 
@@ -171,14 +237,12 @@ def _write(path: Path, text: str) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        fault = Fault("--output", str(path), "is there already", "remove it, or name another file")
+        fault = Fault(option, str(path), "is there already", "remove it, or name another file")
         raise InputError(fault) from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else None
         problem = f"cannot be written: {reason or error}"
-        raise InputError(
-            Fault("--output", str(path), problem, "name a file that can be")
-        ) from error
+        raise InputError(Fault(option, str(path), problem, "name a file that can be")) from error
 
 
 def _story(tasks: TaskFile, uavs: int, output: Path | None) -> str:

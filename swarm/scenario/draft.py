@@ -16,11 +16,11 @@ from swarm.scenario.read import build_mission
 from swarm.scenario.task_files import TaskFile
 from swarm.scenario.write import toml_float, toml_string
 
-__all__ = ["SPEED_M_S", "Fleet", "draft_scenario"]
+__all__ = ["PAD_SPACING_M", "SPEED_M_S", "Fleet", "draft_scenario", "horizon_for"]
 
 SPEED_M_S = 5.0
 """Cruise speed where neither the file nor its reader names one [m/s]."""
-_PAD_SPACING_M = 5.0
+PAD_SPACING_M = 5.0
 """Distance between the pads of neighbouring UAVs [m]."""
 _SHORTEST_HORIZON_S = 60.0
 _LONGEST_HORIZON_S = 1e9
@@ -67,7 +67,7 @@ def draft_scenario(tasks: TaskFile, fleet: Fleet) -> str:
     uavs = [
         {
             "id": f"uav{number + 1}",
-            "position_m": [number * _PAD_SPACING_M, 0.0],
+            "position_m": [number * PAD_SPACING_M, 0.0],
             "speed_m_s": speed_m_s,
         }
         for number in range(fleet.uavs)
@@ -83,15 +83,15 @@ def draft_scenario(tasks: TaskFile, fleet: Fleet) -> str:
         tasks.source,
         tasks,
     )
-    horizon_s = fleet.horizon_s or _horizon_s(mission)
+    horizon_s = fleet.horizon_s or horizon_for(mission)
     return "\n".join(_lines(tasks, fleet, uavs, horizon_s)) + "\n"
 
 
-def _horizon_s(mission: Mission) -> float:
-    """When one UAV alone would have done every task, going to the nearest next [s]."""
+def horizon_for(mission: Mission) -> float:
+    """A horizon D: when one UAV alone would have done every task, going to the nearest next [s]."""
     uav = mission.uavs[0]
     here = np.array(uav.position_enu_m)
-    places = np.array([task.position_enu_m for task in mission.tasks])
+    places = np.array([task.position_enu_m for task in mission.tasks]).reshape(-1, 3)
     open_tasks = np.full(len(places), True)
     length_m = 0.0
     for _ in range(len(places)):
@@ -101,7 +101,7 @@ def _horizon_s(mission: Mission) -> float:
         open_tasks[nearest] = False
         here = places[nearest]
     service_s = sum(task.service_s for task in mission.tasks)
-    latest_s = max(task.appears_s for task in mission.tasks)
+    latest_s = max((task.appears_s for task in mission.tasks), default=0.0)
     needed_s = length_m / uav.speed_m_s + service_s + latest_s
     return min(max(_SHORTEST_HORIZON_S, 10.0 * math.ceil(needed_s / 10.0)), _LONGEST_HORIZON_S)
 

@@ -21,7 +21,6 @@ from tests.process.mission import wait_until
 __all__ = ["LIMIT_S", "ByHand"]
 
 LIMIT_S = 150.0
-SPEEDUP = "2"
 
 
 class ByHand:
@@ -30,10 +29,13 @@ class ByHand:
     Args:
         folder: for scenario and logs.
         stack: ends the processes.
-        mission: flown, at twice the speed of the wall's clock.
+        mission: flown.
+        speedup: mission seconds per second of the wall's clock.
     """
 
-    def __init__(self, folder: Path, stack: contextlib.ExitStack, mission: Mission) -> None:
+    def __init__(
+        self, folder: Path, stack: contextlib.ExitStack, mission: Mission, speedup: int = 2
+    ) -> None:
         self.folder = folder
         self.mission = mission
         self.uavs: list[str] = [uav.id for uav in mission.uavs]
@@ -41,11 +43,11 @@ class ByHand:
         self._scenario = folder / "scenario.toml"
         self._scenario.write_text(format_scenario(mission))
         (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
-        self.seat = ["--connect", endpoint, "--speedup", SPEEDUP]
+        self.seat = ["--connect", endpoint, "--speedup", str(speedup)]
         router = self.start("router", ["router", "--listen", endpoint, "--json"])
         self._line(router)
         chosen = [word for uav in self.uavs for word in ("--uav", uav)]
-        listen = ["--listen", "tcp:127.0.0.1:0", "--speedup", SPEEDUP, "--json"]
+        listen = ["--listen", "tcp:127.0.0.1:0", "--speedup", str(speedup), "--json"]
         autopilot = ["autopilot", str(self._scenario), *chosen, *listen]
         flying = self.start("autopilot", autopilot)
         vehicles = [self._line(flying) for _ in self.uavs]

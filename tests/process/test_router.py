@@ -28,7 +28,9 @@ LOOPBACK = "tcp/127.0.0.1:0"
 def test_signals_end_it_while_a_client_is_there(number: signal.Signals, status: int) -> None:
     with router("--listen", LOOPBACK) as (process, endpoint), token_holder("client", "t", endpoint):
         process.send_signal(number)
-        assert finish(process) == (status, "", f"router ready at {endpoint}\n")
+        ended, out, log = finish(process)
+        assert (ended, out, len(log.splitlines())) == (status, "", 1)
+        assert f"router ready at {endpoint}" in log
 
 
 def test_end_of_standard_input_ends_it() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 from pathlib import Path
@@ -21,7 +22,9 @@ def kill(pid: int) -> None:
 
 @pytest.mark.parametrize("bus", ["mesh", "router"])
 def test_paper_mission_flies_the_offline_plan(tmp_path: Path, bus: str) -> None:
-    with SwarmRun(["table-1", "--bus", bus, "--method", "greedy"], tmp_path) as run:
+    logs = tmp_path / "logs"
+    arguments = ["table-1", "--bus", bus, "--method", "greedy", "--logs", str(logs)]
+    with SwarmRun(arguments, tmp_path) as run:
         status, told = run.result()
 
         assert status == 0, run.story()
@@ -34,7 +37,31 @@ def test_paper_mission_flies_the_offline_plan(tmp_path: Path, bus: str) -> None:
         assert told["objective"] == pytest.approx(118.4939, abs=5e-5)
         assert told["executed_objective"] == pytest.approx(118.49, rel=0.02)
         assert told["optimum"] == pytest.approx(120.3335, abs=5e-5)
-        run.assert_nothing_left()
+        assert_every_line_tells_whose_it_is(logs)
+        run.assert_nothing_left(but="logs")
+
+
+def assert_every_line_tells_whose_it_is(logs: Path) -> None:
+    """Each is a JSON object with the ids of mission, UAV, process and plan."""
+    lines = {
+        path.stem: [json.loads(line) for line in path.read_text().splitlines()]
+        for path in logs.iterdir()
+    }
+    uavs = [f"uav{number}" for number in (1, 2, 3)]
+    assert lines.keys() == {"coordinator", *uavs, *(f"autopilot-of-{uav}" for uav in uavs)}
+    for name, told in lines.items():
+        assert told
+        assert all(
+            {"mission", "event", "level", "timestamp", "module"} <= set(each) for each in told
+        )
+        assert {each["mission"] for each in told} == {"table-1"}
+        if name in uavs:
+            assert {each["uav"] for each in told} == {name}
+        if name in (*uavs, "coordinator"):
+            assert len({each["incarnation"] for each in told}) == 1
+    assert lines["coordinator"][-1]["epoch"] >= 1
+    decided = [each for uav in uavs for each in lines[uav] if "decision" in each]
+    assert len({(each["uav"], each["decision"]) for each in decided}) >= 8
 
 
 def test_killed_agents_tasks_are_done_by_the_others(tmp_path: Path) -> None:

@@ -413,6 +413,17 @@ def test_it_asks_the_others_for_the_last_words_of_the_lost_and_for_what_the_retu
     assert onlooker.happen(PeerSeen("u9"), 15.0) == []
 
 
+def test_it_asks_a_uav_that_appears_for_what_it_said_before_it_could_be_heard() -> None:
+    observer = Observer(FLOWN, TIMING)
+    observer.start(0.0)
+    assert observer.step(PeerSeen("u0"), 0.5) == [], "who is there is being asked already"
+    observer.step(Heard(message(COORDINATOR, brief_of(FLOWN))), 2.0)
+
+    assert observer.step(PeerSeen("u1"), 5.0) == [Ask()]
+    assert observer.step(PeerSeen("u1"), 9.0) == []
+    assert observer.step(PeerSeen("stranger"), 15.0) == []
+
+
 def test_it_asks_again_when_a_token_that_was_gone_is_back_before_its_writer_was_lost() -> None:
     onlooker = Onlooker().running()
     onlooker.happen(PeerGone("u0"), 5.0)

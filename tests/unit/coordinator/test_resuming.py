@@ -414,7 +414,9 @@ def test_after_a_pause_of_its_own_it_asks_before_it_decides() -> None:
     coordinator.hear("u0", done("t0"), 160.5)
     assert coordinator.phase is EpochPhase.RUNNING
 
+    coordinator.answers = ()
     coordinator.happen(Learned(()))
+    coordinator.run_until(160.0 + short.relink_grace_s)
     assert coordinator.reason == "every task has ended"
 
 
@@ -437,7 +439,9 @@ def test_when_its_link_is_back_it_asks_before_it_decides() -> None:
     coordinator.hear("u0", done("t0"), 115.5)
     assert coordinator.phase is EpochPhase.RUNNING
 
+    coordinator.answers = ()
     coordinator.happen(Learned(()))
+    coordinator.run_until(115.0 + TIMING.relink_grace_s)
     assert coordinator.reason == "every task has ended"
 
 

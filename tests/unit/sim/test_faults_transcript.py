@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sim.faults.transcript import Transcript
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.wire.messages import (
     Board,
     Body,
@@ -18,6 +18,7 @@ from swarm.wire.messages import (
     Result,
     Stamp,
 )
+from tests.builders import order
 
 
 class Telling:
@@ -104,6 +105,14 @@ def test_a_task_that_is_done_may_be_left(told: Telling, uav: str) -> None:
 def test_a_task_that_is_withdrawn_may_be_left(told: Telling) -> None:
     told.claim("u0", "t0")
     told.say(COORDINATOR, Board("t0", 0, (0.0, 0.0, 0.0), 1.0, 0.0, None, True))
+    told.claim("u0", "t1")
+
+    assert told.broken == []
+
+
+def test_a_task_that_the_operator_withdraws_may_be_left(told: Telling) -> None:
+    told.claim("u0", "t0")
+    told.say(OPERATOR, order("t0", withdrawn=True))
     told.claim("u0", "t1")
 
     assert told.broken == []

@@ -68,7 +68,7 @@ def test_without_a_coordinator_pop_ups_are_done_all_the_same(
 
     assert status == 0
     assert len(found["done"]) == 8
-    assert sum("appeared" in line["text"] for line in found["story"]) > 1
+    assert sum("operator adds" in line["text"] for line in found["story"]) > 1
     assert any("coordinator lost" in line["text"] for line in found["story"])
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import logging
+import sys
+import threading
 
 import pytest
 import structlog
 
-from swarm.log import LogFormat, LogLevel, configure_logging, get_logger
+from swarm.log import LogFormat, LogLevel, configure_logging, get_logger, identify
 
 
 def test_json_has_one_object_per_line_with_its_context(capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,3 +97,53 @@ def test_dependencies_are_heard_from_warnings_on(capsys: pytest.CaptureFixture[s
     logging.getLogger("asyncio").warning("slow callback")
 
     assert capsys.readouterr().err == "WARNING asyncio: slow callback\n"
+
+
+def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, object]]:
+    return [json.loads(line) for line in capsys.readouterr().err.splitlines()]
+
+
+def test_every_line_of_a_process_carries_its_ids_on_every_thread(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    configure_logging(form=LogFormat.JSON, mission="m", uav="uav1")
+    identify(incarnation=7)
+    thread = threading.Thread(target=lambda: get_logger("bus").warning("stuck"))
+    thread.start()
+    thread.join()
+    logging.getLogger("dependency").warning("old %s", "name")
+    get_logger("core", mission="other").info("own goes first")
+
+    told = lines(capsys)
+    assert [each["event"] for each in told] == ["stuck", "old name", "own goes first"]
+    assert {each["uav"] for each in told} == {"uav1"}
+    assert {each["incarnation"] for each in told} == {7}
+    assert [each["mission"] for each in told] == ["m", "m", "other"]
+    assert all({"level", "module", "timestamp"} <= each.keys() for each in told)
+    assert all(str(each["timestamp"]).endswith("Z") for each in told)
+
+
+def test_the_ids_of_an_earlier_configuration_are_forgotten(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    configure_logging(form=LogFormat.JSON, mission="m")
+    configure_logging(form=LogFormat.JSON)
+    get_logger("x").info("begun")
+
+    assert "mission" not in lines(capsys)[0]
+
+
+def test_a_process_that_dies_of_an_exception_says_so_in_one_line_of_json(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    configure_logging(form=LogFormat.JSON, mission="m")
+    try:
+        raise ZeroDivisionError("a bug")
+    except ZeroDivisionError as fault:
+        sys.excepthook(type(fault), fault, fault.__traceback__)
+
+    (told,) = lines(capsys)
+    assert (told["event"], told["mission"]) == ("crashed", "m")
+    assert "ZeroDivisionError: a bug" in str(told["exception"])
+    configure_logging(form=LogFormat.LINES)
+    assert sys.excepthook is sys.__excepthook__

@@ -23,6 +23,7 @@ from swarm.events import (
     PeerGone,
     PeerSeen,
     Publish,
+    PublishLast,
     Save,
     Stop,
     Tick,
@@ -34,7 +35,7 @@ from swarm.wire.codec import Codec, encode
 from swarm.wire.digest import decode_digest, encode_digest
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
-from tests.builders import MISSION, brief, done, entry, epoch, held, message, status, uav
+from tests.builders import MISSION, brief, choice, done, entry, epoch, held, message, status, uav
 from tests.shell_play import HandClock, play, take_until, until
 
 KEYS = Keys(MISSION)
@@ -162,6 +163,29 @@ def test_every_register_that_is_said_is_heard(said: Message) -> None:
             played.other.publish(said.key, encode(said))
             await until(lambda: Heard(said) in core.heard, "hearing it")
             assert played.shell.dropped == {}
+
+    play(scenario)
+
+
+def test_what_is_said_last_is_put_together_after_all_else_and_heard_by_onlookers() -> None:
+    said = message("u0", choice("t0"))
+
+    async def scenario() -> None:
+        made: list[list[str]] = []
+
+        def make() -> Message:
+            made.append(list(played.own))
+            return said
+
+        core = ScriptedCore(
+            lambda fact: [Own("first"), PublishLast(make)] if fact == Tick() else ()
+        )
+        async with at_work(core) as played:
+            played.shell.step(Tick())
+            heard = Sample(said.key, encode(said))
+            await take_until(played.other, lambda events: heard in events)
+
+            assert made == [["first"]]
 
     play(scenario)
 

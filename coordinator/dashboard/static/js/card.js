@@ -54,9 +54,33 @@ export class Card {
 
   #frame(row) {
     this.known = new Map();
-    this.parts = new Map(["state", "actions", "facts", "lists", "choices"].map((name) => [name, make("div", { class: `card-${name}` })]));
-    const close = make("button", { type: "button", class: "quiet", "aria-label": "Close", title: "Close (Esc)", click: () => this.on.close() }, "×");
-    const centre = make("button", { type: "button", class: "quiet", title: "Bring it to the middle of the map", click: () => this.on.centre(this.#row()?.position) }, "Show on map");
+    this.parts = new Map(
+      ["state", "actions", "facts", "lists", "choices"].map((name) => [
+        name,
+        make("div", { class: `card-${name}` }),
+      ]),
+    );
+    const close = make(
+      "button",
+      {
+        type: "button",
+        class: "quiet",
+        "aria-label": "Close",
+        title: "Close (Esc)",
+        click: () => this.on.close(),
+      },
+      "×",
+    );
+    const centre = make(
+      "button",
+      {
+        type: "button",
+        class: "quiet",
+        title: "Bring it to the middle of the map",
+        click: () => this.on.centre(this.#row()?.position),
+      },
+      "Show on map",
+    );
     const name = make("h2", {}, row.id);
     if (this.of.kind === "uav") {
       const dot = make("i", { class: "dot", "aria-hidden": "true" });
@@ -64,8 +88,13 @@ export class Card {
       name.prepend(dot);
     }
     this.element.setAttribute("aria-label", `${this.of.kind === "uav" ? "UAV" : "Task"} ${row.id}`);
-    this.element.replaceChildren(make("header", {}, name, this.parts.get("state"), make("span", { class: "gap" }), centre, close),
-      this.parts.get("actions"), this.parts.get("facts"), this.parts.get("lists"), this.parts.get("choices"));
+    this.element.replaceChildren(
+      make("header", {}, name, this.parts.get("state"), make("span", { class: "gap" }), centre, close),
+      this.parts.get("actions"),
+      this.parts.get("facts"),
+      this.parts.get("lists"),
+      this.parts.get("choices"),
+    );
   }
 
   #uav(row) {
@@ -83,7 +112,12 @@ export class Card {
       ["Rule", picture.head?.rule ?? NOTHING],
       ["Place", place(row.position)],
       origin && row.position ? ["WGS84", degrees(degreesOf(origin, row.position))] : null,
-      ["Speed", row.velocity ? `${number(Math.hypot(...row.velocity))} of ${number(described.speed_m_s)} m/s` : `${number(described.speed_m_s)} m/s at most`],
+      [
+        "Speed",
+        row.velocity
+          ? `${number(Math.hypot(...row.velocity))} of ${number(described.speed_m_s)} m/s`
+          : `${number(described.speed_m_s)} m/s at most`,
+      ],
       ["Battery", percent(row.battery)],
       ["Heard", row.silent_s === null ? "never" : `${seconds(row.silent_s)} ago`],
       described.kind ? ["Kind", described.kind] : null,
@@ -97,8 +131,11 @@ export class Card {
       ["state", [row.does, row.lost], () => this.#drawn(drawDoing, row)],
       ["actions", [row.does, row.claim, row.lost, this.operator.able], () => this.#uavActions(row)],
       ["facts", facts.map(([title, value, key]) => [title, key ?? String(value)]), () => definition(facts)],
-      ["lists", [list, sets, task?.state], () => [
-        this.#chips("Planned", list.planned), this.#chips("Flown", list.flown)]],
+      [
+        "lists",
+        [list, sets, task?.state],
+        () => [this.#chips("Planned", list.planned), this.#chips("Flown", list.flown)],
+      ],
       ["choices", this.#choicesKey(), () => this.#choices()],
     ];
   }
@@ -106,7 +143,9 @@ export class Card {
   #task(row) {
     const { picture } = this;
     const { origin } = picture.mission ?? {};
-    const planners = [...picture.lists.values()].filter((list) => list.planned.includes(row.id)).map((list) => list.uav);
+    const planners = [...picture.lists.values()]
+      .filter((list) => list.planned.includes(row.id))
+      .map((list) => list.uav);
     const state = taskState(row);
     const who = { taken: "Taken by", done: "Done by", failed: "Failed by" }[state] ?? "UAV";
     const facts = [
@@ -137,9 +176,16 @@ export class Card {
   #uavActions(row) {
     if (!this.operator.able) return [];
     const gone = ["home", "out", "lost", "absent", "returning"].includes(row.does);
-    const action = (kind, title, off) => make("button", { type: "button", disabled: off, click: () => this.operator.command(kind, row.id) }, title);
+    const action = (kind, title, off) =>
+      make(
+        "button",
+        { type: "button", disabled: off, click: () => this.operator.command(kind, row.id) },
+        title,
+      );
     return [
-      row.does === "holding" ? action("resume", "Resume", false) : action("hold", "Hold", gone && row.does !== "returning"),
+      row.does === "holding"
+        ? action("resume", "Resume", false)
+        : action("hold", "Hold", gone && row.does !== "returning"),
       row.does === "holding" ? null : action("resume", "Resume", row.claim !== "paused"),
       action("return", "Return home", gone),
     ];
@@ -147,7 +193,13 @@ export class Card {
 
   #taskActions(row) {
     if (!this.operator.able) return [];
-    return [make("button", { type: "button", disabled: row.state !== "open", click: () => this.operator.withdraw(row.id) }, "Withdraw")];
+    return [
+      make(
+        "button",
+        { type: "button", disabled: row.state !== "open", click: () => this.operator.withdraw(row.id) },
+        "Withdraw",
+      ),
+    ];
   }
 
   #chips(title, ids) {
@@ -161,19 +213,37 @@ export class Card {
       button.setAttribute("aria-label", `${id}, ${state}`);
       return make("li", {}, button);
     });
-    return make("section", {}, make("h3", {}, `${title} ${ids.length}`), make("ol", { class: "chips" }, ...chips));
+    return make(
+      "section",
+      {},
+      make("h3", {}, `${title} ${ids.length}`),
+      make("ol", { class: "chips" }, ...chips),
+    );
   }
 
   #choicesKey() {
-    return this.picture.choices.filter((choice) => concerns(choice, this.of)).slice(-LAST_CHOICES).map((choice) => choice.n);
+    return this.picture.choices
+      .filter((choice) => concerns(choice, this.of))
+      .slice(-LAST_CHOICES)
+      .map((choice) => choice.n);
   }
 
   #choices() {
     const mine = this.picture.choices.filter((choice) => concerns(choice, this.of)).reverse();
     if (!mine.length) return [];
-    const more = make("button", { type: "button", class: "link", click: () => this.on.choices(this.of) }, mine.length > LAST_CHOICES ? `all ${mine.length}` : "in the log");
-    return [make("h3", {}, "Last decisions ", more),
-      make("ol", { class: "log choices" }, ...mine.slice(0, LAST_CHOICES).map((choice) => make("li", {}, choiceDetails(choice, this.on.select))))];
+    const more = make(
+      "button",
+      { type: "button", class: "link", click: () => this.on.choices(this.of) },
+      mine.length > LAST_CHOICES ? `all ${mine.length}` : "in the log",
+    );
+    return [
+      make("h3", {}, "Last decisions ", more),
+      make(
+        "ol",
+        { class: "log choices" },
+        ...mine.slice(0, LAST_CHOICES).map((choice) => make("li", {}, choiceDetails(choice, this.on.select))),
+      ),
+    ];
   }
 
   #go(kind, id) {
@@ -182,5 +252,9 @@ export class Card {
 }
 
 function definition(facts) {
-  return make("dl", { class: "facts" }, ...facts.map(([title, value]) => make("div", {}, make("dt", {}, title), make("dd", {}, value))));
+  return make(
+    "dl",
+    { class: "facts" },
+    ...facts.map(([title, value]) => make("div", {}, make("dt", {}, title), make("dd", {}, value))),
+  );
 }

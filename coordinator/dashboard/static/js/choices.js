@@ -13,7 +13,11 @@ export class ChoiceLog {
     Object.assign(this, { picture, onSelect });
     this.of = null;
     this.caption = make("p", { class: "caption" });
-    this.all = make("button", { type: "button", class: "pill", hidden: true, click: () => this.filter(null) }, "Show all");
+    this.all = make(
+      "button",
+      { type: "button", class: "pill", hidden: true, click: () => this.filter(null) },
+      "Show all",
+    );
     this.list = make("ol", { class: "log choices", "aria-label": "Decisions, newest first" });
     this.empty = make("p", { class: "empty" }, "No UAV has chosen a task yet.");
     panel.append(
@@ -43,7 +47,10 @@ export class ChoiceLog {
   }
 
   #rebuild() {
-    const shown = this.picture.choices.filter((choice) => concerns(choice, this.of)).slice(-SHOWN).reverse();
+    const shown = this.picture.choices
+      .filter((choice) => concerns(choice, this.of))
+      .slice(-SHOWN)
+      .reverse();
     const open = new Set([...this.list.querySelectorAll("details[open]")].map((each) => each.dataset.n));
     this.list.replaceChildren(...shown.map((choice) => this.#line(choice, open.has(String(choice.n)))));
     this.#caption();
@@ -52,7 +59,10 @@ export class ChoiceLog {
   #caption() {
     const { of } = this;
     this.empty.hidden = this.list.children.length > 0;
-    setText(this.caption, of === null ? "Who chose what, and why" : `Choices ${of.kind === "uav" ? "of" : "about"} ${of.id}`);
+    setText(
+      this.caption,
+      of === null ? "Who chose what, and why" : `Choices ${of.kind === "uav" ? "of" : "about"} ${of.id}`,
+    );
   }
 
   #line(choice, open = false) {
@@ -69,13 +79,23 @@ export function concerns(choice, of) {
 
 /** One choice: its line, and all about it once it is unfolded. */
 export function choiceDetails(choice, onSelect, open = false) {
-  const details = make("details", { "data-n": String(choice.n) },
-    make("summary", {},
+  const details = make(
+    "details",
+    { "data-n": String(choice.n) },
+    make(
+      "summary",
+      {},
       make("time", {}, seconds(choice.mission_s)),
-      make("b", {}, choice.uav), " → ", make("b", {}, choice.task),
+      make("b", {}, choice.uav),
+      " → ",
+      make("b", {}, choice.task),
       choice.left ? make("span", { class: "tag" }, `left ${choice.left}`) : null,
       make("span", { class: "lead" }, lead(choice)),
-      choice.certificate ? make("span", { class: "tag good", title: "Theorem 5 proves it" }, "✓ proven") : null));
+      choice.certificate
+        ? make("span", { class: "tag good", title: "Theorem 5 proves it" }, "✓ proven")
+        : null,
+    ),
+  );
   const unfold = () => details.children.length > 1 || details.append(body(choice, onSelect));
   details.addEventListener("toggle", unfold);
   if (open) {
@@ -89,24 +109,59 @@ export function choiceDetails(choice, onSelect, open = false) {
 function lead({ score, second_score: second }) {
   if (second === null) return "nothing else to take";
   const by = score - second;
-  const share = Math.abs(second) > 1e-9 ? ` (${(100 * by / Math.abs(second)).toFixed(1)} %)` : "";
+  const share = Math.abs(second) > 1e-9 ? ` (${((100 * by) / Math.abs(second)).toFixed(1)} %)` : "";
   return `+${number(by, 2)}${share}`.replace("+-", "−");
 }
 
 function body(choice, onSelect) {
-  const go = (kind, id) => make("button", { type: "button", class: "link", click: () => onSelect(kind, id) }, id);
-  const told = [make("p", {}, go("uav", choice.uav), ` took `, go("task", choice.task),
-    ` by the rule ${choice.rule}, rank ${choice.rank} of epoch ${choice.epoch}; it expected to be done at ${seconds(choice.completion_s)}.`)];
-  if (choice.left) told.push(make("p", {}, "It turned aside from ", go("task", choice.left), " in flight: the whole team gains by it."));
-  told.push(make("p", {}, choice.second_score === null
-    ? "There was no other task to take."
-    : `Score ${number(choice.score, 2)}, second best ${number(choice.second_score, 2)}.`));
-  told.push(make("p", {}, choice.certificate
-    ? "Certificate: by Theorem 5 the greedy choice is also the best beginning of this UAV's whole tour."
-    : "No certificate: Theorem 5 does not settle this choice; its score does."));
+  const go = (kind, id) =>
+    make("button", { type: "button", class: "link", click: () => onSelect(kind, id) }, id);
+  const told = [
+    make(
+      "p",
+      {},
+      go("uav", choice.uav),
+      ` took `,
+      go("task", choice.task),
+      ` by the rule ${choice.rule}, rank ${choice.rank + 1} of epoch ${choice.epoch}; it expected to be done at ${seconds(choice.completion_s)}.`,
+    ),
+  ];
+  if (choice.left)
+    told.push(
+      make(
+        "p",
+        {},
+        "It turned aside from ",
+        go("task", choice.left),
+        " in flight: the whole team gains by it.",
+      ),
+    );
+  told.push(
+    make(
+      "p",
+      {},
+      choice.second_score === null
+        ? "There was no other task to take."
+        : `Score ${number(choice.score, 2)}, second best ${number(choice.second_score, 2)}.`,
+    ),
+  );
+  told.push(
+    make(
+      "p",
+      {},
+      choice.certificate
+        ? "Certificate: by Theorem 5 the greedy choice is also the best beginning of this UAV's whole tour."
+        : "No certificate: Theorem 5 does not settle this choice; its score does.",
+    ),
+  );
   const { candidates } = choice;
-  return make("div", { class: "unfolded" }, ...told, candidates.length ? bars(choice, go) : null,
-    make("p", { class: "fine" }, `Decision ${choice.id}`));
+  return make(
+    "div",
+    { class: "unfolded" },
+    ...told,
+    candidates.length ? bars(choice, go) : null,
+    make("p", { class: "fine" }, `Decision ${choice.id}`),
+  );
 }
 
 /** Candidates as bars; where all are close the bars begin later, and say so. */
@@ -119,12 +174,19 @@ function bars({ candidates, task }, go) {
   const rows = candidates.map((each) => {
     const bar = make("i", { "aria-hidden": "true" });
     bar.style.width = `${width(each.score).toFixed(1)}%`;
-    return make("tr", { class: each.task === task ? "taken" : null },
+    return make(
+      "tr",
+      { class: each.task === task ? "taken" : null },
       make("th", { scope: "row" }, go("task", each.task)),
       make("td", { class: "bar" }, bar),
       make("td", {}, number(each.score, 2)),
-      make("td", {}, each.score === best ? "best" : `−${number(best - each.score, 2)}`));
+      make("td", {}, each.score === best ? "best" : `−${number(best - each.score, 2)}`),
+    );
   });
-  return make("table", { class: "bars" },
-    make("caption", {}, `Candidates and scores${close ? `; bars begin at ${number(begin, 1)}` : ""}`), ...rows);
+  return make(
+    "table",
+    { class: "bars" },
+    make("caption", {}, `Candidates and scores${close ? `; bars begin at ${number(begin, 1)}` : ""}`),
+    ...rows,
+  );
 }

@@ -35,9 +35,9 @@ export function inks() {
 }
 
 const THEMES = [
-  [null, "Auto", "Colours: as the system has them"],
-  ["light", "Light", "Colours: light"],
-  ["dark", "Dark", "Colours: dark"],
+  [null, "◐", "Colours: as the system has them"],
+  ["light", "○", "Colours: light"],
+  ["dark", "●", "Colours: dark"],
 ];
 const KEPT_AS = "peckorder.theme";
 

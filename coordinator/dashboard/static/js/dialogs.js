@@ -3,14 +3,28 @@
 import { make, setText } from "./dom.js";
 import { Refusal, post, token } from "./say.js";
 
+let asked = 0;
+
 /** A labelled field. */
 export function field(label, input, hint = null) {
-  return make("label", { class: "field" }, make("span", {}, label), input, hint ? make("small", {}, hint) : null);
+  return make(
+    "label",
+    { class: "field" },
+    make("span", {}, label),
+    input,
+    hint ? make("small", {}, hint) : null,
+  );
 }
 
 /** The field for the operator's reason, which goes into the log. */
 export function reasonField() {
-  return make("input", { name: "reason", type: "text", maxlength: "200", autocomplete: "off", placeholder: "goes into the log" });
+  return make("input", {
+    name: "reason",
+    type: "text",
+    maxlength: "200",
+    autocomplete: "off",
+    placeholder: "goes into the log",
+  });
 }
 
 /**
@@ -24,14 +38,28 @@ export function reasonField() {
  * @param send takes FormData.
  */
 export function ask({ title, text, fields = [], confirm, danger = false, send }) {
+  asked += 1;
+  const id = `dialog-${asked}`;
   return new Promise((resolve) => {
     const fault = make("p", { class: "fault", role: "alert" });
-    const yes = make("button", { type: "submit", class: danger ? "danger" : "primary" }, confirm);
+    // Fields are for who wants them: on a touch screen no keyboard covers half of the question.
+    const touch = window.matchMedia("(pointer: coarse)").matches;
+    const yes = make(
+      "button",
+      { type: "submit", class: danger ? "danger" : "primary", autofocus: touch },
+      confirm,
+    );
     const no = make("button", { type: "button", click: () => dialog.close() }, "Cancel");
-    const form = make("form", { method: "dialog" },
-      make("h2", { id: "dialog-title" }, title), text ? make("p", {}, text) : null, ...fields, fault,
-      make("menu", {}, no, yes));
-    const dialog = make("dialog", { "aria-labelledby": "dialog-title" }, form);
+    const form = make(
+      "form",
+      { method: "dialog" },
+      make("h2", { id }, title),
+      text ? make("p", {}, text) : null,
+      ...fields,
+      fault,
+      make("menu", {}, no, yes),
+    );
+    const dialog = make("dialog", { "aria-labelledby": id }, form);
     let told = null;
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
@@ -55,27 +83,51 @@ export function ask({ title, text, fields = [], confirm, danger = false, send })
   });
 }
 
-/** Posts, asking for the token first where the server wants one, and again if it was wrong. */
-export async function postWithToken(path, body, wanted) {
-  if (wanted && !token.get() && !(await askToken("This server takes commands only with the operator's token."))) {
-    throw new Refusal(401, "Nothing was sent: no token was given.");
-  }
+/** Posts, and asks for the token again if the server did not take the one there is. */
+export async function postWithToken(path, body) {
   for (;;) {
     try {
       return await post(path, body, token.get());
     } catch (error) {
       if (!(error instanceof Refusal) || error.status !== 401) throw error;
-      token.set(null);
-      if (!(await askToken("The server did not accept that token."))) throw new Refusal(401, "Nothing was done: the token is missing or wrong.");
+      if ((await theToken(true)) === null)
+        throw new Refusal(401, "Nothing was done: the token is missing or wrong.");
     }
   }
 }
+
+/** The token of this tab, asked for where there is none or it was wrong; null without any. */
+export async function theToken(wrong) {
+  if (wrong) token.set(null);
+  if (token.get()) return token.get();
+  asking ??= askToken(
+    wrong
+      ? "The server did not accept that token."
+      : "This server shows and commands a mission only to who has its token.",
+  );
+  await asking;
+  asking = null;
+  return token.get();
+}
+
+let asking = null;
 
 function askToken(text) {
   return ask({
     title: "Operator token",
     text: `${text} It is printed where the dashboard was started, and kept in this tab only.`,
-    fields: [field("Token", make("input", { name: "token", type: "password", required: true, autocomplete: "off", spellcheck: "false" }))],
+    fields: [
+      field(
+        "Token",
+        make("input", {
+          name: "token",
+          type: "password",
+          required: true,
+          autocomplete: "off",
+          spellcheck: "false",
+        }),
+      ),
+    ],
     confirm: "Use it",
     send: async (form) => {
       token.set(form.get("token").trim());

@@ -42,7 +42,9 @@ export function draw(tag, properties = {}, ...children) {
 /** Whether a key press is meant for a field and not for the page. */
 export function isTyping(event) {
   const where = event.target;
-  return where instanceof HTMLElement
-    && (where.matches("input:not([type=range]):not([type=checkbox]), textarea, select")
-      || where.closest("dialog") !== null);
+  return (
+    where instanceof HTMLElement &&
+    (where.matches("input:not([type=range]):not([type=checkbox]), textarea, select") ||
+      where.closest("dialog") !== null)
+  );
 }

@@ -2,6 +2,8 @@
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
+/** Close code of a server that wants another token. */
+const WRONG_TOKEN = 4401;
 /** A feed that has told frames tells two a second; after this long its server hangs. */
 const SILENCE_MS = 5000;
 
@@ -9,10 +11,13 @@ export class Feed {
   /**
    * @param onMessage called with every message.
    * @param onState called with "connecting", "open" or "lost".
+   * @param askToken resolves to the token, or to null when the person has none; takes whether the
+   *     last one was wrong.
    */
-  constructor(onMessage, onState) {
-    this.onMessage = onMessage;
-    this.onState = onState;
+  constructor(onMessage, onState, askToken) {
+    Object.assign(this, { onMessage, onState, askToken });
+    /** Why the server has ended, as it said itself; null for any other end of the connection. */
+    this.ended = null;
     /** Wall time since which there is no connection; null while there is one. */
     this.lostSince = null;
     this.url = new URL("feed", document.baseURI);
@@ -29,7 +34,21 @@ export class Feed {
     this.socket = socket;
     this.heardAt = null;
     socket.onmessage = (event) => this.#hear(socket, event.data);
-    socket.onclose = () => this.#lose(socket);
+    socket.onclose = (event) => this.#lose(socket, event.code === WRONG_TOKEN && this.given === socket);
+  }
+
+  /** Gives the token where one is wanted; without one nothing comes. */
+  async #introduce(socket) {
+    const token = await this.askToken(this.refused ?? false);
+    this.refused = false;
+    if (token === null || socket.readyState !== WebSocket.OPEN) return;
+    this.given = socket;
+    socket.send(JSON.stringify({ type: "token", token }));
+  }
+
+  /** Asks for the token once more, after the person had none. */
+  introduceAgain() {
+    if (this.socket) this.#introduce(this.socket);
   }
 
   #hear(socket, data) {
@@ -44,14 +63,18 @@ export class Feed {
     if (message.type === "hello") {
       this.waitMs = FIRST_WAIT_MS;
       this.lostSince = null;
+      this.ended = null;
       this.onState("open");
+      if (message.token) this.#introduce(socket);
     }
+    if (message.type === "end") this.ended = message.reason;
     if (message.type === "frame") this.heardAt = performance.now();
     this.onMessage(message);
   }
 
-  #lose(socket) {
+  #lose(socket, refused = false) {
     if (socket !== this.socket) return;
+    this.refused = refused;
     this.socket = null;
     this.lostSince ??= Date.now();
     this.onState("lost");

@@ -27,21 +27,35 @@ export class Finder {
 
   #look() {
     const wanted = this.input.value.trim().toLowerCase();
-    this.found = wanted ? [...this.#matches("uav", this.picture.uavs, wanted), ...this.#matches("task", this.picture.tasks, wanted)].slice(0, MOST) : [];
+    this.found = wanted
+      ? [
+          ...this.#matches("uav", this.picture.uavs, wanted),
+          ...this.#matches("task", this.picture.tasks, wanted),
+        ].slice(0, MOST)
+      : [];
     this.chosen = 0;
     this.#show();
   }
 
   #matches(kind, rows, wanted) {
     const rank = (id) => (id.toLowerCase() === wanted ? 0 : id.toLowerCase().startsWith(wanted) ? 1 : 2);
-    return [...rows.keys()].filter((id) => id.toLowerCase().includes(wanted))
-      .sort((one, other) => rank(one) - rank(other) || byName(one, other)).map((id) => [kind, id]);
+    return [...rows.keys()]
+      .filter((id) => id.toLowerCase().includes(wanted))
+      .sort((one, other) => rank(one) - rank(other) || byName(one, other))
+      .map((id) => [kind, id]);
   }
 
   #show() {
-    this.list.replaceChildren(...this.found.map(([kind, id], index) =>
-      make("li", { role: "option", id: `found-${index}`, "aria-selected": String(index === this.chosen) },
-        id, make("small", {}, kind === "uav" ? "UAV" : "task"))));
+    this.list.replaceChildren(
+      ...this.found.map(([kind, id], index) =>
+        make(
+          "li",
+          { role: "option", id: `found-${index}`, "aria-selected": String(index === this.chosen) },
+          id,
+          make("small", {}, kind === "uav" ? "UAV" : "task"),
+        ),
+      ),
+    );
     this.list.hidden = !this.found.length;
     setAttribute(this.input, "aria-expanded", String(this.found.length > 0));
     setAttribute(this.input, "aria-activedescendant", this.found.length ? `found-${this.chosen}` : null);

@@ -10,6 +10,7 @@ const LONG_SILENCE_S = 3;
 
 export class FleetTable {
   constructor(panel, picture, onSelect) {
+    this.panel = panel;
     this.picture = picture;
     const done = (row) => picture.lists.get(row.id)?.flown.length ?? 0;
     this.grid = new Grid(panel, {
@@ -18,25 +19,65 @@ export class FleetTable {
       onSelect: (id) => onSelect("uav", id),
       decorate: (slot, row) => setAttribute(slot, "data-trouble", isTroubled(row) ? "" : null),
       columns: [
-        { id: "uav", title: "UAV", value: (row) => row.id, rank: (row) => row.id, draw: (cell, row) => this.#drawName(cell, row) },
+        {
+          id: "uav",
+          title: "UAV",
+          value: (row) => row.id,
+          rank: (row) => row.id,
+          draw: (cell, row) => this.#drawName(cell, row),
+        },
         { id: "does", title: "Does", value: doing, rank: doing, draw: drawDoing },
         { id: "task", title: "Task", value: (row) => row.task ?? NOTHING, rank: (row) => row.task },
-        { id: "eta", title: "In", hint: "Until its task is done", value: (row) => seconds(row.eta_s), rank: (row) => row.eta_s },
-        { id: "battery", title: "Battery", value: (row) => percent(row.battery), rank: (row) => row.battery, draw: drawBattery },
-        { id: "heard", title: "Heard", hint: "How long ago it last said something", value: heard, rank: (row) => row.silent_s, draw: drawHeard },
-        { id: "done", title: "Done", hint: "Tasks it has done", value: (row) => String(done(row)), rank: done },
-        { id: "place", title: "Place", hint: "Metres east and north", value: where, rank: (row) => row.position?.[0] ?? null },
+        {
+          id: "eta",
+          title: "In",
+          hint: "Until its task is done",
+          value: (row) => seconds(row.eta_s),
+          rank: (row) => row.eta_s,
+        },
+        {
+          id: "battery",
+          title: "Battery",
+          value: (row) => percent(row.battery),
+          rank: (row) => row.battery,
+          draw: drawBattery,
+        },
+        {
+          id: "heard",
+          title: "Heard",
+          hint: "How long ago it last said something",
+          value: heard,
+          rank: (row) => row.silent_s,
+          draw: drawHeard,
+        },
+        {
+          id: "done",
+          title: "Done",
+          hint: "Tasks it has done",
+          value: (row) => String(done(row)),
+          rank: done,
+        },
         { id: "note", title: "Note", value: note, draw: drawNote },
+        {
+          id: "place",
+          title: "Place",
+          hint: "Metres east and north",
+          value: where,
+          rank: (row) => row.position?.[0] ?? null,
+        },
       ],
     });
   }
 
   show() {
+    if (this.panel.hidden) return;
     const rank = new Map((this.picture.head?.sequence ?? []).map((id, index) => [id, index]));
     const last = rank.size;
-    this.grid.show([...this.picture.uavs.values()].sort(
-      (one, other) => (rank.get(one.id) ?? last) - (rank.get(other.id) ?? last) || byName(one.id, other.id),
-    ));
+    this.grid.show(
+      [...this.picture.uavs.values()].sort(
+        (one, other) => (rank.get(one.id) ?? last) - (rank.get(other.id) ?? last) || byName(one.id, other.id),
+      ),
+    );
   }
 
   #drawName(cell, row) {
@@ -63,7 +104,9 @@ function doing(row) {
 /** Sign and word of what a UAV does. */
 export function drawDoing(cell, row) {
   const [sign, mood] = DOES[doing(row)] ?? ["○", "rest"];
-  cell.replaceChildren(make("span", { class: `state ${mood}` }, make("i", { "aria-hidden": "true" }, sign), doing(row)));
+  cell.replaceChildren(
+    make("span", { class: `state ${mood}` }, make("i", { "aria-hidden": "true" }, sign), doing(row)),
+  );
 }
 
 function drawBattery(cell, row, text) {

@@ -10,19 +10,34 @@ const SPARE_ROWS = 4;
  * what room is left.
  */
 export class Grid {
-  constructor(host, { label, columns, rowHeight = 30, onSelect, decorate = () => {}, empty = "Nothing yet." }) {
+  constructor(
+    host,
+    { label, columns, rowHeight = 30, onSelect, decorate = () => {}, empty = "Nothing yet." },
+  ) {
     Object.assign(this, { columns, rowHeight, onSelect, decorate });
     this.rows = [];
     this.selected = null;
     this.active = 0;
     this.sorted = null;
     this.slots = [];
-    this.before = make("tr", { class: "spacer", "aria-hidden": "true" }, make("td", { colspan: columns.length }));
-    this.after = make("tr", { class: "spacer", "aria-hidden": "true" }, make("td", { colspan: columns.length }));
+    this.before = make(
+      "tr",
+      { class: "spacer", "aria-hidden": "true" },
+      make("td", { colspan: columns.length }),
+    );
+    this.after = make(
+      "tr",
+      { class: "spacer", "aria-hidden": "true" },
+      make("td", { colspan: columns.length }),
+    );
     this.body = make("tbody", {}, this.before, this.after);
     this.heads = columns.map((column) => this.#head(column));
-    this.table = make("table", { role: "grid", "aria-label": label, class: "grid" },
-      make("thead", {}, make("tr", { role: "row" }, ...this.heads)), this.body);
+    this.table = make(
+      "table",
+      { role: "grid", "aria-label": label, class: "grid" },
+      make("thead", {}, make("tr", { role: "row" }, ...this.heads)),
+      this.body,
+    );
     this.empty = make("p", { class: "empty" }, empty);
     this.scroller = make("div", { class: "scroller" }, this.table, this.empty);
     this.scroller.addEventListener("scroll", () => this.#render(), { passive: true });
@@ -89,20 +104,31 @@ export class Grid {
     if (!height) return;
     const fit = Math.ceil(height / this.rowHeight) + 2 * SPARE_ROWS;
     const most = Math.max(0, this.rows.length - fit);
-    const first = Math.min(most, Math.max(0, Math.floor(this.scroller.scrollTop / this.rowHeight) - SPARE_ROWS));
+    const first = Math.min(
+      most,
+      Math.max(0, Math.floor(this.scroller.scrollTop / this.rowHeight) - SPARE_ROWS),
+    );
     const shown = Math.min(fit, this.rows.length);
-    const held = this.body.contains(document.activeElement);
+    const held = this.slots.indexOf(document.activeElement);
     while (this.slots.length < shown) this.slots.push(this.#slot());
     while (this.slots.length > shown) this.slots.pop().remove();
+    // Who has scrolled away from the row that has the focus goes on from what is there now.
+    if (held >= 0 && (this.active < first || this.active >= first + shown)) {
+      this.active = first + Math.min(held, shown - 1);
+    }
     this.slots.forEach((slot, index) => this.#fill(slot, first + index));
     this.before.style.height = `${first * this.rowHeight}px`;
     this.after.style.height = `${(this.rows.length - first - shown) * this.rowHeight}px`;
     this.first = first;
-    if (held && this.#slotOf(this.active) !== document.activeElement) this.#slotOf(this.active)?.focus({ preventScroll: true });
+    if (held >= 0) this.#slotOf(this.active)?.focus({ preventScroll: true });
   }
 
   #slot() {
-    const slot = make("tr", { role: "row" }, ...this.columns.map((column) => make("td", { class: `col-${column.id}`, role: "gridcell" })));
+    const slot = make(
+      "tr",
+      { role: "row" },
+      ...this.columns.map((column) => make("td", { class: `col-${column.id}`, role: "gridcell" })),
+    );
     this.after.before(slot);
     return slot;
   }
@@ -160,7 +186,14 @@ export class Grid {
 
   #key(event) {
     const page = Math.max(1, Math.floor(this.scroller.clientHeight / this.rowHeight) - 2);
-    const steps = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity };
+    const steps = {
+      ArrowDown: 1,
+      ArrowUp: -1,
+      PageDown: page,
+      PageUp: -page,
+      Home: -Infinity,
+      End: Infinity,
+    };
     if (event.key === "Enter" || event.key === " ") {
       event.preventDefault();
       this.onSelect(this.rows[this.active].id);

@@ -19,23 +19,63 @@ export const KEYS = [
 ];
 
 const WORDS = {
-  open: "waiting", taken: "a UAV is on its way or at it", done: "done", failed: "failed", withdrawn: "taken off the board",
+  open: "waiting",
+  taken: "a UAV is on its way or at it",
+  done: "done",
+  failed: "failed",
+  withdrawn: "taken off the board",
 };
 
 export function showHelp() {
-  const keys = make("dl", { class: "keys" }, ...KEYS.map(([key, what]) => make("div", {}, make("dt", {}, make("kbd", {}, key)), make("dd", {}, what))));
-  const tasks = make("ul", { class: "signs" }, ...Object.entries(TASK_SIGNS).map(([state, sign]) =>
-    make("li", {}, make("span", { class: `state task-${state}` }, make("i", {}, sign), state), WORDS[state])));
-  const does = make("ul", { class: "signs" }, ...Object.entries(DOES).map(([what, [sign, mood]]) =>
-    make("li", {}, make("span", { class: `state ${mood}` }, make("i", {}, sign), what))));
-  const dialog = make("dialog", { class: "help", "aria-labelledby": "help-title" },
-    make("form", { method: "dialog" },
-      make("h2", { id: "help-title" }, "Keys and signs"), keys,
-      make("h3", {}, "Tasks"), tasks,
-      make("p", { class: "fine" }, "The larger a task, the greater its value; corners mark those that the operator added."),
-      make("h3", {}, "UAVs"), does,
-      make("p", { class: "fine" }, "Solid lines were flown, dashed ones are planned; the straight line from a UAV leads to its task."),
-      make("menu", {}, make("button", { class: "primary", autofocus: true }, "Close"))));
+  const keys = make(
+    "dl",
+    { class: "keys" },
+    ...KEYS.map(([key, what]) => make("div", {}, make("dt", {}, make("kbd", {}, key)), make("dd", {}, what))),
+  );
+  const tasks = make(
+    "ul",
+    { class: "signs" },
+    ...Object.entries(TASK_SIGNS).map(([state, sign]) =>
+      make(
+        "li",
+        {},
+        make("span", { class: `state task-${state}` }, make("i", {}, sign), state),
+        WORDS[state],
+      ),
+    ),
+  );
+  const does = make(
+    "ul",
+    { class: "signs" },
+    ...Object.entries(DOES).map(([what, [sign, mood]]) =>
+      make("li", {}, make("span", { class: `state ${mood}` }, make("i", {}, sign), what)),
+    ),
+  );
+  const dialog = make(
+    "dialog",
+    { class: "help", "aria-labelledby": "help-title" },
+    make(
+      "form",
+      { method: "dialog" },
+      make("h2", { id: "help-title" }, "Keys and signs"),
+      keys,
+      make("h3", {}, "Tasks"),
+      tasks,
+      make(
+        "p",
+        { class: "fine" },
+        "The larger a task, the greater its value; corners mark those that the operator added.",
+      ),
+      make("h3", {}, "UAVs"),
+      does,
+      make(
+        "p",
+        { class: "fine" },
+        "Solid lines were flown, dashed ones are planned; the straight line from a UAV leads to its task.",
+      ),
+      make("menu", {}, make("button", { class: "primary", autofocus: true }, "Close")),
+    ),
+  );
   dialog.addEventListener("close", () => dialog.remove());
   dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
   document.body.append(dialog);

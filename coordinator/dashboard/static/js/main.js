@@ -3,6 +3,7 @@
 import { Card } from "./card.js";
 import { ChoiceLog } from "./choices.js";
 import { themeSwitch } from "./colours.js";
+import { theToken } from "./dialogs.js";
 import { byId, isTyping, setText } from "./dom.js";
 import { Feed } from "./feed.js";
 import { Finder } from "./finder.js";
@@ -25,11 +26,15 @@ import { Worth } from "./worth.js";
 
 const picture = new Picture();
 const motion = new Motion();
-const feed = new Feed(hear, (state) => {
-  header.connection = state;
-});
+const feed = new Feed(
+  hear,
+  (state) => {
+    header.connection = state;
+  },
+  theToken,
+);
 const header = new Header(picture, feed);
-const tabs = new Tabs();
+const tabs = new Tabs(() => show(WHOLE));
 const map = new MissionMap(byId("map"), picture, motion, {
   select,
   place: (position) => tools.placed(position),
@@ -58,7 +63,18 @@ const finder = new Finder(picture, (kind, id) => {
   select(kind, id);
   card.element.focus();
 });
-const WHOLE = { whole: true, mission: true, uavs: new Set(), tasks: new Set(), lists: new Set(), commands: new Set(), story: [], choices: [] };
+// Everything is shown anew, though nothing new was told.
+const WHOLE = {
+  whole: true,
+  again: true,
+  mission: true,
+  uavs: new Set(),
+  tasks: new Set(),
+  lists: new Set(),
+  commands: new Set(),
+  story: [],
+  choices: [],
+};
 
 let serverVersion = null;
 let missedWhileHidden = false;
@@ -80,7 +96,21 @@ function hear(message) {
 }
 
 function show(changed) {
-  for (const part of [header, map, tools, fleet, tasks, choices, story, worth, order, operator, links, card, replay]) {
+  for (const part of [
+    header,
+    map,
+    tools,
+    fleet,
+    tasks,
+    choices,
+    story,
+    worth,
+    order,
+    operator,
+    links,
+    card,
+    replay,
+  ]) {
     part.show(changed);
   }
 }
@@ -88,11 +118,11 @@ function show(changed) {
 /** Chooses a UAV or a task everywhere on the page; null chooses nothing. */
 function select(kind, id) {
   const of = kind && (kind === "uav" ? picture.uavs : picture.tasks).has(id) ? { kind, id } : null;
+  card.select(of); // first, as it takes room from the lists
   map.select(of?.id ?? null);
   fleet.grid.select(of?.kind === "uav" ? of.id : null, true);
   tasks.grid.select(of?.kind === "task" ? of.id : null, true);
   links.grid.select(of?.kind === "uav" ? of.id : null, true);
-  card.select(of);
   tools.show();
 }
 
@@ -102,7 +132,9 @@ const KEYS = {
   f: () => map.fit(),
   l: () => tools.nextLists(),
   n: () => tools.place(),
-  c: () => card.of && card.on.centre((card.of.kind === "uav" ? picture.uavs : picture.tasks).get(card.of.id)?.position),
+  c: () =>
+    card.of &&
+    card.on.centre((card.of.kind === "uav" ? picture.uavs : picture.tasks).get(card.of.id)?.position),
 };
 
 document.addEventListener("keydown", (event) => {
@@ -112,7 +144,7 @@ document.addEventListener("keydown", (event) => {
   } else if (event.key === "Enter" && map.isPlacing && byId("map").contains(event.target)) {
     event.preventDefault();
     tools.placed(map.middle());
-  } else if (event.key === " " && event.target === document.body) {
+  } else if (event.key === " " && !event.target.closest("a, button, input, select, summary, tr")) {
     event.preventDefault();
     replay.toggle();
   } else if (event.key in KEYS) {
@@ -137,4 +169,5 @@ themeSwitch(byId("theme"), () => {
   order.recolour();
   if (card.of) card.select(card.of);
 });
+tabs.open("fleet");
 feed.open();

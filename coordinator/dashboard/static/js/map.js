@@ -9,7 +9,6 @@ import { number, place, taskState } from "./words.js";
 
 /** Least time between two pictures of what moves [ms]: 30 a second are smooth enough. */
 const BETWEEN_MS = 30;
-const LABELS_FOR = 40;
 
 export class MissionMap {
   /**
@@ -22,9 +21,21 @@ export class MissionMap {
     Object.assign(this, { container, picture, motion, on });
     this.projection = PLANE;
     this.map = window.L.map(container, {
-      crs: PLANE.crs(), center: [0, 0], zoom: 0, minZoom: -8, maxZoom: 9, zoomSnap: 0.25, zoomDelta: 0.5,
-      zoomControl: false, attributionControl: false, zoomAnimation: false, fadeAnimation: false,
-      inertia: !motion.still.matches, wheelPxPerZoomLevel: 90, boxZoom: false, doubleClickZoom: false,
+      crs: PLANE.crs(),
+      center: [0, 0],
+      zoom: 0,
+      minZoom: -8,
+      maxZoom: 9,
+      zoomSnap: 0.25,
+      zoomDelta: 0.5,
+      zoomControl: false,
+      attributionControl: false,
+      zoomAnimation: false,
+      fadeAnimation: false,
+      inertia: !motion.still.matches,
+      wheelPxPerZoomLevel: 90,
+      boxZoom: false,
+      doubleClickZoom: false,
     });
     this.scale = window.L.control.scale({ imperial: false, maxWidth: 120 }).addTo(this.map);
     this.credit = window.L.control.attribution({ prefix: false, position: "bottomright" });
@@ -49,7 +60,13 @@ export class MissionMap {
 
   /** Takes note of a frame. */
   show(changed) {
-    if (this.picture.mission && this.picture.head && this.fitted !== this.picture.mission.name && this.#places().length) this.fit();
+    if (
+      this.picture.mission &&
+      this.picture.head &&
+      this.fitted !== this.picture.mission.name &&
+      this.#places().length
+    )
+      this.fit();
     this.mostValue = Math.max(1e-9, ...[...this.picture.tasks.values()].map((task) => task.value));
     this.groundDirty = true;
     this.movingDirty = true;
@@ -110,7 +127,12 @@ export class MissionMap {
     if (!places.length) return;
     const bounds = window.L.latLngBounds(places.map((position) => this.projection.toLeaflet(position)));
     this.map.invalidateSize({ animate: false });
-    this.map.fitBounds(bounds, { padding: [38, 38], maxZoom: this.projection === PLANE ? 6 : 20, animate: false });
+    this.map.fitBounds(bounds, {
+      paddingTopLeft: [40, 56],
+      paddingBottomRight: [40, this.picture.hello?.kind === "replay" ? 100 : 40],
+      maxZoom: this.projection === PLANE ? 6 : 20,
+      animate: false,
+    });
     this.fitted = this.picture.mission?.name ?? null;
     this.#measure();
   }
@@ -157,7 +179,6 @@ export class MissionMap {
     const room = (size.x * size.y) / Math.max(8, this.picture.tasks.size);
     this.taskSize = Math.min(10, Math.max(3, Math.sqrt(room) / 9));
     this.uavSize = this.picture.uavs.size > 40 ? 8 : 11;
-    this.labels = this.picture.uavs.size <= 4 * LABELS_FOR;
   }
 
   #run(wallMs) {
@@ -192,7 +213,6 @@ export class MissionMap {
       size: this.taskSize,
       mostValue: this.mostValue ?? 1,
       uavSize: this.uavSize,
-      labels: this.labels,
       selected: this.selected,
       ghosts: this.ghosts,
       showsList: (uav) => which === "all" || (which === "selected" && uav === this.selected),
@@ -254,7 +274,9 @@ export class MissionMap {
     const uav = near(this.uavSpots, () => 14);
     if (uav) return ["uav", uav];
     const look = { size: this.taskSize, mostValue: this.mostValue };
-    const task = near(this.taskSpots, (id) => Math.max(11, taskRadius(this.picture.tasks.get(id)?.value ?? 0, look) + 4));
+    const task = near(this.taskSpots, (id) =>
+      Math.max(11, taskRadius(this.picture.tasks.get(id)?.value ?? 0, look) + 4),
+    );
     return task ? ["task", task] : null;
   }
 }

@@ -8,17 +8,45 @@ export class MapTools {
   constructor(map, picture, operator) {
     Object.assign(this, { map, picture, operator });
     const button = (text, title, key, click, more = {}) =>
-      make("button", { type: "button", title: key ? `${title} (${key})` : title, "aria-keyshortcuts": key, click, ...more }, text);
-    this.add = button("+ Task", "New task: then click its place", "n", () => this.place(), { "aria-pressed": "false", id: "add-task" });
+      make(
+        "button",
+        {
+          type: "button",
+          title: key ? `${title} (${key})` : title,
+          "aria-keyshortcuts": key,
+          click,
+          ...more,
+        },
+        text,
+      );
+    this.add = button("+ Task", "New task: then click its place", "n", () => this.place(), {
+      "aria-pressed": "false",
+      id: "add-task",
+    });
     this.lists = button("Lists", "Planned and flown lists on the map", "l", () => this.nextLists());
-    this.ground = button("Earth", "Map of the earth, or the mission's plane in metres", null, () => this.#ground(), { hidden: true, "aria-pressed": "false" });
+    this.ground = button(
+      "Earth",
+      "Map of the earth, or the mission's plane in metres",
+      null,
+      () => this.#ground(),
+      { hidden: true, "aria-pressed": "false" },
+    );
     byId("map-tools").append(
-      this.add, this.lists, this.ground,
+      this.add,
+      this.lists,
+      this.ground,
       button("Fit", "Show the whole mission", "f", () => map.fit()),
-      make("span", { class: "pair" },
+      make(
+        "span",
+        { class: "pair" },
         button("+", "Zoom in", null, () => map.zoom(1), { "aria-label": "Zoom in" }),
-        button("−", "Zoom out", null, () => map.zoom(-1), { "aria-label": "Zoom out" })));
-    byId("placing").append(make("span", {}), make("button", { type: "button", click: () => this.leave() }, "Cancel"));
+        button("−", "Zoom out", null, () => map.zoom(-1), { "aria-label": "Zoom out" }),
+      ),
+    );
+    byId("placing").append(
+      make("span", {}),
+      make("button", { type: "button", click: () => this.leave() }, "Cancel"),
+    );
     this.where = "";
   }
 
@@ -27,7 +55,10 @@ export class MapTools {
     this.add.hidden = !this.operator.able || !mission;
     this.add.disabled = Boolean(head?.aborted || head?.phase === "ended");
     this.ground.hidden = !this.map.hasEarth;
-    setText(this.lists, { all: "Lists: all", selected: "Lists: chosen", none: "Lists: none" }[this.map.listsShown]);
+    setText(
+      this.lists,
+      { all: "Lists: all", selected: "Lists: chosen", none: "Lists: none" }[this.map.listsShown],
+    );
     this.#legend();
   }
 
@@ -48,8 +79,8 @@ export class MapTools {
   /** Takes the place of a new task. */
   placed(position) {
     this.#mode(false);
-    this.map.expect([{ position, label: "new task" }]);
-    this.operator.addTask(position)?.then((n) => n === null && this.map.expect([]));
+    this.operator.expect({ position, label: "new task" });
+    this.operator.addTask(position)?.then((n) => n === null && this.operator.expect());
   }
 
   nextLists() {
@@ -79,7 +110,10 @@ export class MapTools {
     this.map.placing = on;
     setAttribute(this.add, "aria-pressed", String(on));
     byId("placing").hidden = !on;
-    setText(byId("placing").firstChild, on ? "Click the place of the new task, or bring it under the cross and press Enter." : "");
+    setText(
+      byId("placing").firstChild,
+      on ? "Click the place of the new task, or bring it under the cross and press Enter." : "",
+    );
     if (on) byId("map").focus({ preventScroll: true });
   }
 }

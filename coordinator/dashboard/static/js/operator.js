@@ -40,7 +40,11 @@ export class Operator {
   }
 
   show(changed) {
-    if (changed.whole) this.#forgetFormer();
+    if (changed.hello) this.renewed = true;
+    if (changed.whole && this.renewed && !changed.again) {
+      this.renewed = false;
+      this.#forgetFormer();
+    }
     if (!changed.whole && !changed.commands.size) return;
     const rows = [...this.picture.commands.values()].sort((one, other) => other.n - one.n);
     this.empty.hidden = rows.length > 0;
@@ -52,9 +56,17 @@ export class Operator {
   command(kind, uav) {
     const { title, text, confirm } = COMMANDS[kind];
     return this.#ask({
-      title: title(uav), text, confirm, danger: kind === "return",
+      title: title(uav),
+      text,
+      confirm,
+      danger: kind === "return",
       fields: [field("Reason (optional)", reasonField())],
-      send: (form) => this.#post("api/command", { command: kind, uav, reason: form.get("reason").trim() }, `${kind} ${uav}`),
+      send: (form) =>
+        this.#post(
+          "api/command",
+          { command: kind, uav, reason: form.get("reason").trim() },
+          `${kind} ${uav}`,
+        ),
     });
   }
 
@@ -65,42 +77,77 @@ export class Operator {
     return this.#ask({
       title: "Abort the mission?",
       text: "Every UAV gives its task up and flies home. The mission is over and cannot be taken up again.",
-      confirm: "Abort mission", danger: true,
-      fields: [field("Reason (optional)", reasonField()), make("label", { class: "check" }, sure, "Yes, bring all UAVs home now")],
-      send: (form) => this.#post("api/command", { command: "abort", uav: null, reason: form.get("reason").trim() }, "abort"),
+      confirm: "Abort mission",
+      danger: true,
+      fields: [
+        field("Reason (optional)", reasonField()),
+        make("label", { class: "check" }, sure, "Yes, bring all UAVs home now"),
+      ],
+      send: (form) =>
+        this.#post(
+          "api/command",
+          { command: "abort", uav: null, reason: form.get("reason").trim() },
+          "abort",
+        ),
     });
   }
 
   /** Asks what task is wanted at a place, and adds it. */
   addTask(position) {
-    const input = (name, value, more = {}) => make("input", { name, type: "number", step: "any", value: String(value), required: true, ...more });
+    const input = (name, value, more = {}) =>
+      make("input", { name, type: "number", step: "any", value: String(value), required: true, ...more });
     const { origin } = this.picture.mission ?? {};
     return this.#ask({
       title: "New task",
       text: "The next UAV that decides may take it.",
       confirm: "Add task",
       fields: [
-        make("div", { class: "row" },
+        make(
+          "div",
+          { class: "row" },
           field("East [m]", input("east", position[0].toFixed(1))),
           field("North [m]", input("north", position[1].toFixed(1))),
-          field("Up [m]", input("up", (position[2] ?? 0).toFixed(1)))),
+          field("Up [m]", input("up", (position[2] ?? 0).toFixed(1))),
+        ),
         origin ? make("p", { class: "fine" }, degrees(degreesOf(origin, position))) : null,
-        make("div", { class: "row" },
+        make(
+          "div",
+          { class: "row" },
           field("Value", input("value", number(this.#usualValue()).replace("\u202f", ""), { min: "0" })),
-          field("Service [s]", input("service", 0, { min: "0" }))),
-        make("div", { class: "row" },
-          field("Id", make("input", { name: "id", maxlength: "64", pattern: "[A-Za-z0-9][A-Za-z0-9_.\\-]*", placeholder: "next free", autocomplete: "off" })),
-          field("Kind", this.#kindField())),
+          field("Service [s]", input("service", 0, { min: "0" })),
+        ),
+        make(
+          "div",
+          { class: "row" },
+          field(
+            "Id",
+            make("input", {
+              name: "id",
+              maxlength: "64",
+              pattern: "[A-Za-z0-9][A-Za-z0-9_.\\-]*",
+              placeholder: "next free",
+              autocomplete: "off",
+            }),
+          ),
+          field("Kind", this.#kindField()),
+        ),
         field("Reason (optional)", reasonField()),
       ],
       send: (form) => {
         const at = ["east", "north", "up"].map((name) => Number(form.get(name)));
         const id = form.get("id").trim() || null;
         const body = {
-          id, position: at, value: Number(form.get("value")), service_s: Number(form.get("service")),
-          kind: form.get("kind").trim() || null, reason: form.get("reason").trim(),
+          id,
+          position: at,
+          value: Number(form.get("value")),
+          service_s: Number(form.get("service")),
+          kind: form.get("kind").trim() || null,
+          reason: form.get("reason").trim(),
         };
-        return this.#post("api/task", body, `add ${id ?? "a task"}`, { position: at, label: `${id ?? "task"} …` });
+        return this.#post("api/task", body, `add ${id ?? "a task"}`, {
+          position: at,
+          label: `${id ?? "task"} …`,
+        });
       },
     });
   }
@@ -109,9 +156,11 @@ export class Operator {
     return this.#ask({
       title: `Withdraw ${task}?`,
       text: "It leaves the board. A UAV on its way to it turns to something else.",
-      confirm: "Withdraw", danger: true,
+      confirm: "Withdraw",
+      danger: true,
       fields: [field("Reason (optional)", reasonField())],
-      send: (form) => this.#post("api/task/withdraw", { id: task, reason: form.get("reason").trim() }, `withdraw ${task}`),
+      send: (form) =>
+        this.#post("api/task/withdraw", { id: task, reason: form.get("reason").trim() }, `withdraw ${task}`),
     });
   }
 
@@ -120,20 +169,37 @@ export class Operator {
   }
 
   #usualValue() {
-    const values = [...this.picture.tasks.values()].map((task) => task.value).sort((one, other) => one - other);
+    const values = [...this.picture.tasks.values()]
+      .map((task) => task.value)
+      .sort((one, other) => one - other);
     return values[values.length >> 1] ?? 1;
   }
 
   #kindField() {
     const kinds = new Set([...this.picture.tasks.values()].map((task) => task.kind).filter(Boolean));
-    const list = make("datalist", { id: "kinds" }, ...[...kinds].sort().map((kind) => make("option", { value: kind })));
-    return make("span", {}, make("input", { name: "kind", maxlength: "64", list: "kinds", placeholder: "any", autocomplete: "off" }), list);
+    const list = make(
+      "datalist",
+      { id: "kinds" },
+      ...[...kinds].sort().map((kind) => make("option", { value: kind })),
+    );
+    return make(
+      "span",
+      {},
+      make("input", {
+        name: "kind",
+        maxlength: "64",
+        list: "kinds",
+        placeholder: "any",
+        autocomplete: "off",
+      }),
+      list,
+    );
   }
 
   async #post(path, body, text, ghost = null) {
-    const n = await postWithToken(path, body, this.picture.hello.token);
+    const n = await postWithToken(path, body);
     this.sent.set(n, { toast: toast(text), ghost });
-    this.#expect();
+    this.expect();
     const row = this.picture.commands.get(n);
     if (row) this.#follow(row);
     return n;
@@ -146,41 +212,67 @@ export class Operator {
     ours.toast.show(row);
     if (row.state === "pending") return;
     this.sent.delete(row.n);
-    this.#expect();
-    setText(byId(row.state === "obeyed" ? "say-polite" : "say-trouble"), `${row.text}: ${row.result || row.state}`);
+    this.expect();
+    setText(
+      byId(row.state === "obeyed" ? "say-polite" : "say-trouble"),
+      `${row.text}: ${row.result || row.state}`,
+    );
   }
 
-  #expect() {
-    this.onExpect([...this.sent.values()].map((each) => each.ghost).filter(Boolean));
+  /** Shows on the map what was asked for and has not come, and what is being asked for. */
+  expect(...asked) {
+    this.onExpect([...asked, ...[...this.sent.values()].map((each) => each.ghost).filter(Boolean)]);
   }
 
   /** Commands of a server that has begun anew can't be followed any more. */
   #forgetFormer() {
     for (const [n, ours] of this.sent) {
       if (this.picture.commands.has(n)) continue;
-      ours.toast.show({ text: ours.toast.text, state: "not obeyed", result: "the dashboard began anew; look at the fleet for what came of it" });
+      ours.toast.show({
+        text: ours.toast.text,
+        state: "not obeyed",
+        result: "the dashboard began anew; look at the fleet for what came of it",
+      });
       this.sent.delete(n);
     }
-    this.#expect();
+    this.expect();
   }
 }
 
 function commandLine(row) {
-  return make("li", { class: row.state === "not obeyed" ? "trouble" : null, "data-state": row.state },
+  return make(
+    "li",
+    { class: row.state === "not obeyed" ? "trouble" : null, "data-state": row.state },
     make("i", { "aria-hidden": "true" }, COMMAND_SIGNS[row.state] ?? "·"),
-    make("span", {}, make("b", {}, row.text), ` ${row.state}`, row.result ? make("small", {}, row.result) : null));
+    make(
+      "span",
+      {},
+      make("b", {}, row.text),
+      ` ${row.state}`,
+      row.result ? make("small", {}, row.result) : null,
+    ),
+  );
 }
 
 /** A note that stays until its command has been obeyed or not, and a while longer. */
 function toast(text) {
   const sign = make("i", { "aria-hidden": "true" });
   const words = make("span", {});
-  const close = make("button", { type: "button", class: "quiet", "aria-label": "Close", click: () => element.remove() }, "×");
+  const close = make(
+    "button",
+    { type: "button", class: "quiet", "aria-label": "Close", click: () => element.remove() },
+    "×",
+  );
   const element = make("div", { class: "toast" }, sign, words, close);
   const show = (row) => {
     element.dataset.state = row.state;
     setText(sign, COMMAND_SIGNS[row.state] ?? "·");
-    setText(words, row.state === "pending" ? `${row.text}: sent, waiting for what comes of it` : `${row.text}: ${row.result || row.state}`);
+    setText(
+      words,
+      row.state === "pending"
+        ? `${row.text}: sent, waiting for what comes of it`
+        : `${row.text}: ${row.result || row.state}`,
+    );
     if (row.state !== "pending") setTimeout(() => element.remove(), VERDICT_MS);
   };
   show({ text, state: "pending" });

@@ -10,7 +10,11 @@ export class Order {
     this.epoch = make("span", { class: "fine" });
     this.reason = make("p", { class: "reason" });
     this.list = make("ol", { class: "order", "aria-label": "Sequence, first rank first" });
-    panel.append(make("header", {}, make("h2", { id: "head-order" }, "Pecking order"), this.epoch), this.reason, this.list);
+    panel.append(
+      make("header", {}, make("h2", { id: "head-order" }, "Pecking order"), this.epoch),
+      this.reason,
+      this.list,
+    );
     this.known = "";
   }
 
@@ -40,7 +44,12 @@ export class Order {
     const { short, number } = this.picture.described(id);
     const dot = make("i", { class: "dot", "aria-hidden": "true" });
     dot.style.background = uavColour(number);
-    const button = make("button", { type: "button", "data-id": id, "aria-label": id, title: id, click: () => this.onSelect("uav", id) }, dot, short);
+    const button = make(
+      "button",
+      { type: "button", "data-id": id, "aria-label": id, title: id, click: () => this.onSelect("uav", id) },
+      dot,
+      short,
+    );
     return make("li", {}, button);
   }
 }

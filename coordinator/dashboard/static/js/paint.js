@@ -4,6 +4,8 @@ import { uavColour } from "./colours.js";
 import { taskState } from "./words.js";
 
 const WIDE = 2 * Math.PI;
+/** Pixels per letter of all names from which on tasks are named. */
+const ROOM_PER_LETTER = 330;
 
 /** The plane of one drawing: turns unit coordinates into pixels of the canvas. */
 export class View {
@@ -78,7 +80,7 @@ function paintLists(canvas, view, picture, motion, look) {
     canvas.lineWidth = strong ? 2.5 : 1.5;
     if (visited.length && described.start) path(canvas, view, [described.start, ...visited]);
     const uav = picture.uavs.get(id);
-    if (uav?.lost || uav?.does === "home" || uav?.does === "out") continue;
+    if (uav?.lost || uav?.claim === "out") continue;
     const ahead = planned
       .map((task) => picture.tasks.get(task))
       .filter((task) => task && task.state === "open" && task.id !== uav?.task);
@@ -122,14 +124,18 @@ function paintTasks(canvas, view, picture, look, spots) {
   const weight = (task) => (task.state === "open" ? 2 : task.state === "failed" ? 1 : 0);
   inView.sort((one, other) => weight(one[0]) - weight(other[0]));
   for (const [task, spot] of inView) paintTask(canvas, task, spot, picture, look);
-  const room = (view.width * view.height) / Math.max(1, inView.length);
-  if (room < 2600) return;
+  const letters = inView.reduce((sum, [task]) => sum + task.id.length, 0);
+  if (view.width * view.height < letters * ROOM_PER_LETTER) return;
   canvas.font = `11px ${look.ink.font}`;
   canvas.textAlign = "center";
-  for (const [task, [x, y]] of inView) {
-    const below = y + taskRadius(task.value, look) + 12;
-    label(canvas, task.id, x, below, task.state === "open" ? look.ink.text : look.ink.muted, look);
-  }
+  const labels = inView.map(([task, [x, y]]) => ({
+    text: task.id,
+    weight: weight(task) + (look.selected === task.id ? 10 : 0),
+    x,
+    y: y + taskRadius(task.value, look) + 12,
+    colour: task.state === "open" ? look.ink.text : look.ink.muted,
+  }));
+  paintLabels(canvas, labels, look, 10);
 }
 
 /** One task: hollow when open, with a core when taken, full when done, crossed when failed. */
@@ -183,7 +189,12 @@ function paintByOperator(canvas, x, y, radius, ink) {
   canvas.strokeStyle = ink.muted;
   canvas.lineWidth = 1.25;
   canvas.beginPath();
-  for (const [across, down] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+  for (const [across, down] of [
+    [-1, -1],
+    [1, -1],
+    [1, 1],
+    [-1, 1],
+  ]) {
     canvas.moveTo(x + across * half, y + down * (half - 3.5));
     canvas.lineTo(x + across * half, y + down * half);
     canvas.lineTo(x + across * (half - 3.5), y + down * half);
@@ -209,9 +220,12 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
     const [x, y] = view.spot(target.position);
     line(canvas, spot[0], spot[1], x, y);
   }
+  const labels = [];
   for (const [id, spot] of spots) {
-    if (view.holds(spot)) paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look);
+    if (view.holds(spot))
+      labels.push(paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look));
   }
+  paintLabels(canvas, labels, look, 1);
   for (const ghost of look.ghosts) paintGhost(canvas, view.spot(ghost.position), ghost.label, look);
 }
 
@@ -242,9 +256,28 @@ function paintUav(canvas, picture, motion, row, [x, y], look) {
   }
   if (look.selected === row.id) ring(canvas, 0, 0, size + 6, ink.accent);
   canvas.restore();
-  if (!look.labels && look.selected !== row.id && !troubled) return;
-  const text = look.selected === row.id ? told(row, picture) : described.short;
-  label(canvas, text, x + size + 3, y + 4, troubled ? ink.trouble : ink.text, look);
+  const chosen = look.selected === row.id;
+  return {
+    text: chosen ? told(row, picture) : described.short,
+    weight: chosen ? 2 : Number(troubled),
+    x: x + size + 3,
+    y: y + 4,
+    colour: troubled ? ink.trouble : ink.text,
+  };
+}
+
+/** Labels that have room, the weightiest first; those of weight `always` or more in any case. */
+function paintLabels(canvas, labels, look, always) {
+  const taken = [];
+  const centred = canvas.textAlign === "center" ? 0.5 : 0;
+  for (const each of labels.sort((one, other) => other.weight - one.weight)) {
+    const width = canvas.measureText(each.text).width;
+    const [left, right] = [each.x - centred * width, each.x + (1 - centred) * width];
+    const hits = ([from, to, y]) => left < to && right > from && Math.abs(each.y - y) < 12;
+    if (each.weight < always && taken.some(hits)) continue;
+    taken.push([left, right, each.y]);
+    label(canvas, each.text, each.x, each.y, each.colour, look);
+  }
 }
 
 /** Id, target and rule of the UAV that is selected. */

@@ -1,5 +1,7 @@
 // All that the feed has told, kept up to date message by message. Knows nothing of the page.
 
+import { byName } from "./words.js";
+
 const STORY_LINES = 500;
 const CHOICES = 300;
 const CURVE_POINTS = 600;
@@ -8,6 +10,7 @@ const CURVE_POINTS = 600;
 function changes(whole = false) {
   return {
     whole,
+    again: false,
     hello: false,
     mission: false,
     uavs: new Set(),
@@ -40,6 +43,14 @@ export class Picture {
     this.curve = [];
     /** Mission time at which each UAV's row came, for those who draw it between frames. */
     this.toldAt = new Map();
+    this.inOrder = null;
+  }
+
+  /** All tasks in the order people count. */
+  get tasksInOrder() {
+    // Rows never vanish from a mission: as many as before are the same ones.
+    if (this.inOrder?.length !== this.tasks.size) this.inOrder = [...this.tasks.keys()].sort(byName);
+    return this.inOrder.map((id) => this.tasks.get(id));
   }
 
   /** Takes a message of the feed in; what has changed, or null for one that is not understood. */

@@ -13,10 +13,20 @@ export class Replay {
     Object.assign(this, { picture, onRefused });
     this.bar = byId("replay");
     this.play = make("button", { type: "button", class: "play", click: () => this.toggle() });
-    this.seek = make("input", { type: "range", min: "0", step: "0.1", "aria-label": "Place in the recording", input: () => this.#drag(), change: () => this.#drop() });
+    this.seek = make("input", {
+      type: "range",
+      min: "0",
+      step: "0.1",
+      "aria-label": "Place in the recording",
+      input: () => this.#drag(),
+      change: () => this.#drop(),
+    });
     this.time = make("output", { class: "time" });
-    this.speed = make("select", { "aria-label": "Speed", change: () => this.#say({ speed: Number(this.speed.value) }) },
-      ...SPEEDS.map((speed) => make("option", { value: String(speed) }, `${speed} ×`)));
+    this.speed = make(
+      "select",
+      { "aria-label": "Speed", change: () => this.#say({ speed: Number(this.speed.value) }) },
+      ...SPEEDS.map((speed) => make("option", { value: String(speed) }, `${speed} ×`)),
+    );
     this.bar.append(this.play, this.seek, this.time, this.speed);
   }
 
@@ -67,7 +77,7 @@ export class Replay {
 
   async #say(body) {
     try {
-      await postWithToken("api/recording", body, false);
+      await postWithToken("api/recording", body);
     } catch (refusal) {
       this.onRefused(refusal.message);
     }

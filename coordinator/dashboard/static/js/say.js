@@ -26,7 +26,8 @@ export async function post(path, body, token) {
     throw new Refusal(0, "The server cannot be reached; it is not known whether it has heard this.");
   }
   const answer = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Refusal(response.status, answer.error ?? `The server refused it (${response.status}).`);
+  if (!response.ok)
+    throw new Refusal(response.status, answer.error ?? `The server refused it (${response.status}).`);
   return answer.n ?? null;
 }
 

@@ -9,9 +9,18 @@ export class Story {
   constructor(panel, picture) {
     this.picture = picture;
     this.troubleOnly = make("input", { type: "checkbox", change: () => this.#rebuild() });
-    this.list = make("ol", { class: "log story", "aria-label": "What happened, newest first", tabindex: "0" });
+    this.list = make("ol", {
+      class: "log story",
+      "aria-label": "What happened, newest first",
+      tabindex: "0",
+    });
     panel.append(
-      make("header", {}, make("h2", { id: "head-story" }, "Story"), make("label", { class: "check" }, this.troubleOnly, "Trouble only")),
+      make(
+        "header",
+        {},
+        make("h2", { id: "head-story" }, "Story"),
+        make("label", { class: "check" }, this.troubleOnly, "Trouble only"),
+      ),
       this.list,
     );
   }
@@ -25,7 +34,8 @@ export class Story {
     this.list.prepend(...this.#wanted(changed.story).reverse().map(line));
     while (this.list.children.length > SHOWN) this.list.lastChild.remove();
     const troubles = changed.story.filter((told) => told.trouble);
-    if (troubles.length > 3) setText(byId("say-trouble"), `${count(troubles.length, "trouble")}, the last: ${troubles.at(-1).text}`);
+    if (troubles.length > 3)
+      setText(byId("say-trouble"), `${count(troubles.length, "trouble")}, the last: ${troubles.at(-1).text}`);
     else if (troubles.length) setText(byId("say-trouble"), troubles.map((told) => told.text).join("; "));
   }
 
@@ -39,8 +49,11 @@ export class Story {
 }
 
 function line(told) {
-  return make("li", { class: told.trouble ? "trouble" : null },
+  return make(
+    "li",
+    { class: told.trouble ? "trouble" : null },
     make("time", {}, told.mission_s === null ? "before" : seconds(told.mission_s)),
     told.trouble ? make("i", { role: "img", "aria-label": "trouble:" }, "!") : null,
-    make("span", {}, told.text));
+    make("span", {}, told.text),
+  );
 }

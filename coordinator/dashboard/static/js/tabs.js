@@ -15,19 +15,23 @@ const PANELS = [
 const ALWAYS_THERE = ["worth", "order", "story"];
 
 export class Tabs {
-  constructor() {
+  /** `onOpen` is called when another tab is shown. */
+  constructor(onOpen) {
+    this.onOpen = onOpen;
     this.missing = new Set();
     this.wide = window.matchMedia("(min-width: 1000px)");
     this.tabs = new Map(PANELS.map(([name, title], index) => [name, this.#tab(name, title, index)]));
     byId("tabs").append(...this.tabs.values());
     byId("tabs").addEventListener("keydown", (event) => this.#key(event));
     this.wide.addEventListener("change", () => this.open(this.shown));
-    this.open("fleet");
+    this.shown = "fleet";
   }
 
   /** Names of the tabs there are now. */
   get names() {
-    return [...this.tabs.keys()].filter((name) => !this.missing.has(name) && !(this.wide.matches && ALWAYS_THERE.includes(name)));
+    return [...this.tabs.keys()].filter(
+      (name) => !this.missing.has(name) && !(this.wide.matches && ALWAYS_THERE.includes(name)),
+    );
   }
 
   /** Whether there is such a tab at all. */
@@ -50,10 +54,22 @@ export class Tabs {
       setAttribute(panel, "role", always ? "region" : "tabpanel");
       setAttribute(panel, "aria-labelledby", always ? `head-${each}` : `tab-${each}`);
     }
+    this.onOpen();
   }
 
   #tab(name, title, index) {
-    return make("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "data-index": String(index), click: () => this.open(name) }, title);
+    return make(
+      "button",
+      {
+        type: "button",
+        role: "tab",
+        id: `tab-${name}`,
+        "aria-controls": `panel-${name}`,
+        "data-index": String(index),
+        click: () => this.open(name),
+      },
+      title,
+    );
   }
 
   #key(event) {

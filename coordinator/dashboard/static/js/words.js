@@ -42,9 +42,9 @@ export function number(value, digits = 1) {
 /** Seconds, from 100 on as minutes and seconds. */
 export function seconds(value) {
   if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
-  if (Math.abs(value) < 100) return `${value.toFixed(1)} s`;
+  if (Math.abs(value) < 99.95) return `${value.toFixed(1)} s`;
   const sign = value < 0 ? "−" : "";
-  const whole = Math.floor(Math.abs(value));
+  const whole = Math.floor(Math.abs(value) + 0.05);
   const pad = (part) => String(part).padStart(2, "0");
   const [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
   return sign + (hours ? `${hours}:${pad(minutes)}:${pad(rest)}` : `${minutes}:${pad(rest)}`);

@@ -15,23 +15,46 @@ export class Worth {
     this.bound = draw("path", { class: "bound" });
     this.base = draw("path", { class: "base" });
     this.till = draw("text", { class: "axis", x: WIDTH - EDGE.right, y: HEIGHT - 2, "text-anchor": "end" });
-    this.chart = draw("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img" },
-      this.base, this.area, this.bound, this.plan, this.curve);
+    this.chart = draw(
+      "svg",
+      { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img" },
+      this.base,
+      this.area,
+      this.bound,
+      this.plan,
+      this.curve,
+    );
     this.axis = make("p", { class: "axis" }, make("span", {}, "0"), make("span", {}));
     this.values = {};
     const row = (key, sign, title, hint) => {
       this.values[key] = make("dd", {});
-      return make("div", { class: key, title: hint }, make("dt", {}, make("i", { "aria-hidden": "true" }, sign), title), this.values[key]);
+      return make(
+        "div",
+        { class: key, title: hint },
+        make("dt", {}, make("i", { "aria-hidden": "true" }, sign), title),
+        this.values[key],
+      );
     };
     panel.append(
-      make("header", {}, make("h2", { id: "head-worth" }, "Worth J"), make("span", { class: "fine" }, "value · s")),
-      make("div", { class: "worth" },
+      make(
+        "header",
+        {},
+        make("h2", { id: "head-worth" }, "Worth J"),
+        make("span", { class: "fine" }, "value · s"),
+      ),
+      make(
+        "div",
+        { class: "worth" },
         make("figure", {}, this.chart, this.axis),
-        make("dl", {},
+        make(
+          "dl",
+          {},
           row("now", "━", "so far", "J of all tasks done so far"),
           row("share", " ", "of plan", "J so far over the plan's J"),
           row("plan", "╌", "plan", "J of the plan, if all goes as planned"),
-          row("bound", "┈", "bound", "No plan can be worth more"))),
+          row("bound", "─", "bound", "No plan can be worth more"),
+        ),
+      ),
     );
   }
 
@@ -49,10 +72,14 @@ export class Worth {
   #draw(objective, plan, now, curve) {
     const last = curve.length ? curve[curve.length - 1][0] : 0;
     const till = Math.max(now ?? 0, last, 1e-3);
-    const values = [objective, plan?.objective, plan?.bound, ...curve.map((point) => point[1])].filter(Number.isFinite);
+    const values = [objective, plan?.objective, plan?.bound, ...curve.map((point) => point[1])].filter(
+      Number.isFinite,
+    );
     const [most, least] = [Math.max(1e-9, ...values) * 1.04, Math.min(0, ...values)];
-    const x = (time) => (EDGE.left + (Math.max(0, time) / till) * (WIDTH - EDGE.left - EDGE.right)).toFixed(1);
-    const y = (worth) => (HEIGHT - 2 - ((worth - least) / (most - least)) * (HEIGHT - 2 - EDGE.top)).toFixed(1);
+    const x = (time) =>
+      (EDGE.left + (Math.max(0, time) / till) * (WIDTH - EDGE.left - EDGE.right)).toFixed(1);
+    const y = (worth) =>
+      (HEIGHT - 2 - ((worth - least) / (most - least)) * (HEIGHT - 2 - EDGE.top)).toFixed(1);
     // J rises by steps: what a task is worth counts from the moment it is done.
     let steps = `M${x(0)} ${y(0)}`;
     for (const [time, worth] of curve) steps += `H${x(time)}V${y(worth)}`;
@@ -64,6 +91,9 @@ export class Worth {
     this.bound.setAttribute("d", across(plan?.bound));
     this.base.setAttribute("d", across(0));
     setText(this.axis.lastChild, seconds(till));
-    this.chart.setAttribute("aria-label", `J so far ${number(objective)}, the plan's ${number(plan?.objective)}, bound ${number(plan?.bound)}`);
+    this.chart.setAttribute(
+      "aria-label",
+      `J so far ${number(objective)}, the plan's ${number(plan?.objective)}, bound ${number(plan?.bound)}`,
+    );
   }
 }

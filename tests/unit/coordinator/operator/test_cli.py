@@ -43,3 +43,37 @@ def test_an_abort_asks_on_a_terminal(
     told = capsys.readouterr()
     assert "Bring every UAV home and end the mission?" in told.out + told.err
     assert told.err.endswith("swarm: nothing was aborted\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ([], "swarm task add: no place was given; give either --position, or --lat-deg and"),
+        (["--position", "1"], "--position: '1' is no place; give metres east, north and maybe up"),
+        (["--position", "-1,x"], "--position: '-1,x' is no place"),
+        (["--position", "1e9,0"], "--position: '1e9,0' is too far away; give metres within"),
+        (["--lat-deg", "47"], "swarm task add: no place was given"),
+        (["--position", "1,2", "--alt-m", "5"], "swarm task add: two places were given"),
+        (["a b", "--position", "1,2"], "ID: 'a b' is no id; give 1 to 64 letters"),
+        (["--position", "1,2", "--kind", "a b"], "--kind: 'a b' is no id"),
+        (["--position", "1,2", "--value", "nan"], "swarm task add: invalid value for '--value'"),
+        (["--position", "1,2", "--value", "-1"], "swarm task add: invalid value for '--value'"),
+    ],
+)
+def test_a_task_that_cannot_be_is_refused_in_one_line(
+    words: list[str], complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["task", "add", *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(complaint)
+
+
+def test_what_is_withdrawn_must_be_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["task", "withdraw"]) == 2
+    assert "'ID'" in capsys.readouterr().err
+
+
+def test_each_command_about_tasks_shows_examples(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("add", "withdraw"):
+        assert main(["task", name, "--help"]) == 0
+        assert f"\n      swarm task {name} " in capsys.readouterr().out

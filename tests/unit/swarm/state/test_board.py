@@ -6,11 +6,24 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.state.board import TaskBoard, TaskState, doable
 from swarm.state.registers import Replica
 from swarm.wire.messages import Board, Body, Message
-from tests.builders import IDLE, MISSION, OUT, brief, done, entry, epoch, failed, held, message, uav
+from tests.builders import (
+    IDLE,
+    MISSION,
+    OUT,
+    brief,
+    done,
+    entry,
+    epoch,
+    failed,
+    held,
+    message,
+    order,
+    uav,
+)
 from tests.message_strategies import messages
 
 FLEET = (uav("u0"), uav("u1", east_m=5.0, t0=0.5))
@@ -71,6 +84,34 @@ def test_a_withdrawn_task_may_come_back() -> None:
 
     registers.post(entry("t0"))
     assert registers.state() is TaskState.OPEN
+
+
+def test_the_operator_adds_withdraws_and_brings_back_tasks() -> None:
+    registers = Registers((COORDINATOR, entry("t0", number=1)))
+    registers.say(OPERATOR, order("op1", east_m=7.0, number=0))
+    problem = registers.board.problem
+    assert problem is not None
+    assert problem.task_ids == ("op1", "t0")
+    np.testing.assert_array_equal(problem.task_enu_m[0], [7.0, 0.0, 0.0])
+    assert registers.board.states == {"op1": TaskState.OPEN, "t0": TaskState.OPEN}
+
+    registers.say(OPERATOR, order("t0", withdrawn=True))
+    assert registers.state() is TaskState.WITHDRAWN
+    registers.post(entry("t0", number=1))
+    assert registers.state() is TaskState.WITHDRAWN
+
+    registers.say(OPERATOR, order("t0"))
+    assert registers.state() is TaskState.OPEN
+
+
+def test_in_another_flight_what_the_operator_added_is_gone() -> None:
+    registers = Registers((COORDINATOR, entry("t0")), (OPERATOR, order("op1")))
+    assert registers.board.problem is not None
+
+    registers.say(OPERATOR, order("op1", run=2))
+    problem = registers.board.problem
+    assert problem is not None
+    assert (problem.task_ids, list(registers.board.states)) == (("t0",), ["t0"])
 
 
 def test_outcomes_of_tasks_that_are_not_posted_make_no_task() -> None:

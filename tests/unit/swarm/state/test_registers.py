@@ -8,23 +8,25 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.state.board import TaskBoard
 from swarm.state.claims import holders
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
 from swarm.wire.codec import encode
-from swarm.wire.messages import Body, Claim, Message, Stamp
+from swarm.wire.messages import Body, Brief, Claim, Command, CommandKind, Message, Stamp, TaskOrder
 from tests.builders import (
     IDLE,
     MISSION,
     OUT,
     brief,
+    choice,
     done,
     entry,
     epoch,
     held,
     message,
+    order,
     proposed,
     status,
     uav,
@@ -39,6 +41,7 @@ briefs_and_tasks = st.sampled_from(
     [
         brief(uav("u0")),
         brief(uav("u0"), uav("u1", t0=0.5)),
+        replace(brief(uav("u0")), run=2),
         epoch("u0", "u1"),
         epoch("u1", "u0"),
         entry("t0"),
@@ -46,7 +49,18 @@ briefs_and_tasks = st.sampled_from(
         entry("t1"),
     ]
 )
+orders_and_commands = st.sampled_from(
+    [
+        order("t0"),
+        order("t0", withdrawn=True),
+        order("t0", run=2, value=3.0),
+        order("t2"),
+        order("t2", run=2),
+        Command("u0", CommandKind.HOLD, 1, ""),
+    ]
+)
 statements = st.one_of(
+    st.builds(Message, st.just(MISSION), st.just(OPERATOR), few_stamps, orders_and_commands),
     st.builds(Message, st.just(MISSION), st.just(COORDINATOR), few_stamps, briefs_and_tasks),
     st.builds(
         Message,
@@ -73,8 +87,12 @@ def contents(replica: Replica) -> tuple[object, ...]:
         replica.brief,
         replica.epoch,
         replica.board,
+        replica.posted,
+        replica.task_orders,
         replica.claims,
         replica.outcomes,
+        replica.commands,
+        replica.digest(),
     )
 
 
@@ -267,3 +285,80 @@ def test_one_answers_for_what_an_earlier_life_of_somebody_said() -> None:
     replica.join_all([said_before, message("u1", IDLE, incarnation=2)])
 
     assert list(replica.answers("u0", {"u1"})) == [said_before]
+
+
+@given(crowds)
+def test_heads_are_the_newest_stamps_of_all_writers_whose_registers_are_known(
+    said: list[Message],
+) -> None:
+    replica = joined(said)
+    stamps: dict[str, list[Stamp]] = {}
+    for known in replica.messages():
+        stamps.setdefault(known.writer, []).append(known.stamp)
+
+    assert replica.heads == {writer: max(of_one) for writer, of_one in stamps.items()}
+
+
+def test_what_is_no_register_changes_nothing() -> None:
+    replica = joined([message("u0", held("t0", 1.0))])
+    before = replica.digest(), dict(replica.heads)
+
+    assert not replica.join(message("u0", choice("t0"), 9))
+    assert not replica.join(message("u0", status(), 10))
+    assert (replica.digest(), replica.heads) == before
+
+
+# -- the operator's word about tasks ------------------------------------------------------
+
+
+@given(crowds)
+def test_the_board_is_the_operators_word_about_this_run_else_the_coordinators(
+    said: list[Message],
+) -> None:
+    """And its versions grow when it changes, and with the brief."""
+    replica = Replica()
+    for statement in said:
+        before, versions = dict(replica.board), (replica.board_version, replica.task_version)
+        briefed = replica.join(statement) and isinstance(statement.body, Brief)
+        bodies = [message.body for message in replica.messages()]
+        run = None if replica.brief is None else replica.brief.run
+        orders = {b.task: b for b in bodies if isinstance(b, TaskOrder) and b.run == run}
+        assert replica.board.keys() == replica.posted.keys() | orders.keys()
+        for task, found in replica.board.items():
+            word = orders.get(task, replica.posted.get(task))
+            assert word is not None
+            assert (found.value, found.withdrawn) == (word.value, word.withdrawn)
+        grown = replica.board_version > versions[0]
+        assert grown == (before != replica.board or briefed)
+        assert not grown or replica.task_version > versions[1]
+
+
+def test_orders_count_in_the_flight_they_were_given_for_and_in_no_other() -> None:
+    said = [message(OPERATOR, order("t0", value=3.0)), message(OPERATOR, order("t1"), 2)]
+    replica = joined([message(COORDINATOR, entry("t0")), *said])
+    assert replica.board == {"t0": entry("t0")}, "nobody knows which flight this is"
+
+    replica.join(message(COORDINATOR, brief(uav("u0")), 2))
+    assert {task: found.value for task, found in replica.board.items()} == {"t0": 3.0, "t1": 1.0}
+
+    replica.join(message(COORDINATOR, replace(brief(uav("u0")), run=2), 3))
+    assert replica.board == {"t0": entry("t0")}
+    assert list(replica.messages({OPERATOR})) == said
+
+
+def test_everyone_answers_for_the_operator_whose_seat_is_gone() -> None:
+    replica = joined([message("u0", IDLE), message(OPERATOR, order("t0"))])
+
+    assert message(OPERATOR, order("t0")) in list(replica.answers("u0", {"u0", "u1"}))
+    assert OPERATOR in replica.digest()
+
+
+def test_what_the_coordinator_says_of_an_ordered_task_changes_nothing() -> None:
+    replica = joined([message(COORDINATOR, brief(uav("u0")))])
+    replica.join(message(OPERATOR, order("t0", withdrawn=True)))
+    version = replica.board_version
+
+    replica.join(message(COORDINATOR, entry("t0"), 2))
+
+    assert (replica.board["t0"].withdrawn, replica.board_version) == (True, version)
+    assert not replica.posted["t0"].withdrawn

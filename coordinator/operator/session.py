@@ -1,0 +1,124 @@
+"""One wish of somebody at a terminal: reach the mission, say it, and wait for what comes of it.
+
+Leaves out: what they type and read (coordinator.operator.cli), and the seat itself
+(coordinator.operator.seat).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from coordinator.joining import joined, onlooking
+from coordinator.operator.commanding import CommandWish
+from coordinator.operator.errands import OperatorWish
+from coordinator.operator.seat import OperatorSeat
+from coordinator.operator.verdict import Result, Verdict
+from swarm.bus.config import bus_config
+from swarm.clock import ScaledClock, incarnation
+from swarm.config import Link, preset
+from swarm.errors import Fault, InputError, SwarmError
+from swarm.log import LogLevel, configure_logging
+from swarm.model.ids import ID_RULE, OPERATOR, valid_id
+from swarm.process import run_until_stopped
+
+__all__ = ["Reach", "check_words", "fulfil"]
+
+LONGEST_REASON = 150
+"""What is told of a command has to have room in a status."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """How to reach a mission, as the common options have it."""
+
+    mission: str | None
+    """Its name; None for the only one there is."""
+    timeout_s: float
+    """How long to wait for it, and then for the effect [wall s]."""
+    bus: str
+    listen: str
+    connect: Sequence[str]
+    link: Link
+    lease_s: float | None
+    speedup: float
+
+
+def check_words(reason: str, *ids: tuple[str, str | None]) -> None:
+    """Refuse what no message can carry.
+
+    Args:
+        reason: the operator's words.
+        ids: what was given, and where; None where nothing was.
+
+    Raises:
+        InputError: one line for each fault.
+    """
+    faults = [
+        Fault(where, "", f"{text!r} is no id", f"give {ID_RULE}")
+        for where, text in ids
+        if text is not None and not valid_id(text)
+    ]
+    if len(reason) > LONGEST_REASON:
+        problem = f"it has {len(reason)} characters"
+        faults.append(Fault("--reason", "", problem, f"give at most {LONGEST_REASON}"))
+    if faults:
+        raise InputError(*faults)
+
+
+def fulfil(
+    wish: OperatorWish,
+    reach: Reach,
+    *,
+    source: str,
+    tell: Callable[[str, OperatorSeat, Verdict], None],
+) -> int:
+    """Say what is wanted, wait for what comes of it, and tell; the exit status.
+
+    Args:
+        wish: what is wanted.
+        reach: how to reach the mission.
+        source: argument that what does not fit the mission came from.
+        tell: told the mission's name, the seat and what came of it, unless nothing was said
+            for wrong input.
+
+    Raises:
+        InputError: what is wanted does not fit the mission.
+        SwarmError: there is no mission, or it was not seen to take effect.
+    """
+    configure_logging(LogLevel.ERROR)
+
+    async def work() -> int:
+        mission, seat = await _sit(wish, reach)
+        verdict = seat.verdict
+        if verdict is None:
+            raise SwarmError("nothing was said")
+        if verdict.result.is_wrong_input:
+            name = wish.target if isinstance(wish, CommandWish) else wish.task
+            taken = verdict.result is Result.TAKEN_ID
+            problem = f"{name!r} is {'taken' if taken else 'not'} in mission {mission}"
+            raise InputError(Fault(source, "", problem, verdict.text))
+        tell(mission, seat, verdict)
+        if verdict.result is not Result.OBEYED:
+            raise SwarmError(verdict.text)
+        return 0
+
+    return asyncio.run(run_until_stopped(work()))
+
+
+async def _sit(wish: OperatorWish, reach: Reach) -> tuple[str, OperatorSeat]:
+    """Take a seat on the bus and say what is wanted; the mission's name, and the seat."""
+    settings = preset(reach.link, reach.lease_s)
+    config = bus_config(reach.bus, reach.listen, reach.connect, settings.lease_s)
+    clock = ScaledClock(reach.speedup)
+    async with joined(reach.mission, config, reach.timeout_s) as (mission, bus):
+        seat = OperatorSeat(
+            mission,
+            wish,
+            incarnation=incarnation(),
+            timing=settings.timing.scaled(reach.speedup),
+            patience_s=reach.timeout_s * reach.speedup,
+        )
+        await onlooking(seat, bus, clock, mission, OPERATOR).run()
+        return mission, seat

@@ -1,0 +1,1 @@
+"""`swarm doctor`: looks before a flight at everything the flight will lean on."""

@@ -1,0 +1,273 @@
+"""The command `swarm doctor`.
+
+Leaves out: every check (the modules beside this one).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm.config import Link
+from swarm.options import (
+    BusOption,
+    ConnectOption,
+    JsonOption,
+    ListenOption,
+    OptionalScenarioArgument,
+)
+
+if TYPE_CHECKING:
+    from agent.mavlink.signing import SigningKey
+    from sim.doctor.finding import Finding
+    from sim.doctor.link import Vehicle
+    from swarm.bus.config import BusConfig
+    from swarm.model import Mission
+
+__all__ = ["doctor"]
+
+_LEAST_PYTHON = (3, 11)
+_DEFAULT_UAVS = 3
+"""Fleet for which the machine is judged without a scenario."""
+
+
+def doctor(
+    scenario: OptionalScenarioArgument = None,
+    mission: Annotated[
+        str | None,
+        typer.Option(
+            "--mission",
+            metavar="NAME",
+            help="Mission that should be there on the bus.",
+            show_default=False,
+        ),
+    ] = None,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+    connect: ConnectOption = None,
+    mavlink: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--mavlink",
+            metavar="URL[#SYSID]",
+            help="Autopilot to listen to, as for swarm agent, such as udpin:0.0.0.0:14550#1; may "
+            "be repeated. It is asked for messages and never commanded.",
+            show_default=False,
+        ),
+    ] = None,
+    signing_key: Annotated[
+        Path | None,
+        typer.Option(
+            "--signing-key",
+            metavar="FILE",
+            help="Key that the autopilots sign with.",
+            show_default=False,
+        ),
+    ] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option(
+            "--state",
+            metavar="DIR",
+            help="Folder in which processes shall keep what they know.",
+            show_default=False,
+        ),
+    ] = None,
+    port: Annotated[
+        list[int] | None,
+        typer.Option(
+            "--port",
+            min=1,
+            max=65535,
+            metavar="P",
+            help="TCP port that must be free, such as a dashboard's or a router's; may be "
+            "repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    timeout_s: Annotated[
+        float,
+        typer.Option(
+            "--timeout-s",
+            min=0.1,
+            max=600.0,
+            metavar="S",
+            help="How long to wait for each autopilot's heartbeat.",
+        ),
+    ] = 5.0,
+    json: JsonOption = False,
+) -> int:
+    """Check all that a flight leans on, and say what to do.
+
+    Looks at Python and its packages, the compiled kernels, the machine's clock and limits and
+    Zenoh; at the scenario, ports, bus, autopilots, signing key and state folder that are
+    named. One line per check: ok, warning or fails, what was found, and what to do.
+    Exit status 0: nothing fails.
+
+    Examples:
+        swarm doctor
+        swarm doctor valley-survey --port 8080 --state /var/lib/peckorder
+        swarm doctor --connect tcp/192.168.1.2:7447 --mission valley-survey
+        swarm doctor --mavlink udpin:0.0.0.0:14550 --mavlink serial:/dev/ttyUSB0:57600#7
+        swarm doctor --mavlink tcp:127.0.0.1:5760 --signing-key uav1.key --json
+    """
+    import asyncio
+    from json import dumps
+
+    from rich.console import Console
+
+    from coordinator.joining import check_mission
+    from sim.doctor.finding import State, as_json, print_findings
+    from sim.doctor.link import parse_vehicle
+    from swarm.bus.config import bus_config
+    from swarm.config import preset
+    from swarm.log import LogLevel, configure_logging
+    from swarm.process import run_until_stopped
+
+    configure_logging(LogLevel.ERROR)
+    check_mission(mission)
+    config = bus_config(bus, listen, connect or (), preset(Link.NORMAL).lease_s)
+    asked_for = bool(connect or listen or bus != "router")
+    vehicles = [parse_vehicle(text) for text in mavlink or ()]
+    found: list[Finding] = []
+    console = Console(highlight=False)
+
+    async def work() -> int:
+        async for finding in _checks(
+            scenario,
+            mission,
+            config,
+            vehicles,
+            signing_key,
+            state,
+            port or (),
+            timeout_s,
+            asked_for=asked_for,
+        ):
+            found.append(finding)
+            if not json:
+                print_findings([finding], console)
+        if json:
+            print(dumps(as_json(found)))
+        return 1 if any(each.state is State.FAILS for each in found) else 0
+
+    return asyncio.run(run_until_stopped(work()))
+
+
+async def _checks(
+    scenario: Path | None,
+    mission: str | None,
+    config: BusConfig,
+    vehicles: list[Vehicle],
+    key_file: Path | None,
+    state: Path | None,
+    ports: tuple[int, ...] | list[int],
+    wait_s: float,
+    *,
+    asked_for: bool,
+) -> AsyncIterator[Finding]:
+    """Every finding as it comes, from the ground up."""
+    import asyncio
+
+    from sim.doctor.bus import check_bus, check_zenoh
+    from sim.doctor.link import check_vehicle
+    from sim.doctor.machine import check_clock, check_limits, check_port, check_state
+    from sim.doctor.probes import (
+        listen_problem,
+        port_holder,
+        read_clock,
+        read_folder,
+        read_limits,
+    )
+
+    for finding in _software():
+        yield finding
+    yield check_clock(read_clock())
+    flown = None
+    if scenario is not None:
+        flown, findings = _scenario(scenario)
+        for finding in findings:
+            yield finding
+    for finding in check_limits(read_limits(), len(flown.uavs) if flown else _DEFAULT_UAVS):
+        yield finding
+    if state is not None:
+        yield check_state(read_folder(state))
+    for each in ports:
+        problem = listen_problem("0.0.0.0", each, datagrams=False)  # noqa: S104 - tried, not kept
+        holder = None if problem is None else port_holder(each, datagrams=False)
+        yield check_port("port", str(each), problem, holder)
+    yield await check_zenoh()
+    for finding in await check_bus(config, mission, asked_for=asked_for):
+        yield finding
+    key = None
+    if key_file is not None:
+        key, finding = _key(key_file)
+        yield finding
+    for findings in await asyncio.gather(*(check_vehicle(each, key, wait_s) for each in vehicles)):
+        for finding in findings:
+            yield finding
+
+
+def _software() -> list[Finding]:
+    from importlib.metadata import PackageNotFoundError, requires, version
+
+    from sim.doctor.software import check_kernels, check_packages, check_python
+
+    def installed(name: str) -> str | None:
+        try:
+            return version(name)
+        except PackageNotFoundError:
+            return None
+
+    return [
+        check_python(sys.version_info[:3], _LEAST_PYTHON),
+        check_packages(requires("peckorder") or (), installed),
+        check_kernels(_planned),
+    ]
+
+
+def _planned() -> Mapping[str, float]:
+    """J of plans of table-1 by method."""
+    from coordinator.planner.plan import make_plan
+    from swarm.clock import SystemClock
+    from swarm.scenario import load_scenario, shipped_scenarios
+
+    mission = load_scenario(shipped_scenarios()["table-1"])
+    methods = ("greedy", "exact")
+    return {m: make_plan(mission, m, clock=SystemClock(), seed=0).objective for m in methods}
+
+
+def _scenario(path: Path) -> tuple[Mission | None, list[Finding]]:
+    from sim.doctor.finding import fails, fine, warns
+    from swarm.errors import InputError
+    from swarm.scenario import load_scenario
+
+    try:
+        mission = load_scenario(path)
+    except InputError as error:
+        return None, [
+            fails("scenario", f"{fault.source}: {fault.place}: {fault.problem}", fault.remedy)
+            for fault in error.faults
+        ]
+    text = f"{mission.name}: {len(mission.uavs)} UAVs, {len(mission.tasks)} tasks"
+    if mission.origin is None:
+        remedy = "give it [origin] with the place of your field before flying outdoors"
+        return mission, [warns("scenario", f"{text}, and no origin", remedy)]
+    return mission, [fine("scenario", f"{text}, D = {mission.horizon_s:g} s")]
+
+
+def _key(path: Path) -> tuple[SigningKey | None, Finding]:
+    from agent.mavlink.signing_key import load_signing_key
+    from sim.doctor.machine import check_key
+    from sim.doctor.probes import file_mode
+    from swarm.errors import InputError
+
+    try:
+        key, problem = load_signing_key(path), None
+    except InputError as error:
+        key, problem = None, str(error)
+    return key, check_key(path, problem, file_mode(path))

@@ -1,0 +1,260 @@
+"""Whether an autopilot is heard, which one it is, and what it says of itself.
+
+It is listened to and asked for messages, and never told to do anything. What it says is
+read as the bridge reads it. Leaves out: sockets (sim.doctor.link).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from agent.mavlink.codec import MavlinkCodec
+from agent.mavlink.flavours import Flavour, flavour_of
+from agent.mavlink.framing import Framer
+from agent.mavlink.messages import CommandLong, Heartbeat, Position
+from agent.mavlink.signing import Signing
+from agent.mavlink.state import VehicleState
+from sim.doctor.finding import Finding, fails, fine, warns
+
+__all__ = ["OWN_SYSTEM_ID", "Listening"]
+
+OWN_SYSTEM_ID = 254
+"""Not a ground station's 255: an autopilot would take its end for the loss of its station."""
+ASK_AGAIN_S = 1.0
+_AUTOPILOT_COMPONENT = 1
+_CMD_REQUEST_MESSAGE = 512
+_ASKED_FOR = (
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
+)
+"""What a vehicle may not say unasked."""
+_SKEW_S = 1.0
+_LOSSY, _DEAF = 0.02, 0.2
+"""Shares of frames lost from which on a link is doubtful, and of no use."""
+
+
+@dataclass(slots=True)
+class _Sequence:
+    """Sequence numbers of one component: gaps are frames that were lost."""
+
+    newest: int
+    received: int = 1
+    lost: int = 0
+
+    def received_one(self, number: int) -> None:
+        ahead = (number - self.newest) % 256
+        if ahead == 0 or ahead > 128:
+            return  # doubled, or late
+        self.received += 1
+        self.lost += ahead - 1
+        self.newest = number
+
+
+class Listening:
+    """What one vehicle says on a link; a core without sockets.
+
+    Args:
+        system_id: of the vehicle.
+        signing: with its key; None to believe what is not signed.
+    """
+
+    def __init__(self, system_id: int, signing: Signing | None = None) -> None:
+        self._system_id = system_id
+        self._signed = signing is not None
+        self._codec = MavlinkCodec(system_id, source_system_id=OWN_SYSTEM_ID, signing=signing)
+        self._codec.keep_frames = True
+        self._framer = Framer()
+        """Of what was believed: for what the codec keeps to itself."""
+        self._state = VehicleState()
+        self._now_s = 0.0
+        self._sequences: dict[int, _Sequence] = {}
+        self._ahead_s: float | None = None
+        self._time_heard = False
+        self._others: dict[int, int] = {}
+        self._bytes = 0
+
+    @property
+    def heard(self) -> bool:
+        """Whether the vehicle's own heartbeat has come."""
+        return self._state.heartbeat is not None
+
+    def requests(self) -> list[bytes]:
+        """Frames that ask the vehicle for messages, once each."""
+        return [
+            self._codec.encode(
+                CommandLong(_CMD_REQUEST_MESSAGE, (float(each), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            )
+            for each in _ASKED_FOR
+        ]
+
+    def receive(self, data: bytes, now_s: float, unix_s: float) -> None:
+        """Take in what came.
+
+        Args:
+            data: from the link.
+            now_s: time of any clock [s].
+            unix_s: wall time here.
+        """
+        self._bytes += len(data)
+        self._now_s = now_s
+        for heard in self._codec.decode(data):
+            if heard.system_id != self._system_id:
+                if isinstance(heard.message, Heartbeat):
+                    self._others[heard.system_id] = self._others.get(heard.system_id, 0) + 1
+            elif heard.component_id != _AUTOPILOT_COMPONENT:
+                continue
+            elif isinstance(heard.message, Position):
+                self._state.on_position(heard.message)
+            else:
+                self._state.on_message(heard.message, now_s)
+        for frame in self._codec.take_frames():
+            for each in self._framer.feed(frame):
+                self._count(each.data)
+                self._take_time(each.message, unix_s)
+
+    def _count(self, frame: bytes) -> None:
+        number, component = (
+            (frame[4], frame[6]) if frame[0] == mavlink.PROTOCOL_MARKER_V2 else (frame[2], frame[4])
+        )
+        known = self._sequences.get(component)
+        if known is None:
+            self._sequences[component] = _Sequence(number)
+        else:
+            known.received_one(number)
+
+    def _take_time(self, message: Any, unix_s: float) -> None:
+        if message is None or message.get_msgId() != mavlink.MAVLINK_MSG_ID_SYSTEM_TIME:
+            return
+        self._time_heard = True
+        if message.time_unix_usec:
+            self._ahead_s = message.time_unix_usec / 1e6 - unix_s
+
+    def findings(self, name: str) -> list[Finding]:
+        """What is to be said of the vehicle, and of the link to it.
+
+        Args:
+            name: of the link.
+        """
+        heartbeat = self._state.heartbeat
+        if heartbeat is None:
+            return [self._not_heard(name)]
+        flavour = flavour_of(heartbeat)
+        if flavour is None:
+            text = (
+                f"autopilot {heartbeat.autopilot} on vehicle type {heartbeat.vehicle_type} "
+                "(MAV_AUTOPILOT, MAV_TYPE)"
+            )
+            return [fails(name, text, "fly ArduCopter or PX4 on a multicopter")]
+        return [
+            self._vehicle(name, heartbeat, flavour),
+            self._readiness(name, flavour),
+            self._time(name),
+            self._loss(name),
+            self._signature(name),
+        ]
+
+    def _not_heard(self, name: str) -> Finding:
+        if self._others:
+            heard = ", ".join(map(str, sorted(self._others)))
+            text = f"heard system id {heard}, not {self._system_id}"
+            remedy = f"give --mavlink URL#{min(self._others)} here, and --system-id to swarm agent"
+            return fails(name, text, remedy)
+        if reasons := " and ".join(self._codec.distrusted):
+            text = f"heard only frames that are not to be believed: {reasons}"
+            remedy = "give the vehicle the same key (MAVLink SETUP_SIGNING, by a ground station)"
+            return fails(name, text, remedy)
+        if self._bytes:
+            text = f"{self._bytes} bytes and no heartbeat among them"
+            return fails(
+                name, text, "set the baud rate and MAVLink 2 on that port of the autopilot"
+            )
+        return fails(
+            name, "nothing heard", "see that the autopilot runs and sends MAVLink to this place"
+        )
+
+    def _vehicle(self, name: str, heartbeat: Heartbeat, flavour: Flavour) -> Finding:
+        firmware = {3: "ArduPilot", 12: "PX4"}.get(heartbeat.autopilot, "?")
+        mode = flavour.mode_name(heartbeat.custom_mode)
+        armed = "ARMED" if heartbeat.armed else "not armed"
+        text = f"system id {self._system_id}, {firmware}, mode {mode}, {armed}"
+        if self._others:
+            others = ", ".join(map(str, sorted(self._others)))
+            text += f"; also heard: system id {others}"
+        if heartbeat.armed:
+            return warns(name, text, "somebody flies it: leave it alone until it has landed")
+        return fine(name, text)
+
+    def _readiness(self, name: str, flavour: Flavour) -> Finding:
+        state = self._state
+        what = f"{name} ready"
+        charge = state.battery_frac
+        battery = "" if charge is None else f", battery {charge:.0%}"
+        heartbeat = state.heartbeat
+        if heartbeat is not None and not flavour.has_booted(heartbeat):
+            return warns(what, "still booting or calibrating", "wait, and keep it still")
+        problem = flavour.unready(state) or flavour.position_fault(state)
+        if problem is not None:
+            said = f"; it says: {state.warning}" if state.warning else ""
+            return warns(what, f"not yet: {problem}{said}{battery}", _advice(problem))
+        if charge is not None and charge < 0.2:
+            return warns(what, f"battery {charge:.0%}", "charge it: below 20 % nothing is armed")
+        place = "" if state.position is None else ", position known"
+        return fine(what, f"pre-arm checks pass{place}{battery}")
+
+    def _time(self, name: str) -> Finding:
+        what = f"{name} time"
+        if self._ahead_s is None:
+            how = "does not know the time" if self._time_heard else "does not tell the time"
+            return fine(what, f"it {how}; nothing depends on that")
+        if abs(self._ahead_s) > _SKEW_S:
+            by = _shown(abs(self._ahead_s))
+            text = f"its clock is {by} {'ahead of' if self._ahead_s > 0 else 'behind'} this one"
+            remedy = "see which of the two is wrong: logs will not agree (a simulator's may be)"
+            return warns(what, text, remedy)
+        return fine(what, f"its clock and this one differ by {abs(self._ahead_s):.2f} s")
+
+    def _loss(self, name: str) -> Finding:
+        what = f"{name} link"
+        received = sum(each.received for each in self._sequences.values())
+        lost = sum(each.lost for each in self._sequences.values())
+        share = lost / max(1, received + lost)
+        text = f"{received} frames, {lost} lost ({share:.1%})"
+        if share > _DEAF:
+            return fails(what, text, "better the radio link, or lower the rate of its streams")
+        if share > _LOSSY:
+            return warns(what, text, "better the radio link, or lower the rate of its streams")
+        return fine(what, text)
+
+    def _signature(self, name: str) -> Finding:
+        what = f"{name} signing"
+        if self._signed:
+            dropped = sum(self._codec.distrusted.values())
+            return fine(what, f"its frames are signed; {dropped} others dropped")
+        if self._codec.unchecked_frames:
+            text = "it signs what it says, and may obey nobody who does not"
+            return warns(what, text, "give --signing-key FILE, here and to swarm agent")
+        return fine(what, "nothing is signed; whoever reaches the link can command the vehicle")
+
+
+def _advice(problem: str) -> str:
+    """What helps an autopilot that is not ready."""
+    if "position" in problem or "GPS" in problem or "estimat" in problem:
+        return "wait for a GPS fix under the open sky"
+    return "mend what its pre-arm checks complain of; a ground station shows it all"
+
+
+def _shown(duration_s: float) -> str:
+    if duration_s < 120.0:
+        return f"{duration_s:.1f} s"
+    return (
+        f"{duration_s / 3600.0:.1f} h"
+        if duration_s < 172_800.0
+        else f"{duration_s / 86_400.0:.0f} days"
+    )

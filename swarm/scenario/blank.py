@@ -1,0 +1,246 @@
+"""A new scenario that flies as it is, with every field explained, for a person to make their own.
+
+The fields and their defaults are those of swarm.scenario.shapes; here is what they mean.
+Leaves out: scenarios made of files of tasks (swarm.scenario.draft).
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+
+from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.scenario.draft import PAD_SPACING_M, horizon_for
+from swarm.scenario.shapes import (
+    SCHEMA,
+    MissionTable,
+    OriginTable,
+    Scenario,
+    TaskTable,
+    UavTable,
+)
+from swarm.scenario.write import toml_float, toml_point, toml_string
+
+__all__ = ["Blank", "blank_scenario"]
+
+_SPEED_M_S = 8.0
+_SPACING_M = 60.0
+"""About how far tasks lie from their neighbours."""
+_GOLDEN_ANGLE_RAD = math.pi * (3.0 - math.sqrt(5.0))
+"""Points on a spiral, that angle after each other, cover a disk evenly (H. Vogel, 1979,
+https://doi.org/10.1016/0025-5564(79)90080-4)."""
+_WIDTH = 92
+
+_ABOUT: Mapping[str, Mapping[str, str]] = {
+    "": {
+        "schema": "Version of this format.",
+        "name": "Name of the mission: what --mission and swarm status call it. Letters, digits, "
+        "'_', '-' and '.'.",
+        "tasks_from": "A file beside this one whose points are tasks, too: a QGroundControl .plan, "
+        ".waypoints, .geojson or .csv.",
+        "mission": "",
+        "origin": "",
+        "uav": "",
+        "task": "",
+    },
+    "mission": {
+        "horizon_s": "D, the horizon [s]: a task done t seconds after the start is worth "
+        "p · S · value · (D − t). Later than D it counts against the mission, so let D be later "
+        "than the last task can be done.",
+        "success_default": "p, how likely a UAV succeeds at a task (0..1), where its table "
+        "success says nothing else. 0 means that it cannot do the task at all.",
+        "survival_default": "How likely a UAV survives a task (0..1), where its table survival "
+        "says nothing else; S is the product over those before. Below 1, risky tasks come late.",
+        "reattempt_failed": "Whether a task whose attempt failed opens again for everyone; "
+        "otherwise it is closed as failed.",
+    },
+    "origin": {
+        "lat_deg": "Latitude and longitude (WGS84) of the place where position_m is [0, 0] [deg]. "
+        "Without [origin] simulated vehicles fly near Zürich; real ones need their own field here.",
+        "lon_deg": "",
+        "alt_m": "Height of that place above mean sea level [m]. A vehicle that finds its ground "
+        "more than 10 m above or below is not started.",
+    },
+    "uav": {
+        "id": "Name of the UAV: what --uav, hold and return call it.",
+        "position_m": "Where it takes off [m east, m north] of the origin; a third number is the "
+        "height above it. UAVs at one place are told apart in the air by height layers.",
+        "lat_deg": "Instead of position_m: latitude and longitude [deg], and the height above mean "
+        "sea level [m]; without alt_m it is the origin's.",
+        "lon_deg": "",
+        "alt_m": "",
+        "speed_m_s": "Cruise speed over ground [m/s]; plans count on it, and the vehicle is told "
+        "to fly at it.",
+        "success": "p by task id or by kind of task; an id goes before a kind.",
+        "survival": "How likely it survives a task, by task id or by kind of task.",
+        "kind": "What kind of UAV it is; for people.",
+    },
+    "task": {
+        "id": "Name of the task: what reports and swarm task call it.",
+        "position_m": "Where it is [m east, m north] of the origin; a third number is the height "
+        "above it. A UAV flies its height layer above that place: the first 10 m, every other "
+        "one 3 m more.",
+        "lat_deg": "Instead of position_m: latitude and longitude [deg], and the height above mean "
+        "sea level [m]; without alt_m it is the origin's.",
+        "lon_deg": "",
+        "alt_m": "",
+        "value": "m, what it is worth; only the ratios to other tasks count.",
+        "service_s": "Time on the spot [s]: the UAV waits there for so long.",
+        "kind": "What kind of task it is; success and survival of UAVs may name it.",
+        "appears_s": "When it becomes known [s of mission time]: later than 0 it is a pop-up that "
+        "no plan made before the start knows of.",
+    },
+}
+"""What every field means, by table; empty for one that is explained with the one before."""
+_TABLES: Mapping[str, type[BaseModel]] = {
+    "": Scenario,
+    "mission": MissionTable,
+    "origin": OriginTable,
+    "uav": UavTable,
+    "task": TaskTable,
+}
+_EXAMPLES: Mapping[tuple[str, str], str] = {
+    ("", "tasks_from"): '"survey.plan"',
+    ("uav", "lat_deg"): "47.397742",
+    ("uav", "lon_deg"): "8.545594",
+    ("uav", "alt_m"): "488.0",
+    ("uav", "success"): "{ t1 = 0.9 }",
+    ("uav", "survival"): "{ t1 = 0.99 }",
+    ("uav", "kind"): '"quad"',
+    ("task", "lat_deg"): "47.398",
+    ("task", "lon_deg"): "8.546",
+    ("task", "alt_m"): "488.0",
+    ("task", "service_s"): "5.0",
+    ("task", "kind"): '"inspect"',
+    ("task", "appears_s"): "60.0",
+}
+"""Values of fields that may be left out, as they could be."""
+
+
+@dataclass(frozen=True, slots=True)
+class Blank:
+    """What is asked of a new scenario."""
+
+    name: str
+    uavs: int
+    tasks: int
+    origin: Origin
+
+
+def blank_scenario(blank: Blank) -> str:
+    """The text of a commented scenario in which that many UAVs do tasks all around them."""
+    mission = _mission(blank)
+    return "\n".join(_lines(blank, mission)) + "\n"
+
+
+def _mission(blank: Blank) -> Mission:
+    uavs = tuple(
+        Uav(UavId(f"uav{number + 1}"), (number * PAD_SPACING_M, 0.0, 0.0), _SPEED_M_S)
+        for number in range(blank.uavs)
+    )
+    tasks = tuple(_task(number) for number in range(blank.tasks))
+    mission = Mission(blank.name, 60.0, uavs, tasks, origin=blank.origin)
+    return Mission(blank.name, horizon_for(mission), uavs, tasks, origin=blank.origin)
+
+
+def _task(number: int) -> Task:
+    radius_m = _SPACING_M * math.sqrt(number + 1.0)
+    angle_rad = number * _GOLDEN_ANGLE_RAD
+    east_m, north_m = radius_m * math.cos(angle_rad), radius_m * math.sin(angle_rad)
+    # Adding 0 turns -0 into 0.
+    place = (round(east_m) + 0.0, round(north_m) + 0.0, 0.0)
+    return Task(TaskId(f"t{number + 1}"), place, 1.0 + number % 5)
+
+
+def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
+    fleet = f"{blank.uavs} UAV{'s'[: blank.uavs - 1]}, {blank.tasks} tasks"
+    yield f"# Scenario {blank.name}: {fleet}. It flies as it is; make it yours."
+    yield "#"
+    yield from _wrapped(
+        "Lines that begin with '#' are comments; fields in them may be left out and show "
+        "examples. Every fault of this file is told by:  swarm plan FILE"
+    )
+    yield ""
+    top = {"schema": str(SCHEMA), "name": toml_string(mission.name)}
+    if not mission.tasks:
+        top["task"] = "[]"
+    yield from _explained("", top)
+    if not mission.tasks:
+        yield "task = []  # none yet: an operator adds them (swarm task add), or tables follow"
+        yield ""
+    yield "[mission]"
+    yield from _explained("mission", {"horizon_s": toml_float(mission.horizon_s)})
+    place = {
+        "lat_deg": blank.origin.lat_deg,
+        "lon_deg": blank.origin.lon_deg,
+        "alt_m": blank.origin.alt_m,
+    }
+    yield "[origin]"
+    yield from _explained("origin", {key: toml_float(value) for key, value in place.items()})
+    for number, uav in enumerate(mission.uavs):
+        given = {
+            "id": toml_string(uav.id),
+            "position_m": toml_point(uav.position_enu_m),
+            "speed_m_s": toml_float(uav.speed_m_s),
+        }
+        yield from _entry("uav", given, explained=number == 0)
+    for number, task in enumerate(mission.tasks):
+        given = {
+            "id": toml_string(task.id),
+            "position_m": toml_point(task.position_enu_m),
+            "value": toml_float(task.value),
+        }
+        yield from _entry("task", given, explained=number == 0)
+    if not mission.tasks:
+        yield "# [[task]]"
+        yield from (
+            f"# {line}".rstrip() if not line.startswith("#") else line
+            for line in _explained(
+                "task", {"id": '"t1"', "position_m": "[60.0, 0.0]", "value": "1.0"}
+            )
+        )
+
+
+def _entry(table: str, given: Mapping[str, str], *, explained: bool) -> Iterator[str]:
+    yield f"[[{table}]]"
+    if explained:
+        yield from _explained(table, given)
+        return
+    yield from (f"{key} = {value}" for key, value in given.items())
+    yield ""
+
+
+def _explained(table: str, given: Mapping[str, str]) -> Iterator[str]:
+    """Every field of a table with what it means; those not ``given`` as comments."""
+    fields = _TABLES[table].model_fields
+    keys = {field.alias or name: field for name, field in fields.items()}
+    ordered = sorted(keys, key=list(_ABOUT[table]).index)
+    for key in ordered:
+        if table == "" and key in _TABLES:
+            continue  # a table of its own, below
+        about = _ABOUT[table][key]
+        default = keys[key].get_default(call_default_factory=True)
+        if default not in (PydanticUndefined, None, {}):
+            about += f" Default: {_toml(default)}."
+        yield from _wrapped(about)
+        if key in given:
+            yield f"{key} = {given[key]}"
+        elif (table, key) in _EXAMPLES:
+            yield f"# {key} = {_EXAMPLES[table, key]}"
+        else:
+            yield f"{key} = {_toml(default)}"
+    yield ""
+
+
+def _wrapped(text: str) -> Iterator[str]:
+    yield from (f"# {line}" for line in textwrap.wrap(text, _WIDTH))
+
+
+def _toml(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else toml_float(value)

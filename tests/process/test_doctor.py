@@ -1,0 +1,67 @@
+"""`swarm doctor` beside a router and simulated autopilots."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.process.router_processes import SWARM, router, started
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+
+
+def doctor(*words: str) -> tuple[int, dict[str, dict[str, Any]]]:
+    """Exit status, and the checks by name."""
+    done = subprocess.run(
+        [sys.executable, "-m", "swarm", "doctor", *words, "--json"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+    assert done.stderr == ""
+    told = json.loads(done.stdout)
+    assert told["ok"] == (done.returncode == 0)
+    return done.returncode, {check["check"]: check for check in told["checks"]}
+
+
+def test_a_sound_flight_passes_and_every_fault_is_named(tmp_path: Path) -> None:
+    key = tmp_path / "uav.key"
+    key.write_text("0" * 63 + "1")
+    key.chmod(0o600)
+    flying = ["autopilot", "table-1", "--uav", "uav1", "--listen", "tcp:127.0.0.1:0", "--json"]
+    with (
+        router("--listen", "tcp/127.0.0.1:0") as (serving, endpoint),
+        started("-c", SWARM, *flying) as autopilot,
+    ):
+        assert autopilot.stdout is not None
+        url = json.loads(autopilot.stdout.readline())["url"]
+        seat = ["--connect", endpoint, "--mavlink", url]
+
+        status, checks = doctor("table-1", *seat, "--state", str(tmp_path))
+
+        assert status == 0, checks
+        assert checks["scenario"]["text"] == "table-1: 3 UAVs, 8 tasks, D = 5 s"
+        assert checks[f"bus {endpoint}"]["state"] == checks["session"]["state"] == "ok"
+        assert checks["zenoh"]["state"] == checks["kernels"]["state"] == "ok"
+        assert checks[url]["text"] == "system id 1, ArduPilot, mode STABILIZE, not armed"
+        assert checks[f"{url} ready"]["text"].startswith("pre-arm checks pass, position known")
+        assert " 0 lost" in checks[f"{url} link"]["text"]
+
+        port = endpoint.rpartition(":")[2]
+        status, checks = doctor(
+            *("--mission", "table-1", "--connect", endpoint, "--port", port),
+            *("--mavlink", f"{url}#9", "--signing-key", str(key), "--timeout-s", "1"),
+        )
+
+        assert status == 1
+        wrong = {name for name, check in checks.items() if check["state"] == "fails"}
+        assert wrong == {"mission", "port", url}
+        assert f"(pid {serving.pid})" in checks["port"]["text"]
+        assert "not to be believed: unsigned" in checks[url]["text"]

@@ -1,0 +1,349 @@
+"""Tasks that an operator adds and withdraws: what is said, and how what comes of it is seen."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+from coordinator.observer import Observer
+from coordinator.operator.commanding import CommandWish
+from coordinator.operator.errands import Errand, Errands
+from coordinator.operator.task_orders import NewTask, Wgs84, Withdrawal
+from coordinator.operator.verdict import Result
+from swarm.config import Timing
+from swarm.events import Ask, BusFact, Heard, Learned, PeerSeen, Publish, Tick, Wish
+from swarm.model import Mission
+from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.wire.messages import (
+    Body,
+    CommandKind,
+    EpochPhase,
+    Message,
+    Snapshot,
+    Stamp,
+    StatusPhase,
+    TaskOrder,
+)
+from tests.builders import (
+    IDLE,
+    MISSION,
+    OUT,
+    brief,
+    done,
+    entry,
+    epoch,
+    held,
+    message,
+    mission,
+    order,
+    status,
+    task,
+    uav,
+)
+
+PATIENCE_S = 10.0
+TIMING = Timing(silence_s=100.0)
+FLEET = [uav("u0", lift=0.0), uav("u1", lift=0.0)]
+HERE = NewTask((3.0, 4.0, 0.0))
+
+
+class Desk:
+    """An operator's errands beside ``u0`` and ``u1``, whom the test plays."""
+
+    def __init__(self, flown: Mission | None = None) -> None:
+        self.observer = Observer(flown or mission(FLEET, []), TIMING)
+        self.errands = Errands(self.observer, incarnation=50, timing=TIMING, patience_s=PATIENCE_S)
+        self.now_s = 0.0
+        self.wishes: list[Wish] = []
+        self._counter = 0
+        self.hear(COORDINATOR, brief(*FLEET))
+        self.hear(COORDINATOR, entry("t0", value=2.0), entry("t1", number=4, value=6.0))
+        self.hear(COORDINATOR, epoch("u0", "u1"))
+        for writer in ("u0", "u1"):
+            self.happen(PeerSeen(writer))
+            self.hear(writer, IDLE)
+        self.wishes.clear()
+
+    def hear(self, writer: str, *bodies: Body) -> None:
+        for body in bodies:
+            self._counter += 1
+            self.happen(Heard(message(writer, body, self._counter)))
+
+    def give(self, wish: NewTask | Withdrawal | CommandWish) -> Errand:
+        errand = self.errands.give(wish, self.now_s)
+        self.happen(Tick())
+        return errand
+
+    def confirm(self, errand: Errand, *writers: str) -> None:
+        assert errand.said is not None
+        answers = [Snapshot(MISSION, w, 1, None, (errand.said,)) for w in writers]
+        self.happen(Learned(tuple(answers)))
+
+    def happen(self, fact: BusFact, at_s: float | None = None) -> None:
+        self.now_s = self.now_s if at_s is None else at_s
+        self.observer.step(fact, self.now_s)
+        self.wishes += self.errands.step(fact, self.now_s)
+
+    def wait(self, until_s: float) -> None:
+        while (due_s := self.errands.next_deadline_s()) is not None and due_s <= until_s:
+            assert due_s >= self.now_s
+            self.happen(Tick(), due_s)
+
+    @property
+    def said(self) -> list[Message]:
+        return [wish.message for wish in self.wishes if isinstance(wish, Publish)]
+
+
+def came(errand: Errand) -> tuple[Result, str]:
+    assert errand.verdict is not None
+    return errand.verdict.result, errand.verdict.text
+
+
+# -- adding -------------------------------------------------------------------------------
+
+
+def test_a_task_is_added_at_the_end_of_the_board_worth_the_boards_median() -> None:
+    desk = Desk()
+    desk.give(NewTask((3.0, 4.0, 0.0), service_s=5.0, kind="look", reason="smoke"))
+
+    expected = TaskOrder("op1", 5, (3.0, 4.0, 0.0), 4.0, 5.0, "look", False, 1, "smoke")
+    assert desk.said == [Message(MISSION, OPERATOR, Stamp(50, 1), expected)]
+
+
+def test_it_repeats_and_asks_until_everyone_there_has_confirmed() -> None:
+    desk = Desk()
+    errand = desk.give(HERE)
+    desk.wait(2.5 * TIMING.announce_s)
+    assert (len(desk.said), len(set(desk.said))) == (3, 1)
+    assert desk.wishes.count(Ask()) >= 4
+
+    desk.confirm(errand, "u0")
+    assert errand.verdict is None
+    desk.confirm(errand, "u1")
+    desk.hear("u1", held("op1", 6.0))
+    assert came(errand) == (Result.OBEYED, "op1 is on the board, worth 4; u1 flies there")
+    assert desk.errands.next_deadline_s() is None
+
+
+def test_a_task_that_nobody_takes_at_once_is_told_so() -> None:
+    desk = Desk()
+    errand = desk.give(HERE)
+    desk.confirm(errand, "u0", "u1")
+    desk.wait(5.0)
+
+    assert came(errand) == (Result.OBEYED, "op1 is on the board, worth 4; nobody has taken it yet")
+    assert desk.now_s < 2.0
+
+
+def test_who_has_not_confirmed_in_time_is_named() -> None:
+    desk = Desk()
+    errand = desk.give(HERE)
+    desk.confirm(errand, "u1")
+    desk.wait(PATIENCE_S)
+
+    result, text = came(errand)
+    assert (result, text.rpartition("; ")[2]) == (Result.OBEYED, "u0 has not confirmed it yet")
+
+
+def test_without_any_answer_it_was_not_seen_to_arrive() -> None:
+    desk = Desk()
+    errand = desk.give(HERE)
+    desk.wait(PATIENCE_S)
+
+    assert came(errand) == (Result.NOT_OBEYED, "op1: nobody has confirmed it within 10 s")
+
+
+def test_a_task_no_uav_is_capable_of_is_added_all_the_same() -> None:
+    desk = Desk()
+    errand = desk.give(replace(HERE, kind="lift"))
+    desk.confirm(errand, "u0", "u1")
+
+    result, text = came(errand)
+    assert result is Result.OBEYED
+    assert text.endswith("but no UAV is capable of it: the success of each there is 0")
+
+
+def test_when_nobody_takes_part_any_more_it_was_in_vain() -> None:
+    desk = Desk()
+    desk.hear("u0", OUT)
+    desk.hear("u1", OUT)
+    errand = desk.give(HERE)
+    desk.confirm(errand, "u0")
+
+    result, text = came(errand)
+    assert (result, text.partition("; ")[2]) == (
+        Result.NOT_OBEYED,
+        "but nobody who could do it takes part any more",
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("t0", "t0 is open"), ("t1", "t1 is done"), ("late", "late is yet to appear")],
+)
+def test_an_id_that_is_taken_is_refused(name: str, why: str) -> None:
+    desk = Desk(mission(FLEET, [task("late", 9.0, appears_s=50.0)]))
+    desk.hear("u0", done("t1"))
+    errand = desk.give(replace(HERE, task=name))
+
+    assert came(errand) == (Result.TAKEN_ID, f"{why}: give another id, or none")
+    assert desk.said == []
+
+
+def test_ids_that_are_not_chosen_by_hand_go_on() -> None:
+    desk = Desk()
+    desk.hear(OPERATOR, order("op2", run=9))
+
+    assert [desk.give(HERE).task for _ in range(2)] == ["op1", "op3"]
+
+
+def test_a_place_on_the_earth_is_brought_into_the_missions_frame() -> None:
+    desk = Desk()
+    errand = desk.give(NewTask(Wgs84(47.0, 8.001)))
+    assert errand.said is not None
+    body = errand.said.body
+    assert isinstance(body, TaskOrder)
+    assert body.position_enu_m[0] == pytest.approx(76.05, abs=0.1)
+    assert body.position_enu_m[1:] == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("fields", "problem"),
+    [
+        ({"place": (1e9, 0.0, 0.0)}, "position must be within -1e+08..1e+08, not 1e+09"),
+        ({"place": (math.nan, 0.0, 0.0)}, "position must be within -1e+08..1e+08, not nan"),
+        ({"value": -1.0}, "value must be within 0..1e+12, not -1"),
+        ({"service_s": math.inf}, "time on the spot must be within 0..1e+09, not inf"),
+        ({"task": "a b"}, "id 'a b' is not 1 to 64 letters"),
+        ({"kind": ""}, "kind '' is not 1 to 64 letters"),
+    ],
+)
+def test_what_no_message_can_carry_is_refused(fields: dict[str, object], problem: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(problem)):
+        replace(HERE, **fields)  # type: ignore[arg-type]  # each case names a real field
+
+
+# -- withdrawing --------------------------------------------------------------------------
+
+
+def test_a_withdrawal_is_obeyed_once_all_know_and_nobody_flies_there() -> None:
+    desk = Desk()
+    desk.hear("u1", held("t1", 1.0))
+    errand = desk.give(Withdrawal("t1", "done by hand"))
+    (message,) = desk.said
+    assert isinstance(message.body, TaskOrder)
+    assert (message.body.withdrawn, message.body.value, message.body.number) == (True, 6.0, 4)
+    desk.confirm(errand, "u0", "u1")
+    assert errand.verdict is None
+
+    desk.hear("u1", IDLE)
+    assert came(errand) == (Result.OBEYED, "t1 is withdrawn")
+
+
+def test_who_does_not_give_a_withdrawn_task_up_is_named() -> None:
+    desk = Desk()
+    desk.hear("u1", held("t1", 1.0))
+    errand = desk.give(Withdrawal("t1"))
+    desk.confirm(errand, "u0", "u1")
+    desk.wait(PATIENCE_S)
+
+    assert came(errand) == (Result.NOT_OBEYED, "u1 still claims t1")
+
+
+def test_a_task_that_is_done_meanwhile_cannot_be_withdrawn() -> None:
+    desk = Desk()
+    errand = desk.give(Withdrawal("t1"))
+    desk.hear("u1", done("t1"))
+    desk.confirm(errand, "u0", "u1")
+
+    assert came(errand) == (Result.NOT_OBEYED, "t1 was done before it could be withdrawn")
+
+
+def test_what_is_not_there_done_or_withdrawn_is_refused_in_words() -> None:
+    desk = Desk()
+    desk.hear("u0", done("t0"))
+    desk.hear(OPERATOR, order("t1", withdrawn=True))
+
+    assert came(desk.give(Withdrawal("t9"))) == (Result.UNKNOWN_TASK, "the board holds t0, t1")
+    assert came(desk.give(Withdrawal("t0"))) == (Result.NOT_OBEYED, "t0 is done already")
+    assert came(desk.give(Withdrawal("t1"))) == (Result.NOT_OBEYED, "t1 is withdrawn already")
+    assert desk.said == []
+
+
+def test_who_knows_the_scenario_withdraws_a_pop_up_before_it_appears() -> None:
+    desk = Desk(mission(FLEET, [task("late", 9.0, 3.0, appears_s=50.0)]))
+    errand = desk.give(Withdrawal("late"))
+
+    assert errand.verdict is None
+    assert desk.observer.board.states["late"].value == "withdrawn"
+    assert desk.observer.result().open == ()
+
+
+# -- many at once, and others ---------------------------------------------------------------
+
+
+def test_several_errands_are_followed_side_by_side() -> None:
+    desk = Desk()
+    held_uav = desk.give(CommandWish(CommandKind.HOLD, "u0"))
+    added, gone = desk.give(HERE), desk.give(Withdrawal("t0"))
+    assert len({message.stamp for message in desk.said}) == 3
+
+    desk.confirm(gone, "u0", "u1")
+    assert (gone.obeyed, added.verdict, held_uav.verdict) == (True, None, None)
+    desk.hear("u0", replace(status(StatusPhase.HOLDING), note="held"))
+    assert (held_uav.obeyed, added.verdict) == (True, None)
+    assert desk.errands.open == [added]
+
+
+def test_it_speaks_above_all_that_any_operator_has_said() -> None:
+    desk = Desk()
+    desk.happen(Heard(Message(MISSION, OPERATOR, Stamp(7_000, 3), order("op1"))))
+    desk.give(HERE)
+
+    assert desk.said[0].stamp > Stamp(7_000, 3)
+
+
+def test_another_operators_later_word_ends_it() -> None:
+    desk = Desk()
+    errand = desk.give(HERE)
+    later = Message(MISSION, OPERATOR, Stamp(60, 1), order("op1", withdrawn=True))
+    desk.happen(Heard(later))
+
+    text = "another operator has withdrawn op1 meanwhile"
+    assert came(errand) == (Result.NOT_OBEYED, text)
+
+
+def test_after_the_end_nothing_is_taken_up() -> None:
+    desk = Desk()
+    before = desk.give(HERE)
+    desk.hear(COORDINATOR, epoch("u0", "u1", phase=EpochPhase.ENDED, number=2))
+    assert came(before)[0] is Result.NOT_OBEYED
+
+    text = "the mission has ended: nothing is taken up any more"
+    assert came(desk.give(HERE)) == (Result.NOT_OBEYED, text)
+    assert came(desk.give(Withdrawal("t0"))) == (Result.NOT_OBEYED, text)
+
+
+def test_a_mission_that_ends_by_what_was_ordered_has_obeyed() -> None:
+    over = epoch("u0", "u1", phase=EpochPhase.ENDED, number=2)
+    desk = Desk()
+    added, gone = desk.give(HERE), desk.give(Withdrawal("t0"))
+    desk.hear("u0", done("op1"))
+    desk.hear(COORDINATOR, over)
+
+    assert came(added) == (Result.OBEYED, "op1 was added and is done")
+    assert came(gone) == (Result.OBEYED, "t0 is withdrawn")
+
+
+def test_when_the_brief_turns_out_to_be_of_another_run_it_says_so_anew() -> None:
+    desk = Desk()
+    errand = desk.give(HERE)
+    desk.hear(COORDINATOR, replace(brief(*FLEET), run=5))
+    desk.happen(Tick())
+
+    assert errand.said is not None
+    assert [m.body.run for m in desk.said if isinstance(m.body, TaskOrder)] == [1, 5]
+    assert "op1" in desk.observer.replica.board
