@@ -7,6 +7,7 @@ how any of it is shown.
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,7 +108,9 @@ class Observer:
     """
 
     def __init__(self, mission: Mission, timing: Timing) -> None:
-        self.mission = mission
+        self._mission = mission
+        self._revision: Callable[[], Mission] | None = None
+        """Gives the mission anew, as soon as somebody wants to know it."""
         """The one being flown, with what the operator has added to it."""
         self.plan: Plan | None = None
         """The offline plan; set by whoever knows it."""
@@ -149,7 +152,8 @@ class Observer:
         self._timing = timing
         self._asking = Asking(timing.ask_gap_s)
         self._ask_at_s = 0.0
-        self._problem = Problem.from_mission(mission)
+        self._problem: Problem | None = None
+        """Of the mission, as far as it has been wanted."""
         self._given = mission
         self._scenario = {task.id for task in mission.tasks}
         self._added_s: dict[str, float] = {}
@@ -203,10 +207,20 @@ class Observer:
         self._pulse.promise(self.next_deadline_s())
         return wishes
 
-    def revise(self, mission: Mission) -> None:
-        """Take ``mission`` for the one being flown: it was unknown, or the board has changed."""
-        self._given = mission
-        self._complete_mission()
+    @property
+    def mission(self) -> Mission:
+        """What is being flown, as far as it is known."""
+        if self._revision is not None:
+            self._given, self._revision = self._revision(), None
+            self._complete_mission()
+        return self._mission
+
+    def revise(self, mission: Callable[[], Mission]) -> None:
+        """The mission was unknown, or the board has changed: take what ``mission`` gives.
+
+        It is called when somebody next wants to know, as boards are told entry by entry.
+        """
+        self._revision = mission
 
     def take_note(self, message: Message, now_s: float) -> None:
         """Take in what is being said by this very process."""
@@ -269,6 +283,9 @@ class Observer:
 
     def result(self) -> MissionResult:
         """What has been executed so far."""
+        mission = self.mission
+        if self._problem is None:
+            self._problem = Problem.from_mission(mission)
         problem = self._problem
         index = {task: number for number, task in enumerate(problem.task_ids)}
         uav_index = {uav: number for number, uav in enumerate(problem.uav_ids)}
@@ -483,8 +500,8 @@ class Observer:
                     order.kind,
                     self._added_s.get(order.task, 0.0) if known is None else known.appears_s,
                 )
-        self.mission = replace(self._given, tasks=tuple(tasks.values()))
-        self._problem = Problem.from_mission(self.mission)
+        self._mission = replace(self._given, tasks=tuple(tasks.values()))
+        self._problem = None
 
     def _lose(self, writer: str, now_s: float) -> bool:
         """Tell of a loss; whether others may have heard last words."""

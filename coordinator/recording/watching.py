@@ -45,12 +45,13 @@ class Witness:
         """Take note of one fact."""
         wishes = self.onlooker.step(fact, now_s)
         observer = self.onlooker.observer
-        fleet = {uav.id for uav in observer.mission.uavs}
-        there = bool(observer.present & fleet if self.onlooker.known else observer.present)
+        brief = observer.replica.brief
+        fleet = observer.present if brief is None else {uav.id for uav in brief.uavs}
+        there = not fleet.isdisjoint(observer.present)
         self._met |= there
         if observer.cut_since_s is not None:
             # Who is there cannot be seen; after the end nobody need be waited for.
-            there = self.onlooker.known and observer.phase is not EpochPhase.ENDED
+            there = brief is not None and observer.phase is not EpochPhase.ENDED
         if there or not self._met:
             self._empty_at_s = None
         elif self._empty_at_s is None:

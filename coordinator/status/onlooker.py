@@ -7,6 +7,7 @@ shown (coordinator.status.table).
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 
 from coordinator.observer import Observer
 from coordinator.tempo import Tempo
@@ -91,6 +92,7 @@ class Onlooker:
         complete: bool = True,
     ) -> None:
         self.observer = Observer(Mission(mission, horizon_s=1.0, uavs=(), tasks=()), timing)
+        self._name = mission
         self._patience_s = patience_s
         self._complete = complete
         self._leave_at_s: float | None = None
@@ -111,7 +113,7 @@ class Onlooker:
         changed = replica.board_version != self._version
         if self._complete and replica.brief is not None and changed:
             self._version = replica.board_version
-            self.observer.revise(mission_of(replica, self.observer.mission.name, replica.brief))
+            self.observer.revise(partial(mission_of, replica, self._name, replica.brief))
         if isinstance(fact, Learned):
             self._learned = self.known
         if isinstance(fact, Heard):
