@@ -166,10 +166,9 @@ class RecordingThread:
                 return
             if last:
                 self._last()
+            self._grow(last=last)
         except Exception as fault:  # noqa: BLE001 - top of the thread: the flight must go on
             self._fail(f"{type(fault).__name__}: {fault}")
-            return
-        self._grow(last=last)
 
     def _grow(self, *, last: bool) -> None:
         patch = self._mcap.grow(last=last)
