@@ -26,7 +26,7 @@ export class Worth {
     );
     this.axis = make("p", { class: "axis" }, make("span", {}, "0"), make("span", {}));
     this.values = {};
-    this.why = make("p", { class: "fine", hidden: "" });
+    this.why = make("figcaption", { class: "fine", hidden: "" });
     const row = (key, sign, title, hint) => {
       this.values[key] = make("dd", {});
       return make(
@@ -46,7 +46,7 @@ export class Worth {
       make(
         "div",
         { class: "worth" },
-        make("figure", {}, this.chart, this.axis),
+        make("figure", {}, this.chart, this.axis, this.why),
         make(
           "dl",
           {},
@@ -55,7 +55,6 @@ export class Worth {
           row("plan", "╌", "plan", "J of the plan, if all goes as planned"),
           row("bound", "─", "bound", "No plan can be worth more"),
         ),
-        this.why,
       ),
     );
   }
