@@ -192,3 +192,29 @@ def test_what_goes_wrong_while_writing_keeps_nobody_waiting(
     thread.close()
 
     assert said == ["MemoryError: "]
+
+
+class HungSink(Disk):
+    """Answers no second write until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.go_on = threading.Event()
+
+    def apply(self, patch: Patch) -> None:
+        if self.patches:
+            self.go_on.wait()
+        super().apply(patch)
+
+
+def test_a_disk_that_hangs_keeps_nobody_from_leaving(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("coordinator.recording.recording_file.HUNG_S", 0.05)
+    disk, said = HungSink(), list[str]()
+    recorder = FlightRecorder(ABOUT, disk, virtual_ns, said.append)
+    mission_begins(recorder)
+
+    recorder.close()
+    disk.go_on.set()
+
+    assert said == ["the disk does not answer"]
+    assert recorder.fault == "the disk does not answer"
