@@ -96,6 +96,7 @@ class Chronicle:
         """UAV -> its latest choice."""
         self._lists: dict[str, tuple[str, ...]] = {}
         self._epoch: int | None = None
+        self._ended = False
         self._phases: dict[str, StatusPhase] = {}
         for entry in recording.entries:
             self._now_s = entry.now_s
@@ -353,6 +354,9 @@ class Chronicle:
 
     def _tell_epoch(self, epoch: Epoch) -> None:
         if epoch.phase is EpochPhase.ENDED:
+            if self._ended:
+                return
+            self._ended = True
             everyone = [uav.id for uav in self.observer.mission.uavs]
             self._tell("end", f"The mission was over: {epoch.reason}.", uavs=everyone)
             return
