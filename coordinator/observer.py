@@ -149,6 +149,8 @@ class Observer:
         self._pulse = Pulse(timing.pause_s)
         self._known_at_start = {task.id for task in mission.known_at_start().tasks}
         self._ended_told = False
+        self._joining = False
+        """Whether it is just being told what happened before it came."""
         self._timing = timing
         self._asking = Asking(timing.ask_gap_s)
         self._ask_at_s = 0.0
@@ -178,11 +180,15 @@ class Observer:
                     self._hear_coordinator(message, now_s)
                 self._hear(message, now_s)
             case Learned(snapshots):
+                self._joining, told = self.replica.brief is None, len(self.story)
                 for snapshot in snapshots:
                     if self._zero_s is None and snapshot.mission_s is not None:
                         self._zero_s = now_s - snapshot.mission_s / self.pace
                     for message in snapshot.messages:
                         self._hear(message, now_s)
+                if self._joining:
+                    self.story[told:] = sorted(self.story[told:], key=lambda h: h.mission_s or 0.0)
+                    self._joining = False
                 self._membership.expect(self.replica.claims, now_s)
             case PeerSeen(writer):
                 # What it said while one of us had no link has not come here.
@@ -375,7 +381,8 @@ class Observer:
 
     def _is_news(self, task: str) -> bool:
         """Whether the task is a pop-up, or one that the scenario does not know at all."""
-        return self._zero_s is not None and task not in self._known_at_start
+        started = self._zero_s is not None and not self._joining
+        return started and task not in self._known_at_start
 
     def _hear_status(self, uav: str, stamp: Stamp, status: Status, now_s: float) -> None:
         known = self._stamps.get(uav)
@@ -416,7 +423,8 @@ class Observer:
         outcomes = self.replica.outcomes.items()
         others = {u for (u, t), o in outcomes if t == outcome.task and o.result is Result.DONE}
         again = f", as {', '.join(sorted(others - {by}))} had" if done and others - {by} else ""
-        self._tell(f"{uav} ended {outcome.task}: {outcome.result}{again}", now_s)
+        text = f"{uav} ended {outcome.task}: {outcome.result}{again}"
+        self._tell(text, now_s, outcome.completed_s if self._joining else None)
 
     def _hear_coordinator(self, message: Message, now_s: float) -> None:
         """Tell when the coordinator is back, or another one has taken its place."""
@@ -455,7 +463,9 @@ class Observer:
                 self._zero_s = now_s - epoch.mission_s / self.pace
             order = " > ".join(epoch.sequence)
             why = f" ({epoch.reason})" if epoch.number > 1 and epoch.reason else ""
-            self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}{why}", now_s)
+            # With the first one mission time began.
+            at_s = 0.0 if self._joining and epoch.number == 1 else None
+            self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}{why}", now_s, at_s)
         elif epoch.phase is EpochPhase.ENDED and not self._ended_told:
             self._ended_told = True
             self._asking.want(now_s)  # soon nobody will be there to tell what was not heard
@@ -528,5 +538,6 @@ class Observer:
             self._tell(f"{writer} lost{silent}", now_s)
         return True
 
-    def _tell(self, text: str, now_s: float) -> None:
-        self.story.append(Happening(self.mission_s(now_s), text))
+    def _tell(self, text: str, now_s: float, at_s: float | None = None) -> None:
+        """Add to the story what happened now, or at mission time ``at_s``."""
+        self.story.append(Happening(self.mission_s(now_s) if at_s is None else at_s, text))

@@ -159,7 +159,7 @@ def dashboard(
             try:
                 await served.beside(source.run())
             finally:
-                await served.end("the dashboard has ended")
+                await served.end("it was stopped")
         return 0
 
     return asyncio.run(run_until_stopped(work(), lifeline=lifeline))

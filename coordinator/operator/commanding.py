@@ -6,6 +6,7 @@ coordinator.core).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from coordinator.observer import Observer
@@ -93,7 +94,7 @@ class Commanding:
             return Verdict(Result.NOT_OBEYED, "; ".join(texts))
         effects = [effect for effect in found if effect is not None]
         obeyed = all(effect.result is Result.OBEYED for effect in effects)
-        text = "; ".join(effect.text for effect in effects)
+        text = _in_short({u: e.text for u, e in zip(self.concerned, effects, strict=True)})
         return Verdict(Result.OBEYED if obeyed else Result.NOT_OBEYED, text)
 
     @property
@@ -155,6 +156,19 @@ class Commanding:
         if status is None or status is self._before.get(uav):
             return f"{uav} has not been heard of {waited}"
         return f"{_told(uav, status)} still, {self._kind} was not obeyed {waited}"
+
+
+def _in_short(texts: Mapping[str, str]) -> str:
+    """What came of it for each UAV; what is the same for several is said once."""
+    same: dict[str, list[str]] = {}
+    for uav, text in texts.items():
+        same.setdefault(text.removeprefix(uav), []).append(uav)
+    parts = []
+    for told, uavs in same.items():
+        more = f" and {len(uavs) - 3} more" if len(uavs) > 3 else ""
+        each = f"{', '.join(uavs[:3])}{more}: each{told}"
+        parts.append(texts[uavs[0]] if len(uavs) == 1 else each)
+    return "; ".join(parts)
 
 
 def _told(uav: str, status: Status) -> str:

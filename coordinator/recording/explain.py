@@ -202,7 +202,9 @@ def _worths(observer: Observer) -> dict[str, tuple[str, float, float]]:
 
 
 def _share(worth: float, objective: float) -> str:
-    of_all = f", {worth / objective:.1%} of J = {shown_value(objective)}" if objective > 0.0 else ""
+    of_all = ""
+    if objective > 0.0:
+        of_all = f", {100.0 * worth / objective:.1f} % of J = {shown_value(objective)}"
     return f"{shown_value(worth)} value·s{of_all}"
 
 

@@ -18,18 +18,20 @@ from rich.text import Text
 
 from coordinator.observer import Observer
 from coordinator.view.live import task_counts, title
-from coordinator.view.scene import LOST, Scene, scene_of
+from coordinator.view.scene import LOST, Scene, place_of, scene_of
 from coordinator.view.signs import BAD, Signs, uav_colour
 from coordinator.view.story import clean, shown_value
 from swarm.model import TaskId, UavId
 from swarm.model.ids import COORDINATOR, FLEET
 from swarm.state.board import TaskState
 from swarm.state.commands import words
-from swarm.wire.messages import Command
+from swarm.wire.messages import Command, StatusPhase
 
 __all__ = ["MissionStatus", "UavStatus", "mission_status", "status_as_json", "status_table"]
 
 ABSENT = "absent"
+GONE_FOR_GOOD = (LOST, StatusPhase.RETURNING, StatusPhase.HOME, StatusPhase.OUT)
+"""What is no less true of a UAV that nothing is heard of any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,7 @@ class UavStatus:
     done: int
     """Tasks it has done."""
     position_enu_m: tuple[float, float, float] | None
-    """[m; mission origin], without the height layer; None as long as it has told none."""
+    """[m; mission origin], in its height layer; None as long as it has told none."""
     battery_frac: float | None
     link_age_s: float | None
     """Since it last said something [s of the onlooker's clock]; None when it never has."""
@@ -94,11 +96,11 @@ def mission_status(observer: Observer, now_s: float) -> MissionStatus:
         uavs.append(
             UavStatus(
                 id=view.id,
-                does=view.does if there or view.does == LOST else ABSENT,
+                does=view.does if there or view.does in GONE_FOR_GOOD else ABSENT,
                 task=view.task if there else None,
                 eta_s=view.eta_s if there else None,
                 done=len(view.flown),
-                position_enu_m=None if status is None else status.position_enu_m,
+                position_enu_m=place_of(observer, view.id),
                 battery_frac=view.battery_frac,
                 link_age_s=None if heard_s is None else now_s - heard_s,
                 note=view.note,

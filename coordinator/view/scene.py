@@ -17,7 +17,7 @@ from swarm.state.board import TaskState
 from swarm.state.commands import in_force
 from swarm.wire.messages import ClaimPhase, Command, CommandKind, Epoch, EpochPhase, StatusPhase
 
-__all__ = ["LOST", "Scene", "TaskView", "UavView", "doing", "scene_of"]
+__all__ = ["LOST", "Scene", "TaskView", "UavView", "doing", "place_of", "scene_of"]
 
 LOST = "lost"
 STARTING = "starting"
@@ -185,6 +185,19 @@ def doing(observer: Observer, uav: str) -> tuple[str, TaskId | None]:
     elif task is None and does in _BUSY:
         does = StatusPhase.IDLE
     return does, task
+
+
+def place_of(observer: Observer, uav: str) -> tuple[float, float, float] | None:
+    """Where ``uav`` is, in its height layer [m; mission origin]; None as long as it has not told.
+
+    Agents tell it without the layer, as if all flew at the height of their tasks.
+    """
+    status, brief = observer.statuses.get(uav), observer.replica.brief
+    if status is None or status.position_enu_m is None:
+        return None
+    layers_m = {} if brief is None else {each.id: each.layer_m for each in brief.uavs}
+    east_m, north_m, up_m = status.position_enu_m
+    return east_m, north_m, up_m + layers_m.get(uav, 0.0)
 
 
 def _worth_of(observer: Observer, epoch: Epoch | None) -> float | None:

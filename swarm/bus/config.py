@@ -141,7 +141,8 @@ def bus_config(
             raise InputError(Fault("command line", "--bus", problem, remedy))
     except ValueError as fault:
         remedy = "see --help"
-        raise InputError(Fault("command line", "--bus", str(fault), remedy)) from None
+        options = "--bus, --listen, --connect"
+        raise InputError(Fault("command line", options, str(fault), remedy)) from None
     return BusConfig(FileTopology(Path(kind)), lease_s)
 
 

@@ -115,7 +115,9 @@ async def open_session(config: zenoh.Config, *, timeout_s: float) -> zenoh.Sessi
                 await asyncio.sleep(pause_s)
                 pause_s = min(2 * pause_s, RECONNECT_SLOWEST_S)
     except TimeoutError:
-        raise BusError(f"cannot reach the bus within {timeout_s:g} s: {problem}") from None
+        hint = "is a router running there, or is --connect to name another one?"
+        text = f"cannot reach the bus within {timeout_s:g} s: {problem} {hint}"
+        raise BusError(text) from None
 
 
 def close_session(session: zenoh.Session, *, limit_s: float) -> bool:

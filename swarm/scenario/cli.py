@@ -199,10 +199,10 @@ def new(
     if name is not None and not valid_id(name):
         raise InputError(Fault("--name", "", f"{name!r} is not an id", f"give {ID_RULE}"))
     if file.suffix != ".toml":
-        remedy = f"end it in .toml, such as {file.name or 'field'}.toml"
-        raise InputError(Fault("FILE.toml", str(file), "is no name of a scenario file", remedy))
+        remedy = f"end it in .toml, such as {file.stem or 'field'}.toml"
+        raise InputError(Fault(str(file), "", "is no name of a scenario file", remedy))
     place = DEFAULT_ORIGIN if origin is None else _origin(origin, "--origin", alt_m=0.0)
-    _write(file, blank_scenario(Blank(name or _id_of(file.stem), uavs, tasks, place)), "FILE.toml")
+    _write(file, blank_scenario(Blank(name or _id_of(file.stem), uavs, tasks, place)), "")
     print(f"fly it with: swarm run {file}", file=sys.stderr)
     return 0
 
@@ -233,16 +233,17 @@ def _write(path: Path, text: str, option: str = "--output") -> None:
     """Write a new file; one that is there may have been worked on."""
     from swarm.errors import Fault, InputError
 
+    where = (option, str(path)) if option else (str(path), "")
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        fault = Fault(option, str(path), "is there already", "remove it, or name another file")
+        fault = Fault(*where, "is there already", "remove it, or name another file")
         raise InputError(fault) from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else None
         problem = f"cannot be written: {reason or error}"
-        raise InputError(Fault(option, str(path), problem, "name a file that can be")) from error
+        raise InputError(Fault(*where, problem, "name a file that can be")) from error
 
 
 def _story(tasks: TaskFile, uavs: int, output: Path | None) -> str:

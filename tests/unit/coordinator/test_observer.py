@@ -460,6 +460,22 @@ def test_one_who_joins_late_learns_time_and_result_but_tells_no_tales_of_pop_ups
     assert not any("appeared" in sentence for sentence in onlooker.story)
 
 
+def test_one_who_joins_late_tells_what_was_before_at_its_own_time() -> None:
+    onlooker = Onlooker(replace(FLOWN, tasks=()))
+    said = [onlooker.statement(COORDINATOR, epoch("u0", "u1", mission_s=40.0))]
+    said += [onlooker.statement(COORDINATOR, body) for body in Onlooker().posted()]
+    said += [onlooker.statement("u1", done("t1", 9.0)), onlooker.statement("u0", done("t0", 5.0))]
+    onlooker.happen(Learned((Snapshot(MISSION, COORDINATOR, 1, 41.0, tuple(said)),)))
+    onlooker.hear("u0", done("popup", 33.0), 50.0)
+
+    assert [(h.mission_s, h.text) for h in onlooker.observer.story] == [
+        (0.0, "epoch 1: greedy, u0 > u1"),
+        (5.0, "u0 ended t0: done"),
+        (9.0, "u1 ended t1: done"),
+        (onlooker.observer.mission_s(onlooker.now_s), "u0 ended popup: done"),
+    ]
+
+
 def leaving(phase: StatusPhase, note: str, counter: int, incarnation: int = 1) -> Heard:
     said = replace(status(phase), note=note)
     return Heard(message("u0", said, counter, incarnation=incarnation))

@@ -54,7 +54,8 @@ export class Replay {
   #showSpeed(speed) {
     const value = String(speed);
     if (![...this.speed.options].some((option) => option.value === value)) {
-      this.speed.append(make("option", { value }, `${speed} ×`));
+      const faster = [...this.speed.options].find((option) => Number(option.value) > speed);
+      this.speed.insertBefore(make("option", { value }, `${speed} ×`), faster ?? null);
     }
     this.speed.value = value;
   }

@@ -263,6 +263,15 @@ def test_an_abort_is_obeyed_when_everyone_there_goes_home() -> None:
     assert seat.result is Result.OBEYED
 
 
+def test_what_is_the_same_for_several_uavs_is_told_once() -> None:
+    seat = Seat(ABORT, FLEET)
+    seat.learn()
+    seat.does("u0", StatusPhase.RETURNING)
+    seat.does("u1", StatusPhase.RETURNING)
+
+    assert seat.text.startswith("u0, u1: each is returning")
+
+
 def test_an_abort_that_a_lost_uav_has_not_heard_is_told() -> None:
     seat = Seat(ABORT, FLEET)
     seat.hear("u1", IDLE)

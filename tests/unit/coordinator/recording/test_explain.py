@@ -123,7 +123,7 @@ def test_a_task_that_was_chosen_claimed_and_done(tape: Tape) -> None:
     assert told.state == "done"
     assert told.worth == pytest.approx(1000.0 - 10.25)
     assert told.ending == (
-        "So t0 was done by u0 at 10.2 s. That is worth 989.75 value·s, 100.0% of J = 989.75."
+        "So t0 was done by u0 at 10.2 s. That is worth 989.75 value·s, 100.0 % of J = 989.75."
     )
 
 

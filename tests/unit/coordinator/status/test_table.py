@@ -12,7 +12,7 @@ from coordinator.status.table import mission_status, status_as_json, status_tabl
 from coordinator.view.signs import signs_for
 from swarm.events import PeerGone, PeerSeen, Tick
 from swarm.model.ids import COORDINATOR, OPERATOR
-from swarm.wire.messages import Command, CommandKind, Status, StatusPhase
+from swarm.wire.messages import Claim, ClaimPhase, Command, CommandKind, Status, StatusPhase
 from tests.builders import TIMING, brief_of
 from tests.observed_mission import Teller, random_mission, shipped
 
@@ -151,3 +151,17 @@ def test_without_a_word_of_the_operator_nothing_is_told_of_any() -> None:
     told = status_as_json(mission_status(flying().observer, 3.0))
 
     assert (told["aborted"], told["commands"]) == (False, {})
+
+
+def test_who_went_home_and_left_is_home_and_its_height_is_that_of_its_layer() -> None:
+    teller = flying()
+    layered = brief_of(shipped("table-1"))
+    layered = replace(layered, uavs=tuple(replace(uav, layer_m=10.0) for uav in layered.uavs))
+    teller.say(COORDINATOR, layered, 2.4)
+    teller.say("uav1", Claim(ClaimPhase.OUT, None, 2.5, 0, 2.5), 2.5)
+    teller.status("uav1", StatusPhase.HOME, 2.6, position_enu_m=(5.0, 0.0, -10.0))
+    go(teller, "uav1", 2.7)
+
+    first = mission_status(teller.observer, 3.0).uavs[0]
+
+    assert (first.does, first.position_enu_m) == ("home", (5.0, 0.0, 0.0))
