@@ -105,7 +105,8 @@ class Judge:
         now_s, transcript = self._now_s, self.transcript
         life = self._lives.setdefault(process, len(self._lives))
         self._changed_s[process.name] = now_s
-        transcript.said(now_s, process.name, life, message)
+        alone = self._network is not None and self._network.is_alone(process)
+        transcript.said(now_s, process.name, life, message, unheard=alone)
         self._note_what_is_left(process, message)
         self._stop_if_broken()
 
