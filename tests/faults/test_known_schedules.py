@@ -39,6 +39,17 @@ ONCE_BROKEN = {
         3 deadlock u3
         9 cut coordinator u0 u1 for 19.68
     """,
+    "a coordinator's first words reach neither its disk nor anybody": """
+        fleet seed=82105 uavs=2 tasks=1 popups=0 topology=mesh method=greedy
+        0.02 crash coordinator for 1 with past
+    """,
+    "who was refused goes home before it may try again, as there is no coordinator": """
+        fleet seed=92515 uavs=2 tasks=3 popups=0 topology=router method=greedy
+        1 return u1
+        2 refuse u0 t2 for 18
+        8 hold u0 for 0.1
+        18 deadlock coordinator
+    """,
 }
 
 
