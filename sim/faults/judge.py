@@ -19,8 +19,8 @@ Beside the invariants of the messages (sim.faults.transcript):
 - *miscounted*: the onlooker knows the visits of every UAV that left in calm, invents none, and
   counts as duplicates all that it knows of, and no more than there were.
 
-UAVs that were cut off or died may have done what nobody could hear of; nothing is claimed
-about the counting of that. Leaves out: how faults come about (sim.faults.director).
+UAVs that were cut off or died may have done what nobody could hear of, and one that forgot
+it cannot tell of it later; nothing is claimed about the counting of that. Leaves out: how faults come about (sim.faults.director).
 """
 
 from __future__ import annotations
@@ -277,12 +277,17 @@ class Judge:
             if completed_s not in true[key]:
                 self._break("miscounted", f"{key[0]} never visited {key[1]} at {completed_s:.3f} s")
         for uav, task in sorted(true.keys() - known.keys()):
-            if uav in self._left_in_calm:
+            if uav in self._left_in_calm and not self._is_forgotten(uav, task):
                 self._break("miscounted", f"nobody knows that {uav} visited {task}")
         told = observer.result().duplicate_visits
         least, most = len(known) - len({task for _, task in known}), self.transcript.duplicates
         if not least <= told <= most:
             self._break("miscounted", f"{told} duplicates told, not {least} to {most}")
+
+    def _is_forgotten(self, uav: str, task: str) -> bool:
+        """Whether an earlier life did ``task``, nobody heard of it, and the last does not know."""
+        last_life = self._lives.get(self._there.processes[uav])
+        return self.transcript.unheard.get((uav, task), last_life) != last_life
 
     # -- pieces -----------------------------------------------------------------------
 

@@ -63,6 +63,9 @@ class Transcript:
         """The operator's newest word about every task that they have ever said anything about."""
         self.visits: dict[tuple[str, str], set[float]] = defaultdict(set)
         """By UAV and task: when attempts ended done [s mission time]."""
+        self.unheard: dict[tuple[str, str], int] = {}
+        """By UAV and task: the life that told of its visit when nobody was there to hear it, where
+        nobody has told of it again."""
         self.failed: set[str] = set()
         """Tasks an attempt at which failed."""
         self.ended = False
@@ -147,7 +150,11 @@ class Transcript:
             case Epoch(phase=EpochPhase.ENDED):
                 self.ended = True
             case Outcome(task=task, result=Result.DONE, completed_s=completed_s):
-                self.visits[message.writer, task].add(completed_s)
+                visit = message.writer, task
+                self.visits[visit].add(completed_s)
+                self.unheard.pop(visit, None)
+                if unheard:
+                    self.unheard[visit] = life
             case Outcome(task=task):
                 self.failed.add(task)
             case Claim() as claim:

@@ -43,6 +43,11 @@ ONCE_BROKEN = {
         fleet seed=82105 uavs=2 tasks=1 popups=0 topology=mesh method=greedy
         0.02 crash coordinator for 1 with past
     """,
+    "who was cut off forgets what it visited there": """
+        fleet seed=97670 uavs=5 tasks=9 popups=0 topology=router method=greedy
+        3.2 routers for 11
+        10.4 crash u4 for 1 with none
+    """,
     "who was refused goes home before it may try again, as there is no coordinator": """
         fleet seed=92515 uavs=2 tasks=3 popups=0 topology=router method=greedy
         1 return u1
