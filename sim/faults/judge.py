@@ -85,8 +85,8 @@ class Judge:
         self._left_in_calm: set[str] = set()
         self._left_undone: dict[str, set[str]] = {}
         """By UAV that takes no further part: the tasks it knew of that were on the board."""
-        self._known_at_the_end: set[str] = set()
-        """Tasks that a coordinator knew of when it ended the mission."""
+        self._known_at_the_end: dict[str, set[str]] = {}
+        """By coordinator's process: tasks that it knew of when it first said the mission over."""
         self._shared_since_s: dict[tuple[Process, Process, str], float] = {}
 
     @property
@@ -120,7 +120,7 @@ class Judge:
             case Claim():
                 self._left_undone.pop(process.name, None)
             case Epoch(phase=EpochPhase.ENDED) if isinstance(core, CoordinatorCore | StandbyCore):
-                self._known_at_the_end |= _on_board(core.replica)
+                self._known_at_the_end.setdefault(process.name, _on_board(core.replica))
             case _:
                 pass
 
@@ -253,10 +253,11 @@ class Judge:
             for task, order in transcript.ordered.items()
             if task not in transcript.posted
         }
+        known_at_the_end = set[str]().union(*self._known_at_the_end.values())
         tasks = [task for task in world.mission.tasks if task.id in transcript.posted]
         tasks += [Task(TaskId(task), added[task].position_enu_m, 0.0) for task in added]
         for task in tasks:
-            unheard = task.id in added and task.id not in self._known_at_the_end
+            unheard = task.id in added and task.id not in known_at_the_end
             if task.id in settled or (transcript.ended and unheard):
                 continue
             able = [

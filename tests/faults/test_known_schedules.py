@@ -48,6 +48,14 @@ ONCE_BROKEN = {
         3.2 routers for 11
         10.4 crash u4 for 1 with none
     """,
+    "a task is added while the word that ends the mission is under way": """
+        fleet seed=98650 uavs=3 tasks=14 popups=0 topology=router method=greedy
+        5 hang u0 for 3
+        7 hold u2 for 1
+        8 blink
+        14 add by 1
+        32.6 add by 1
+    """,
     "who was refused goes home before it may try again, as there is no coordinator": """
         fleet seed=92515 uavs=2 tasks=3 popups=0 topology=router method=greedy
         1 return u1
