@@ -310,15 +310,18 @@ def run(
         if verbose:
             print(f"{name}: {line}", file=sys.stderr)
 
-    for line in () if options.dashboard is None else options.dashboard.lines:
+    def say(line: str) -> None:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+    for line in () if options.dashboard is None else options.dashboard.lines:
+        say(line)
 
     async def work() -> int:
         about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))
         try:
             with (
                 kept or contextlib.nullcontext(),
-                recording_or_none(record, about, wall_ns(), console.print) as recorder,
+                recording_or_none(record, about, wall_ns(), say) as recorder,
                 LiveView(console, speedup=speedup) as view,
             ):
                 flight = await fly(

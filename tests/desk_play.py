@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from coordinator.dashboard.desk import Desk
@@ -114,6 +114,7 @@ class DeskPlay:
         return self.desk.observer
 
     link = True
+    dropped: Mapping[str, int] = {}
 
     def now_s(self) -> float:
         return self.time_s

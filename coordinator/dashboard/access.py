@@ -11,6 +11,7 @@ import hmac
 import ipaddress
 import os
 import secrets
+import socket
 import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -93,13 +94,12 @@ def access_for(host: str, allowed: Sequence[str], token: str | None) -> tuple[Ac
         allowed: other names under which it may be asked for.
         token: None for one of its own where it can be reached from elsewhere.
     """
-    names = {_bracketed(name).lower() for name in allowed}
+    names = {_bracketed(name).lower() for name in (*allowed, host)} | _LOOPBACK_NAMES
     if is_loopback(host):
-        return Access(frozenset(names | _LOOPBACK_NAMES), any_address=False, token=token), False
-    names.add(_bracketed(host).lower())
+        return Access(frozenset(names), any_address=False, token=token), False
+    names.add(socket.gethostname().lower())  # by which people are told where to find it
     made = secrets.token_urlsafe(18) if token is None else token
-    known = frozenset(names | _LOOPBACK_NAMES)
-    return Access(known, any_address=True, token=made), token is None
+    return Access(frozenset(names), any_address=True, token=made), token is None
 
 
 def is_loopback(host: str) -> bool:

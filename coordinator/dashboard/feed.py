@@ -32,6 +32,8 @@ __all__ = ["PROTOCOL", "Display", "Feed"]
 
 PROTOCOL = 1
 _STORY, _CHOICES, _CURVE, _COMMANDS = 500, 300, 600, 200
+_MEASURES = 8
+"""Flights of which it is remembered how they began."""
 _QUIET_LOOKS = 5
 """A row of which only the silence has grown is sent after so many looks."""
 _GONE = (StatusPhase.HOME, StatusPhase.RETURNING, StatusPhase.OUT)
@@ -236,6 +238,7 @@ class Feed:
             "aborted": observer is not None and aborted(observer.replica) is not None,
             "counts": counts,
             "dropped": dict(dropped.most_common()),
+            "dropped_here": dict(self._source.dropped),
             "others": sorted(present - {COORDINATOR, *fleet}),
             "recording": None
             if player is None
@@ -252,6 +255,8 @@ class Feed:
             measure = measure_of(observer.replica, observer.mission.name)
             if measure is not None:
                 self._measures[observer.mission.name, self._brief.run] = measure
+                if len(self._measures) > _MEASURES:
+                    self._measures.pop(next(iter(self._measures)))
         return measure
 
     def _look_at_tasks(self, observer: Observer, brief: Brief, counts: dict[str, int]) -> None:

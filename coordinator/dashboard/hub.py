@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -47,8 +48,6 @@ class Hub:
     _wanted: asyncio.Event = field(default_factory=asyncio.Event)
     """Somebody wants a look soon."""
     _bounding: asyncio.Task[None] | None = None
-    _bounded: list[Measure] = field(default_factory=list)
-    """Whose bound has been asked for."""
 
     def __post_init__(self) -> None:
         self.deserted.set()
@@ -101,9 +100,9 @@ class Hub:
 
     def _look_for_a_bound(self) -> None:
         measure = self.feed.measure
-        if measure is None or self._bounding is not None or measure in self._bounded:
+        if measure is None or measure.sought or self._bounding is not None:
             return
-        self._bounded.append(measure)
+        measure.sought = True
         self._bounding = asyncio.get_running_loop().create_task(self._bound(measure))
 
     async def _bound(self, measure: Measure) -> None:
@@ -111,7 +110,9 @@ class Hub:
         # On a thread that does not hold the process up when it is told to end.
         work = call_in_background(lambda: measure.work_out(stop), "bound")
         try:
-            measure.bound = await asyncio.wrap_future(work)
-        except ValueError as fault:  # the page does without
-            get_logger("dashboard").warning("no upper bound", problem=str(fault))
+            bound = await asyncio.wrap_future(work)
+            measure.bound = bound if math.isfinite(bound) else None
+        except Exception as fault:  # noqa: BLE001 - the page does without
+            problem = f"{type(fault).__name__}: {fault}"
+            get_logger("dashboard").warning("no upper bound", problem=problem)
         self._bounding = None

@@ -7,7 +7,7 @@ decision (coordinator.dashboard.desk), and telling a page (coordinator.dashboard
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Awaitable, Callable, Sequence
 
 from coordinator.dashboard.desk import KEPT_ROWS, Desk
@@ -59,6 +59,8 @@ class LiveMission:
         self._shell: Shell[BusFact, Wish] | None = None
         self._before: deque[CommandRow] = deque(maxlen=KEPT_ROWS)
         """What was ordered at earlier desks."""
+        self._dropped = Counter[str]()
+        """What was dropped in earlier seats."""
         self._log = get_logger("dashboard")
 
     async def run(self) -> None:
@@ -74,7 +76,7 @@ class LiveMission:
                 mission = self._mission or await only_mission(bus, None)
                 await self._look_on(bus, mission)
             finally:
-                self._shell, self._linked = None, False
+                self._dropped, self._shell, self._linked = self.dropped, None, False
                 bus.close()
 
     async def _look_on(self, bus: Bus, mission: str) -> None:
@@ -116,6 +118,11 @@ class LiveMission:
     def now_s(self) -> float:
         """Now."""
         return self._clock.now_s()
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """What could not be taken in."""
+        return self._dropped + Counter({} if self._shell is None else self._shell.dropped)
 
     @property
     def commands(self) -> Sequence[CommandRow]:

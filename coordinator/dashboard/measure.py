@@ -31,6 +31,8 @@ class Measure:
     """J of these lists [value·s]."""
     bound: float | None = None
     """No lists of those tasks have a larger J [value·s]; None as long as it is not known."""
+    sought: bool = False
+    """Whether somebody is looking for the bound, or has."""
 
     def work_out(self, should_stop: ShouldStop) -> float:
         """The bound; takes a while, on one thread."""
@@ -54,9 +56,11 @@ def measure_of(replica: Replica, name: str) -> Measure | None:
     if epoch.number != 1 or epoch.phase is not EpochPhase.RUNNING:
         return None
     listed = {task for tasks in epoch.routes.values() for task in tasks}
+    if not listed or not listed <= replica.board.keys():
+        return None
     mission = mission_of(replica, name, brief)
     tasks = [task for task in mission.tasks if task.id in listed]
-    if not listed or len(tasks) != len(listed):
+    if len(tasks) != len(listed):
         return None
     index = {str(task.id): place for place, task in enumerate(tasks)}
     routes = tuple(

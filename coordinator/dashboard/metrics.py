@@ -56,12 +56,22 @@ class _Mission(Collector):
         """All metrics, as they are now."""
         yield _gauge("dashboard_clients", "Pages that follow the feed.", self._hub.clients)
         yield _gauge("link_up", "Whether this process is linked to the bus.", self._source.link)
+        yield self._dropped()
         yield self._commands()
         observer = self._source.observer
         brief = None if observer is None else observer.replica.brief
         if observer is not None and brief is not None:
             yield from self._of_mission(observer)
             yield from _of_uavs(observer, brief, self._source, self._done())
+
+    def _dropped(self) -> Metric:
+        text = "Messages this process has dropped, by reason."
+        family = CounterMetricFamily(
+            "peckorder_dashboard_dropped_messages", text, labels=["reason"]
+        )
+        for reason, number in sorted(self._source.dropped.items()):
+            family.add_metric((reason,), number)
+        return family
 
     def _commands(self) -> Metric:
         family = GaugeMetricFamily(

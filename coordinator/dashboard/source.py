@@ -6,7 +6,7 @@ page (coordinator.dashboard.feed).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -131,6 +131,11 @@ class Source(Protocol):
     @property
     def speedup(self) -> float:
         """Seconds of the observer per wall second, of then in a recording."""
+        ...
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Messages that this very process has dropped, by reason."""
         ...
 
     @property

@@ -96,6 +96,7 @@ class Chronicle:
         """UAV -> its latest choice."""
         self._lists: dict[str, tuple[str, ...]] = {}
         self._epoch: int | None = None
+        self._over = False
         self._phases: dict[str, StatusPhase] = {}
         for entry in recording.entries:
             self._now_s = entry.now_s
@@ -147,9 +148,12 @@ class Chronicle:
         news = self.observer.replica.known(message) is message
         if not news or (before is not None and before.body == body):
             return
+        brief = self.observer.replica.brief
         match body:
             case Board():
                 self._tell_posting(body.task, body, by="the coordinator")
+            case TaskOrder() | Command() if brief is not None and body.run != brief.run:
+                pass  # of another flight
             case TaskOrder():
                 self._tell_posting(body.task, body, by="the operator")
             case Claim():
@@ -353,6 +357,9 @@ class Chronicle:
 
     def _tell_epoch(self, epoch: Epoch) -> None:
         if epoch.phase is EpochPhase.ENDED:
+            if self._over:
+                return  # it is restated with every new mission time
+            self._over = True
             everyone = [uav.id for uav in self.observer.mission.uavs]
             self._tell("end", f"The mission was over: {epoch.reason}.", uavs=everyone)
             return

@@ -25,6 +25,7 @@ from swarm.options import (
 )
 
 if TYPE_CHECKING:
+    from coordinator.recording.flight_recorder import FlightRecorder
     from coordinator.recording.playback import Playback
     from coordinator.recording.reader import Recording
 
@@ -101,8 +102,10 @@ def record(
     network = preset(link, lease_s)
     config = bus_config(bus, listen, connect or (), network.lease_s)
     timing = network.timing.scaled(speedup)
+    begun: FlightRecorder | None = None
 
     async def work() -> int:
+        nonlocal begun
         async with joined(mission, config, timeout_s) as (name, seat):
             clock = ScaledClock(speedup)
             witness = Witness(
@@ -113,6 +116,7 @@ def record(
             )
             about = About(name, timing, speedup)
             with recording_to(file, about, wall_ns(), _warn) as recorder:
+                begun = recorder
                 print(f"recording {name} in {file}", file=sys.stderr)
                 core = recorder.around(witness, witness.onlooker.observer)
                 shell = onlooking(
@@ -122,12 +126,19 @@ def record(
                     await shell.run()
                 finally:
                     recorder.close()
+                    if shell.dropped:
+                        reasons = ", ".join(f"{n} {why}" for why, n in shell.dropped.items())
+                        _warn(f"{file}: messages were dropped, and are missing: {reasons}")
                     print(f"{file}: {recorder.told}", file=sys.stderr)
-            return 0 if recorder.fault is None else 1
+        return 0
 
     status = asyncio.run(run_until_stopped(work()))
+    if begun is None:
+        return status
+    if begun.fault is not None:
+        return 1
     # Ctrl-C is how a recording is ended; before it began there is none.
-    return 0 if status == EXIT_INTERRUPTED and file.exists() else status
+    return 0 if status == EXIT_INTERRUPTED else status
 
 
 def replay(

@@ -12,9 +12,10 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
+import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -27,7 +28,8 @@ __all__ = ["FileRecords", "is_mcap"]
 
 _HEAD: Final = struct.Struct("<BQ")
 _FOOTER: Final = struct.Struct("<BQQQI")
-_LARGEST_CHUNK: Final = 1 << 30
+_LARGEST_CHUNK: Final = 256 << 20
+"""Bytes of a chunk that is unpacked; ours hold what is heard in about a second."""
 _DAMAGES: Final = (
     McapError,
     MemoryError,
@@ -110,10 +112,7 @@ class FileRecords:
         stream = ReadDataStream(io.BytesIO(body))
         match opcode:
             case Opcode.CHUNK:
-                chunk = Chunk.read(stream)
-                if chunk.uncompressed_size > _LARGEST_CHUNK:
-                    return None
-                return breakup_chunk(chunk, validate_crc=True)
+                return breakup_chunk(_unpacked(Chunk.read(stream)), validate_crc=True)
             case Opcode.METADATA:
                 return [Metadata.read(stream)]
             case Opcode.SCHEMA:
@@ -143,3 +142,26 @@ class FileRecords:
             case _:
                 pass
         return None
+
+
+def _unpacked(chunk: Chunk) -> Chunk:
+    """``chunk`` as it is without compression; it takes no more memory than it says.
+
+    Raises:
+        ValueError: it says too much, or it is longer than it says.
+    """
+    if chunk.uncompressed_size > _LARGEST_CHUNK:
+        raise ValueError(f"{chunk.uncompressed_size} bytes are too many for a chunk")
+    if chunk.compression == "zstd":
+        # By itself the library believes what the data say of their length.
+        reader = zstandard.ZstdDecompressor().stream_reader(chunk.data)
+        data = reader.read(chunk.uncompressed_size + 1)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(
+            chunk.data, max_length=chunk.uncompressed_size + 1
+        )
+    else:
+        data = chunk.data
+    if len(data) != chunk.uncompressed_size:
+        raise ValueError("a chunk is longer or shorter than it says")
+    return replace(chunk, compression="", data=data)

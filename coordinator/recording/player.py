@@ -6,6 +6,7 @@ Leaves out: playing (coordinator.recording.playback) and serving (coordinator.da
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 
 from coordinator.dashboard.source import CommandRow, Orders, PlayerState
 from coordinator.observer import Observer
@@ -57,6 +58,11 @@ class Player:
     def now_s(self) -> float:
         """The moment that is shown."""
         return self._playback.now_s
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """None: nothing is heard."""
+        return {}
 
     @property
     def commands(self) -> tuple[CommandRow, ...]:

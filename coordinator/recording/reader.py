@@ -157,7 +157,7 @@ def _about(path: Path, told: dict[str, str] | None) -> dict[str, Any]:
             "virtual": told["clock"] == "virtual",
             "version": told["version"],
         }
-    except (KeyError, ValueError, ValidationError):
+    except (KeyError, ValueError, ValidationError, RecursionError):
         problem = "has metadata that no recording has"
         remedy = "give a file as swarm ... --record has written it"
         raise _fault(path, METADATA, problem, remedy) from None

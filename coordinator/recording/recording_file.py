@@ -26,6 +26,8 @@ PERIOD_S = 1.0
 """Wall time between two writes."""
 MAX_WAITING = 50_000
 """Jobs that wait for a thread that does not keep up, as when a disk hangs; more are lost."""
+HUNG_S = 30.0
+"""Wall time in which at the end something is written, or nothing more will be."""
 
 Job = Callable[[], None]
 """Something to record: adds messages to the file in the making."""
@@ -144,10 +146,15 @@ class RecordingThread:
             self.lost += 1
 
     def close(self) -> None:
-        """Write all that is left, and wait until it is written."""
+        """Write all that is left, and wait until it is written; not for a disk that hangs."""
         if not self._stop.is_set():
             self._stop.set()
-            self._thread.join()
+            while self._thread.is_alive():
+                before = self._jobs.qsize()
+                self._thread.join(HUNG_S)
+                if self._thread.is_alive() and self._jobs.qsize() == before:
+                    self._fail("the disk does not answer")
+                    return
             self._sink.close()
 
     def _work(self) -> None:
@@ -166,10 +173,9 @@ class RecordingThread:
                 return
             if last:
                 self._last()
+            self._grow(last=last)
         except Exception as fault:  # noqa: BLE001 - top of the thread: the flight must go on
             self._fail(f"{type(fault).__name__}: {fault}")
-            return
-        self._grow(last=last)
 
     def _grow(self, *, last: bool) -> None:
         patch = self._mcap.grow(last=last)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, make_dataclass
+from dataclasses import asdict, dataclass, make_dataclass
 from functools import cache
 from typing import Annotated, Any, Final, Literal, get_args
 
@@ -91,7 +91,7 @@ class _Moment:
 
     __pydantic_config__ = _CHECKED
 
-    now_s: float
+    now_s: Instant
     """Of the recording core's clock [s]."""
     what: Literal["begun", "tick"]
 
@@ -102,7 +102,7 @@ class _Presence:
 
     __pydantic_config__ = _CHECKED
 
-    now_s: float
+    now_s: Instant
     writer: str
     there: Flag
 
@@ -113,18 +113,39 @@ class _Link:
 
     __pydantic_config__ = _CHECKED
 
-    now_s: float
+    now_s: Instant
     up: Flag
 
 
 @dataclass(frozen=True, slots=True)
-class _Plan:
-    """A plan the coordinator made: lists, sequence, value and bound, as `swarm plan --json`."""
+class _PlanSaid:
+    """As `swarm plan --json` has it."""
 
     __pydantic_config__ = _CHECKED
 
-    now_s: float
-    plan: dict[str, Any]
+    scenario: str
+    method: str
+    objective: float
+    sequence: list[str] | None
+    routes: dict[str, list[str]]
+    completion_s: dict[str, float]
+    optimum: float | None
+    gap: float | None
+    evaluations: int
+    elapsed_s: float
+    seed: int
+    bound: float | None
+    basis: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """A plan the coordinator made: lists, sequence, value and bound."""
+
+    __pydantic_config__ = _CHECKED
+
+    now_s: Instant
+    plan: _PlanSaid
 
 
 def _said(name: str, body: type[Body], *, kind: bool) -> type[Any]:
@@ -139,7 +160,7 @@ def _said(name: str, body: type[Body], *, kind: bool) -> type[Any]:
     if kind:
         fields.insert(0, ("kind", Literal[name]))
     else:
-        fields += [("now_s", float), ("mission_s", float | None)]
+        fields += [("now_s", Instant), ("mission_s", float | None)]
     shape = make_dataclass(f"{'Known' if kind else ''}{name}", fields, frozen=True, slots=True)
     shape.__doc__ = body.__doc__
     shape.__pydantic_config__ = _CHECKED  # type: ignore[attr-defined]  # read by pydantic alone
@@ -172,7 +193,7 @@ _Answer: Final = make_dataclass(
 )
 _Answers: Final = make_dataclass(
     "_Answers",
-    [("now_s", float), ("snapshots", tuple[_Answer, ...])],  # type: ignore[valid-type]  # likewise
+    [("now_s", Instant), ("snapshots", tuple[_Answer, ...])],  # type: ignore[valid-type]  # likewise
     frozen=True,
     slots=True,
 )
@@ -253,7 +274,8 @@ def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) 
         case Begun():
             schema, shape = "peckorder.Moment", _Moment(now_s, "begun")
         case Plan():
-            schema, shape = "peckorder.Plan", _Plan(now_s, plan_as_json(what))
+            plan: dict[str, Any] = plan_as_json(what)
+            schema, shape = "peckorder.Plan", _Plan(now_s, _PlanSaid(**plan))
         case _:
             return None
     return _line(topics_of(mission)[schema], schema, shape)
@@ -316,7 +338,7 @@ def _meant(schema: str, shape: Any) -> Recorded:
         case "peckorder.Link":
             return LinkChanged(shape.up)
         case "peckorder.Plan":
-            return plan_from_json(shape.plan)
+            return plan_from_json(asdict(shape.plan))
         case "peckorder.Answers":
             return Learned(tuple(map(_snapshot, shape.snapshots)))
         case _:

@@ -228,8 +228,8 @@ class Launch:
             setting=setting,
             returns=arguments[0] == "agent" and not isinstance(self.options.autopilots, Simulated),
         )
-        self.lives.append(child)
         await child.start()
+        self.lives.append(child)
         self._current[name] = child
         return child
 

@@ -190,7 +190,8 @@ class Run:
         child = self.launch.child(DASHBOARD)
         dead = child.returncode is not None and not child.stopped
         if dead and self._deaths[DASHBOARD] < MAX_DEATHS:
-            await self._mend(child)
+            with contextlib.suppress(OSError):  # no room for a process just now
+                await self._mend(child)
 
     async def _mend(self, child: Child) -> None:
         """Start it anew, and tell so."""

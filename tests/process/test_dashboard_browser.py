@@ -117,7 +117,7 @@ def all_uavs_move(page: Page) -> None:
         20.0,
         "a move of every UAV",
     )
-    assert painted(page) != picture
+    wait_until(lambda: painted(page) != picture, 5.0, "a new picture")
 
 
 def add_a_task_by_a_click(page: Page) -> str:

@@ -24,6 +24,7 @@ export class Links {
         row("coordinator", "Coordinator"),
         row("others", "Others there"),
         row("lost", "Lost UAVs"),
+        row("here", "Dropped here"),
         row("page", "This page"),
       ),
       this.reasons,
@@ -70,6 +71,7 @@ export class Links {
     setText(this.values.coordinator, head.coordinator ? "there" : "not there; the fleet flies on by itself");
     setText(this.values.others, head.others?.length ? head.others.join(", ") : "nobody");
     setText(this.values.lost, lost.length ? lost.join(", ") : "none");
+    setText(this.values.here, reasons(head.dropped_here) || "nothing");
     const [frame, ground, moving] = ["frame", "ground", "moving"].map(timing);
     const ms = (time) => (time ? `${number(time.median)} ms (${number(time.longest)})` : NOTHING);
     setText(

@@ -26,6 +26,7 @@ export class Worth {
     );
     this.axis = make("p", { class: "axis" }, make("span", {}, "0"), make("span", {}));
     this.values = {};
+    this.why = make("figcaption", { class: "fine", hidden: "" });
     const row = (key, sign, title, hint) => {
       this.values[key] = make("dd", {});
       return make(
@@ -45,7 +46,7 @@ export class Worth {
       make(
         "div",
         { class: "worth" },
-        make("figure", {}, this.chart, this.axis),
+        make("figure", {}, this.chart, this.axis, this.why),
         make(
           "dl",
           {},
@@ -64,8 +65,11 @@ export class Worth {
     const { objective, plan, mission_s: now } = head;
     setText(this.values.now, number(objective));
     setText(this.values.share, plan?.objective ? percent(objective / plan.objective, 1) : NOTHING);
-    setText(this.values.plan, number(plan?.objective));
-    setText(this.values.bound, number(plan?.bound));
+    const why = whyUnknown(head);
+    setText(this.values.plan, why ? "unknown" : number(plan?.objective));
+    setText(this.values.bound, why ? "unknown" : number(plan?.bound));
+    setText(this.why, why);
+    this.why.hidden = !why;
     this.#draw(objective, plan, now, curve);
   }
 
@@ -96,4 +100,12 @@ export class Worth {
       `J so far ${number(objective)}, the plan's ${number(plan?.objective)}, bound ${number(plan?.bound)}`,
     );
   }
+}
+
+/** Why nothing is known of a plan; empty where it is, or there is none yet. */
+function whyUnknown({ plan, epoch, phase }) {
+  if (Number.isFinite(plan?.objective) || !Number.isFinite(epoch)) return "";
+  if (epoch > 1 || phase === "ended")
+    return "The plan is that of the first epoch, which was over before anything was seen here.";
+  return phase === "running" ? "The first epoch has no lists." : "";
 }

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from coordinator.dashboard.access import Pace, access_for, is_loopback, read_token
+from coordinator.dashboard.listening import url_of
 from coordinator.dashboard.place import parse_place
 from swarm.errors import InputError
 
@@ -48,6 +49,13 @@ def test_beyond_loopback_addresses_and_given_names_are_answered(host: str, known
     access, _ = access_for("0.0.0.0", ("Mast.example",), TOKEN)
 
     assert access.knows_host(host) is known
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "127.0.0.1", "127.0.0.2", "::1", "192.168.1.5"])
+def test_the_address_that_is_told_is_answered(host: str) -> None:
+    access, _ = access_for(host, (), TOKEN)
+
+    assert access.knows_host(url_of(host, 8080).split("/")[2])
 
 
 def test_beyond_loopback_a_token_is_made_where_none_is_given() -> None:

@@ -351,6 +351,7 @@ def test_only_so_many_orders_are_taken_at_once(page: TestClient) -> None:
 
 def test_the_metrics_are_what_prometheus_reads(page: TestClient, play: DeskPlay) -> None:
     play.time_s = 4.0
+    play.dropped = {"malformed": 3}
     play.claim("u1", "t1")
     play.end("u2", "t2")
     page.post("/api/command", json=HOLD)
@@ -388,6 +389,7 @@ def test_the_metrics_are_what_prometheus_reads(page: TestClient, play: DeskPlay)
     assert value("peckorder_uav_dropped_messages_total", uav="u1", reason="stale") == 2.0
     assert value("peckorder_operator_commands", state="pending") == 1.0
     assert value("peckorder_dashboard_clients") == 1.0
+    assert value("peckorder_dashboard_dropped_messages_total", reason="malformed") == 3.0
     assert value("process_resident_memory_bytes") > 1e6
 
 

@@ -70,6 +70,7 @@ def test_a_whole_frame_tells_everything() -> None:
     play.status("u1", StatusPhase.FLYING, east_m=3.0)
     play.time_s = 4.0
     play.end("u2", "t2")
+    play.dropped = {"malformed": 1}
     feed = feed_of(play)
     feed.look()
 
@@ -90,7 +91,7 @@ def test_a_whole_frame_tells_everything() -> None:
     assert picture["lists"]["u1"]["planned"] == ["t1", "t2", "t3"]
     assert picture["objective"] == 996.0
     assert picture["objective_curve"] == [[4.0, 996.0]]
-    assert picture["dropped"] == {"stale": 2}
+    assert (picture["dropped"], picture["dropped_here"]) == ({"stale": 2}, {"malformed": 1})
     assert picture["story"][-1]["text"] == "u2 ended t2: done"
     mission = json.loads(feed.mission or "")
     assert [uav["id"] for uav in mission["uavs"]] == ["u1", "u2"]

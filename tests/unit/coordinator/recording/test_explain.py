@@ -198,6 +198,23 @@ def test_the_operator_is_named_where_it_was_the_operator(tape: Tape) -> None:
     assert "The operator told u0 to hold: traffic." in texts(explain_uav(recording, "u0"))
 
 
+def test_what_the_operator_said_of_an_earlier_flight_is_no_part_of_the_story(tape: Tape) -> None:
+    tape.say(OPERATOR, Command("u0", CommandKind.HOLD, 0, "traffic"), 4.0)
+    tape.say(OPERATOR, TaskOrder("t0", 0, (0.0, 0.0, 0.0), 1.0, 0.0, None, True, 0, ""), 5.0)
+    recording = tape.stop()
+
+    assert not any("operator" in text for text in texts(explain_uav(recording, "u0")))
+    assert not any("operator" in text for text in texts(explain_task(recording, "t0")))
+
+
+def test_an_end_that_is_restated_is_told_once(tape: Tape) -> None:
+    for mission_s in (9.0, 10.0, 11.0):
+        ended = epoch("u0", phase=EpochPhase.ENDED, number=2, reason="all over")
+        tape.say(COORDINATOR, replace(ended, mission_s=mission_s), mission_s)
+
+    assert texts(explain_uav(tape.stop(), "u0")).count("The mission was over: all over.") == 1
+
+
 def test_a_failed_attempt_and_the_way_home_are_told(tape: Tape) -> None:
     tape.say("u0", held("t0", 0.0), 0.0)
     tape.say("u0", failed("t0", 9.0), 9.0)

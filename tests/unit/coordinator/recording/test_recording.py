@@ -8,9 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import lz4.frame
 import pytest
+import zstandard
+from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
+from mcap.records import Chunk, DataEnd, Footer, Header
+from mcap.writer import MCAP0_MAGIC
 
+from coordinator.recording.file_records import FileRecords
 from coordinator.recording.playback import Playback
 from coordinator.recording.reader import Recording, read_recording
 from coordinator.recording.records import Begun
@@ -207,6 +213,38 @@ def test_other_files_are_refused_in_one_line(data: bytes, words: str, tmp_path: 
 
     assert str(path) in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def packed(data: bytes, says: int, compression: str) -> bytes:
+    """A file with one chunk that says it holds so many bytes."""
+    out = RecordBuilder()
+    out.write(MCAP0_MAGIC)
+    Header("", "").write(out)
+    Chunk(
+        compression=compression,
+        data=data,
+        message_start_time=0,
+        message_end_time=0,
+        uncompressed_crc=0,
+        uncompressed_size=says,
+    ).write(out)
+    DataEnd(0).write(out)
+    Footer(0, 0, 0).write(out)
+    out.write(MCAP0_MAGIC)
+    return bytes(out.end())
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+@pytest.mark.parametrize(("says", "whole"), [(90, False), (9000, True), (2**40, False)])
+def test_a_chunk_is_unpacked_no_further_than_it_says_and_never_without_end(
+    compression: str, says: int, whole: bool
+) -> None:
+    pack = {"zstd": zstandard.compress, "lz4": lz4.frame.compress}[compression]
+    nothing = 1000 * (b"\xff" + bytes(8))  # records that readers pass over
+    records = FileRecords(packed(pack(nothing), says, compression))
+
+    assert list(records.messages()) == []
+    assert (records.torn_at is None) is whole
 
 
 def test_a_recording_of_another_version_is_refused(flown: Flown, tmp_path: Path) -> None:

@@ -167,3 +167,54 @@ def test_a_bug_in_the_recorder_does_not_reach_the_flight() -> None:
 
     assert said == ["KeyError: 'oops'"]
     assert thread.fault == "KeyError: 'oops'"
+
+
+class BrokenSink(Disk):
+    """Has a bug."""
+
+    def apply(self, patch: Patch) -> None:
+        if self.patches:
+            raise MemoryError
+        super().apply(patch)
+
+
+def test_what_goes_wrong_while_writing_keeps_nobody_waiting(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("coordinator.recording.recording_file.MAX_WAITING", 2)
+    said = list[str]()
+    mcap = GrowingMcap("test", {}, "about")
+    mcap.define("thing", b"{}")
+    thread = RecordingThread(mcap, BrokenSink(), on_fault=said.append, patient=True, period_s=0.001)
+
+    for number in range(20):
+        thread.hand_over(lambda number=number: mcap.add("a", "thing", b"{}", number))  # type: ignore[misc]  # bound
+    thread.close()
+
+    assert said == ["MemoryError: "]
+
+
+class HungSink(Disk):
+    """Answers no second write until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.go_on = threading.Event()
+
+    def apply(self, patch: Patch) -> None:
+        if self.patches:
+            self.go_on.wait()
+        super().apply(patch)
+
+
+def test_a_disk_that_hangs_keeps_nobody_from_leaving(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("coordinator.recording.recording_file.HUNG_S", 0.05)
+    disk, said = HungSink(), list[str]()
+    recorder = FlightRecorder(ABOUT, disk, virtual_ns, said.append)
+    mission_begins(recorder)
+
+    recorder.close()
+    disk.go_on.set()
+
+    assert said == ["the disk does not answer"]
+    assert recorder.fault == "the disk does not answer"
