@@ -412,7 +412,10 @@ class AgentCore:
         waits = self._stage is StatusPhase.HOLDING and self._homebound
         if waits or self._stage is StatusPhase.RETURNING:
             return
-        reason = self._ending.reason(self.phase, now_s, undecided=self._tasking.undecided)
+        tasking = self._tasking
+        reason = self._ending.reason(
+            self.phase, now_s, undecided=tasking.undecided, refused=tasking.leaves_refused(now_s)
+        )
         if reason is not None and self._stage is StatusPhase.HOLDING:
             self._take_no_further_part(now_s)  # and stays where the operator wants it
         elif reason is not None:

@@ -34,20 +34,23 @@ class Ending:
         self._timing = timing
         self._forsaken_at_s: float | None = None
 
-    def reason(self, phase: StatusPhase, now_s: float, *, undecided: bool) -> str | None:
+    def reason(
+        self, phase: StatusPhase, now_s: float, *, undecided: bool, refused: bool
+    ) -> str | None:
         """Why to go home; None to go on.
 
         Args:
             phase: what the UAV is doing.
             now_s: now.
             undecided: whether, being idle, it may yet find a task.
+            refused: whether it leaves an open task alone only because its vehicle refused that.
         """
         if (abort := aborted(self._replica)) is not None:
             return words(abort)
         epoch = self._replica.epoch
         if epoch is not None and epoch.phase is EpochPhase.ENDED:
             return epoch.reason
-        if self._forsaken(phase, now_s, undecided=undecided):
+        if self._forsaken(phase, now_s, undecided=undecided, refused=refused):
             return "no coordinator and nothing left to do"
         return None
 
@@ -59,7 +62,9 @@ class Ending:
         """When `reason` may find that it has waited long enough."""
         return self._forsaken_at_s
 
-    def _forsaken(self, phase: StatusPhase, now_s: float, *, undecided: bool) -> bool:
+    def _forsaken(
+        self, phase: StatusPhase, now_s: float, *, undecided: bool, refused: bool
+    ) -> bool:
         """Whether there has been neither a coordinator nor anything to do for long enough."""
         if COORDINATOR in self._peers.membership.present:
             self._forsaken_at_s = None
@@ -69,10 +74,17 @@ class Ending:
         if not (waiting or (running and self._nothing_to_do(phase, undecided=undecided))):
             self._forsaken_at_s = None
             return False
-        if self._forsaken_at_s is None:
-            patience_s = self._timing.abandon_s if waiting else self._timing.linger_s
-            self._forsaken_at_s = now_s + patience_s
+        at_s = now_s + self._patience_s(waiting=waiting, refused=refused)
+        self._forsaken_at_s = (
+            at_s if self._forsaken_at_s is None else min(self._forsaken_at_s, at_s)
+        )
         return self._forsaken_at_s <= now_s
+
+    def _patience_s(self, *, waiting: bool, refused: bool) -> float:
+        """A coordinator would wait as long for a UAV to consider a refused task again."""
+        if waiting:
+            return self._timing.abandon_s
+        return self._timing.stalemate_s if refused else self._timing.linger_s
 
     def _nothing_to_do(self, phase: StatusPhase, *, undecided: bool) -> bool:
         """Tasks may be open still: those that nobody who is there can or will take."""

@@ -92,6 +92,13 @@ class Tasking:
         """Whether, being idle, it may yet find a task."""
         return self._to_decide or self._awaits_peers
 
+    def leaves_refused(self, now_s: float) -> bool:
+        """Whether, being idle, it leaves an open task alone that its vehicle has refused."""
+        return self.phase is StatusPhase.IDLE and any(
+            now_s < until_s and self._picture.is_open(task)
+            for task, (_, until_s) in self._refusals.items()
+        )
+
     def label(self, leg: int) -> dict[str, object]:
         """For the log: which choice that leg came of, if it is the one being flown."""
         return self._choices.label if leg == self._leg and self._task() is not None else {}

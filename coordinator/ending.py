@@ -69,12 +69,11 @@ class Ending:
 
     @property
     def somebody_knows_more(self) -> bool:
-        """Whether somebody who is there claims a task that is not known here."""
-        board, present = self._board.replica.board, self._membership.present
-        return any(
-            claim.task is not None and claim.task not in board and uav in present
-            for uav, claim in self._board.replica.claims.items()
-        )
+        """Whether a UAV of the fleet that is there claims a task that is not known here."""
+        replica, present = self._board.replica, self._membership.present
+        fleet = () if replica.brief is None else (uav.id for uav in replica.brief.uavs)
+        claimed = (replica.claims[u].task for u in fleet if u in present and u in replica.claims)
+        return any(task is not None and task not in replica.board for task in claimed)
 
     def settle(self) -> None:
         """The mission has ended: nothing more to find out."""

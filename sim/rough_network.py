@@ -266,10 +266,18 @@ class RoughNetwork:
         both = (one, other) in self._open and (other, one) in self._open
         return both and not self._is_cut(one, other)
 
+    def is_alone(self, sender: Seat) -> bool:
+        """Whether nobody is there to hear what ``sender`` says now."""
+        return not any(self._reaches(sender, seat) for seat in self._seats if seat is not sender)
+
+    def _reaches(self, sender: Seat, receiver: Seat) -> bool:
+        muted = self._muted[sender.name, receiver.name]
+        return not muted and self.joined(sender, receiver)
+
     # -- messages ---------------------------------------------------------------------
 
     def _send(self, sender: Seat, receiver: Seat, fact: BusFact) -> None:
-        if not self.joined(sender, receiver) or self._muted[sender.name, receiver.name]:
+        if not self._reaches(sender, receiver):
             return
         link = self._link(sender, receiver)
         draw, weather = link.draws, self.weather

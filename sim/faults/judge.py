@@ -19,8 +19,9 @@ Beside the invariants of the messages (sim.faults.transcript):
 - *miscounted*: the onlooker knows the visits of every UAV that left in calm, invents none, and
   counts as duplicates all that it knows of, and no more than there were.
 
-UAVs that were cut off or died may have done what nobody could hear of; nothing is claimed
-about the counting of that. Leaves out: how faults come about (sim.faults.director).
+UAVs that were cut off or died may have done what nobody could hear of, and one that forgot
+it cannot tell of it later; nothing is claimed about the counting of that. Leaves out: how
+faults come about (sim.faults.director).
 """
 
 from __future__ import annotations
@@ -84,8 +85,8 @@ class Judge:
         self._left_in_calm: set[str] = set()
         self._left_undone: dict[str, set[str]] = {}
         """By UAV that takes no further part: the tasks it knew of that were on the board."""
-        self._known_at_the_end: set[str] = set()
-        """Tasks that a coordinator knew of when it ended the mission."""
+        self._known_at_the_end: dict[str, set[str]] = {}
+        """By coordinator's process: tasks that it knew of when it first said the mission over."""
         self._shared_since_s: dict[tuple[Process, Process, str], float] = {}
 
     @property
@@ -105,7 +106,8 @@ class Judge:
         now_s, transcript = self._now_s, self.transcript
         life = self._lives.setdefault(process, len(self._lives))
         self._changed_s[process.name] = now_s
-        transcript.said(now_s, process.name, life, message)
+        alone = self._network is not None and self._network.is_alone(process)
+        transcript.said(now_s, process.name, life, message, unheard=alone)
         self._note_what_is_left(process, message)
         self._stop_if_broken()
 
@@ -118,7 +120,7 @@ class Judge:
             case Claim():
                 self._left_undone.pop(process.name, None)
             case Epoch(phase=EpochPhase.ENDED) if isinstance(core, CoordinatorCore | StandbyCore):
-                self._known_at_the_end |= _on_board(core.replica)
+                self._known_at_the_end.setdefault(process.name, _on_board(core.replica))
             case _:
                 pass
 
@@ -251,10 +253,11 @@ class Judge:
             for task, order in transcript.ordered.items()
             if task not in transcript.posted
         }
+        known_at_the_end = set[str]().union(*self._known_at_the_end.values())
         tasks = [task for task in world.mission.tasks if task.id in transcript.posted]
         tasks += [Task(TaskId(task), added[task].position_enu_m, 0.0) for task in added]
         for task in tasks:
-            unheard = task.id in added and task.id not in self._known_at_the_end
+            unheard = task.id in added and task.id not in known_at_the_end
             if task.id in settled or (transcript.ended and unheard):
                 continue
             able = [
@@ -276,12 +279,17 @@ class Judge:
             if completed_s not in true[key]:
                 self._break("miscounted", f"{key[0]} never visited {key[1]} at {completed_s:.3f} s")
         for uav, task in sorted(true.keys() - known.keys()):
-            if uav in self._left_in_calm:
+            if uav in self._left_in_calm and not self._is_forgotten(uav, task):
                 self._break("miscounted", f"nobody knows that {uav} visited {task}")
         told = observer.result().duplicate_visits
         least, most = len(known) - len({task for _, task in known}), self.transcript.duplicates
         if not least <= told <= most:
             self._break("miscounted", f"{told} duplicates told, not {least} to {most}")
+
+    def _is_forgotten(self, uav: str, task: str) -> bool:
+        """Whether an earlier life did ``task``, nobody heard of it, and the last does not know."""
+        last_life = self._lives.get(self._there.processes[uav])
+        return self.transcript.unheard.get((uav, task), last_life) != last_life
 
     # -- pieces -----------------------------------------------------------------------
 

@@ -3,7 +3,8 @@
 `Transcript` is told every statement in the order it was made and keeps what breaks a rule:
 
 - *stamps*: a process never says a register with a smaller stamp than before, in this life or
-  an earlier one, nor with the same stamp and other contents;
+  an earlier one, nor with the same stamp and other contents; words of an earlier life that
+  nobody was there to hear do not count, as nobody is deaf to what is said below them;
 - *keeps its task*: a UAV leaves a task it claimed only when the task is done or withdrawn,
   another has a stronger claim on it, its vehicle refused, its process started anew, the
   operator has said so, or the mission has ended for it; or, once for each task that appears and
@@ -62,13 +63,19 @@ class Transcript:
         """The operator's newest word about every task that they have ever said anything about."""
         self.visits: dict[tuple[str, str], set[float]] = defaultdict(set)
         """By UAV and task: when attempts ended done [s mission time]."""
+        self.unheard: dict[tuple[str, str], int] = {}
+        """By UAV and task: the life that told of its visit when nobody was there to hear it, where
+        nobody has told of it again."""
         self.failed: set[str] = set()
         """Tasks an attempt at which failed."""
         self.ended = False
         """Whether a coordinator has said that the mission is over."""
         self.commands: dict[CommandKind, set[str]] = defaultdict(set)
         """Whom the operator has ever told what."""
-        self._said: dict[tuple[str, str], Message] = {}
+        self._said: dict[tuple[str, int, str], Message] = {}
+        """By process, its life and register, what it said last."""
+        self._heard: dict[tuple[str, str], Message] = {}
+        """By process and register, what it said last in any life while somebody was there."""
         self._claims: dict[tuple[str, int], Claim] = {}
         self._rivals: dict[str, dict[str, list[Claim]]] = defaultdict(lambda: defaultdict(list))
         self._left: set[tuple[str, str]] = set()
@@ -117,7 +124,9 @@ class Transcript:
         if self._turns[uav] > len(appeared) + self._missed[uav]:
             self._break(at_s, "left its task", f"{uav} left {task} though nothing had opened")
 
-    def said(self, at_s: float, process: str, life: int, message: Message) -> None:
+    def said(
+        self, at_s: float, process: str, life: int, message: Message, *, unheard: bool = False
+    ) -> None:
         """A process has said something.
 
         Args:
@@ -125,10 +134,14 @@ class Transcript:
             process: name; two processes may speak for one writer, one after the other.
             life: another number in every life of the process.
             message: what it said.
+            unheard: whether nobody was there to hear it.
         """
         if isinstance(message.body, Status):
             return
-        self._check_stamp(at_s, process, message)
+        self._check_stamp(at_s, process, life, message)
+        self._said[process, life, message.key] = message
+        if not unheard:
+            self._heard[process, message.key] = message
         match message.body:
             case Board(task=task) as entry:
                 self.posted[task] = entry
@@ -137,7 +150,11 @@ class Transcript:
             case Epoch(phase=EpochPhase.ENDED):
                 self.ended = True
             case Outcome(task=task, result=Result.DONE, completed_s=completed_s):
-                self.visits[message.writer, task].add(completed_s)
+                visit = message.writer, task
+                self.visits[visit].add(completed_s)
+                self.unheard.pop(visit, None)
+                if unheard:
+                    self.unheard[visit] = life
             case Outcome(task=task):
                 self.failed.add(task)
             case Claim() as claim:
@@ -147,16 +164,17 @@ class Transcript:
             case _:
                 pass
 
-    def _check_stamp(self, at_s: float, process: str, message: Message) -> None:
+    def _check_stamp(self, at_s: float, process: str, life: int, message: Message) -> None:
         register = message.key
-        before = self._said.get((process, register))
+        own, heard = self._said.get((process, life, register)), self._heard.get((process, register))
+        said = [each for each in (own, heard) if each is not None]
+        before = max(said, key=lambda each: each.stamp, default=None)
         if before is not None and message.stamp < before.stamp:
             text = f"{process} said {register} with {message.stamp} after {before.stamp}"
             self._break(at_s, "stamps go back", text)
         elif before is not None and message.stamp == before.stamp and message.body != before.body:
             text = f"{process} said {register} differently with {message.stamp}"
             self._break(at_s, "one stamp, two contents", text)
-        self._said[process, register] = message
 
     def _check_claim(self, at_s: float, uav: str, life: int, claim: Claim) -> None:
         before = self._claims.get((uav, life))

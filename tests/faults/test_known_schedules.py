@@ -39,6 +39,30 @@ ONCE_BROKEN = {
         3 deadlock u3
         9 cut coordinator u0 u1 for 19.68
     """,
+    "a coordinator's first words reach neither its disk nor anybody": """
+        fleet seed=82105 uavs=2 tasks=1 popups=0 topology=mesh method=greedy
+        0.02 crash coordinator for 1 with past
+    """,
+    "who was cut off forgets what it visited there": """
+        fleet seed=97670 uavs=5 tasks=9 popups=0 topology=router method=greedy
+        3.2 routers for 11
+        10.4 crash u4 for 1 with none
+    """,
+    "a task is added while the word that ends the mission is under way": """
+        fleet seed=98650 uavs=3 tasks=14 popups=0 topology=router method=greedy
+        5 hang u0 for 3
+        7 hold u2 for 1
+        8 blink
+        14 add by 1
+        32.6 add by 1
+    """,
+    "who was refused goes home before it may try again, as there is no coordinator": """
+        fleet seed=92515 uavs=2 tasks=3 popups=0 topology=router method=greedy
+        1 return u1
+        2 refuse u0 t2 for 18
+        8 hold u0 for 0.1
+        18 deadlock coordinator
+    """,
 }
 
 

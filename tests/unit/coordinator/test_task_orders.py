@@ -7,7 +7,7 @@ from dataclasses import replace
 from coordinator.briefing import brief_of, differences
 from coordinator.events import Withdraw
 from coordinator.postings import Postings
-from swarm.events import LinkChanged, Publish
+from swarm.events import LinkChanged, PeerSeen, Publish
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.state.registers import Replica
 from swarm.wire.messages import Board, Brief, Epoch, EpochPhase, Message, Snapshot
@@ -200,3 +200,12 @@ def test_it_does_not_end_the_mission_while_somebody_claims_what_it_does_not_know
     coordinator.hear("u0", done("t0"), 111.0)
 
     assert coordinator.phase is EpochPhase.RUNNING
+
+
+def test_what_a_stranger_claims_keeps_no_mission_from_ending() -> None:
+    coordinator = started()
+    coordinator.happen(PeerSeen("stranger"), 109.0)
+    coordinator.hear("stranger", held("op1", 1.0), 110.0)
+    coordinator.hear("u0", done("t0"), 111.0)
+
+    assert coordinator.reason == "every task has ended"

@@ -28,10 +28,18 @@ class Telling:
         self.transcript = Transcript()
         self._counter = 0
 
-    def say(self, writer: str, body: Body, *, life: int = 0, stamp: Stamp | None = None) -> None:
+    def say(
+        self,
+        writer: str,
+        body: Body,
+        *,
+        life: int = 0,
+        stamp: Stamp | None = None,
+        unheard: bool = False,
+    ) -> None:
         self._counter += 1
         message = Message("m", writer, stamp or Stamp(1, self._counter), body)
-        self.transcript.said(float(self._counter), writer, life, message)
+        self.transcript.said(float(self._counter), writer, life, message, unheard=unheard)
 
     def claim(self, uav: str, task: str | None, *, decided_s: float = 0.0, life: int = 0) -> None:
         phase = ClaimPhase.IDLE if task is None else ClaimPhase.PROPOSED
@@ -53,6 +61,25 @@ IDLE = Claim(ClaimPhase.IDLE, None, 0.0, 0, 0.0)
 def test_a_smaller_stamp_than_before_is_a_breach(told: Telling) -> None:
     told.say("u0", IDLE, stamp=Stamp(2, 1))
     told.say("u0", IDLE, stamp=Stamp(1, 9), life=1)
+
+    assert told.broken == ["stamps go back"]
+
+
+def test_a_new_life_may_speak_below_what_nobody_has_heard_but_not_below_what_somebody_has(
+    told: Telling,
+) -> None:
+    told.say("u0", IDLE, stamp=Stamp(2, 1))
+    told.say("u0", IDLE, stamp=Stamp(2, 9), unheard=True)
+    told.say("u0", IDLE, stamp=Stamp(2, 3), life=1)
+    assert told.broken == []
+
+    told.say("u0", IDLE, stamp=Stamp(2, 2), life=2)
+    assert told.broken == ["stamps go back"]
+
+
+def test_one_life_never_speaks_below_itself_heard_or_not(told: Telling) -> None:
+    told.say("u0", IDLE, stamp=Stamp(2, 2), unheard=True)
+    told.say("u0", IDLE, stamp=Stamp(2, 1), unheard=True)
 
     assert told.broken == ["stamps go back"]
 
