@@ -57,6 +57,8 @@ class Quality:
     """A segment takes up to this much longer, evenly distributed [s]."""
     loss_frac: float = 0.0
     """Probability that a segment is lost."""
+    most_lost: int | None = None
+    """A segment is lost at most so many times running; None: as chance has it."""
     rate_bytes_s: float = math.inf
     """Bandwidth [bytes/s]."""
 
@@ -65,6 +67,8 @@ class Quality:
             raise ValueError(f"delay_s and jitter_s must be >= 0 and finite, not {self}")
         if not 0.0 <= self.loss_frac < 1.0:
             raise ValueError(f"loss_frac must be within 0..1 and below 1, not {self.loss_frac}")
+        if self.most_lost is not None and self.most_lost < 0:
+            raise ValueError(f"most_lost must be >= 0, not {self.most_lost}")
         if not self.rate_bytes_s > 0.0:
             raise ValueError(f"rate_bytes_s must be > 0, not {self.rate_bytes_s}")
 
@@ -75,6 +79,8 @@ def stall_s(quality: Quality, n_segment: int, rng: np.random.Generator) -> float
         return 0.0
     # The first try of a segment succeeds with 1 - loss_frac; tries before that are lost.
     most_lost = int(rng.geometric(1.0 - quality.loss_frac, size=n_segment).max()) - 1
+    if quality.most_lost is not None:
+        most_lost = min(most_lost, quality.most_lost)
     timeout_s = SHORTEST_TIMEOUT_S + 2.0 * quality.delay_s
     return sum(min(timeout_s * 2.0**k, LONGEST_TIMEOUT_S) for k in range(most_lost))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,9 +53,18 @@ def test_a_timeout_never_exceeds_a_minute() -> None:
         {"jitter_s": math.nan},
         {"loss_frac": 1.0},
         {"loss_frac": -0.1},
+        {"most_lost": -1},
         {"rate_bytes_s": 0.0},
     ],
 )
-def test_a_quality_that_makes_no_sense_is_refused(wrong: dict[str, float]) -> None:
+def test_a_quality_that_makes_no_sense_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         Quality(**wrong)
+
+
+def test_a_segment_is_lost_no_more_often_running_than_allowed() -> None:
+    quality, rng = Quality(delay_s=0.05, loss_frac=0.5, most_lost=2), np.random.default_rng(0)
+
+    drawn = {stall_s(quality, 1, rng) for _ in range(1000)}
+
+    assert sorted(drawn) == pytest.approx([0.0, 0.3, 0.3 + 0.6])
