@@ -93,7 +93,7 @@ def test_study_that_is_ended_keeps_what_is_done_and_leaves_no_process(
                 os.killpg(process.pid, ending)  # as a terminal does
             else:
                 process.kill()
-            out, err = process.communicate(timeout=60)
+            out, err = process.communicate(timeout=20)
         finally:
             process.kill()
 
