@@ -63,7 +63,7 @@ def test_a_restarted_agent_resumes_its_task_while_its_vehicle_flies_on(
     mission = survey(3, 0)
     tasks = (Task(TaskId(f"t{n}"), (36.0 * n, 600.0, 0.0), 1.0, service_s=1.0) for n in (1, 2, 3))
     mission = replace(mission, tasks=tuple(tasks))
-    verdict = play(mission, tmp_path, script, bus=bus, speedup=10.0)
+    verdict = play(mission, tmp_path, script, bus=bus, speedup=5.0)
 
     all_done(verdict, 3)
     assert verdict.duplicates == 0
@@ -80,8 +80,7 @@ def test_a_restarted_agent_resumes_its_task_while_its_vehicle_flies_on(
         for life, said in said_by(verdict, VICTIM, Status)
         if said.task == task.id and said.position_enu_m is not None
     ]
-    # How far it has come when the new life first speaks is a matter of the machine.
-    assert left_m[0] > left_m[-1]
+    assert left_m[0] > 100.0
     assert left_m[-1] < 50.0  # the last status before the arrival
     assert all(later <= earlier + 1.0 for earlier, later in pairwise(left_m))
 
