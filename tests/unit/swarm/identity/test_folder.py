@@ -89,15 +89,15 @@ def refused(path: Path, **how: Any) -> str:
         (
             {"now_s": NOW_S + 91 * DAY_S},
             (
-                "expired on 2027-04-15 08:00 UTC; issue a new one with 'swarm keys add DIR uav1', or "
-                "set the clock, which says 2027-04-16 08:00 UTC"
+                "expired on 2027-04-15 08:00 UTC; issue a new one with 'swarm keys add DIR uav1', "
+                "or set the clock, which says 2027-04-16 08:00 UTC"
             ),
         ),
         (
             {"now_s": NOW_S - 2 * DAY_S},
             (
-                "is not valid before 2027-01-14 08:00 UTC; set the clock of this machine, which says "
-                "2027-01-13 08:00 UTC"
+                "is not valid before 2027-01-14 08:00 UTC; set the clock of this machine, which "
+                "says 2027-01-13 08:00 UTC"
             ),
         ),
     ],
