@@ -45,6 +45,7 @@ from swarm.bus.zenoh_session import (
 )
 from swarm.errors import BusError
 from swarm.log import get_logger
+from swarm.sealing import seal_of
 from swarm.wire.seal import Seal
 
 __all__ = ["ZenohBus", "open_zenoh_bus"]
@@ -75,7 +76,8 @@ async def open_zenoh_bus(
         InputError: the user's configuration file is wrong.
     """
     session = await open_session(_zenoh_config(config), timeout_s=timeout_s)
-    return ZenohBus(session, Inbox(asyncio.get_running_loop(), inbox_capacity))
+    inbox = Inbox(asyncio.get_running_loop(), inbox_capacity)
+    return ZenohBus(session, inbox, seal_of(config.identity))
 
 
 def _zenoh_config(config: BusConfig) -> zenoh.Config:
