@@ -16,6 +16,7 @@ from coordinator.dashboard.place import Place
 from sim.launch.autopilots import Autopilots, Running, Simulated
 from sim.launch.firmware import Firmware
 from sim.launch.handed_on import HandedOn
+from sim.launch.keys import RunKeys
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
 from swarm.bus.endpoints import free_loopback_endpoints
 from swarm.config import Link, preset
@@ -90,6 +91,8 @@ class LaunchOptions:
     """What a line of a process's log looks like."""
     dashboard: Place | None = None
     """Where a page shows the run; nowhere if None."""
+    keys: RunKeys | None = None
+    """With which the processes prove who they are; None: whoever reaches the bus is believed."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -137,7 +140,8 @@ class Layout:
         """Names of the routers; none in a mesh."""
         listeners = self.routers or (*self._seats, *self._onlookers)
         ports = [each.rpartition(":")[2] for each in free_loopback_endpoints(len(listeners), rng)]
-        endpoints = [f"tcp/{options.address}:{port}" for port in ports]
+        protocol = "tcp" if options.keys is None else "tls"
+        endpoints = [f"{protocol}/{options.address}:{port}" for port in ports]
         self._endpoints = dict(zip(listeners, endpoints, strict=True))
         self._diverted: dict[DialedLink, str] = {}
         self.state: Path | None = None
@@ -168,7 +172,8 @@ class Layout:
         """Arguments of a router's process."""
         dialed = _repeated("--connect", self._dialed(name))
         listen = ["--listen", self._endpoints[name]]
-        return ["router", "--json", *listen, *dialed, *self._link(), *self._log()]
+        keys = self._keys_arguments(name)
+        return ["router", "--json", *listen, *dialed, *keys, *self._link(), *self._log()]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
@@ -244,10 +249,26 @@ class Layout:
 
     def seat_arguments(self, name: str) -> list[str]:
         """Arguments with which a process, or an onlooker by that name, finds the bus."""
-        dialed = [*_repeated("--connect", self._dialed(name)), *self._link()]
+        rest = [*_repeated("--connect", self._dialed(name)), *self._link()]
+        rest += self._keys_arguments(name)
         if self.routers:
-            return ["--bus", "router", *dialed]
-        return ["--bus", "mesh", "--listen", self._endpoints[name], *dialed]
+            return ["--bus", "router", *rest]
+        return ["--bus", "mesh", "--listen", self._endpoints[name], *rest]
+
+    def _keys_arguments(self, name: str) -> list[str]:
+        folder = self._keys_of(name)
+        return [] if folder is None else ["--keys", str(folder)]
+
+    def _keys_of(self, name: str) -> Path | None:
+        """The folder of keys of the process, or onlooker, by that name; None without keys."""
+        keys = self._options.keys
+        if keys is None:
+            return None
+        if name in self.routers:
+            return keys.of_router(self.routers.index(name))
+        if name in self._seats:
+            return keys.of_seat(name)
+        return keys.of_operator() if name == DASHBOARD else keys.of_onlooker(name)
 
     def _dialed(self, name: str) -> tuple[str, ...]:
         """Endpoints that a process is told to dial."""
