@@ -59,8 +59,8 @@ class Flight:
     wall_s: float
     fates: tuple[str, ...]
     """How processes ended that should not have, in words."""
-    dropped: Mapping[str, int]
-    """What the onlooker itself has dropped, by reason."""
+    dropped: tuple[Mapping[str, int], ...]
+    """What each UAV, and the onlooker, has dropped, by reason."""
 
 
 class Run:
@@ -143,7 +143,7 @@ class Run:
             takeoff_s=self._zero_s,
             wall_s=self.clock.now_s() / self.launch.options.speedup,
             fates=tuple(self.fates),
-            dropped=dict(self.dropped),
+            dropped=(*self.observer.dropped.values(), dict(self.dropped)),
         )
 
     def _hear_plan(self, said: dict[str, Any]) -> None:
