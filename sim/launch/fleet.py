@@ -17,9 +17,11 @@ from sim.launch.autopilots import Autopilots, Running, Simulated
 from sim.launch.firmware import Firmware
 from sim.launch.handed_on import HandedOn
 from sim.launch.keys import RunKeys
-from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
+from swarm.bus.config import BusConfig, ClientTopology, MeshTopology, Topology
 from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.loopback import is_loopback
 from swarm.config import Link, preset
+from swarm.identity import load_identity
 from swarm.log import LogFormat
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
@@ -164,16 +166,21 @@ class Layout:
     def seat_of_onlooker(self, name: str = ONLOOKER) -> BusConfig:
         """Seat of the launcher itself, or of another onlooker."""
         dialed, lease_s = self._dialed(name), preset(self._options.link).lease_s
+        topology: Topology
         if self.routers:
-            return BusConfig(ClientTopology(dialed), lease_s)
-        return BusConfig(MeshTopology(self._endpoints[name], dialed), lease_s)
+            topology = ClientTopology(dialed)
+        else:
+            topology = MeshTopology(self._endpoints[name], dialed)
+        if (folder := self._keys_of(name)) is None:
+            return BusConfig(topology, lease_s, unencrypted=self._unencrypted)
+        return BusConfig(topology, lease_s, load_identity(folder, mission=self._mission.name))
 
     def router(self, name: str) -> list[str]:
         """Arguments of a router's process."""
         dialed = _repeated("--connect", self._dialed(name))
         listen = ["--listen", self._endpoints[name]]
-        keys = self._keys_arguments(name)
-        return ["router", "--json", *listen, *dialed, *keys, *self._link(), *self._log()]
+        trust = self._trust(name)
+        return ["router", "--json", *listen, *dialed, *trust, *self._link(), *self._log()]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
@@ -244,20 +251,27 @@ class Layout:
     def _memory(self) -> list[str]:
         return [] if self.state is None else ["--state", str(self.state)]
 
+    @property
+    def _unencrypted(self) -> bool:
+        """Whether processes talk in the clear beyond loopback, as on networks made for a test."""
+        clear = [*self._endpoints.values(), *self._diverted.values()]
+        return self._options.keys is None and not all(map(is_loopback, clear))
+
     def _link(self) -> list[str]:
         return ["--link", self._options.link]
 
     def seat_arguments(self, name: str) -> list[str]:
         """Arguments with which a process, or an onlooker by that name, finds the bus."""
-        rest = [*_repeated("--connect", self._dialed(name)), *self._link()]
-        rest += self._keys_arguments(name)
+        rest = [*_repeated("--connect", self._dialed(name)), *self._trust(name), *self._link()]
         if self.routers:
             return ["--bus", "router", *rest]
         return ["--bus", "mesh", "--listen", self._endpoints[name], *rest]
 
-    def _keys_arguments(self, name: str) -> list[str]:
-        folder = self._keys_of(name)
-        return [] if folder is None else ["--keys", str(folder)]
+    def _trust(self, name: str) -> list[str]:
+        """Arguments by which a process knows whom to trust: its keys, or whoever is there."""
+        if (folder := self._keys_of(name)) is not None:
+            return ["--keys", str(folder)]
+        return ["--unencrypted"] if self._unencrypted else []
 
     def _keys_of(self, name: str) -> Path | None:
         """The folder of keys of the process, or onlooker, by that name; None without keys."""

@@ -41,7 +41,7 @@ from swarm.identity.folder import (
     PRIVATE_KEY_FILE,
     ROSTER_FILE,
 )
-from swarm.identity.ledger import Issued, Ledger, decode_ledger, encode_ledger
+from swarm.identity.ledger import ISSUED_FILE, Issued, Ledger, decode_ledger, encode_ledger
 from swarm.identity.mavlink_keys import decode_table, encode_table, mavlink_key, new_phrase
 from swarm.identity.private_files import (
     replace_private,
@@ -57,7 +57,6 @@ if TYPE_CHECKING:
 __all__ = [
     "DAY_S",
     "EARLY_S",
-    "ISSUED_FILE",
     "MAVLINK_TABLE_FILE",
     "OWN_FILES",
     "Authority",
@@ -66,7 +65,6 @@ __all__ = [
     "require_fit",
 ]
 
-ISSUED_FILE: Final = "issued.json"
 MAVLINK_TABLE_FILE: Final = "mavlink-keys.csv"
 
 DAY_S: Final = 86_400
@@ -126,6 +124,15 @@ class Authority:
         """What goes to the machine of ``name``."""
         return self.directory / name
 
+    @property
+    def mavlink_table(self) -> Path:
+        """Pass phrases of the UAVs' autopilot links."""
+        return self.directory / MAVLINK_TABLE_FILE
+
+    def mavlink_uavs(self) -> set[str]:
+        """Those who have a MAVLink key."""
+        return set(self._phrases())
+
     def roster_bytes(self) -> bytes:
         """The roster in force, as it travels."""
         return encode_roster(self.roster, self._key)
@@ -167,7 +174,7 @@ class Authority:
             roster = replace(self.roster, version=self.roster.version + 1, entries=kept)
             self._enact(roster, encode_roster(roster, self._key))
             phrases = {uav: each for uav, each in self._phrases().items() if uav not in names}
-            replace_private(self.directory / MAVLINK_TABLE_FILE, encode_table(phrases))
+            replace_private(self.mavlink_table, encode_table(phrases))
             for name in names:
                 shutil.rmtree(self.folder(name), ignore_errors=True)
             return self.roster
@@ -209,7 +216,7 @@ class Authority:
         lacking = [each for each in names if names[each] is Role.UAV and each not in phrases]
         if lacking:
             phrases |= {uav: new_phrase() for uav in lacking}
-            replace_private(self.directory / MAVLINK_TABLE_FILE, encode_table(phrases))
+            replace_private(self.mavlink_table, encode_table(phrases))
         for name, key in keys.items():
             files = self._files_of(entries[name], key, not_before_s, phrases.get(name))
             files[ROSTER_FILE] = data
@@ -277,7 +284,7 @@ class Authority:
         return Fault(str(self.directory), "", problem, remedy)
 
     def _phrases(self) -> dict[str, str]:
-        return decoded(self.directory / MAVLINK_TABLE_FILE, decode_table, _RESTORE, secret=True)
+        return decoded(self.mavlink_table, decode_table, _RESTORE, secret=True)
 
     def _read(self) -> tuple[Ledger, Roster]:
         """What changes."""

@@ -15,14 +15,13 @@ from swarm.errors import Fault, InputError
 from swarm.identity.authority import (
     DAY_S,
     EARLY_S,
-    ISSUED_FILE,
     MAVLINK_TABLE_FILE,
     Authority,
     new_door_key,
     require_fit,
 )
 from swarm.identity.folder import AUTHORITY_FILE, AUTHORITY_KEY_FILE, DOOR_KEY_FILE, ROSTER_FILE
-from swarm.identity.ledger import Ledger, encode_ledger
+from swarm.identity.ledger import ISSUED_FILE, Ledger, encode_ledger
 from swarm.identity.mavlink_keys import encode_table
 from swarm.identity.private_files import make_private_folder, write_private
 from swarm.identity.roles import fleet_names

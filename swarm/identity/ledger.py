@@ -14,8 +14,9 @@ from typing import Any, Final
 from swarm.identity.roles import Role
 from swarm.identity.roster import Entry
 
-__all__ = ["Issued", "Ledger", "decode_ledger", "encode_ledger"]
+__all__ = ["ISSUED_FILE", "Issued", "Ledger", "decode_ledger", "encode_ledger"]
 
+ISSUED_FILE: Final = "issued.json"
 _FORMAT: Final = "peckorder authority 1"
 
 

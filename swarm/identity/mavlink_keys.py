@@ -15,17 +15,19 @@ import csv
 import hashlib
 import io
 import secrets
+import string
 from collections.abc import Mapping
 
 __all__ = ["decode_table", "encode_table", "mavlink_key", "new_phrase"]
 
 _COLUMNS = ["uav", "pass_phrase", "key"]
-_PHRASE_BYTES = 24
+_LETTERS = string.ascii_letters + string.digits
+_PHRASE_LETTERS = 32
 
 
 def new_phrase() -> str:
-    """A pass phrase that nobody guesses: 192 random bits in 32 characters."""
-    return secrets.token_urlsafe(_PHRASE_BYTES)
+    """A pass phrase that nobody guesses: 190 random bits."""
+    return "".join(secrets.choice(_LETTERS) for _ in range(_PHRASE_LETTERS))
 
 
 def mavlink_key(phrase: str) -> str:
