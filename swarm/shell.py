@@ -10,9 +10,11 @@ sim.launch), through `Shell.execute`.
 from __future__ import annotations
 
 import asyncio
+import secrets
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Generic, Protocol, TypeVar
 
 from swarm.bus.port import (
@@ -43,10 +45,12 @@ from swarm.events import (
     Tick,
 )
 from swarm.log import get_logger
-from swarm.wire.codec import Codec, encode, fit
-from swarm.wire.digest import decode_digest, encode_digest, unknown
+from swarm.wire.codec import Codec
+from swarm.wire.digest import unknown
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Choice, Message, Snapshot, Status
+from swarm.wire.question import NONCE_BYTES, decode_question, encode_question
+from swarm.wire.seal import Seal, UnacceptableError
 
 __all__ = ["Core", "Shell", "take_seat"]
 
@@ -89,6 +93,8 @@ class Shell(Generic[E, A]):
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
         context: what every note of the core is logged with, besides its own fields.
+        seal: signs what is said and believes what is signed; None on a bus without keys.
+        draw_nonce: makes the nonce of a question, see swarm.wire.question.
     """
 
     def __init__(
@@ -106,13 +112,17 @@ class Shell(Generic[E, A]):
         save: Callable[[float], None] | None = None,
         answer_s: float = PRESETS[Link.NORMAL].answer_s,
         context: Callable[[], Mapping[str, object]] = dict,
+        seal: Seal | None = None,
+        draw_nonce: Callable[[], bytes] = partial(secrets.token_bytes, NONCE_BYTES),
     ) -> None:
         self._core = core
         self._bus = bus
         self._clock = clock
         self._keys = Keys(mission)
         self._name = name
-        self._codec = Codec(mission)
+        self._seal = seal
+        self._draw_nonce = draw_nonce
+        self._codec = Codec(mission, seal)
         self._log = get_logger(name, mission=mission)
         self._from_bus = from_bus
         self._execute = execute
@@ -207,7 +217,9 @@ class Shell(Generic[E, A]):
 
     def _publish(self, message: Message) -> None:
         reliable = not isinstance(message.body, Status | Choice)
-        self._bus.publish(message.key, encode(message), reliable=reliable)
+        packed = self._codec.pack(message)
+        if packed is not None:
+            self._bus.publish(message.key, packed, reliable=reliable)
 
     def _reschedule(self) -> None:
         if self._timer is not None:
@@ -256,30 +268,30 @@ class Shell(Generic[E, A]):
     def _answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
         if self._snapshot is None:
             return
-        theirs = decode_digest(payload)
-        if theirs is None:
-            self._codec.dropped["malformed"] += 1
+        try:
+            question = decode_question(payload, self._seal)
+        except UnacceptableError as fault:
+            self._codec.dropped[fault.reason] += 1
             return
         whole = self._snapshot(self._clock.now_s())
-        news = replace(whole, messages=unknown(whole.messages, self._known(), theirs))
-        fitted = fit(news)
-        if len(fitted.messages) < len(news.messages):
-            left_out = len(news.messages) - len(fitted.messages)
+        news = replace(whole, messages=unknown(whole.messages, self._known(), question.known))
+        answer, left_out = self._codec.pack_answer(news, question.nonce)
+        if left_out:
             self._log.warning("an answer has no room for all registers", left_out=left_out)
-        reply(encode(fitted))
+        reply(answer)
 
     async def _ask(self) -> None:
         asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
         # What is said in the own name is always told: by who remembers an earlier life, or a twin.
         known = {writer: number for writer, number in self._known().items() if writer != self._name}
-        answers = await self._bus.query(
-            self._keys.state("*"), encode_digest(known), timeout_s=self._answer_s
-        )
+        nonce = self._draw_nonce()
+        question = encode_question(known, nonce, self._seal)
+        answers = await self._bus.query(self._keys.state("*"), question, timeout_s=self._answer_s)
         now_s, wall_s = self._clock.now_s(), self._loop.time()
         pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
         snapshots = []
         for answer in answers:
-            snapshot = self._codec.decode_snapshot(answer.key, answer.payload)
+            snapshot = self._codec.decode_snapshot(answer.key, answer.payload, nonce)
             if snapshot is not None:
                 age_s = pace * (wall_s - answer.arrived_s)
                 snapshots.append(_aged(snapshot, age_s))
