@@ -2,8 +2,9 @@
 
 It decodes what the bus brings, steps the core, publishes what the core says,
 answers queries with the core's snapshot and ticks at the core's deadlines. A question
-goes out with a digest of what the core knows, and the answer leaves that out. Leaves
-out: what only one kind of process does (agent.runner, coordinator.daemon,
+goes out with a digest of what the core knows, and the answer leaves that out. On a bus
+with keys it says and believes only what is signed, and puts newer rosters in force.
+Leaves out: what only one kind of process does (agent.runner, coordinator.daemon,
 sim.launch), through `Shell.execute`.
 """
 
@@ -12,9 +13,8 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Generic, Protocol, TypeVar
 
 from swarm.bus.port import (
@@ -45,12 +45,13 @@ from swarm.events import (
     Tick,
 )
 from swarm.log import get_logger
+from swarm.model.ids import AUTHORITY
 from swarm.wire.codec import Codec
 from swarm.wire.digest import unknown
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Choice, Message, Snapshot, Status
+from swarm.wire.messages import Choice, Message, SignedRoster, Snapshot, Stamp, Status
 from swarm.wire.question import NONCE_BYTES, decode_question, encode_question
-from swarm.wire.seal import Seal, UnacceptableError
+from swarm.wire.seal import SIGNER_UNKNOWN, Seal, UnacceptableError
 
 __all__ = ["Core", "Shell", "take_seat"]
 
@@ -58,6 +59,11 @@ E_contra = TypeVar("E_contra", contravariant=True)
 A_co = TypeVar("A_co", covariant=True)
 E = TypeVar("E")
 A = TypeVar("A")
+
+
+def draw_nonce() -> bytes:
+    """A nonce that nobody can guess."""
+    return secrets.token_bytes(NONCE_BYTES)
 
 
 class Core(Protocol[E_contra, A_co]):
@@ -93,7 +99,6 @@ class Shell(Generic[E, A]):
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
         context: what every note of the core is logged with, besides its own fields.
-        seal: signs what is said and believes what is signed; None on a bus without keys.
         draw_nonce: makes the nonce of a question, see swarm.wire.question.
     """
 
@@ -112,17 +117,17 @@ class Shell(Generic[E, A]):
         save: Callable[[float], None] | None = None,
         answer_s: float = PRESETS[Link.NORMAL].answer_s,
         context: Callable[[], Mapping[str, object]] = dict,
-        seal: Seal | None = None,
-        draw_nonce: Callable[[], bytes] = partial(secrets.token_bytes, NONCE_BYTES),
+        draw_nonce: Callable[[], bytes] = draw_nonce,
     ) -> None:
         self._core = core
         self._bus = bus
         self._clock = clock
+        self._mission = mission
         self._keys = Keys(mission)
         self._name = name
-        self._seal = seal
+        self._seal = bus.seal
         self._draw_nonce = draw_nonce
-        self._codec = Codec(mission, seal)
+        self._codec = Codec(mission, bus.seal)
         self._log = get_logger(name, mission=mission)
         self._from_bus = from_bus
         self._execute = execute
@@ -180,7 +185,39 @@ class Shell(Generic[E, A]):
     def _start(self) -> None:
         for action in self._core.start(self._clock.now_s()):
             self._carry_out(action)
+        if self._seal is not None:  # what is in its folder is as if it had been heard
+            self._events.append(self._from_bus(Heard(self._roster(self._seal))))
         self._step_all()
+
+    def _roster(self, seal: Seal) -> Message:
+        body = SignedRoster(seal.signed_roster)
+        return Message(self._mission, AUTHORITY, Stamp(seal.roster.version, 0), body)
+
+    def _heed(self, messages: Iterable[Message], *, answers: bool = False) -> None:
+        """Put a newer roster in force; who told an older one is told the newer."""
+        seal = self._seal
+        if seal is None:
+            return
+        for message in messages:
+            if not isinstance(message.body, SignedRoster):
+                continue
+            behind = message.stamp.incarnation < seal.roster.version
+            if behind and answers and seal.may_publish_roster:
+                self._publish(self._roster(seal))
+            before = [entry.name for entry in seal.roster.entries]
+            try:
+                news = seal.put_in_force(message.body.signed)
+            except OSError as fault:
+                news, reason = True, fault.strerror or str(fault)
+                self._log.warning("cannot keep the newer roster", reason=reason)
+            if not news:
+                continue
+            gone = [name for name in before if seal.roster.entry(name) is None]
+            self._log.info(
+                "newer roster in force", version=seal.roster.version, without=", ".join(gone)
+            )
+            for name in gone:  # a token cannot be signed: it counts no longer
+                self.step(self._from_bus(PeerGone(name)))
 
     def _guard(self, act: Callable[[], None]) -> None:
         """Act and reschedule; a bug ends the process rather than half of it."""
@@ -250,10 +287,13 @@ class Shell(Generic[E, A]):
         match event:
             case Sample(key, payload):
                 message = self._codec.decode(key, payload)
-                return None if message is None else Heard(message)
+                if message is None:
+                    return None
+                self._heed([message])
+                return Heard(message)
             case TokenSeen(key):
                 writer = self._keys.writer_of_token(key)
-                return None if writer is None else PeerSeen(writer)
+                return PeerSeen(writer) if writer is not None and self._belongs(writer) else None
             case TokenGone(key):
                 writer = self._keys.writer_of_token(key)
                 return None if writer is None else PeerGone(writer)
@@ -264,6 +304,13 @@ class Shell(Generic[E, A]):
             case Query(reply=reply, payload=payload):
                 self._answer(reply, payload)
                 return None
+
+    def _belongs(self, writer: str) -> bool:
+        """Whether a token may be shown by somebody of this mission; tokens cannot be signed."""
+        if self._seal is None or self._seal.knows(writer):
+            return True
+        self._codec.dropped[SIGNER_UNKNOWN] += 1
+        return False
 
     def _answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
         if self._snapshot is None:
@@ -295,6 +342,8 @@ class Shell(Generic[E, A]):
             if snapshot is not None:
                 age_s = pace * (wall_s - answer.arrived_s)
                 snapshots.append(_aged(snapshot, age_s))
+        for snapshot in snapshots:
+            self._heed(snapshot.messages, answers=True)
         self.step(self._from_bus(Learned(tuple(snapshots))))
 
 
@@ -311,7 +360,7 @@ def take_seat(
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
     Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
-    ``operator/*`` and ``operator/task/*``, watches ``alive/*``.
+    ``operator/*`` and ``operator/task/*``, where there are keys ``roster``, watches ``alive/*``.
 
     Args:
         bus: an open bus.
@@ -335,6 +384,8 @@ def take_seat(
     if status:
         bus.subscribe(keys.status("*"), latest=not every_status)
         bus.subscribe(keys.choice("*"))
+    if bus.seal is not None:
+        bus.subscribe(keys.roster)
     bus.watch_tokens(keys.alive("*"))
     if name is not None:
         bus.serve(keys.state(name))

@@ -20,10 +20,12 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 import msgpack
 
+from swarm.identity.roles import Role
+from swarm.identity.roster import Roster, decode_roster
 from swarm.model.ids import COORDINATOR, OPERATOR, valid_id
 
 if TYPE_CHECKING:
@@ -38,7 +40,6 @@ __all__ = [
     "SIGNER_UNKNOWN",
     "WRONGLY_SIGNED",
     "Envelope",
-    "KeyHolder",
     "Seal",
     "UnacceptableError",
     "is_envelope",
@@ -75,56 +76,6 @@ class UnacceptableError(Exception):
         super().__init__(reason)
         self.reason = reason
         """Under which it is counted."""
-
-
-class Member(Protocol):
-    """One entry of a roster."""
-
-    @property
-    def role(self) -> str:
-        """What it may do: uav, coordinator, operator or another."""
-        ...
-
-    @property
-    def public_key(self) -> bytes:
-        """Ed25519, 32 bytes."""
-        ...
-
-
-class Members(Protocol):
-    """Everyone whose word counts."""
-
-    @property
-    def mission(self) -> str:
-        """Name of the mission."""
-        ...
-
-    @property
-    def series(self) -> bytes:
-        """What is signed under one series is worth nothing under another."""
-        ...
-
-    @property
-    def version(self) -> int:
-        """Grows with every change."""
-        ...
-
-    def entry(self, name: str) -> Member | None:
-        """That of ``name``; None if its word does not count."""
-        ...
-
-
-class KeyHolder(Protocol):
-    """Somebody with a private key."""
-
-    @property
-    def name(self) -> str:
-        """As in the roster."""
-        ...
-
-    def sign(self, data: bytes) -> bytes:
-        """Its Ed25519 signature of ``data``."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,10 +117,10 @@ def open_envelope(data: bytes) -> Envelope | None:
     signature, place = data[place : place + SIGNATURE_BYTES], place + SIGNATURE_BYTES
     for width, code in ((1, 0xC4), (2, 0xC5), (4, 0xC6)):
         if data[place : place + 1] == bytes([code]):
-            length = int.from_bytes(data[place + 1 : place + 1 + width], "big")
-            said = data[place + 1 + width :]
+            told, said = data[place + 1 : place + 1 + width], data[place + 1 + width :]
+            length = int.from_bytes(told, "big")
             shortest = length >= {1: 0, 2: 1 << 8, 4: 1 << 16}[width]
-            if shortest and len(said) == length:
+            if shortest and len(told) == width and len(said) == length:
                 break
     else:
         return None
@@ -181,30 +132,47 @@ class Seal:
     """What one process needs to be believed, and to believe others.
 
     Args:
-        holder: signs.
-        roster: in force.
-        read_roster: what the authority has signed; ValueError when it has not.
+        name: of this process in the roster.
+        sign: makes its Ed25519 signature of some bytes.
+        signed_roster: the newest roster it knows, as its authority has signed it.
+        authority_public_key: Ed25519, 32 bytes.
+        keep: puts a newer roster where the next life of this process finds it.
+
+    Raises:
+        ValueError: that authority has not signed the roster.
     """
 
     def __init__(
-        self, holder: KeyHolder, roster: Members, read_roster: Callable[[bytes], Members]
+        self,
+        name: str,
+        sign: Callable[[bytes], bytes],
+        signed_roster: str,
+        authority_public_key: bytes,
+        keep: Callable[[bytes], object] = bytes,
     ) -> None:
-        self.name = holder.name
+        self.name = name
         """Of this process among the signers."""
-        self._holder = holder
-        self._roster = roster
-        self._read_roster = read_roster
-        self._rosters: OrderedDict[str, Members] = OrderedDict()
+        self._sign = sign
+        self._authority_public_key = authority_public_key
+        self._keep_roster = keep
+        self._rosters: OrderedDict[str, Roster] = OrderedDict()
         """Those read lately; everyone repeats the same."""
+        self._signed_roster = signed_roster
+        self._roster = decode_roster(signed_roster.encode(), authority_public_key)
         self._genuine: OrderedDict[bytes, None] = OrderedDict()
         """Hashes of envelopes found genuine under the roster in force."""
 
     @property
-    def roster(self) -> Members:
+    def roster(self) -> Roster:
         """In force."""
         return self._roster
 
-    def read_roster(self, signed: str) -> Members:
+    @property
+    def signed_roster(self) -> str:
+        """The same, in the words of the authority."""
+        return self._signed_roster
+
+    def read_roster(self, signed: str) -> Roster:
         """The roster that the authority of this mission has signed.
 
         Raises:
@@ -213,7 +181,7 @@ class Seal:
         known = self._rosters.get(signed)
         if known is None:
             try:
-                known = self._read_roster(signed.encode("ascii"))
+                known = decode_roster(signed.encode("ascii"), self._authority_public_key)
             except ValueError:  # of which UnicodeError is one
                 raise UnacceptableError(WRONGLY_SIGNED) from None
             if known.mission != self._roster.mission:
@@ -228,13 +196,21 @@ class Seal:
 
         Raises:
             UnacceptableError: the authority has not signed it.
+            OSError: it counts, but could not be kept for the next life.
         """
         roster = self.read_roster(signed)
-        if roster.version <= self._roster.version:
+        if not roster.supersedes(self._roster):
             return False
         self._genuine.clear()
-        self._roster = roster
+        self._roster, self._signed_roster = roster, signed
+        self._keep_roster(signed.encode())
         return True
+
+    @property
+    def may_publish_roster(self) -> bool:
+        """Whether routers let this process say who belongs to the mission."""
+        member = self._roster.entry(self.name)
+        return member is not None and member.role in (Role.COORDINATOR, Role.OPERATOR)
 
     # -- being believed ---------------------------------------------------------------
 
@@ -245,7 +221,7 @@ class Seal:
             said: a statement's bytes.
             bound: what it is bound to, at most 255 bytes; empty for what holds by itself.
         """
-        signature = self._holder.sign(_signed_bytes(self._roster.series, bound, said))
+        signature = self._sign(_signed_bytes(self._roster.series, bound, said))
         envelope: bytes = msgpack.packb([SEALED_MARK, self.name, signature, said])
         if not bound:
             self._keep(_hash(envelope))
@@ -294,13 +270,13 @@ class Seal:
         if member is None:
             return False
         match member.role:
-            case "uav":
+            case Role.UAV:
                 return signer == writer
-            case "coordinator":
+            case Role.COORDINATOR:
                 return writer == COORDINATOR
-            case "operator":
+            case Role.OPERATOR:
                 return writer == OPERATOR
-            case _:
+            case Role.ROUTER | Role.VIEWER:
                 return False
 
     def knows(self, writer: str) -> bool:
