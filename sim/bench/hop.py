@@ -97,7 +97,7 @@ class _Speaker(_Silent):
 
     def step(self, event: BusFact, now_s: float) -> Sequence[Wish]:
         del now_s
-        if isinstance(event, Heard):
+        if isinstance(event, Heard) and isinstance(event.message.body, Claim):
             self.at_s[event.message.stamp.counter] = self._clock.now_s()
             return [Publish(event.message)]
         return []
@@ -112,7 +112,7 @@ class _Hearer(_Silent):
 
     def step(self, event: BusFact, now_s: float) -> Sequence[Wish]:
         del now_s
-        if isinstance(event, Heard):
+        if isinstance(event, Heard) and isinstance(event.message.body, Claim):
             self.at_s.setdefault(event.message.stamp.counter, self._clock.now_s())
         return []
 
