@@ -112,7 +112,7 @@ async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
         print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
         if not quiet:
             get_logger("router").info(f"router ready at {', '.join(serving.endpoints)}")
-        await asyncio.Event().wait()
+        await serving.serve()
         return 0
     finally:
         serving.close()

@@ -38,6 +38,8 @@ from swarm.bus.port import (
 from swarm.bus.writer import Writer
 from swarm.bus.zenoh_session import (
     close_session,
+    lay_over,
+    mode_of,
     open_session,
     plain_error,
     session_config,
@@ -75,7 +77,13 @@ async def open_zenoh_bus(
         BusError: the bus cannot be reached in time, or the own endpoint is taken.
         InputError: the user's configuration file is wrong.
     """
-    session = await open_session(_zenoh_config(config), timeout_s=timeout_s)
+    settings = _zenoh_config(config)
+    identity = config.identity
+    if identity is not None:
+        from swarm.bus.secure import secure_settings
+
+        lay_over(settings, secure_settings(identity, mode_of(settings), identity.roster))
+    session = await open_session(settings, timeout_s=timeout_s)
     inbox = Inbox(asyncio.get_running_loop(), inbox_capacity)
     return ZenohBus(session, inbox, seal_of(config.identity))
 
