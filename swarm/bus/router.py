@@ -20,7 +20,6 @@ from swarm.bus.config import RouterConfig
 from swarm.bus.rosters import Rosters
 from swarm.bus.zenoh_session import (
     close_session,
-    lay_over,
     open_session,
     session_config,
     session_config_file,
@@ -137,11 +136,11 @@ async def _open(
     zenoh_config = _zenoh_config(config, listen)
     if rosters is None:
         return await open_session(zenoh_config, timeout_s=OPEN_LIMIT_S)
-    from swarm.bus.secure import door_of, secure_settings
+    from swarm.bus.secure import door_of, secure
 
     roster = rosters.roster
     with door_of(rosters.identity, roster) as door:
-        lay_over(zenoh_config, secure_settings(rosters.identity, "router", roster, door))
+        secure(zenoh_config, rosters.identity, "router", roster, door)
         return await open_session(zenoh_config, timeout_s=OPEN_LIMIT_S)
 
 

@@ -38,7 +38,7 @@ from swarm.bus.port import (
 from swarm.bus.writer import Writer
 from swarm.bus.zenoh_session import (
     close_session,
-    lay_over,
+    endpoints_of,
     mode_of,
     open_session,
     plain_error,
@@ -77,15 +77,29 @@ async def open_zenoh_bus(
         BusError: the bus cannot be reached in time, or the own endpoint is taken.
         InputError: the user's configuration file is wrong.
     """
-    settings = _zenoh_config(config)
-    identity = config.identity
-    if identity is not None:
-        from swarm.bus.secure import secure_settings
-
-        lay_over(settings, secure_settings(identity, mode_of(settings), identity.roster))
-    session = await open_session(settings, timeout_s=timeout_s)
+    session = await _open(config, timeout_s)
     inbox = Inbox(asyncio.get_running_loop(), inbox_capacity)
     return ZenohBus(session, inbox, seal_of(config.identity))
+
+
+async def _open(config: BusConfig, timeout_s: float) -> zenoh.Session:
+    settings, identity = _zenoh_config(config), config.identity
+    if identity is None:
+        return await open_session(settings, timeout_s=timeout_s)
+    # Loaded by those alone that have keys.
+    from swarm.bus.refusal import why_refused
+    from swarm.bus.secure import secure
+
+    mode = mode_of(settings)
+    secure(settings, identity, mode, identity.roster)
+    try:
+        return await open_session(settings, timeout_s=timeout_s)
+    except BusError as fault:
+        routers = endpoints_of(settings, "connect")
+        if mode != "client" or not routers:
+            raise
+        reason = await why_refused(routers, identity)
+        raise BusError(f"cannot reach the bus within {timeout_s:g} s: {reason}") from fault
 
 
 def _zenoh_config(config: BusConfig) -> zenoh.Config:
