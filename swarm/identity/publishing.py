@@ -17,7 +17,10 @@ from swarm.clock import SystemClock
 from swarm.errors import SwarmError
 from swarm.events import BusFact, Wish
 from swarm.identity.herald import Herald, roster_message
+from swarm.identity.roles import Role
+from swarm.identity.roster import Roster
 from swarm.log import LogLevel, configure_logging
+from swarm.model.ids import COORDINATOR
 from swarm.shell import Shell, take_seat
 
 __all__ = ["CONFIRM_S", "CONNECT_S", "publish"]
@@ -67,8 +70,9 @@ async def _tell(config: BusConfig, change: Callable[[], bytes]) -> Herald:
         signed = change()
         with suppress(OSError):  # its folder may have been taken away
             seal.put_in_force(signed.decode("ascii"))
-        version = seal.read_roster(signed.decode("ascii")).version
-        herald = Herald(roster_message(identity.mission, version, signed), CONFIRM_S)
+        roster = seal.read_roster(signed.decode("ascii"))
+        message = roster_message(identity.mission, roster.version, signed)
+        herald = Herald(message, _writers(roster), CONFIRM_S)
         shell: Shell[BusFact, Wish] = Shell(
             herald,
             bus,
@@ -85,3 +89,12 @@ async def _tell(config: BusConfig, change: Callable[[], bytes]) -> Herald:
         return herald
     finally:
         bus.close()
+
+
+def _writers(roster: Roster) -> set[str]:
+    """Who may show a token and answers questions."""
+    return {
+        COORDINATOR if entry.role is Role.COORDINATOR else entry.name
+        for entry in roster.entries
+        if entry.role in (Role.UAV, Role.COORDINATOR)
+    }
