@@ -58,7 +58,6 @@ __all__ = [
     "DAY_S",
     "EARLY_S",
     "MAVLINK_TABLE_FILE",
-    "OWN_FILES",
     "Authority",
     "new_door_key",
     "open_authority",
@@ -71,7 +70,7 @@ DAY_S: Final = 86_400
 EARLY_S: Final = DAY_S
 """How far a certificate's beginning lies back, for machines whose clocks are behind."""
 _RESTORE: Final = "put a copy of the authority's folder back"
-OWN_FILES: Final = frozenset(
+_OWN_FILES: Final = frozenset(
     {
         AUTHORITY_KEY_FILE,
         AUTHORITY_FILE,
@@ -327,12 +326,31 @@ def open_authority(directory: Path) -> Authority:
 def require_fit(
     names: Mapping[str, Role], ledger: Ledger, source: str, remedy: str = "choose another name"
 ) -> None:
-    """See that something can be issued for each of ``names``."""
-    faults = [
-        Fault(source, "", problem, remedy)
-        for name, role in names.items()
-        if (problem := ledger.why_unfit(name, role, OWN_FILES)) is not None
-    ]
+    """See that something can be issued for each of ``names``, in a folder of its own.
+
+    Args:
+        names: role by name.
+        ledger: what was issued before.
+        source: where the names come from, for the fault.
+        remedy: what to do about a name that is unfit.
+
+    Raises:
+        InputError: for one of them nothing can be.
+    """
+    firsts: dict[str, str] = {}
+    for name in (*_OWN_FILES, *ledger.issued, *names):
+        firsts.setdefault(name.casefold(), name)  # some disks do not tell capitals apart
+    faults = []
+    for name, role in names.items():
+        first = firsts[name.casefold()]
+        if name in _OWN_FILES:
+            problem: str | None = f"{name!r} is the name of a file of the authority"
+        elif first != name:
+            problem = f"{name!r} differs from {first!r} in capital letters alone"
+        else:
+            problem = ledger.why_unfit(name, role)
+        if problem is not None:
+            faults.append(Fault(source, "", problem, remedy))
     if faults:
         raise InputError(*faults)
 

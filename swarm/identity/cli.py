@@ -220,7 +220,7 @@ def renew(
     directory: DirectoryArgument,
     days: DaysOption = None,
 ) -> int:
-    """Issue everything anew: certificates, passwords and a new series.
+    """Issue everything anew, so that nothing from before counts.
 
     Between flights, for the whole fleet: all certificates get the next generation and a new end.
     What was signed before is worth nothing afterwards, so nobody can replay what they recorded,
