@@ -19,7 +19,7 @@ from sim.launch.handed_on import HandedOn
 from sim.launch.keys import RunKeys
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology, Topology
 from swarm.bus.endpoints import free_loopback_endpoints
-from swarm.bus.loopback import is_loopback
+from swarm.bus.privacy import is_loopback
 from swarm.config import Link, preset
 from swarm.identity import load_identity
 from swarm.log import LogFormat

@@ -14,12 +14,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+import zenoh
+
 from swarm.bus.access import access_settings
+from swarm.bus.privacy import is_encrypted
+from swarm.bus.zenoh_session import endpoints_of, lay_over
 from swarm.errors import Fault, InputError
 from swarm.identity import Identity, Role, Roster
 from swarm.identity.door import door_dictionary
 
-__all__ = ["door_of", "secure_settings"]
+__all__ = ["door_of", "secure"]
 
 _TLS: Final = "transport/link/tls"
 _DOOR: Final = "transport/auth/usrpwd"
@@ -29,20 +33,34 @@ PENDING: Final = 100
 """Sessions that are being opened at once."""
 
 
-def secure_settings(
-    identity: Identity, mode: str, roster: Roster, door: Path | None = None
-) -> dict[str, object]:
-    """Settings of Zenoh by path, to be laid over those of a session.
+def secure(
+    config: zenoh.Config, identity: Identity, mode: str, roster: Roster, door: Path | None = None
+) -> None:
+    """Lay what keys entail over the configuration of a session, a user's file included.
 
     Args:
+        config: of the session.
         identity: of the session.
         mode: ``client``, ``peer`` or ``router``.
         roster: in force.
         door: for a router, the file that `door_of` made.
 
     Raises:
-        InputError: in that mode others would dial it, which its certificate does not allow.
+        InputError: an endpoint is not encrypted, or others would dial it in that mode, which
+            its certificate does not allow.
     """
+    for side in ("listen", "connect"):
+        for endpoint in endpoints_of(config, side):
+            if not is_encrypted(endpoint):
+                problem = f"{endpoint} is not encrypted"
+                remedy = f"with --keys write tls/… or quic/… among {side}/endpoints"
+                raise InputError(Fault("Zenoh configuration", "", problem, remedy))
+    lay_over(config, _settings(identity, mode, roster, door))
+
+
+def _settings(
+    identity: Identity, mode: str, roster: Roster, door: Path | None
+) -> dict[str, object]:
     certificate, key = str(identity.certificate_path), str(identity.private_key_path)
     settings: dict[str, object] = {
         # Nobody who is reached otherwise has proven anything.

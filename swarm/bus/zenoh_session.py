@@ -24,6 +24,7 @@ from swarm.process import call_in_background
 
 __all__ = [
     "close_session",
+    "endpoints_of",
     "lay_over",
     "mode_of",
     "open_session",
@@ -108,6 +109,17 @@ def session_config_file(path: Path) -> zenoh.Config:
 def mode_of(config: zenoh.Config) -> str:
     """``client``, ``peer`` or ``router``."""
     return str(json.loads(config.get_json("mode")) or DEFAULT_MODE)
+
+
+def endpoints_of(config: zenoh.Config, side: str) -> list[str]:
+    """Endpoints that a session of ``config`` has on one side: ``connect`` or ``listen``."""
+    mode = mode_of(config)
+    if side == "listen" and mode == "client":
+        return []
+    named = json.loads(config.get_json(f"{side}/endpoints")) or []
+    if isinstance(named, dict):
+        named = named.get(mode) or []
+    return [str(each) for each in named]
 
 
 async def open_session(config: zenoh.Config, *, timeout_s: float) -> zenoh.Session:
