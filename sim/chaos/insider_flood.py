@@ -32,6 +32,7 @@ from swarm.bus.zenoh_session import lay_over, session_config
 from swarm.config import Link, preset
 from swarm.errors import SwarmError
 from swarm.identity import load_identity
+from swarm.identity.door import door_dictionary
 from swarm.log import LogFormat
 from swarm.model import Mission, UavId
 from swarm.scenario.write import format_scenario
@@ -162,15 +163,11 @@ def _unguarded(folder: Path, keys: RunKeys) -> Path:
     """A configuration of the router by which TLS alone decides, and lets all say all."""
     identity = load_identity(keys.of_router(0))
     config = session_config("router", listen=[], connect=[], lease_s=preset(Link.NORMAL).lease_s)
-    settings = secure_settings(identity, "router", identity.roster)
-    lay_over(
-        config,
-        {
-            path: value
-            for path, value in settings.items()
-            if path not in ACCESS and not path.startswith("transport/auth")
-        },
-    )
+    door = folder / "door"
+    passwords = door_dictionary(identity.roster, identity.door_secret or b"")
+    door.write_text("".join(f"{user}:{word}\n" for user, word in passwords.items()))
+    settings = secure_settings(identity, "router", identity.roster, door)
+    lay_over(config, {path: value for path, value in settings.items() if path not in ACCESS})
     file = folder / "router.json5"
     file.write_text(str(config), encoding="utf-8")
     return file

@@ -31,10 +31,16 @@ class ByHand:
         stack: ends the processes.
         mission: flown.
         speedup: mission seconds per second of the wall's clock.
+        keys: folder of the mission's authority; None to fly without keys.
     """
 
     def __init__(
-        self, folder: Path, stack: contextlib.ExitStack, mission: Mission, speedup: int = 2
+        self,
+        folder: Path,
+        stack: contextlib.ExitStack,
+        mission: Mission,
+        speedup: int = 2,
+        keys: Path | None = None,
     ) -> None:
         self.folder = folder
         self.mission = mission
@@ -42,9 +48,13 @@ class ByHand:
         self._stack = stack
         self._scenario = folder / "scenario.toml"
         self._scenario.write_text(format_scenario(mission))
+        self._keys = keys
         (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
-        self.seat = ["--connect", endpoint, "--speedup", str(speedup)]
-        router = self.start("router", ["router", "--listen", endpoint, "--json"])
+        self.endpoint = endpoint if keys is None else endpoint.replace("tcp/", "tls/")
+        """Of the router."""
+        self.seat = ["--connect", self.endpoint, "--speedup", str(speedup)]
+        serving = ["router", "--listen", self.endpoint, "--json", *self.keys_of("router")]
+        router = self.start("router", serving)
         self._line(router)
         chosen = [word for uav in self.uavs for word in ("--uav", uav)]
         listen = ["--listen", "tcp:127.0.0.1:0", "--speedup", str(speedup), "--json"]
@@ -56,7 +66,11 @@ class ByHand:
     def coordinator(self, name: str, *options: str) -> subprocess.Popen[str]:
         """Start a coordinator; ``name`` is that of its log."""
         words = ["coordinator", str(self._scenario), "--method", "greedy", "--json"]
-        return self.start(name, [*words, *self.seat, *options])
+        return self.start(name, [*words, *self.seat, *self.keys_of("coordinator"), *options])
+
+    def keys_of(self, name: str) -> list[str]:
+        """What to tell a process so that it has the keys of ``name``."""
+        return [] if self._keys is None else ["--keys", str(self._keys / name)]
 
     def start(self, name: str, arguments: list[str]) -> subprocess.Popen[str]:
         log = self._stack.enter_context((self.folder / f"{name}.log").open("w"))
@@ -97,7 +111,7 @@ class ByHand:
         uav = str(vehicle["uav"])
         words = ["agent", "--mission", self.mission.name, "--uav", uav]
         words += ["--mavlink", str(vehicle["url"]), "--system-id", str(vehicle["system_id"])]
-        return self.start(uav, [*words, *self.seat])
+        return self.start(uav, [*words, *self.seat, *self.keys_of(uav)])
 
     @staticmethod
     def _line(process: subprocess.Popen[str]) -> dict[str, object]:
