@@ -24,6 +24,7 @@ from sim.bench.flooding import while_it_flies
 from sim.bench.hop import SPEAKER, measure_hops
 from sim.bench.process_costs import Costs, ProcessCosts
 from sim.bench.turnaround import listen
+from sim.chaos.flooder import Sent
 from sim.chaos.insider_flood import FLOODER
 from sim.launch.fleet import BusKind, LaunchOptions
 from sim.launch.protection import protected
@@ -66,8 +67,8 @@ class CostFlight:
     as_planned: bool
     """Whether every list flown was the one planned."""
     refused: Mapping[str, int]
-    poured_hz: float
-    """Messages a second of the hostile agent; 0 without one."""
+    flood: Sent | None
+    """What the hostile agent has sent; None without one."""
     load: float
     """Processes that wanted to run during the last minute of the flight."""
 
@@ -213,7 +214,7 @@ async def _fly(mission: Mission, options: LaunchOptions, way: Way, flood_hz: flo
             for uav, route in flight.result.executed_routes.items()
         ),
         refused=refusals(flight.dropped),
-        poured_hz=sum(each.rate_hz for each in sent),
+        flood=sent[0] if sent else None,
         load=os.getloadavg()[0],
     )
 

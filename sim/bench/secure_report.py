@@ -60,13 +60,13 @@ def _way_as_json(done: SecureBench, way: Way) -> dict[str, Any]:
             **_target_ms(done, way),
         },
         "hop_ms": {"count": len(done.hops_s.get(way, ())), **_hop_ms(done, way)},
-        "poured_hz": _mean(f.poured_hz for f in flights),
     }
 
 
 def _flight_as_json(done: SecureBench, flight: CostFlight) -> dict[str, Any]:
     return {
         "way": flight.way,
+        "flood": None if flight.flood is None else asdict(flight.flood),
         "done": flight.done,
         "tasks": flight.tasks,
         "as_planned": flight.as_planned,
@@ -171,12 +171,14 @@ def _verdict(done: SecureBench) -> list[str]:
         if p99_ms is not None:
             held = "held" if p99_ms < limit_ms else "NOT held"
             lines.append(f"wanted: p99 of next target sent below {limit_ms:g} ms, {way}: {held}")
-    if flooded := done.of(Way.FLOODED):
-        rate_hz = _mean(each.poured_hz for each in flooded)
-        refused = sum(sum(each.refused.values()) for each in flooded)
-        lines.append(
-            f"flooded by {rate_hz:.0f} messages a second; behind the router {refused} were refused"
-        )
+    for each in done.of(Way.FLOODED):
+        if each.flood is not None:
+            tried_hz = (each.flood.own + each.flood.others) / max(each.flood.seconds, 1e-9)
+            refused = sum(each.refused.values())
+            lines.append(
+                f"flooded with {tried_hz:.0f} messages a second; {each.flood.rate_hz:.0f} a second "
+                f"left the hostile agent, and {refused} in all were refused behind the router"
+            )
     if done.flights:
         lines.append("every task was done, and nothing honest was refused" if done.ok else "FAILED")
     return lines
