@@ -6,7 +6,7 @@ Leaves out: how it arrives (coordinator.dashboard.app).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import Strict, ValidationError
@@ -14,10 +14,13 @@ from pydantic import Strict, ValidationError
 from coordinator.operator.commanding import CommandWish
 from coordinator.operator.task_orders import NewTask, Withdrawal
 from swarm.model.ids import FLEET
-from swarm.wire.bounds import CHECKED, Duration, Flag, Id, Point, Value
+from swarm.wire.bounds import Duration, Flag, Id, Point, Value
 from swarm.wire.messages import CommandKind
 
 __all__ = ["CommandSaid", "PlayerSaid", "TaskSaid", "WithdrawalSaid", "fault_of"]
+
+_CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
+"""A page is of the same release as its server: what it says too much is a mistake."""
 
 Reason = Annotated[str, Strict(), Len(0, 150)]
 """What is told of a command has to have room in a status."""
@@ -29,7 +32,7 @@ Moment = Annotated[float, Strict(), Ge(0.0), Le(1e9)]
 class CommandSaid:
     """Body of ``/api/command``."""
 
-    __pydantic_config__: ClassVar = CHECKED
+    __pydantic_config__: ClassVar = _CHECKED
 
     command: CommandKind
     uav: Id | None = None
@@ -51,7 +54,7 @@ class CommandSaid:
 class TaskSaid:
     """Body of ``/api/task``."""
 
-    __pydantic_config__: ClassVar = CHECKED
+    __pydantic_config__: ClassVar = _CHECKED
 
     position: Point
     """East, north, up [m; mission origin]."""
@@ -72,7 +75,7 @@ class TaskSaid:
 class WithdrawalSaid:
     """Body of ``/api/task/withdraw``."""
 
-    __pydantic_config__: ClassVar = CHECKED
+    __pydantic_config__: ClassVar = _CHECKED
 
     id: Id
     reason: Reason = ""
@@ -87,7 +90,7 @@ class WithdrawalSaid:
 class PlayerSaid:
     """Body of ``/api/recording``."""
 
-    __pydantic_config__: ClassVar = CHECKED
+    __pydantic_config__: ClassVar = _CHECKED
 
     playing: Flag | None = None
     speed: Rate | None = None
