@@ -130,6 +130,7 @@ def dashboard(
     from swarm.config import preset
     from swarm.log import configure_logging
     from swarm.process import run_until_stopped
+    from swarm.watchdog import SERVICE
 
     configure_logging(log_level, log_format)
     network = preset(link, lease_s)
@@ -156,6 +157,7 @@ def dashboard(
     async def work() -> int:
         served = create_app(source, access, display)
         async with serving(served.app, taken):
+            SERVICE.ready(f"shows {mission or 'any mission'} at {url}")
             try:
                 await served.beside(source.run())
             finally:

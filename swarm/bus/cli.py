@@ -93,10 +93,12 @@ def router(
 async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
     from swarm.bus.router import open_router
     from swarm.log import get_logger
+    from swarm.watchdog import SERVICE
 
     serving = await open_router(settings)
     try:
         print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
+        SERVICE.ready(f"serves at {', '.join(serving.endpoints)}")
         if not quiet:
             get_logger("router").info(f"router ready at {', '.join(serving.endpoints)}")
         await asyncio.Event().wait()
