@@ -45,6 +45,7 @@ from swarm.bus.zenoh_session import (
 )
 from swarm.errors import BusError
 from swarm.log import get_logger
+from swarm.wire.seal import Seal
 
 __all__ = ["ZenohBus", "open_zenoh_bus"]
 
@@ -164,7 +165,9 @@ class _Reply:
 class ZenohBus:
     """One session on the bus; see `swarm.bus.port.Bus`. Made by `open_zenoh_bus`."""
 
-    def __init__(self, session: zenoh.Session, inbox: Inbox) -> None:
+    def __init__(self, session: zenoh.Session, inbox: Inbox, seal: Seal | None = None) -> None:
+        self.seal = seal
+        """Of whoever sits here."""
         self._session = session
         self._inbox = inbox
         self._loop = asyncio.get_running_loop()
