@@ -11,6 +11,7 @@ from agent.mavlink.config import CommandStyle
 from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
+    CheckOption,
     LifelineOption,
     LogFormatOption,
     LogLevelOption,
@@ -157,6 +158,7 @@ def agent(
     ] = False,
     seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
+    check: CheckOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
@@ -203,6 +205,8 @@ def agent(
         parse_forward(url)
     own_system_id, own_component_id = _ground_ids(ground_id)
     key = None if signing_key is None else load_signing_key(signing_key)
+    if check:
+        return 0
     log = get_logger(uav)
 
     def no_seat_yet(reason: str) -> None:

@@ -14,6 +14,7 @@ from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
+    CheckOption,
     JsonOption,
     LifelineOption,
     LogFormatOption,
@@ -87,6 +88,7 @@ def dashboard(
     seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
+    check: CheckOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
@@ -129,6 +131,8 @@ def dashboard(
     token = read_token(token_file, os.environ)
     access, made = access_for(host, allow_host or (), token)
     display = _display(access.token is not None, tiles, tiles_credit)
+    if check:
+        return 0
     taken = take_port(host, port)
     url = url_of(host, taken.getsockname()[1])
     if json:

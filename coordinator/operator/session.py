@@ -10,8 +10,6 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from swarm.identity import Role
-
 from coordinator.joining import joined, onlooking
 from coordinator.operator.commanding import CommandWish
 from coordinator.operator.errands import OperatorWish
@@ -20,6 +18,7 @@ from coordinator.operator.verdict import Result, Verdict
 from swarm.bus.seat import Seat
 from swarm.clock import ScaledClock, incarnation
 from swarm.errors import Fault, InputError, SwarmError
+from swarm.identity import Role
 from swarm.log import LogLevel, configure_logging
 from swarm.model.ids import ID_RULE, OPERATOR, valid_id
 from swarm.process import run_until_stopped

@@ -16,6 +16,7 @@ from swarm.bus.config import DEFAULT_ROUTER, DEFAULT_SECURE_ROUTER
 from swarm.config import Link, preset
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
+    CheckOption,
     JsonOption,
     KeysOption,
     LeaseOption,
@@ -63,6 +64,7 @@ def router(
     link: LinkOption = Link.NORMAL,
     lease_s: LeaseOption = None,
     json: JsonOption = False,
+    check: CheckOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
@@ -100,6 +102,8 @@ def router(
         raise InputError(
             Fault("swarm router", "", problem, remedy or "see 'swarm router --help'")
         ) from None
+    if check:
+        return 0
     return asyncio.run(run_until_stopped(_serve(settings, quiet=json), lifeline=lifeline))
 
 
