@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
+from swarm import __version__
 from swarm.bus.port import (
     Bus,
     BusEvent,
@@ -168,6 +169,7 @@ class Shell(Generic[E, A]):
             self._done.set_exception(fault)
 
     def _start(self) -> None:
+        self._log.info("begins", release=__version__)
         for action in self._core.start(self._clock.now_s()):
             self._carry_out(action)
         self._step_all()

@@ -91,6 +91,7 @@ def router(
 
 
 async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
+    from swarm import __version__
     from swarm.bus.router import open_router
     from swarm.log import get_logger
 
@@ -98,7 +99,8 @@ async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
     try:
         print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
         if not quiet:
-            get_logger("router").info(f"router ready at {', '.join(serving.endpoints)}")
+            ready = f"router ready at {', '.join(serving.endpoints)}"
+            get_logger("router").info(ready, release=__version__)
         await asyncio.Event().wait()
         return 0
     finally:

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -31,15 +32,23 @@ class ByHand:
         stack: ends the processes.
         mission: flown.
         speedup: mission seconds per second of the wall's clock.
+        programs: words that start `swarm` for the process of that name, where they are others
+            than for everybody.
     """
 
     def __init__(
-        self, folder: Path, stack: contextlib.ExitStack, mission: Mission, speedup: int = 2
+        self,
+        folder: Path,
+        stack: contextlib.ExitStack,
+        mission: Mission,
+        speedup: int = 2,
+        programs: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         self.folder = folder
         self.mission = mission
         self.uavs: list[str] = [uav.id for uav in mission.uavs]
         self._stack = stack
+        self._programs = programs or {}
         self._scenario = folder / "scenario.toml"
         self._scenario.write_text(format_scenario(mission))
         (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
@@ -60,8 +69,9 @@ class ByHand:
 
     def start(self, name: str, arguments: list[str]) -> subprocess.Popen[str]:
         log = self._stack.enter_context((self.folder / f"{name}.log").open("w"))
+        program = self._programs.get(name, (sys.executable, "-m", "swarm"))
         process = subprocess.Popen(
-            [sys.executable, "-m", "swarm", *arguments],
+            [*program, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=log,
