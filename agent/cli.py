@@ -8,15 +8,10 @@ from typing import Annotated
 import typer
 
 from agent.mavlink.config import CommandStyle
-from swarm.config import Link
+from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
-    BusOption,
-    ConnectOption,
-    LeaseOption,
     LifelineOption,
-    LinkOption,
-    ListenOption,
     LogFormatOption,
     LogLevelOption,
     MissionOption,
@@ -27,6 +22,7 @@ from swarm.options import (
 __all__ = ["agent"]
 
 
+@seated
 def agent(
     mission: MissionOption,
     uav: Annotated[str, typer.Option("--uav", metavar="ID", help="UAV this agent flies.")],
@@ -159,11 +155,7 @@ def agent(
             "taken over by its pilot.",
         ),
     ] = False,
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
-    link: LinkOption = Link.NORMAL,
-    lease_s: LeaseOption = None,
+    seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
@@ -178,7 +170,7 @@ def agent(
       swarm agent --mission table-1 --uav uav1 --mavlink tcp:127.0.0.1:5760
 
       swarm agent --mission valley-survey --uav quad-2 --mavlink serial:/dev/ttyAMA0:921600
-      --connect tcp/192.168.1.2:7447 --state /var/lib/peckorder
+      --keys keys/quad-2 --connect tls/192.168.1.2:7447 --state /var/lib/peckorder
     """
     import asyncio
     import gc
@@ -191,10 +183,9 @@ def agent(
     from agent.mavlink.vehicle import MavlinkVehicle
     from agent.runner import Vehicle, run_agent, seat_or_stop
     from agent.vehicle import Report
-    from swarm.bus.config import bus_config
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, incarnation
-    from swarm.config import preset
+    from swarm.identity import Role
     from swarm.log import configure_logging, get_logger
     from swarm.model import Origin
     from swarm.process import stop_requests
@@ -203,9 +194,9 @@ def agent(
     # A life begins with its process: of two agents of one UAV the one started last counts.
     life = incarnation()
     configure_logging(log_level, log_format, mission=mission, uav=uav, incarnation=life)
-    network = preset(link, lease_s)
-    config = bus_config(bus, listen, connect or (), network.lease_s)
     _check_ids(mission, uav)
+    network = seat.network
+    config = seat.config(mission=mission, roles=(Role.UAV,), name=uav)
     parse_link(mavlink)
     for url in forward or ():
         parse_forward(url)
@@ -232,12 +223,12 @@ def agent(
             return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
 
         async with stop_requests(lifeline=lifeline) as stop:
-            seat = await seat_or_stop(
+            place = await seat_or_stop(
                 lambda: open_zenoh_bus(config),
                 stop,
                 lambda reason: log.warning("no bus yet", reason=reason),
             )
-            if seat is None:
+            if place is None:
                 return stop.exit_status or 0
             # Only now: waiting for a seat may have taken long.
             memory = None if store is None else store.load()
@@ -256,7 +247,7 @@ def agent(
                 return await run_agent(
                     core,
                     mission,
-                    seat,
+                    place,
                     clock,
                     vehicle,
                     stop,
@@ -264,7 +255,7 @@ def agent(
                     answer_s=network.answer_s,
                 )
             finally:
-                seat.close()
+                place.close()
 
     store = None if state is None else Store(state, mission, uav, speedup=speedup)
     # What has been imported stays: a full collection would look through all of it for tens of

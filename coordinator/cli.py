@@ -16,18 +16,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coordinator.planner.methods import METHODS, ONLINE_METHODS
+from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.complete import among
-from swarm.config import Link
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
-    BusOption,
-    ConnectOption,
     JsonOption,
-    LeaseOption,
     LifelineOption,
-    LinkOption,
-    ListenOption,
     LogFormatOption,
     LogLevelOption,
     ScenarioArgument,
@@ -206,6 +201,7 @@ def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float
         signal.signal(signal.SIGINT, before)
 
 
+@seated
 def coordinator(
     scenario: ScenarioArgument,
     method: Annotated[
@@ -254,11 +250,7 @@ def coordinator(
             help="Watch the coordinator that is there, and take its place when it is lost.",
         ),
     ] = False,
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
-    link: LinkOption = Link.NORMAL,
-    lease_s: LeaseOption = None,
+    seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     dashboard: Annotated[
         str | None,
@@ -284,8 +276,8 @@ def coordinator(
 
     Examples:
         swarm coordinator table-1
-        swarm coordinator valley-survey --connect tcp/192.168.1.2:7447 --state /var/lib/peckorder
-        swarm coordinator valley-survey --connect tcp/192.168.1.2:7447 --standby
+        swarm coordinator valley-survey --keys keys/coordinator --state /var/lib/peckorder
+        swarm coordinator valley-survey --keys keys/coordinator-2 --standby
         swarm coordinator valley-survey --dashboard 8080
     """
     import asyncio
@@ -298,10 +290,9 @@ def coordinator(
     from coordinator.plan_report import plan_as_json
     from coordinator.planner.plan import check_online_method, make_plan
     from coordinator.service import Service
-    from swarm.bus.config import bus_config
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, SystemClock, incarnation
-    from swarm.config import preset
+    from swarm.identity import Role
     from swarm.log import configure_logging, identify
     from swarm.model.ids import COORDINATOR
     from swarm.process import run_until_stopped
@@ -310,9 +301,9 @@ def coordinator(
 
     configure_logging(log_level, log_format)
     check_online_method(method)
-    network = preset(link, lease_s)
-    config = bus_config(bus, listen, connect or (), network.lease_s)
+    network = seat.network
     mission = load_scenario(scenario)
+    config = seat.config(mission=mission.name, roles=(Role.COORDINATOR,))
     timing = network.timing.scaled(speedup)
 
     def planner(what: Mission, how: str, planner_seed: int) -> Plan:
@@ -339,15 +330,7 @@ def coordinator(
         )
 
     place = None if dashboard is None else parse_place(dashboard, must_be_free=False)
-    page = page_beside(
-        place,
-        mission.name,
-        bus=bus,
-        connect=connect or (),
-        link=link,
-        lease_s=lease_s,
-        speedup=speedup,
-    )
+    page = page_beside(place, mission.name, seat, speedup=speedup)
     for line in () if place is None else place.lines:
         print(line, file=sys.stderr)
     store = None if state is None else Store(state, mission.name, COORDINATOR, speedup=speedup)

@@ -39,7 +39,7 @@ async def joined(
     """The name of a mission and an open seat on its bus, which is closed at the end.
 
     Args:
-        mission: its name; None for the only one there is.
+        mission: its name; None for that of the keys, or the only one there is.
         config: how to reach the others.
         patience_s: how long to wait for the bus, and then for a mission [wall s].
 
@@ -50,7 +50,7 @@ async def joined(
     """
     bus = await open_zenoh_bus(config, timeout_s=patience_s)
     try:
-        yield mission or await only_mission(bus, patience_s), bus
+        yield mission or config.mission or await only_mission(bus, patience_s), bus
     finally:
         bus.close()
 

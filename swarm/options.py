@@ -11,9 +11,10 @@ Names: `ScenarioArgument` (a `pathlib.Path`; give it to
 `LogFormatOption` (for `swarm.log.configure_logging`; defaults `LogLevel.INFO`,
 `LogFormat.AUTO`), the hidden `LifelineOption` (bool), `SpeedupOption`, `MissionOption` and,
 for those that can find the mission, `SomeMissionOption` (str or None); `BusOption`,
-`ListenOption` and `ConnectOption` (for `swarm.bus.config.bus_config`); `LinkOption` and
-`LeaseOption` (for `swarm.config.preset`; defaults `Link.NORMAL` and None); `StateOption`
-(a folder or None, for `swarm.store.Store`).
+`ListenOption`, `ConnectOption`, `KeysOption` and `UnencryptedOption`; `LinkOption` and
+`LeaseOption` (for `swarm.config.preset`; defaults `Link.NORMAL` and None), all of which a
+command has by one parameter of the kind `swarm.bus.seat.Seat`; `StateOption` (a folder or
+None, for `swarm.store.Store`).
 Leaves out: what a single command alone has.
 """
 
@@ -33,6 +34,7 @@ __all__ = [
     "BusOption",
     "ConnectOption",
     "JsonOption",
+    "KeysOption",
     "LeaseOption",
     "LifelineOption",
     "LinkOption",
@@ -47,6 +49,7 @@ __all__ = [
     "SpeedupOption",
     "StateOption",
     "TimeLimitOption",
+    "UnencryptedOption",
 ]
 
 
@@ -161,7 +164,7 @@ ListenOption = Annotated[
     typer.Option(
         "--listen",
         metavar="ENDPOINT",
-        help="Mesh: own endpoint, such as tcp/192.168.1.7:7448.",
+        help="Mesh: own endpoint, such as tls/192.168.1.7:7448.",
         show_default=False,
     ),
 ]
@@ -172,8 +175,30 @@ ConnectOption = Annotated[
         "--connect",
         metavar="ENDPOINT",
         help="Router to use, or with --bus mesh a peer to dial; may be repeated. "
-        "Default with --bus router: tcp/127.0.0.1:7447.",
+        "Default with --bus router: tcp/127.0.0.1:7447, with --keys tls/127.0.0.1:7447.",
         show_default=False,
+    ),
+]
+
+KeysOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--keys",
+        metavar="DIR",
+        envvar="SWARM_KEYS",
+        help="Folder with this process's keys, made by 'swarm keys': it then speaks encrypted, "
+        "by tls/ or quic/, and with the same mission's processes alone. What the keys say about "
+        "security overrides a Zenoh file.",
+        show_default=False,
+    ),
+]
+
+UnencryptedOption = Annotated[
+    bool,
+    typer.Option(
+        "--unencrypted",
+        help="Without keys, talk to other machines all the same: who reaches the network can "
+        "listen to everything, and steer.",
     ),
 ]
 

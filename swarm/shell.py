@@ -2,16 +2,18 @@
 
 It decodes what the bus brings, steps the core, publishes what the core says,
 answers queries with the core's snapshot and ticks at the core's deadlines. A question
-goes out with a digest of what the core knows, and the answer leaves that out. Leaves
-out: what only one kind of process does (agent.runner, coordinator.daemon,
+goes out with a digest of what the core knows, and the answer leaves that out. On a bus
+with keys it says and believes only what is signed, and puts newer rosters in force.
+Leaves out: what only one kind of process does (agent.runner, coordinator.daemon,
 sim.launch), through `Shell.execute`.
 """
 
 from __future__ import annotations
 
 import asyncio
+import secrets
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
@@ -44,10 +46,13 @@ from swarm.events import (
     Tick,
 )
 from swarm.log import get_logger
-from swarm.wire.codec import Codec, encode, fit
-from swarm.wire.digest import decode_digest, encode_digest, unknown
+from swarm.model.ids import AUTHORITY
+from swarm.wire.codec import Codec
+from swarm.wire.digest import unknown
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Choice, Message, Snapshot, Status
+from swarm.wire.messages import Choice, Message, SignedRoster, Snapshot, Stamp, Status
+from swarm.wire.question import NONCE_BYTES, decode_question, encode_question
+from swarm.wire.seal import SIGNER_UNKNOWN, Seal, UnacceptableError
 
 __all__ = ["Core", "Shell", "take_seat"]
 
@@ -55,6 +60,11 @@ E_contra = TypeVar("E_contra", contravariant=True)
 A_co = TypeVar("A_co", covariant=True)
 E = TypeVar("E")
 A = TypeVar("A")
+
+
+def draw_nonce() -> bytes:
+    """A nonce that nobody can guess."""
+    return secrets.token_bytes(NONCE_BYTES)
 
 
 class Core(Protocol[E_contra, A_co]):
@@ -90,6 +100,7 @@ class Shell(Generic[E, A]):
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
         context: what every note of the core is logged with, besides its own fields.
+        draw_nonce: makes the nonce of a question, see swarm.wire.question.
     """
 
     def __init__(
@@ -107,13 +118,17 @@ class Shell(Generic[E, A]):
         save: Callable[[float], None] | None = None,
         answer_s: float = PRESETS[Link.NORMAL].answer_s,
         context: Callable[[], Mapping[str, object]] = dict,
+        draw_nonce: Callable[[], bytes] = draw_nonce,
     ) -> None:
         self._core = core
         self._bus = bus
         self._clock = clock
+        self._mission = mission
         self._keys = Keys(mission)
         self._name = name
-        self._codec = Codec(mission)
+        self._seal = bus.seal
+        self._draw_nonce = draw_nonce
+        self._codec = Codec(mission, bus.seal)
         self._log = get_logger(name, mission=mission)
         self._from_bus = from_bus
         self._execute = execute
@@ -172,7 +187,39 @@ class Shell(Generic[E, A]):
         self._log.info("begins", release=__version__)
         for action in self._core.start(self._clock.now_s()):
             self._carry_out(action)
+        if self._seal is not None:  # what is in its folder is as if it had been heard
+            self._events.append(self._from_bus(Heard(self._roster(self._seal))))
         self._step_all()
+
+    def _roster(self, seal: Seal) -> Message:
+        body = SignedRoster(seal.signed_roster)
+        return Message(self._mission, AUTHORITY, Stamp(seal.roster.version, 0), body)
+
+    def _heed(self, messages: Iterable[Message], *, answers: bool = False) -> None:
+        """Put a newer roster in force; who told an older one is told the newer."""
+        seal = self._seal
+        if seal is None:
+            return
+        for message in messages:
+            if not isinstance(message.body, SignedRoster):
+                continue
+            behind = message.stamp.incarnation < seal.roster.version
+            if behind and answers and seal.may_publish_roster:
+                self._publish(self._roster(seal))
+            before = [entry.name for entry in seal.roster.entries]
+            try:
+                news = seal.put_in_force(message.body.signed)
+            except OSError as fault:
+                news, reason = True, fault.strerror or str(fault)
+                self._log.warning("cannot keep the newer roster", reason=reason)
+            if not news:
+                continue
+            gone = [name for name in before if seal.roster.entry(name) is None]
+            self._log.info(
+                "newer roster in force", version=seal.roster.version, without=", ".join(gone)
+            )
+            for name in gone:  # a token cannot be signed: it counts no longer
+                self.step(self._from_bus(PeerGone(name)))
 
     def _guard(self, act: Callable[[], None]) -> None:
         """Act and reschedule; a bug ends the process rather than half of it."""
@@ -209,7 +256,9 @@ class Shell(Generic[E, A]):
 
     def _publish(self, message: Message) -> None:
         reliable = not isinstance(message.body, Status | Choice)
-        self._bus.publish(message.key, encode(message), reliable=reliable)
+        packed = self._codec.pack(message)
+        if packed is not None:
+            self._bus.publish(message.key, packed, reliable=reliable)
 
     def _reschedule(self) -> None:
         if self._timer is not None:
@@ -240,10 +289,13 @@ class Shell(Generic[E, A]):
         match event:
             case Sample(key, payload):
                 message = self._codec.decode(key, payload)
-                return None if message is None else Heard(message)
+                if message is None:
+                    return None
+                self._heed([message])
+                return Heard(message)
             case TokenSeen(key):
                 writer = self._keys.writer_of_token(key)
-                return None if writer is None else PeerSeen(writer)
+                return PeerSeen(writer) if writer is not None and self._belongs(writer) else None
             case TokenGone(key):
                 writer = self._keys.writer_of_token(key)
                 return None if writer is None else PeerGone(writer)
@@ -255,36 +307,45 @@ class Shell(Generic[E, A]):
                 self._answer(reply, payload)
                 return None
 
+    def _belongs(self, writer: str) -> bool:
+        """Whether a token may be shown by somebody of this mission; tokens cannot be signed."""
+        if self._seal is None or self._seal.knows(writer):
+            return True
+        self._codec.dropped[SIGNER_UNKNOWN] += 1
+        return False
+
     def _answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
         if self._snapshot is None:
             return
-        theirs = decode_digest(payload)
-        if theirs is None:
-            self._codec.dropped["malformed"] += 1
+        try:
+            question = decode_question(payload, self._seal)
+        except UnacceptableError as fault:
+            self._codec.dropped[fault.reason] += 1
             return
         whole = self._snapshot(self._clock.now_s())
-        news = replace(whole, messages=unknown(whole.messages, self._known(), theirs))
-        fitted = fit(news)
-        if len(fitted.messages) < len(news.messages):
-            left_out = len(news.messages) - len(fitted.messages)
+        news = replace(whole, messages=unknown(whole.messages, self._known(), question.known))
+        answer, left_out = self._codec.pack_answer(news, question.nonce)
+        if left_out:
             self._log.warning("an answer has no room for all registers", left_out=left_out)
-        reply(encode(fitted))
+        reply(answer)
 
     async def _ask(self) -> None:
         asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
         # What is said in the own name is always told: by who remembers an earlier life, or a twin.
         known = {writer: number for writer, number in self._known().items() if writer != self._name}
-        answers = await self._bus.query(
-            self._keys.state("*"), encode_digest(known), timeout_s=self._answer_s
-        )
+        nonce = self._draw_nonce()
+        question = encode_question(known, nonce, self._seal)
+        answers = await self._bus.query(self._keys.state("*"), question, timeout_s=self._answer_s)
         now_s, wall_s = self._clock.now_s(), self._loop.time()
         pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
         snapshots = []
         for answer in answers:
-            snapshot = self._codec.decode_snapshot(answer.key, answer.payload)
+            snapshot = self._codec.decode_snapshot(answer.key, answer.payload, nonce)
             if snapshot is not None:
                 age_s = pace * (wall_s - answer.arrived_s)
                 snapshots.append(_aged(snapshot, age_s))
+        for snapshot in snapshots:
+            self._heed(snapshot.messages, answers=True)
         self.step(self._from_bus(Learned(tuple(snapshots))))
 
 
@@ -301,7 +362,7 @@ def take_seat(
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
     Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
-    ``operator/*`` and ``operator/task/*``, watches ``alive/*``.
+    ``operator/*`` and ``operator/task/*``, where there are keys ``roster``, watches ``alive/*``.
 
     Args:
         bus: an open bus.
@@ -325,6 +386,8 @@ def take_seat(
     if status:
         bus.subscribe(keys.status("*"), latest=not every_status)
         bus.subscribe(keys.choice("*"))
+    if bus.seal is not None:
+        bus.subscribe(keys.roster)
     bus.watch_tokens(keys.alive("*"))
     if name is not None:
         bus.serve(keys.state(name))

@@ -1,6 +1,7 @@
 """Where a process keeps its memory from one life to the next: one file.
 
-The file holds the encoded snapshot and the wall time it was taken at. It is replaced
+The file holds the encoded snapshot, others' statements in their envelopes so that they can
+be repeated, and the wall time it was taken at. It is replaced
 whole: written beside the old one, forced to the disk and renamed, so a crash at any
 moment leaves one or the other. Writing waits for the disk, so a thread of its own does
 it; of what waits only the newest is written. Leaves out: what a process remembers (the
@@ -25,7 +26,7 @@ from swarm.bus.writer import Writer
 from swarm.clock import unix_s as system_unix_s
 from swarm.errors import Fault, InputError
 from swarm.log import get_logger
-from swarm.wire.codec import Codec, encode, fit
+from swarm.wire.codec import Codec, encode_memory, fit_memory
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Snapshot
 
@@ -166,7 +167,7 @@ class Store:
         if checksum != zlib.crc32(payload) or not math.isfinite(saved_unix_s):
             raise ValueError("it is damaged")
         codec = Codec(self._mission)
-        snapshot = codec.decode_snapshot(self._state_key, payload)
+        snapshot = codec.decode_memory(self._state_key, payload)
         if snapshot is None:
             raise ValueError(f"what it holds is not ours: {', '.join(codec.dropped)}")
         if codec.dropped:
@@ -190,7 +191,7 @@ class Store:
 
 
 def _encode(unix_s: float, snapshot: Snapshot) -> bytes:
-    payload = encode(fit(snapshot))
+    payload = encode_memory(fit_memory(snapshot))
     packed: bytes = msgpack.packb([FORMAT, unix_s, zlib.crc32(payload), payload])
     return packed
 

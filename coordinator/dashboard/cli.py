@@ -10,17 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.config import Link
+from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
-    BusOption,
-    ConnectOption,
     JsonOption,
-    LeaseOption,
     LifelineOption,
-    LinkOption,
-    ListenOption,
     LogFormatOption,
     LogLevelOption,
     SomeMissionOption,
@@ -34,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["dashboard"]
 
 
+@seated
 def dashboard(
     mission: SomeMissionOption = None,
     host: Annotated[
@@ -88,11 +84,7 @@ def dashboard(
             show_default=False,
         ),
     ] = "",
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
-    link: LinkOption = Link.NORMAL,
-    lease_s: LeaseOption = None,
+    seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
     lifeline: LifelineOption = False,
@@ -108,7 +100,7 @@ def dashboard(
 
     Examples:
         swarm dashboard
-        swarm dashboard --mission valley-survey --connect tcp/192.168.1.2:7447
+        swarm dashboard --keys keys/operator --connect tls/192.168.1.2:7447
         swarm dashboard --host 0.0.0.0 --port 80 --token-file /etc/peckorder/token
         swarm dashboard --tiles https://tile.example.org/{z}/{x}/{y}.png
     """
@@ -124,16 +116,14 @@ def dashboard(
     from coordinator.dashboard.serve import serving
     from coordinator.joining import check_mission
     from coordinator.status.watch import FOREVER_S
-    from swarm.bus.config import bus_config
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock
-    from swarm.config import preset
     from swarm.log import configure_logging
     from swarm.process import run_until_stopped
 
     configure_logging(log_level, log_format)
-    network = preset(link, lease_s)
-    config = bus_config(bus, listen, connect or (), network.lease_s)
+    network = seat.network
+    config = seat.config(mission=mission)
     check_mission(mission)
     token = read_token(token_file, os.environ)
     access, made = access_for(host, allow_host or (), token)
@@ -151,7 +141,7 @@ def dashboard(
     async def open_bus() -> Bus:
         return await open_zenoh_bus(config, timeout_s=FOREVER_S)
 
-    source = LiveMission(mission, open_bus, network, clock, speedup)
+    source = LiveMission(mission or config.mission, open_bus, network, clock, speedup)
 
     async def work() -> int:
         served = create_app(source, access, display)

@@ -16,7 +16,7 @@ from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
 from coordinator.dashboard.place import OPTION, Place
-from swarm.config import Link
+from swarm.bus.seat import Seat
 from swarm.errors import Fault, InputError
 from swarm.log import get_logger
 
@@ -34,11 +34,8 @@ LEAVE_S = 3.0
 def page_beside(
     place: Place | None,
     mission: str,
+    seat: Seat,
     *,
-    bus: str,
-    connect: Sequence[str],
-    link: Link,
-    lease_s: float | None,
     speedup: float,
 ) -> AbstractAsyncContextManager[None]:
     """A dashboard of ``mission`` while the context lasts, on the bus of its parent.
@@ -46,10 +43,7 @@ def page_beside(
     Args:
         place: where; None for no dashboard.
         mission: its name.
-        bus: the parent's, as are the others.
-        connect: routers.
-        link: kind of network.
-        lease_s: given by hand; None for that of ``link``.
+        seat: the parent's; of a coordinator's keys the page can only look on.
         speedup: of the mission.
 
     Raises:
@@ -57,15 +51,11 @@ def page_beside(
     """
     if place is None:
         return contextlib.nullcontext()
-    if bus == "mesh":
+    if seat.bus == "mesh":
         problem = "in a mesh a dashboard needs an endpoint of its own"
         remedy = "start it by: swarm dashboard --bus mesh --listen ENDPOINT --connect ENDPOINT ..."
         raise InputError(Fault(OPTION, "", problem, remedy))
-    arguments = ["--mission", mission, "--bus", bus, "--link", link, "--speedup", repr(speedup)]
-    for endpoint in connect:
-        arguments += ["--connect", endpoint]
-    if lease_s is not None:
-        arguments += ["--lease-s", repr(lease_s)]
+    arguments = ["--mission", mission, "--speedup", repr(speedup), *seat.arguments()]
     return _shown(place, arguments)
 
 

@@ -12,15 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coordinator.operator.completing import complete_uav
-from swarm.config import Link
+from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.errors import Fault, InputError, SwarmError
 from swarm.options import (
-    BusOption,
-    ConnectOption,
     JsonOption,
-    LeaseOption,
-    LinkOption,
-    ListenOption,
     SomeMissionOption,
     SpeedupOption,
 )
@@ -59,20 +54,19 @@ TimeoutOption = Annotated[
 def _of_one_uav(kind: str, help_text: str) -> Callable[..., int]:
     """The command that says ``kind`` to one UAV."""
 
+    @seated
     def command(
         uav: UavArgument,
         reason: ReasonOption = "",
         mission: SomeMissionOption = None,
         timeout_s: TimeoutOption = 10.0,
-        bus: BusOption = "router",
-        listen: ListenOption = "",
-        connect: ConnectOption = None,
-        link: LinkOption = Link.NORMAL,
-        lease_s: LeaseOption = None,
+        seat: Seat = DEFAULT_SEAT,
         speedup: SpeedupOption = 1.0,
         json: JsonOption = False,
     ) -> int:
-        reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
+        from coordinator.operator.session import Reach
+
+        reach = Reach(mission, timeout_s, seat, speedup)
         return _give(kind, uav, reason, reach, json=json)
 
     command.__doc__ = help_text
@@ -91,7 +85,7 @@ hold = _of_one_uav(
 
     Examples:
         swarm hold uav2
-        swarm hold uav2 --reason "helicopter in sight" --connect tcp/192.168.1.2:7447
+        swarm hold uav2 --reason "helicopter in sight" --keys keys/operator
     """,
 )
 
@@ -120,16 +114,13 @@ return_home = _of_one_uav(
 )
 
 
+@seated
 def abort(
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask on a terminal.")] = False,
     reason: ReasonOption = "",
     mission: SomeMissionOption = None,
     timeout_s: TimeoutOption = 10.0,
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
-    link: LinkOption = Link.NORMAL,
-    lease_s: LeaseOption = None,
+    seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
@@ -142,9 +133,10 @@ def abort(
         swarm abort
         swarm abort --yes --reason "thunderstorm" --mission valley-survey
     """
+    from coordinator.operator.session import Reach
     from swarm.model.ids import FLEET
 
-    reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
+    reach = Reach(mission, timeout_s, seat, speedup)
     asks = not yes and sys.stdin is not None and sys.stdin.isatty()
     what = "the mission" if mission is None else f"mission {mission}"
     if asks and not typer.confirm(f"Bring every UAV home and end {what}?", err=True):
@@ -205,6 +197,7 @@ AltOption = Annotated[
 
 
 @task.command("add", help=_ADD_HELP, short_help="Add a task.")
+@seated
 def add(
     name: Annotated[
         str | None, typer.Argument(metavar="ID", help="Default: the next free one.")
@@ -248,45 +241,38 @@ def add(
     reason: ReasonOption = "",
     mission: SomeMissionOption = None,
     timeout_s: TimeoutOption = 10.0,
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
-    link: LinkOption = Link.NORMAL,
-    lease_s: LeaseOption = None,
+    seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
     """Add a task to a running mission."""
-    from coordinator.operator.session import check_words
+    from coordinator.operator.session import Reach, check_words
     from coordinator.operator.task_orders import NewTask
 
     check_words(reason, ("--mission", mission), ("ID", name), ("--kind", kind))
     place = _place(position, lat_deg, lon_deg, alt_m)
     wish = NewTask(place, name, value, service_s, kind, reason)
-    reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
+    reach = Reach(mission, timeout_s, seat, speedup)
     return _order("add", wish, reach, json=json)
 
 
 @task.command("withdraw", help=_WITHDRAW_HELP, short_help="Take a task off the board.")
+@seated
 def withdraw(
     name: Annotated[str, typer.Argument(metavar="ID", help="Id of the task.")],
     reason: ReasonOption = "",
     mission: SomeMissionOption = None,
     timeout_s: TimeoutOption = 10.0,
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
-    link: LinkOption = Link.NORMAL,
-    lease_s: LeaseOption = None,
+    seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
     """Take a task off the board of a running mission."""
-    from coordinator.operator.session import check_words
+    from coordinator.operator.session import Reach, check_words
     from coordinator.operator.task_orders import Withdrawal
 
     check_words(reason, ("--mission", mission), ("ID", name))
-    reach = _reach(mission, timeout_s, bus, listen, connect, link, lease_s, speedup)
+    reach = Reach(mission, timeout_s, seat, speedup)
     return _order("withdraw", Withdrawal(name, reason), reach, json=json)
 
 
@@ -318,21 +304,6 @@ def _place(
         bound = f"give metres within ±{FARTHEST_M:g}"
         raise InputError(Fault("--position", "", f"{position!r} is too far away", bound))
     return metres[0], metres[1], metres[2] if len(metres) == 3 else 0.0
-
-
-def _reach(
-    mission: str | None,
-    timeout_s: float,
-    bus: str,
-    listen: str,
-    connect: list[str] | None,
-    link: Link,
-    lease_s: float | None,
-    speedup: float,
-) -> Reach:
-    from coordinator.operator.session import Reach
-
-    return Reach(mission, timeout_s, bus, listen, connect or (), link, lease_s, speedup)
 
 
 def _give(name: str, target: str, reason: str, reach: Reach, *, json: bool) -> int:

@@ -7,17 +7,18 @@ Leaves out: what they type and read (coordinator.operator.cli), and the seat its
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+
+from swarm.identity import Role
 
 from coordinator.joining import joined, onlooking
 from coordinator.operator.commanding import CommandWish
 from coordinator.operator.errands import OperatorWish
 from coordinator.operator.seat import OperatorSeat
 from coordinator.operator.verdict import Result, Verdict
-from swarm.bus.config import bus_config
+from swarm.bus.seat import Seat
 from swarm.clock import ScaledClock, incarnation
-from swarm.config import Link, preset
 from swarm.errors import Fault, InputError, SwarmError
 from swarm.log import LogLevel, configure_logging
 from swarm.model.ids import ID_RULE, OPERATOR, valid_id
@@ -37,11 +38,7 @@ class Reach:
     """Its name; None for the only one there is."""
     timeout_s: float
     """How long to wait for it, and then for the effect [wall s]."""
-    bus: str
-    listen: str
-    connect: Sequence[str]
-    link: Link
-    lease_s: float | None
+    seat: Seat
     speedup: float
 
 
@@ -109,8 +106,8 @@ def fulfil(
 
 async def _sit(wish: OperatorWish, reach: Reach) -> tuple[str, OperatorSeat]:
     """Take a seat on the bus and say what is wanted; the mission's name, and the seat."""
-    settings = preset(reach.link, reach.lease_s)
-    config = bus_config(reach.bus, reach.listen, reach.connect, settings.lease_s)
+    settings = reach.seat.network
+    config = reach.seat.config(mission=reach.mission, roles=(Role.OPERATOR,))
     clock = ScaledClock(reach.speedup)
     async with joined(reach.mission, config, reach.timeout_s) as (mission, bus):
         seat = OperatorSeat(

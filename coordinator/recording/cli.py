@@ -11,15 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.config import Link
+from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.errors import Fault, InputError
 from swarm.options import (
-    BusOption,
-    ConnectOption,
     JsonOption,
-    LeaseOption,
-    LinkOption,
-    ListenOption,
     SomeMissionOption,
     SpeedupOption,
 )
@@ -41,6 +36,7 @@ LEFT_S = 5.0
 """Wall time after which a mission whose UAVs have all left is over."""
 
 
+@seated
 def record(
     file: NewFileArgument,
     mission: SomeMissionOption = None,
@@ -64,11 +60,7 @@ def record(
             help="How long to wait for the bus, and then for a mission; wall seconds.",
         ),
     ] = 60.0,
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
-    link: LinkOption = Link.NORMAL,
-    lease_s: LeaseOption = None,
+    seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
 ) -> int:
     """Record a mission that is flown elsewhere.
@@ -80,7 +72,7 @@ def record(
 
     Examples:
         swarm record flight.mcap
-        swarm record flight.mcap --mission table-1 --connect tcp/192.168.1.2:7447
+        swarm record flight.mcap --keys keys/dashboard --connect tls/192.168.1.2:7447
         swarm record ten-minutes.mcap --duration-s 600
     """
     import asyncio
@@ -90,23 +82,21 @@ def record(
     from coordinator.recording.options import check_new_recording
     from coordinator.recording.recorder import About
     from coordinator.recording.watching import Witness
-    from swarm.bus.config import bus_config
     from swarm.clock import ScaledClock
-    from swarm.config import preset
     from swarm.log import LogLevel, configure_logging
     from swarm.process import EXIT_INTERRUPTED, run_until_stopped
 
     configure_logging(LogLevel.ERROR)
     check_mission(mission)
     check_new_recording(file)
-    network = preset(link, lease_s)
-    config = bus_config(bus, listen, connect or (), network.lease_s)
+    network = seat.network
+    config = seat.config(mission=mission)
     timing = network.timing.scaled(speedup)
     begun: FlightRecorder | None = None
 
     async def work() -> int:
         nonlocal begun
-        async with joined(mission, config, timeout_s) as (name, seat):
+        async with joined(mission, config, timeout_s) as (name, place):
             clock = ScaledClock(speedup)
             witness = Witness(
                 name,
@@ -120,7 +110,7 @@ def record(
                 print(f"recording {name} in {file}", file=sys.stderr)
                 core = recorder.around(witness, witness.onlooker.observer)
                 shell = onlooking(
-                    core, seat, clock, name, "record", network.answer_s, every_status=True
+                    core, place, clock, name, "record", network.answer_s, every_status=True
                 )
                 try:
                     await shell.run()

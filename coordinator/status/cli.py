@@ -11,15 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swarm.config import Link
+from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.errors import SwarmError
 from swarm.options import (
-    BusOption,
-    ConnectOption,
     JsonOption,
-    LeaseOption,
-    LinkOption,
-    ListenOption,
     SomeMissionOption,
     SpeedupOption,
 )
@@ -39,6 +34,7 @@ PATIENCE_S = 4.0
 """How long to wait when looking once, unless told otherwise [wall s]."""
 
 
+@seated
 def status(
     mission: SomeMissionOption = None,
     watch: Annotated[
@@ -63,11 +59,7 @@ def status(
             show_default=False,
         ),
     ] = None,
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
-    link: LinkOption = Link.NORMAL,
-    lease_s: LeaseOption = None,
+    seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
@@ -83,7 +75,7 @@ def status(
     Examples:
         swarm status
         swarm status --mission table-1 --json
-        swarm status --connect tcp/192.168.1.2:7447
+        swarm status --keys keys/dashboard --connect tls/192.168.1.2:7447
         swarm status --watch
         swarm status --watch --json --mission table-1
     """
@@ -95,17 +87,14 @@ def status(
     from coordinator.joining import check_mission
     from coordinator.status.table import status_as_json, status_table
     from coordinator.view.signs import signs_for
-    from swarm.bus.config import bus_config
     from swarm.clock import ScaledClock
-    from swarm.config import preset
     from swarm.log import LogLevel, configure_logging
     from swarm.process import run_until_stopped
 
     configure_logging(LogLevel.ERROR)
-    settings = preset(link, lease_s)
-    config = bus_config(bus, listen, connect or (), settings.lease_s)
-    timing = settings.timing.scaled(speedup)
     check_mission(mission)
+    config = seat.config(mission=mission)
+    timing = seat.network.timing.scaled(speedup)
     console, clock = Console(highlight=False), ScaledClock(speedup)
 
     async def work() -> int:
@@ -131,9 +120,9 @@ async def _look(
     from coordinator.status.onlooker import Onlooker
     from coordinator.status.table import mission_status
 
-    async with joined(name, config, patience_s) as (mission, seat):
+    async with joined(name, config, patience_s) as (mission, place):
         onlooker = Onlooker(mission, timing, patience_s * clock.speedup)
-        if await onlooking(onlooker, seat, clock, mission, "status").run() != 0:
+        if await onlooking(onlooker, place, clock, mission, "status").run() != 0:
             raise SwarmError(onlooker.lack)
         return mission_status(onlooker.observer, clock.now_s())
 

@@ -56,7 +56,7 @@ async def watch(
     """Show a mission until it is over and nobody is there any more.
 
     Args:
-        mission: its name; None for the only one there is.
+        mission: its name; None for that of the keys, or the only one there is.
         config: how to reach the others.
         timing: timers, in the seconds of ``clock``.
         clock: of the onlooker.
@@ -74,7 +74,7 @@ async def watch(
     bus = await open_zenoh_bus(config, timeout_s=limit_s)
     try:
         shows.wait(f"waiting for {'a mission' if mission is None else f'mission {mission}'}")
-        name = mission or await only_mission(bus, limit_s)
+        name = mission or config.mission or await only_mission(bus, limit_s)
         await _look_on(name, bus, timing, clock, shows, limit_s)
     finally:
         bus.close()

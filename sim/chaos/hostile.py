@@ -63,7 +63,7 @@ REASONS: dict[Kind, str] = {
     Kind.RANDOM: "malformed",
     Kind.TRUNCATED: "malformed",
     Kind.WRONG_TYPES: "malformed",
-    Kind.LONG: "malformed",
+    Kind.LONG: "too large",
     Kind.HUGE: "too large",
     Kind.VERSION: "unknown version",
     Kind.MISSION: "another mission",

@@ -131,10 +131,12 @@ class Recorder:
             entry = Entry(self._clock.now_s(), seat, what, size_bytes)
             self.entries.append(entry)
             if self._file is not None:
-                self._file.write(json.dumps(dataclasses.asdict(entry)) + "\n")
+                self._file.write(json.dumps(_plain(entry)) + "\n")
 
     def _sit(self, bus: Bus) -> None:
         seat = len(self._buses)
+        if bus.seal is not None:
+            self._codec = Codec(self._mission, bus.seal)
         self._buses.append(bus)
         bus.subscribe(f"{self._keys.root}/**")
         bus.watch_tokens(self._keys.alive("*"))
@@ -157,3 +159,13 @@ class Recorder:
             bus.close()
         if self._file is not None:
             self._file.close()
+
+
+def _plain(entry: Entry) -> dict[str, object]:
+    """As JSON has it: without bytes."""
+    return dataclasses.asdict(
+        entry,
+        dict_factory=lambda pairs: {
+            name: value for name, value in pairs if not isinstance(value, bytes)
+        },
+    )

@@ -12,12 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.config import Link
+from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.options import (
-    BusOption,
-    ConnectOption,
     JsonOption,
-    ListenOption,
     OptionalScenarioArgument,
 )
 
@@ -35,6 +32,7 @@ _DEFAULT_UAVS = 3
 """Fleet for which the machine is judged without a scenario."""
 
 
+@seated
 def doctor(
     scenario: OptionalScenarioArgument = None,
     mission: Annotated[
@@ -46,9 +44,7 @@ def doctor(
             show_default=False,
         ),
     ] = None,
-    bus: BusOption = "router",
-    listen: ListenOption = "",
-    connect: ConnectOption = None,
+    seat: Seat = DEFAULT_SEAT,
     mavlink: Annotated[
         list[str] | None,
         typer.Option(
@@ -111,7 +107,7 @@ def doctor(
     Examples:
         swarm doctor
         swarm doctor valley-survey --port 8080 --state /var/lib/peckorder
-        swarm doctor --connect tcp/192.168.1.2:7447 --mission valley-survey
+        swarm doctor --keys keys/uav1 --connect tls/192.168.1.2:7447
         swarm doctor --mavlink udpin:0.0.0.0:14550 --mavlink serial:/dev/ttyUSB0:57600#7
         swarm doctor --mavlink tcp:127.0.0.1:5760 --signing-key uav1.key --json
     """
@@ -123,15 +119,12 @@ def doctor(
     from coordinator.joining import check_mission
     from sim.doctor.finding import State, as_json, print_findings
     from sim.doctor.link import parse_vehicle
-    from swarm.bus.config import bus_config
-    from swarm.config import preset
     from swarm.log import LogLevel, configure_logging
     from swarm.process import run_until_stopped
 
     configure_logging(LogLevel.ERROR)
     check_mission(mission)
-    config = bus_config(bus, listen, connect or (), preset(Link.NORMAL).lease_s)
-    asked_for = bool(connect or listen or bus != "router")
+    config = seat.config(mission=mission)
     vehicles = [parse_vehicle(text) for text in mavlink or ()]
     found: list[Finding] = []
     console = Console(highlight=False)
@@ -146,7 +139,7 @@ def doctor(
             state,
             port or (),
             timeout_s,
-            asked_for=asked_for,
+            asked_for=seat.is_named,
         ):
             found.append(finding)
             if not json:

@@ -16,8 +16,9 @@ from coordinator.dashboard.place import Place
 from sim.launch.autopilots import Autopilots, Running, Simulated
 from sim.launch.firmware import Firmware
 from sim.launch.handed_on import HandedOn
-from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
+from swarm.bus.config import BusConfig, ClientTopology, MeshTopology, Topology
 from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.loopback import is_loopback
 from swarm.config import Link, preset
 from swarm.log import LogFormat
 from swarm.model import Mission
@@ -160,15 +161,26 @@ class Layout:
     def seat_of_onlooker(self, name: str = ONLOOKER) -> BusConfig:
         """Seat of the launcher itself, or of another onlooker."""
         dialed, lease_s = self._dialed(name), preset(self._options.link).lease_s
+        topology: Topology
         if self.routers:
-            return BusConfig(ClientTopology(dialed), lease_s)
-        return BusConfig(MeshTopology(self._endpoints[name], dialed), lease_s)
+            topology = ClientTopology(dialed)
+        else:
+            topology = MeshTopology(self._endpoints[name], dialed)
+        return BusConfig(topology, lease_s, unencrypted=bool(self._unencrypted()))
 
     def router(self, name: str) -> list[str]:
         """Arguments of a router's process."""
         dialed = _repeated("--connect", self._dialed(name))
         listen = ["--listen", self._endpoints[name]]
-        return ["router", "--json", *listen, *dialed, *self._link(), *self._log()]
+        return [
+            "router",
+            "--json",
+            *listen,
+            *dialed,
+            *self._unencrypted(),
+            *self._link(),
+            *self._log(),
+        ]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
@@ -239,12 +251,17 @@ class Layout:
     def _memory(self) -> list[str]:
         return [] if self.state is None else ["--state", str(self.state)]
 
+    def _unencrypted(self) -> list[str]:
+        """What lets processes talk in the clear beyond loopback, as on networks made for a test."""
+        clear = [*self._endpoints.values(), *self._diverted.values()]
+        return [] if all(map(is_loopback, clear)) else ["--unencrypted"]
+
     def _link(self) -> list[str]:
         return ["--link", self._options.link]
 
     def seat_arguments(self, name: str) -> list[str]:
         """Arguments with which a process, or an onlooker by that name, finds the bus."""
-        dialed = [*_repeated("--connect", self._dialed(name)), *self._link()]
+        dialed = [*_repeated("--connect", self._dialed(name)), *self._unencrypted(), *self._link()]
         if self.routers:
             return ["--bus", "router", *dialed]
         return ["--bus", "mesh", "--listen", self._endpoints[name], *dialed]

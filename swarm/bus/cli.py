@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.bus.config import DEFAULT_ROUTER
+from swarm.bus.config import DEFAULT_ROUTER, DEFAULT_SECURE_ROUTER
 from swarm.config import Link, preset
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
     JsonOption,
+    KeysOption,
     LeaseOption,
     LifelineOption,
     LinkOption,
     LogFormatOption,
     LogLevelOption,
+    UnencryptedOption,
 )
 
 if TYPE_CHECKING:
@@ -36,7 +38,7 @@ def router(
         typer.Option(
             metavar="ENDPOINT",
             help="Where clients reach it; may be repeated; port 0 means any free one. "
-            f"Default: {DEFAULT_ROUTER}.",
+            f"Default: {DEFAULT_ROUTER}, with --keys {DEFAULT_SECURE_ROUTER}.",
             show_default=False,
         ),
     ] = None,
@@ -52,10 +54,12 @@ def router(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Zenoh configuration file, for security and such.",
+            help="Zenoh configuration file.",
             show_default=False,
         ),
     ] = None,
+    keys: KeysOption = None,
+    unencrypted: UnencryptedOption = False,
     link: LinkOption = Link.NORMAL,
     lease_s: LeaseOption = None,
     json: JsonOption = False,
@@ -70,7 +74,8 @@ def router(
 
     Examples:
         swarm router
-        swarm router --listen tcp/0.0.0.0:7447 --connect tcp/192.168.1.2:7447
+        swarm router --keys keys/router --listen tls/0.0.0.0:7447
+        swarm router --keys keys/router-2 --listen tls/0.0.0.0:7447 --connect tls/192.168.1.2:7447
     """
     from swarm.bus.config import RouterConfig
     from swarm.errors import Fault, InputError
@@ -78,10 +83,18 @@ def router(
     from swarm.process import run_until_stopped
 
     configure_logging(log_level, log_format)
-    listens = tuple(listen or (() if config else (DEFAULT_ROUTER,)))
+    identity = None
+    if keys is not None:
+        from swarm.identity import Role, load_identity
+
+        identity = load_identity(keys, roles=(Role.ROUTER,))
+    default = DEFAULT_ROUTER if identity is None else DEFAULT_SECURE_ROUTER
+    listens = tuple(listen or (() if config else (default,)))
     try:
         lease_s = preset(link, lease_s).lease_s
-        settings = RouterConfig(listens, tuple(connect or ()), config, lease_s)
+        settings = RouterConfig(
+            listens, tuple(connect or ()), config, lease_s, identity, unencrypted
+        )
     except ValueError as fault:
         problem, _, remedy = str(fault).partition("; ")
         raise InputError(

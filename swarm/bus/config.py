@@ -7,15 +7,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from swarm.bus.loopback import is_loopback
 from swarm.config import PRESETS, Link
 from swarm.errors import Fault, InputError
 from swarm.suggest import instead
 
+if TYPE_CHECKING:
+    from swarm.identity import Identity
+
 __all__ = [
     "DEFAULT_LEASE_S",
+    "DEFAULT_ROUTER",
+    "DEFAULT_SECURE_ROUTER",
     "BusConfig",
     "ClientTopology",
     "FileTopology",
@@ -29,12 +36,15 @@ MIN_LEASE_S = 0.2
 MAX_LEASE_S = 60.0
 DEFAULT_LEASE_S = PRESETS[Link.NORMAL].lease_s
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
+DEFAULT_SECURE_ROUTER = "tls/127.0.0.1:7447"
+"""The one with keys."""
 
 # udp is left out: over it, Zenoh's "reliable" does not retransmit.
 ENDPOINT = re.compile(
     r"(?:tcp|tls|quic|ws)/(?:\[[0-9A-Fa-f:.%\w]+\]|[^\s:/?#\[\]]+):(\d{1,5})(?:[?#]\S*)?"
 )
 UNIX_ENDPOINT = re.compile(r"unixsock-stream/\S+")
+_ENCRYPTED = ("tls/", "quic/")
 ENDPOINT_REMEDY = "write PROTOCOL/HOST:PORT with tcp, tls, quic or ws, as in tcp/127.0.0.1:7447"
 
 
@@ -80,14 +90,40 @@ Topology = MeshTopology | ClientTopology | FileTopology
 
 @dataclass(frozen=True, slots=True)
 class BusConfig:
-    """Settings of one process's seat on the bus."""
+    """Settings of one process's seat on the bus.
+
+    Raises:
+        ValueError: a setting is out of range, or others could listen in and nobody has said
+            that they may.
+    """
 
     topology: Topology
     lease_s: float = DEFAULT_LEASE_S
     """Silence after which the other side takes this process for lost [s]; not used with a file."""
+    identity: Identity | None = field(default=None, compare=False)
+    """Who this process is and proves to be; None: it talks in the clear."""
+    unencrypted: bool = False
+    """Whether it may talk in the clear with other machines."""
 
     def __post_init__(self) -> None:
         _check_lease(self.lease_s)
+        _check_encryption(self.endpoints, self.identity, unencrypted=self.unencrypted)
+
+    @property
+    def mission(self) -> str | None:
+        """The one that the keys are for; None without keys."""
+        return None if self.identity is None else self.identity.mission
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Those that it listens on and dials; none that a file alone names."""
+        match self.topology:
+            case MeshTopology(listen, dial):
+                return (listen, *dial)
+            case ClientTopology(routers):
+                return routers
+            case FileTopology():
+                return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,48 +138,69 @@ class RouterConfig:
     """A Zenoh configuration file; the endpoints above, if any, replace the file's."""
     lease_s: float = DEFAULT_LEASE_S
     """Silence after which clients take the router for lost [s]; not used with a file."""
+    identity: Identity | None = field(default=None, compare=False)
+    """Who the router is, and whom it knows; None: it lets everybody in."""
+    unencrypted: bool = False
+    """Whether it may talk in the clear with other machines."""
 
     def __post_init__(self) -> None:
         if not self.listen and self.path is None:
             raise ValueError("a router needs an endpoint to listen on")
         _check_endpoints(self.listen, self.connect)
         _check_lease(self.lease_s)
+        endpoints = (*self.listen, *self.connect)
+        _check_encryption(endpoints, self.identity, unencrypted=self.unencrypted)
 
 
 def bus_config(
-    kind: str, listen: str, connect: Sequence[str], lease_s: float = DEFAULT_LEASE_S
+    kind: str,
+    listen: str,
+    connect: Sequence[str],
+    lease_s: float = DEFAULT_LEASE_S,
+    *,
+    identity: Identity | None = None,
+    unencrypted: bool = False,
 ) -> BusConfig:
     """Settings from what was given on a command line.
 
     Args:
         kind: ``mesh``, ``router`` or the path of a Zenoh configuration file.
         listen: own endpoint in a mesh; empty when not given.
-        connect: routers, or peers to dial; `DEFAULT_ROUTER` when kind is router and none is given.
+        connect: routers, or peers to dial; when kind is router and none is given,
+            `DEFAULT_ROUTER`, with keys `DEFAULT_SECURE_ROUTER`.
         lease_s: silence after which others take this process for lost [s].
+        identity: what the process proves to be; None without keys.
+        unencrypted: whether it may talk in the clear with other machines.
 
     Raises:
-        InputError: the options contradict each other or an endpoint is wrong.
+        InputError: the options contradict each other, an endpoint is wrong, or others could
+            listen in.
     """
+
+    def seat(topology: Topology) -> BusConfig:
+        return BusConfig(topology, lease_s, identity, unencrypted)
+
     try:
         if kind == "router":
             if listen:
                 raise ValueError("--listen is for --bus mesh only")
-            return BusConfig(ClientTopology(tuple(connect) or (DEFAULT_ROUTER,)), lease_s)
+            default = DEFAULT_ROUTER if identity is None else DEFAULT_SECURE_ROUTER
+            return seat(ClientTopology(tuple(connect) or (default,)))
         if kind == "mesh":
             if not listen:
                 raise ValueError("--bus mesh needs --listen with this process's own endpoint")
-            return BusConfig(MeshTopology(listen, tuple(connect)), lease_s)
+            return seat(MeshTopology(listen, tuple(connect)))
         if listen or connect:
             raise ValueError("--listen and --connect are for --bus mesh or router only")
         if not Path(kind).is_file():
             remedy = instead(kind, ("mesh", "router"), "give a file that is there, or one of")
             problem = f"no such Zenoh configuration file: {kind}"
             raise InputError(Fault("command line", "--bus", problem, remedy))
+        return seat(FileTopology(Path(kind)))
     except ValueError as fault:
-        remedy = "see --help"
+        problem, _, remedy = str(fault).partition("; ")
         options = "--bus, --listen, --connect"
-        raise InputError(Fault("command line", options, str(fault), remedy)) from None
-    return BusConfig(FileTopology(Path(kind)), lease_s)
+        raise InputError(Fault("command line", options, problem, remedy or "see --help")) from None
 
 
 def config_file_fault(path: Path, problem: str) -> InputError:
@@ -175,6 +232,28 @@ def _check_endpoint(endpoint: str, *, port_zero: bool) -> None:
     lowest = 0 if port_zero else 1
     if not lowest <= int(match[1]) <= 0xFFFF:
         raise ValueError(f"{endpoint}: the port must be within {lowest}..65535")
+
+
+def _check_encryption(
+    endpoints: tuple[str, ...], identity: Identity | None, *, unencrypted: bool
+) -> None:
+    """See that nobody is talked to in the clear, or in cipher, who should not be.
+
+    A configuration file is the user's own word: what it names is not looked at.
+    """
+    if identity is not None and unencrypted:
+        raise ValueError("--keys and --unencrypted contradict each other; give one of them")
+    for endpoint in endpoints:
+        if identity is not None and not endpoint.startswith(_ENCRYPTED):
+            raise ValueError(f"{endpoint} is not encrypted; with --keys write tls/… or quic/…")
+        if identity is None and endpoint.startswith(_ENCRYPTED):
+            raise ValueError(f"{endpoint} needs keys; give --keys DIR, which 'swarm keys' makes")
+        if identity is None and not unencrypted and not is_loopback(endpoint):
+            raise ValueError(
+                f"{endpoint} is another machine, or open to others, and anybody on the way could "
+                "steer the fleet; give --keys DIR, which 'swarm keys' makes, and tls/…, or, if "
+                "that network is yours alone, --unencrypted"
+            )
 
 
 def _check_lease(lease_s: float) -> None:

@@ -24,6 +24,7 @@ from swarm.bus.port import (
     check_payload,
 )
 from swarm.errors import BusError
+from swarm.wire.seal import Seal
 
 __all__ = ["MemoryBus", "MemoryNetwork"]
 
@@ -183,7 +184,7 @@ class MemoryNetwork:
         self._hub = _Hub()
         self._seats: dict[str, _Seat] = {}
 
-    def join(self, name: str, *, inbox_capacity: int = 4096) -> MemoryBus:
+    def join(self, name: str, *, inbox_capacity: int = 4096, seal: Seal | None = None) -> MemoryBus:
         """Take a seat in the running loop, under a ``name`` never used here before."""
         if name in self._seats:
             raise ValueError(f"{name} has a seat already")
@@ -191,7 +192,7 @@ class MemoryNetwork:
         seat = _Seat(Inbox(loop, inbox_capacity))
         self._seats[name] = seat
         self._hub.enter(seat)
-        return MemoryBus(self._hub, seat, loop)
+        return MemoryBus(self._hub, seat, loop, seal)
 
     def cut(self, name: str) -> None:
         """Take the link of ``name`` away: it and the others lose sight of each other."""
@@ -207,7 +208,11 @@ class MemoryNetwork:
 class MemoryBus:
     """One seat on a `MemoryNetwork`; see `swarm.bus.port.Bus`."""
 
-    def __init__(self, hub: _Hub, seat: _Seat, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, hub: _Hub, seat: _Seat, loop: asyncio.AbstractEventLoop, seal: Seal | None = None
+    ) -> None:
+        self.seal = seal
+        """Of whoever sits here."""
         self._hub = hub
         self._seat = seat
         self._loop = loop

@@ -15,7 +15,10 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from swarm.wire.seal import Seal
 
 __all__ = [
     "MAX_PAYLOAD_BYTES",
@@ -214,6 +217,13 @@ class Bus(Protocol):
     @property
     def inbox(self) -> Inbox:
         """Where everything arrives."""
+        ...
+
+    @property
+    def seal(self) -> Seal | None:
+        """What the others believe whoever sits here by, and it them; None without keys.
+
+        A bus carries what it is given: whoever sits there seals and unseals it."""
         ...
 
     def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:

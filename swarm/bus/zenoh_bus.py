@@ -45,6 +45,8 @@ from swarm.bus.zenoh_session import (
 )
 from swarm.errors import BusError
 from swarm.log import get_logger
+from swarm.sealing import seal_of
+from swarm.wire.seal import Seal
 
 __all__ = ["ZenohBus", "open_zenoh_bus"]
 
@@ -74,7 +76,8 @@ async def open_zenoh_bus(
         InputError: the user's configuration file is wrong.
     """
     session = await open_session(_zenoh_config(config), timeout_s=timeout_s)
-    return ZenohBus(session, Inbox(asyncio.get_running_loop(), inbox_capacity))
+    inbox = Inbox(asyncio.get_running_loop(), inbox_capacity)
+    return ZenohBus(session, inbox, seal_of(config.identity))
 
 
 def _zenoh_config(config: BusConfig) -> zenoh.Config:
@@ -164,7 +167,9 @@ class _Reply:
 class ZenohBus:
     """One session on the bus; see `swarm.bus.port.Bus`. Made by `open_zenoh_bus`."""
 
-    def __init__(self, session: zenoh.Session, inbox: Inbox) -> None:
+    def __init__(self, session: zenoh.Session, inbox: Inbox, seal: Seal | None = None) -> None:
+        self.seal = seal
+        """Of whoever sits here."""
         self._session = session
         self._inbox = inbox
         self._loop = asyncio.get_running_loop()

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Final, NewType
 
 __all__ = [
+    "AUTHORITY",
     "COORDINATOR",
     "FLEET",
     "ID_RULE",
@@ -22,6 +23,8 @@ __all__ = [
 UavId = NewType("UavId", str)
 TaskId = NewType("TaskId", str)
 
+AUTHORITY = "authority"
+"""Name of the mission authority among the writers on the bus; it signs the roster."""
 COORDINATOR = "coordinator"
 """Name of the coordinator among the writers on the bus."""
 OPERATOR = "operator"
@@ -29,7 +32,12 @@ OPERATOR = "operator"
 FLEET = "fleet"
 """Target of a command that concerns every UAV."""
 RESERVED: Final[Mapping[str, str]] = MappingProxyType(
-    {COORDINATOR: "the coordinator", OPERATOR: "the operator", FLEET: "the whole fleet"}
+    {
+        AUTHORITY: "the mission authority",
+        COORDINATOR: "the coordinator",
+        OPERATOR: "the operator",
+        FLEET: "the whole fleet",
+    }
 )
 """Names that no UAV may bear, and what they stand for on the bus."""
 

@@ -77,6 +77,9 @@ class Replica:
             return False
         if known is not None and not _beats(message, known):
             self.stale += message.stamp < known.stamp
+            if _says_more(message, known):
+                self._registers[key] = message
+                self._changed.add(key)
             return False
         self._registers[key] = message
         self._changed.add(key)
@@ -203,6 +206,15 @@ def _entry_of(order: TaskOrder) -> Board:
         kind=order.kind,
         withdrawn=order.withdrawn,
     )
+
+
+def _says_more(new: Message, known: Message) -> bool:
+    """Whether it is the same statement with more that only newer releases understand.
+
+    An older one that repeats another's statement may have left that out.
+    """
+    same = new.stamp == known.stamp and new.body == known.body
+    return same and new.said is not None and new.said > encode(known)
 
 
 def _beats(new: Message, known: Message) -> bool:

@@ -32,8 +32,8 @@ __all__ = [
     "Words",
 ]
 
-CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
-"""How pydantic checks each message."""
+CHECKED: Final = {"extra": "ignore", "allow_inf_nan": False}
+"""How pydantic checks each message; fields that only a newer release knows are passed over."""
 
 MAX_COUNT: Final = 2**53
 """Largest count; whoever counts on from what it heard stays within."""

@@ -2,22 +2,31 @@
 
 `decode` never raises on what came from the network: whatever is not a valid
 message of this mission, on the key that belongs to its writer, is None and
-counted under a reason. Leaves out: whether a message is news (swarm.state).
+counted under a reason. With a `Seal`, what its writer has not signed is dropped
+before anything of it is parsed; see swarm.wire.seal. Leaves out: whether a message
+is news (swarm.state).
+
+**Releases that differ.** Everything may grow at its end: a message or snapshot by parts,
+a body by fields. An older release passes over what it does not know, and repeats it when it
+repeats the message; a newer one puts the field's wire default in the place of what an older
+one left out. A kind of message that a release does not know is dropped and counted. Only what
+cannot be mixed so (a field that goes or changes its meaning, a new word in an enumeration)
+makes `SCHEMA_VERSION` grow, and then neither release hears the other.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any, Final
+from typing import Final
 
 import msgpack
 from pydantic import TypeAdapter, ValidationError
 
-from swarm.model.ids import COORDINATOR, OPERATOR, valid_id
+from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR, valid_id
 from swarm.wire.choice import Basis, Candidate
 from swarm.wire.keys import Keys
 from swarm.wire.messages import (
@@ -34,10 +43,23 @@ from swarm.wire.messages import (
     Fleet,
     Message,
     Outcome,
+    SignedRoster,
     Snapshot,
     Stamp,
     Status,
     TaskOrder,
+    as_heard,
+)
+from swarm.wire.seal import (
+    ANSWER,
+    ENVELOPE_BYTES,
+    NOT_SIGNED,
+    NOT_THE_SIGNERS,
+    WRONGLY_SIGNED,
+    Seal,
+    UnacceptableError,
+    is_envelope,
+    open_envelope,
 )
 
 __all__ = [
@@ -46,13 +68,16 @@ __all__ = [
     "SNAPSHOT_LIMIT_BYTES",
     "Codec",
     "encode",
+    "encode_memory",
     "fit",
+    "fit_memory",
 ]
 
 SMALL_LIMIT_BYTES: Final = 4 * 1024
 LARGE_LIMIT_BYTES: Final = 1024 * 1024
 SNAPSHOT_LIMIT_BYTES: Final = 4 * 1024 * 1024
 """As much as a bus carries at once."""
+SIGNED_HERE: Final = "signed, but no keys here"
 
 _KINDS: Final[dict[str, type[Body]]] = {
     "brief": Brief,
@@ -64,6 +89,7 @@ _KINDS: Final[dict[str, type[Body]]] = {
     "choice": Choice,
     "command": Command,
     "task": TaskOrder,
+    "roster": SignedRoster,
 }
 _NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in _KINDS.items()}
 _FIELDS: Final[dict[type, tuple[str, ...]]] = {
@@ -71,43 +97,68 @@ _FIELDS: Final[dict[type, tuple[str, ...]]] = {
     for part in (*_KINDS.values(), Fleet, Basis, Candidate)
 }
 """Of everything that a message is made of."""
-_LARGE: Final = frozenset({"brief", "choice", "epoch"})
+_LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
+WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {}
+"""By kind, what a field means that an older release does not say; of fields that were added
+to the end of a body under the `SCHEMA_VERSION` in force."""
 
 
-def encode(message: Message | Snapshot) -> bytes:
-    """The bytes of a message or snapshot."""
-    packed: bytes = msgpack.packb(_packable(message), default=_fields_of)
-    return packed
+# -- writing ------------------------------------------------------------------------------
 
 
-def fit(snapshot: Snapshot, limit_bytes: int = SNAPSHOT_LIMIT_BYTES) -> Snapshot:
+def encode(what: Message | Snapshot) -> bytes:
+    """The bytes of a message or snapshot, as a bus without keys carries them.
+
+    A message that was heard gives the very bytes that were heard.
+    """
+    if isinstance(what, Snapshot):
+        return _snapshot_bytes(what, [encode(message) for message in what.messages])
+    if what.said is None:
+        as_heard(what, _message_bytes(what))
+    return what.said or b""
+
+
+def encode_memory(snapshot: Snapshot) -> bytes:
+    """``snapshot`` with the envelopes of its messages, for `decode_memory` of a later life."""
+    return _snapshot_bytes(snapshot, [_remembered(message) for message in snapshot.messages])
+
+
+def fit_memory(snapshot: Snapshot) -> Snapshot:
+    """What of ``snapshot`` there is room for in a memory; see `fit`."""
+    return fit(snapshot, SNAPSHOT_LIMIT_BYTES, _remembered)
+
+
+def fit(
+    snapshot: Snapshot,
+    limit_bytes: int = SNAPSHOT_LIMIT_BYTES,
+    as_bytes: Callable[[Message], bytes] = encode,
+) -> Snapshot:
     """``snapshot``, without some of the registers when there is no room for all.
 
     Those of its own writer stay before those of others, for which others answer too.
+
+    Args:
+        snapshot: to be shortened.
+        limit_bytes: how long it may be.
+        as_bytes: what becomes of each message in it.
     """
-    if len(encode(snapshot)) <= limit_bytes:
+    parts = [as_bytes(message) for message in snapshot.messages]
+    if len(_snapshot_bytes(snapshot, parts)) <= limit_bytes:
         return snapshot
-    room = limit_bytes - len(encode(replace(snapshot, messages=()))) - 4  # a longer array head
+    room = limit_bytes - len(_snapshot_bytes(snapshot, ())) - 4  # a longer array head
     kept = []
-    for message in sorted(snapshot.messages, key=lambda each: each.writer != snapshot.writer):
-        size_bytes = len(encode(message))
-        if size_bytes <= room:
-            room -= size_bytes
+    for message, part in sorted(
+        zip(snapshot.messages, parts, strict=True),
+        key=lambda each: each[0].writer != snapshot.writer,
+    ):
+        if len(part) <= room:
+            room -= len(part)
             kept.append(message)
     return replace(snapshot, messages=tuple(kept))
 
 
-def _packable(message: Message | Snapshot) -> list[Any]:
-    if isinstance(message, Snapshot):
-        return [
-            SCHEMA_VERSION,
-            message.mission,
-            message.writer,
-            message.incarnation,
-            message.mission_s,
-            [_packable(each) for each in message.messages],
-        ]
-    return [
+def _message_bytes(message: Message) -> bytes:
+    parts = [
         SCHEMA_VERSION,
         message.mission,
         message.writer,
@@ -116,11 +167,41 @@ def _packable(message: Message | Snapshot) -> list[Any]:
         _NAMES[type(message.body)],
         message.body,
     ]
+    packed: bytes = msgpack.packb(parts, default=_fields_of)
+    return packed
+
+
+def _snapshot_bytes(snapshot: Snapshot, registers: Sequence[bytes]) -> bytes:
+    head = (
+        SCHEMA_VERSION,
+        snapshot.mission,
+        snapshot.writer,
+        snapshot.incarnation,
+        snapshot.mission_s,
+    )
+    packed: list[bytes] = [msgpack.packb(part) for part in head]
+    return _array([*packed, _array(registers)])
+
+
+def _array(parts: Sequence[bytes]) -> bytes:
+    """An array of what is MessagePack already."""
+    head: bytes = msgpack.Packer().pack_array_header(len(parts))
+    return head + b"".join(parts)
+
+
+def _remembered(message: Message) -> bytes:
+    if message.envelope is None:
+        return encode(message)
+    packed: bytes = msgpack.packb(message.envelope)
+    return packed
 
 
 def _fields_of(part: object) -> dict[str, object]:
     """A body, or a dataclass within one, by the names of its fields."""
     return {name: getattr(part, name) for name in _FIELDS[type(part)]}
+
+
+# -- reading ------------------------------------------------------------------------------
 
 
 @cache
@@ -134,73 +215,226 @@ def _stamps() -> TypeAdapter[Stamp]:
 
 
 class Codec:
-    """Decodes what one mission's processes say, and counts what it drops."""
+    """Reads and writes what one mission's processes say, and counts what it drops.
 
-    def __init__(self, mission: str) -> None:
+    Args:
+        mission: mission name.
+        seal: believes only what is signed, and signs what is written; None on a bus
+            without keys.
+    """
+
+    def __init__(self, mission: str, seal: Seal | None = None) -> None:
         self._mission = mission
+        self._keys = Keys(mission)
+        self._seal = seal
         self.dropped: Counter[str] = Counter()
         """Messages dropped so far, by reason."""
+        self.newer: set[str] = set()
+        """Kinds of messages heard with more in them than this release understands."""
+
+    # -- for the bus ----------------------------------------------------------------
+
+    def pack(self, message: Message) -> bytes | None:
+        """``message`` as the bus carries it; None when nobody would believe it from here."""
+        said = encode(message)
+        seal = self._seal
+        if seal is None or isinstance(message.body, SignedRoster):
+            return said
+        envelope = message.envelope
+        if envelope is not None and seal.is_genuine(envelope):
+            return envelope
+        if not seal.may_speak_for(seal.name, message.writer):
+            return None
+        envelope = seal.wrap(said)
+        as_heard(message, said, envelope)
+        return envelope
+
+    def pack_answer(self, snapshot: Snapshot, nonce: bytes) -> tuple[bytes, int]:
+        """``snapshot`` as an answer to the question with that nonce.
+
+        Returns:
+            Its bytes, and how many registers had no room in them.
+        """
+        seal = self._seal
+        if seal is None:
+            fitted = fit(snapshot)
+            return encode(fitted), len(snapshot.messages) - len(fitted.messages)
+        told = [message for message in snapshot.messages if self.pack(message) is not None]
+        believed = replace(snapshot, messages=tuple(told))
+        fitted = fit(believed, SNAPSHOT_LIMIT_BYTES - ENVELOPE_BYTES, self._register)
+        said = _snapshot_bytes(fitted, [self._register(message) for message in fitted.messages])
+        return seal.wrap(said, ANSWER + nonce), len(told) - len(fitted.messages)
+
+    def _register(self, message: Message) -> bytes:
+        """As it stands in an answer."""
+        packed = self.pack(message) or b""
+        if self._seal is None or isinstance(message.body, SignedRoster):
+            return packed
+        wrapped: bytes = msgpack.packb(packed)
+        return wrapped
+
+    # -- from the bus ---------------------------------------------------------------
 
     def decode(self, key: str, data: bytes) -> Message | None:
         """The message in ``data``, heard on ``key``; None when it must be dropped."""
         try:
-            _require(len(data) <= LARGE_LIMIT_BYTES, "too large")
-            message = self._message(_unpack(data))
-            large = _NAMES[type(message.body)] in _LARGE
-            _require(large or len(data) <= SMALL_LIMIT_BYTES, "too large")
+            _require(len(data) <= LARGE_LIMIT_BYTES + ENVELOPE_BYTES, "too large")
+            message = self._believed(data) if is_envelope(data) else self._unsigned(key, data)
             _require(message.key == key, "said on another's key")
-        except _UnacceptableError as fault:
+        except UnacceptableError as fault:
             self.dropped[fault.reason] += 1
             return None
         return message
 
-    def decode_snapshot(self, key: str, data: bytes) -> Snapshot | None:
-        """The snapshot in ``data``, answered on ``key``; bad registers in it are left out."""
+    def decode_snapshot(self, key: str, data: bytes, nonce: bytes = b"") -> Snapshot | None:
+        """The snapshot in ``data``, answered on ``key``; bad registers in it are left out.
+
+        Args:
+            key: of who answers.
+            data: the answer.
+            nonce: of the question, where the bus has keys.
+        """
+        signer = None
         try:
             _require(len(data) <= SNAPSHOT_LIMIT_BYTES, "too large")
-            parts = _unpack(data)
-            if not isinstance(parts, tuple) or len(parts) != 6:
-                raise _UnacceptableError("malformed")
-            version, mission, writer, incarnation, mission_s, registers = parts
-            _require(version == SCHEMA_VERSION, "unknown version")
-            _require(mission == self._mission, "another mission")
-            _require(isinstance(writer, str) and valid_id(writer), "malformed")
-            _require(key == Keys(mission).state(writer), "said on another's key")
-            _require(type(incarnation) is int and 0 <= incarnation <= MAX_COUNT, "malformed")
-            known = isinstance(mission_s, float) and abs(mission_s) <= LATEST_S
-            _require(known or mission_s is None, "malformed")
-            _require(isinstance(registers, tuple), "malformed")
-        except _UnacceptableError as fault:
+            if self._seal is not None:
+                envelope = self._seal.unwrap(data, ANSWER + nonce)
+                signer, data = envelope.signer, envelope.said
+            else:
+                _require(not is_envelope(data), SIGNED_HERE)
+            snapshot, registers = self._snapshot(key, data)
+            _require(signer is None or self._may_speak(signer, snapshot.writer), NOT_THE_SIGNERS)
+        except UnacceptableError as fault:
             self.dropped[fault.reason] += 1
             return None
-        return Snapshot(mission, writer, incarnation, mission_s, tuple(self._acceptable(registers)))
+        return replace(snapshot, messages=tuple(self._acceptable(registers, self._answered)))
 
-    def _acceptable(self, registers: Iterable[object]) -> Iterator[Message]:
+    def _may_speak(self, signer: str, writer: str) -> bool:
+        return self._seal is not None and self._seal.may_speak_for(signer, writer)
+
+    def _believed(self, envelope: bytes) -> Message:
+        """The message in an envelope, if its signer may say so."""
+        if self._seal is None:
+            raise UnacceptableError(SIGNED_HERE)
+        opened = self._seal.unwrap(envelope)
+        message = self._read(opened.said)
+        _require(not isinstance(message.body, SignedRoster), NOT_THE_SIGNERS)
+        _require(self._seal.may_speak_for(opened.signer, message.writer), NOT_THE_SIGNERS)
+        return as_heard(message, opened.said, envelope)
+
+    def _unsigned(self, key: str, data: bytes) -> Message:
+        """A message without an envelope; where the bus has keys, a roster."""
+        if self._seal is None:
+            return self._read(data)
+        _require(key == self._keys.roster, NOT_SIGNED)
+        return self._roster(self._read(data))
+
+    def _roster(self, message: Message) -> Message:
+        """``message``, if it is a roster of the authority's, stamped by its version."""
+        if self._seal is None or not isinstance(message.body, SignedRoster):
+            raise UnacceptableError(NOT_SIGNED)
+        roster = self._seal.read_roster(message.body.signed)
+        _require(message.stamp == Stamp(roster.version, 0), WRONGLY_SIGNED)
+        return message
+
+    def _answered(self, register: object) -> Message:
+        """One register of an answer."""
+        if isinstance(register, bytes):
+            return self._believed(register)
+        message = self._message(register)
+        message = as_heard(message, msgpack.packb(register))
+        _require_size(message)
+        return message if self._seal is None else self._roster(message)
+
+    def _read(self, said: bytes) -> Message:
+        message = as_heard(self._message(_unpack(said)), said)
+        _require_size(message)
+        return message
+
+    def _acceptable(
+        self, registers: Iterable[object], read: Callable[[object], Message]
+    ) -> Iterator[Message]:
         for register in registers:
             try:
-                yield self._message(register)
-            except _UnacceptableError as fault:
+                yield read(register)
+            except UnacceptableError as fault:
                 self.dropped[fault.reason] += 1
 
+    # -- from the own memory --------------------------------------------------------
+
+    def decode_memory(self, key: str, data: bytes) -> Snapshot | None:
+        """What `encode_memory` made in an earlier life; envelopes in it need no check.
+
+        They are kept, and are checked before they are ever repeated.
+        """
+        try:
+            snapshot, registers = self._snapshot(key, data)
+        except UnacceptableError as fault:
+            self.dropped[fault.reason] += 1
+            return None
+        return replace(snapshot, messages=tuple(self._acceptable(registers, self._recalled)))
+
+    def _recalled(self, register: object) -> Message:
+        if not isinstance(register, bytes):
+            return as_heard(self._message(register), msgpack.packb(register))
+        envelope = open_envelope(register)
+        if envelope is None:
+            raise UnacceptableError("malformed")
+        return as_heard(self._message(_unpack(envelope.said)), envelope.said, register)
+
+    # -- parts ----------------------------------------------------------------------
+
+    def _snapshot(self, key: str, data: bytes) -> tuple[Snapshot, tuple[object, ...]]:
+        """A snapshot without its registers, and those."""
+        parts = _unpack(data)
+        if not isinstance(parts, tuple) or len(parts) < 6:
+            raise UnacceptableError("malformed")
+        version, mission, writer, incarnation, mission_s, registers = parts[:6]
+        _require(version == SCHEMA_VERSION, "unknown version")
+        _require(mission == self._mission, "another mission")
+        _require(isinstance(writer, str) and valid_id(writer), "malformed")
+        _require(key == self._keys.state(writer), "said on another's key")
+        _require(type(incarnation) is int and 0 <= incarnation <= MAX_COUNT, "malformed")
+        known = isinstance(mission_s, float) and abs(mission_s) <= LATEST_S
+        _require(known or mission_s is None, "malformed")
+        _require(isinstance(registers, tuple), "malformed")
+        return Snapshot(mission, writer, incarnation, mission_s, ()), registers
+
     def _message(self, parts: object) -> Message:
-        if not isinstance(parts, tuple) or len(parts) != 7:
-            raise _UnacceptableError("malformed")
-        version, mission, writer, incarnation, counter, kind, fields = parts
+        if not isinstance(parts, tuple) or len(parts) < 7:
+            raise UnacceptableError("malformed")
+        version, mission, writer, incarnation, counter, kind, fields = parts[:7]
         _require(version == SCHEMA_VERSION, "unknown version")
         _require(mission == self._mission, "another mission")
         _require(isinstance(writer, str) and valid_id(writer), "malformed")
         if not isinstance(kind, str) or kind not in _KINDS:
-            raise _UnacceptableError("unknown kind")
-        # Defaults are for those who write messages: on the wire every field is needed.
-        complete = isinstance(fields, dict) and fields.keys() == set(_FIELDS[_KINDS[kind]])
-        _require(complete, "malformed")
+            raise UnacceptableError("unknown kind")
+        if not isinstance(fields, dict):
+            raise UnacceptableError("malformed")
+        known = _FIELDS[_KINDS[kind]]
+        if fields.keys() != set(known) or len(parts) > 7:
+            fields = self._understood(kind, fields, known)
         try:
             stamp = _stamps().validate_python({"incarnation": incarnation, "counter": counter})
             body = _bodies(kind).validate_python(fields)
         except (ValidationError, RecursionError):
-            raise _UnacceptableError("malformed") from None
+            raise UnacceptableError("malformed") from None
         _require(_may_say(writer, body), "said on another's key")
         return Message(mission, writer, stamp, body)
+
+    def _understood(
+        self, kind: str, fields: Mapping[str, object], known: Sequence[str]
+    ) -> dict[str, object]:
+        """The fields of a body that another release has written, as this one has them.
+
+        A Python default is for those who write messages: on the wire every field is needed
+        but those in `WIRE_DEFAULTS`.
+        """
+        told = {**WIRE_DEFAULTS.get(kind, {}), **fields}
+        _require(told.keys() >= set(known), "malformed")
+        if fields.keys() - set(known):
+            self.newer.add(kind)
+        return {name: told[name] for name in known}
 
 
 def _may_say(writer: str, body: Body) -> bool:
@@ -210,21 +444,22 @@ def _may_say(writer: str, body: Body) -> bool:
             return writer == COORDINATOR
         case Command() | TaskOrder():
             return writer == OPERATOR
+        case SignedRoster():
+            return writer == AUTHORITY
         case Claim() | Outcome() | Status() | Choice():
-            return writer not in (COORDINATOR, OPERATOR)
-
-
-class _UnacceptableError(Exception):
-    """Received bytes that are not a message of ours; never leaves this module."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
+            return writer not in (AUTHORITY, COORDINATOR, OPERATOR)
 
 
 def _require(condition: bool, reason: str) -> None:
     if not condition:
-        raise _UnacceptableError(reason)
+        raise UnacceptableError(reason)
+
+
+def _require_size(message: Message) -> None:
+    """What is in the envelope counts, so that keys leave the room for words as it is."""
+    large = _NAMES[type(message.body)] in _LARGE
+    limit_bytes = LARGE_LIMIT_BYTES if large else SMALL_LIMIT_BYTES
+    _require(len(encode(message)) <= limit_bytes, "too large")
 
 
 def _unpack(data: bytes) -> object:

@@ -2,7 +2,7 @@
 
 ``swarm/<mission>/…``: ``brief``, ``plan`` and ``board/<task>`` are written by the
 coordinator, ``uav/<id>/…`` by that UAV's agent, ``operator/<target>`` and
-``operator/task/<task>`` by the operator;
+``operator/task/<task>`` by the operator, ``roster`` by the mission authority;
 ``alive/<id>`` holds the liveliness token of a process and ``state/<id>`` answers what that
 process knows.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from swarm.model.ids import require_id, valid_id
+from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR, require_id, valid_id
 
 __all__ = ["ANY_TOKEN", "Keys", "mission_of_token"]
 
@@ -56,6 +56,11 @@ class Keys:
         """The current epoch."""
         return f"{self.root}/plan"
 
+    @property
+    def roster(self) -> str:
+        """Who belongs to the mission, by the word of its authority."""
+        return f"{self.root}/roster"
+
     def board(self, task: str) -> str:
         """One task of the task board; ``*`` for all."""
         return f"{self.root}/board/{task}"
@@ -91,6 +96,20 @@ class Keys:
     def state(self, writer: str) -> str:
         """Where a process answers with the registers it answers for; ``*`` for all."""
         return f"{self.root}/state/{writer}"
+
+    def writer_of(self, key: str) -> str | None:
+        """Whose register ``key`` is; None if it is none of this mission."""
+        match key.removeprefix(f"{self.root}/").split("/"):
+            case ["brief"] | ["plan"] | ["board", _]:
+                return COORDINATOR
+            case ["operator", _] | ["operator", "task", _]:
+                return OPERATOR
+            case ["roster"]:
+                return AUTHORITY
+            case ["uav", writer, _] | ["uav", writer, "outcome", _]:
+                return writer
+            case _:
+                return None
 
     def writer_of_token(self, key: str) -> str | None:
         """The writer whose token ``key`` is; None if it is no token of this mission."""

@@ -56,14 +56,19 @@ __all__ = [
     "Message",
     "Outcome",
     "Result",
+    "SignedRoster",
     "Snapshot",
     "Stamp",
     "Status",
     "StatusPhase",
     "TaskOrder",
+    "as_heard",
 ]
 
 SCHEMA_VERSION = 1
+"""Grows only with what releases before cannot be mixed with; see swarm.wire.codec."""
+LONGEST_ROSTER = 1 << 20
+"""Characters of a signed roster."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -308,7 +313,22 @@ class TaskOrder:
     """Why, in the operator's words; empty when there are none."""
 
 
-Body = Brief | Epoch | Board | Claim | Outcome | Status | Choice | Command | TaskOrder
+@dataclass(frozen=True, slots=True)
+class SignedRoster:
+    """Register ``roster``: who belongs to the mission, in the words of its authority.
+
+    It bears the authority's signature inside, so anyone may repeat it.
+    """
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    signed: Annotated[str, Strict(), Len(1, LONGEST_ROSTER)]
+    """As `swarm.identity.roster.decode_roster` reads it; ASCII."""
+
+
+Body = (
+    Brief | Epoch | Board | Claim | Outcome | Status | Choice | Command | TaskOrder | SignedRoster
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,6 +345,11 @@ class Message:
     body: Body
     key: str = field(init=False, repr=False, compare=False)
     """The one key on which it may be said; names its register."""
+    said: bytes | None = field(init=False, default=None, repr=False, compare=False)
+    """The very bytes that were heard, what this release does not understand among them; None
+    for what was made here. Copies made by `dataclasses.replace` say something else: None."""
+    envelope: bytes | None = field(init=False, default=None, repr=False, compare=False)
+    """Those bytes with their writer's signature, where the bus has keys; see swarm.wire.seal."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "key", _key_of(self.mission, self.writer, self.body))
@@ -340,6 +365,13 @@ class Snapshot:
     """Of the process that answers."""
     mission_s: Instant | None
     messages: tuple[Message, ...]
+
+
+def as_heard(message: Message, said: bytes, envelope: bytes | None = None) -> Message:
+    """``message``, just made of these bytes, so that it can be repeated exactly."""
+    object.__setattr__(message, "said", said)
+    object.__setattr__(message, "envelope", envelope)
+    return message
 
 
 def _key_of(mission: str, writer: str, body: Body) -> str:
@@ -363,6 +395,8 @@ def _key_of(mission: str, writer: str, body: Body) -> str:
             return keys.operator(target)
         case TaskOrder(task=task):
             return keys.operator_task(task)
+        case SignedRoster():
+            return keys.roster
 
 
 @lru_cache(maxsize=16)

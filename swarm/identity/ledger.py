@@ -1,0 +1,117 @@
+"""What an authority remembers of all names it ever issued for: role and newest generation.
+
+So the certificate that follows a revoked one bears another name. It holds no secrets.
+Leaves out: who is in force, which the roster says.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from swarm.identity.roles import Role
+from swarm.identity.roster import Entry
+
+__all__ = ["ISSUED_FILE", "Issued", "Ledger", "decode_ledger", "encode_ledger"]
+
+ISSUED_FILE: Final = "issued.json"
+_FORMAT: Final = "peckorder authority 1"
+
+
+@dataclass(frozen=True, slots=True)
+class Issued:
+    """What was issued for one name."""
+
+    role: Role
+    generation: int
+    """Of the newest certificate."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ledger:
+    """An authority's memory and customs."""
+
+    mission: str
+    days: int
+    """How long certificates are valid."""
+    mesh: bool
+    """Whether all may be dialled, not only routers."""
+    issued: Mapping[str, Issued]
+
+    def with_next(self, names: Mapping[str, Role]) -> Ledger:
+        """The same with ``names`` one generation on; see `why_unfit`."""
+        issued = dict(self.issued)
+        for name, role in names.items():
+            before = issued.get(name)
+            issued[name] = Issued(role, 1 if before is None else before.generation + 1)
+        return replace(self, issued=issued)
+
+    def why_unfit(self, name: str, role: Role, taken: frozenset[str]) -> str | None:
+        """Why nothing can be issued for ``name``; None if it can.
+
+        Args:
+            name: of whom.
+            role: of whom.
+            taken: names of files beside the folders of identities.
+        """
+        before = self.issued.get(name)
+        if before is not None and before.role is not role:
+            return f"{name!r} is the name of a {before.role}, and no {role} can get it"
+        if name in taken:
+            return f"{name!r} is the name of a file of the authority"
+        for other in (*self.issued, *taken):
+            if other != name and other.casefold() == name.casefold():
+                return f"{name!r} differs from {other!r} in capital letters alone"
+        generation = 1 if before is None else before.generation + 1
+        try:
+            Entry(name, role, generation, bytes(32), 0)
+        except ValueError as fault:
+            return str(fault)
+        return None
+
+
+def encode_ledger(ledger: Ledger) -> bytes:
+    """As text for people, one name a line."""
+    head = {
+        "format": _FORMAT,
+        "mission": ledger.mission,
+        "days": ledger.days,
+        "mesh": ledger.mesh,
+    }
+    issued = ",\n  ".join(
+        f"{json.dumps(name)}: {json.dumps([str(each.role), each.generation])}"
+        for name, each in sorted(ledger.issued.items())
+    )
+    lines = "".join(f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in head.items())
+    return f'{{\n{lines} "issued": {{\n  {issued}\n }}\n}}\n'.encode("ascii")
+
+
+def decode_ledger(data: bytes) -> Ledger:
+    """The ledger in ``data``.
+
+    Raises:
+        ValueError: it holds none.
+    """
+    document: Any = json.loads(data)
+    match document:
+        case {
+            "format": str(form),
+            "mission": str(mission),
+            "days": int(days),
+            "mesh": bool(mesh),
+            "issued": dict(issued),
+        } if form == _FORMAT:
+            entries = {name: _issued(parts) for name, parts in issued.items()}
+            return Ledger(mission, days, mesh, entries)
+        case _:
+            raise ValueError("it is no list of this version")
+
+
+def _issued(parts: Any) -> Issued:
+    match parts:
+        case [str(role), int(generation)]:
+            return Issued(Role(role), generation)
+        case _:
+            raise ValueError("it has an entry that is none")

@@ -1,0 +1,56 @@
+"""Keys of a small mission, made in memory: who signs what, without a folder or a certificate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+from swarm.identity.roles import Role
+from swarm.identity.roster import SERIES_BYTES, Entry, Roster, encode_roster
+from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.wire.seal import Seal
+from tests.builders import MISSION
+
+__all__ = ["Keyring"]
+
+
+class Keyring:
+    """An authority and everyone's private keys.
+
+    Args:
+        uavs: ids of the fleet; coordinator, operator and a viewer ``dashboard`` come on top.
+        mission: mission name.
+    """
+
+    def __init__(self, *uavs: str, mission: str = MISSION) -> None:
+        roles = dict.fromkeys(uavs, Role.UAV)
+        roles |= {
+            COORDINATOR: Role.COORDINATOR,
+            "coordinator-2": Role.COORDINATOR,
+            OPERATOR: Role.OPERATOR,
+            "dashboard": Role.VIEWER,
+            "router": Role.ROUTER,
+        }
+        self.authority = Ed25519PrivateKey.generate()
+        self.private = {name: Ed25519PrivateKey.generate() for name in roles}
+        entries = tuple(
+            Entry(name, role, 1, self.private[name].public_key().public_bytes_raw(), 1 << 39)
+            for name, role in sorted(roles.items())
+        )
+        self.roster = Roster(mission, bytes(SERIES_BYTES), 1, entries)
+
+    def signed(self, roster: Roster | None = None) -> str:
+        """A roster, by default the present one, as the authority signs it."""
+        return encode_roster(roster or self.roster, self.authority).decode()
+
+    def without(self, *names: str) -> Roster:
+        """The next roster, in which ``names`` are revoked."""
+        kept = tuple(entry for entry in self.roster.entries if entry.name not in names)
+        return replace(self.roster, version=self.roster.version + 1, entries=kept)
+
+    def seal(self, name: str, roster: Roster | None = None) -> Seal:
+        """Of ``name``, with the present roster or another one."""
+        public = self.authority.public_key().public_bytes_raw()
+        kept: list[bytes] = []
+        return Seal(name, self.private[name].sign, self.signed(roster), public, kept.append)
