@@ -70,6 +70,7 @@ def _check(source: Path, wheel: Path, rooms: Path) -> None:
         prefix = f"peckorder-{__version__}/"
         _same("source distribution", source_files(tracked), _names(archive, prefix))
         archive.extractall(rooms, filter="data")
+        made_s = archive.getmember(f"{prefix}PKG-INFO").mtime
     unpacked = rooms / prefix
     with zipfile.ZipFile(wheel) as packed:
         within = [name for name in packed.namelist() if not name.endswith("/")]
@@ -83,7 +84,8 @@ def _check(source: Path, wheel: Path, rooms: Path) -> None:
     _well("metadata: valid, the same in both, of version " + __version__)
 
     again = rooms / "again"
-    _run([sys.executable, "-m", "build", "--outdir", str(again), str(unpacked)], rooms)
+    words = [sys.executable, "-m", "build", "--outdir", str(again), str(unpacked)]
+    _run(words, rooms, SOURCE_DATE_EPOCH=str(int(made_s)))
     for made in (source, wheel):
         if not filecmp.cmp(made, again / made.name, shallow=False):
             raise Failure(f"{made.name}: built again elsewhere, other bytes come out")
@@ -203,12 +205,10 @@ def _installed(python: Path) -> set[str]:
     return {line for line in lines if not line.endswith(own)}
 
 
-def _run(words: Sequence[str], folder: Path) -> str:
+def _run(words: Sequence[str], folder: Path, **environment: str) -> str:
     """The output of a program, which must succeed, in ``folder`` and without our packages."""
-    environment = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
-    done = subprocess.run(
-        words, cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
+    own = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"} | environment
+    done = subprocess.run(words, cwd=folder, env=own, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         last = "\n       ".join((done.stdout + done.stderr).strip().splitlines()[-20:])
         raise Failure(f"{' '.join(words)}: ended with {done.returncode}\n       {last}")
