@@ -24,8 +24,8 @@ from pathlib import Path
 
 import zenoh
 
-from swarm.bus.secure import secure_settings
-from swarm.bus.zenoh_session import close_session, lay_over, open_session, session_config
+from swarm.bus.secure import secure
+from swarm.bus.zenoh_session import close_session, open_session, session_config
 from swarm.clock import SystemClock
 from swarm.identity import Identity, load_identity
 from swarm.sealing import seal_of
@@ -68,7 +68,7 @@ async def _pour(identity: Identity, options: argparse.Namespace, ended: list[int
     if seal is None:
         return
     config = session_config("client", listen=[], connect=options.connect, lease_s=_LEASE_S)
-    lay_over(config, secure_settings(identity, "client", identity.roster))
+    secure(config, identity, "client", identity.roster)
     messages = torrent(identity.mission, seal, options.other)
     session = await open_session(config, timeout_s=_LIMIT_S)
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import re
 import shutil
 import time
 from pathlib import Path
@@ -12,11 +11,9 @@ import numpy as np
 import pytest
 
 from swarm.clock import unix_s
-from swarm.identity.authority import open_authority
 from swarm.identity.founding import found_authority
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import ByHand
-from tests.process.mission import wait_until
 
 pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
 
