@@ -317,13 +317,17 @@ class RoughNetwork:
 
     def _pass_on(self, question: _Question, seat: Seat) -> None:
         def reach() -> None:
-            answer = seat.answer() if self.joined(question.asker, seat) else None
+            answer = self._answer_of(seat) if self.joined(question.asker, seat) else None
             if answer is not None and not self._is_lost(back):
                 self._queue.after(self._delay_s(back), lambda: self._take(question, seat, answer))
 
         there, back = self._link(question.asker, seat), self._link(seat, question.asker)
         if not self._is_lost(there):
             self._queue.after(self._delay_s(there), reach)
+
+    def _answer_of(self, seat: Seat) -> Snapshot | None:
+        """What ``seat`` answers, as it is understood."""
+        return seat.answer()
 
     def _is_lost(self, link: _Link) -> bool:
         """Whether a question or an answer is."""

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
 from swarm.bus.port import (
+    Answer,
     Bus,
     BusEvent,
     LinkDown,
@@ -44,6 +45,7 @@ from swarm.events import (
     Save,
     Tick,
 )
+from swarm.limits import TOO_MANY, Gate
 from swarm.log import get_logger
 from swarm.model.ids import AUTHORITY
 from swarm.wire.codec import Codec
@@ -51,9 +53,12 @@ from swarm.wire.digest import unknown
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Choice, Message, SignedRoster, Snapshot, Stamp, Status
 from swarm.wire.question import NONCE_BYTES, decode_question, encode_question
-from swarm.wire.seal import SIGNER_UNKNOWN, Seal, UnacceptableError
+from swarm.wire.seal import Seal, UnacceptableError
 
 __all__ = ["Core", "Shell", "take_seat"]
+
+TURN = 20
+"""Events from the bus between two looks at everything else."""
 
 E_contra = TypeVar("E_contra", contravariant=True)
 A_co = TypeVar("A_co", covariant=True)
@@ -128,6 +133,8 @@ class Shell(Generic[E, A]):
         self._seal = bus.seal
         self._draw_nonce = draw_nonce
         self._codec = Codec(mission, bus.seal)
+        self._gate = Gate(self._keys, bus.seal, clock.now_s)
+        bus.inbox.admits = self._gate.admits
         self._log = get_logger(name, mission=mission)
         self._from_bus = from_bus
         self._execute = execute
@@ -142,6 +149,9 @@ class Shell(Generic[E, A]):
         self._asking: set[asyncio.Task[None]] = set()
         self._events: deque[E] = deque()
         self._busy = False
+        self._told_newer: set[str] = set()
+        self._counted: Counter[str] = Counter()
+        """Of what never got as far as the codec, what is counted there."""
 
     @property
     def dropped(self) -> Mapping[str, int]:
@@ -150,7 +160,7 @@ class Shell(Generic[E, A]):
 
     async def run(self) -> int:
         """Run the core to its end; its exit status."""
-        reader = self._loop.create_task(self._read())
+        reader = self._loop.create_task(self._hear())
         reader.add_done_callback(self._fail)
         try:
             self._guard(self._start)
@@ -272,16 +282,34 @@ class Shell(Generic[E, A]):
         if not task.cancelled() and (fault := task.exception()):
             self.fail(fault)
 
-    async def _read(self) -> None:
+    async def _hear(self) -> None:
         while True:
             await self._bus.inbox.wait()
             events = self._bus.inbox.take()
-            if self._bus.inbox.dropped:
-                self._codec.dropped["too many"] = self._bus.inbox.dropped
-            for event in events:
+            self._count()
+            for number, event in enumerate(events, 1):
                 fact = self._fact(event)
                 if fact is not None:
                     self.step(self._from_bus(fact))
+                if number % TURN == 0:  # the vehicle must not wait for a flood of words
+                    await asyncio.sleep(0)
+
+    def _tell_newer(self) -> None:
+        """Tell people once of each kind: it is no fault to be of another release."""
+        if len(self._codec.newer) == len(self._told_newer):
+            return
+        for kind in self._codec.newer - self._told_newer:
+            self._told_newer.add(kind)
+            self._log.info("a newer release says more than this one understands", kind=kind)
+
+    def _count(self) -> None:
+        """Count what was dropped before anything was read of it."""
+        gone, refused = self._bus.inbox.dropped, self._gate.refused
+        if gone or refused:
+            counts = Counter(dict(refused))  # copied at once: others may count on meanwhile
+            counts[TOO_MANY] += gone
+            self._codec.dropped.update(counts - self._counted)
+            self._counted = counts
 
     def _fact(self, event: BusEvent) -> BusFact | None:
         match event:
@@ -289,11 +317,12 @@ class Shell(Generic[E, A]):
                 message = self._codec.decode(key, payload)
                 if message is None:
                     return None
+                self._tell_newer()
                 self._heed([message])
                 return Heard(message)
             case TokenSeen(key):
                 writer = self._keys.writer_of_token(key)
-                return PeerSeen(writer) if writer is not None and self._belongs(writer) else None
+                return None if writer is None else PeerSeen(writer)
             case TokenGone(key):
                 writer = self._keys.writer_of_token(key)
                 return None if writer is None else PeerGone(writer)
@@ -304,13 +333,6 @@ class Shell(Generic[E, A]):
             case Query(reply=reply, payload=payload):
                 self._answer(reply, payload)
                 return None
-
-    def _belongs(self, writer: str) -> bool:
-        """Whether a token may be shown by somebody of this mission; tokens cannot be signed."""
-        if self._seal is None or self._seal.knows(writer):
-            return True
-        self._codec.dropped[SIGNER_UNKNOWN] += 1
-        return False
 
     def _answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
         if self._snapshot is None:
@@ -334,17 +356,30 @@ class Shell(Generic[E, A]):
         nonce = self._draw_nonce()
         question = encode_question(known, nonce, self._seal)
         answers = await self._bus.query(self._keys.state("*"), question, timeout_s=self._answer_s)
+        read = [(await self._read(answer, nonce), answer.arrived_s) for answer in answers]
         now_s, wall_s = self._clock.now_s(), self._loop.time()
         pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
         snapshots = []
-        for answer in answers:
-            snapshot = self._codec.decode_snapshot(answer.key, answer.payload, nonce)
+        for snapshot, arrived_s in read:
             if snapshot is not None:
-                age_s = pace * (wall_s - answer.arrived_s)
-                snapshots.append(_aged(snapshot, age_s))
-        for snapshot in snapshots:
-            self._heed(snapshot.messages, answers=True)
+                self._heed(snapshot.messages, answers=True)
+                snapshots.append(_aged(snapshot, pace * (wall_s - arrived_s)))
         self.step(self._from_bus(Learned(tuple(snapshots))))
+
+    async def _read(self, answer: Answer, nonce: bytes) -> Snapshot | None:
+        """What is in an answer, as far as it is to be believed."""
+        opened = self._codec.open_answer(answer.key, answer.payload, nonce)
+        if opened is None:
+            return None
+        snapshot, registers = opened
+        messages = []
+        for number, register in enumerate(registers, 1):
+            message = self._codec.decode_register(register)
+            if message is not None:
+                messages.append(message)
+            if number % TURN == 0:
+                await asyncio.sleep(0)
+        return replace(snapshot, messages=tuple(messages))
 
 
 def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:

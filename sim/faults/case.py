@@ -7,7 +7,7 @@ Leaves out: how schedules are made up (sim.faults.generator) and made smaller
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -35,9 +35,11 @@ from swarm.model.ids import COORDINATOR
 __all__ = [
     "MOST_TASKS",
     "MOST_UAVS",
+    "TIMING",
     "Case",
     "Verdict",
     "format_case",
+    "limit_s",
     "parse_case",
     "play",
     "quick_plan",
@@ -131,12 +133,22 @@ def quick_plan(mission: Mission, method: str, seed: int) -> Plan:
     )
 
 
-def play(case: Case, make_plan: Planner = quick_plan) -> Verdict:
-    """Fly ``case`` to its end, or until an invariant breaks."""
+def play(
+    case: Case,
+    make_plan: Planner = quick_plan,
+    join: Callable[[EventQueue, Conditions, int], RoughNetwork] = RoughNetwork,
+) -> Verdict:
+    """Fly ``case`` to its end, or until an invariant breaks.
+
+    Args:
+        case: the fleet and what goes wrong.
+        make_plan: plans.
+        join: makes the network, given conditions and seed.
+    """
     network: list[RoughNetwork] = []
 
     def make_network(queue: EventQueue) -> RoughNetwork:
-        network.append(RoughNetwork(queue, Conditions(case.topology), case.seed))
+        network.append(join(queue, Conditions(case.topology), case.seed))
         return network[0]
 
     mission, judge = case.flown(), Judge()

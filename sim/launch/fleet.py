@@ -18,7 +18,7 @@ from sim.launch.firmware import Firmware
 from sim.launch.handed_on import HandedOn
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology, Topology
 from swarm.bus.endpoints import free_loopback_endpoints
-from swarm.bus.loopback import is_loopback
+from swarm.bus.privacy import is_loopback
 from swarm.config import Link, preset
 from swarm.log import LogFormat
 from swarm.model import Mission

@@ -118,7 +118,7 @@ async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
         SERVICE.ready(f"serves at {', '.join(serving.endpoints)}")
         if not quiet:
             get_logger("router").info(f"router ready at {', '.join(serving.endpoints)}")
-        await asyncio.Event().wait()
+        await serving.serve()
         return 0
     finally:
         serving.close()

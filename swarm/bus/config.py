@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm.bus.loopback import is_loopback
+from swarm.bus.privacy import is_encrypted, is_loopback
 from swarm.config import PRESETS, Link
 from swarm.errors import Fault, InputError
 from swarm.suggest import instead
@@ -44,7 +44,6 @@ ENDPOINT = re.compile(
     r"(?:tcp|tls|quic|ws)/(?:\[[0-9A-Fa-f:.%\w]+\]|[^\s:/?#\[\]]+):(\d{1,5})(?:[?#]\S*)?"
 )
 UNIX_ENDPOINT = re.compile(r"unixsock-stream/\S+")
-_ENCRYPTED = ("tls/", "quic/")
 ENDPOINT_REMEDY = "write PROTOCOL/HOST:PORT with tcp, tls, quic or ws, as in tcp/127.0.0.1:7447"
 
 
@@ -244,9 +243,9 @@ def _check_encryption(
     if identity is not None and unencrypted:
         raise ValueError("--keys and --unencrypted contradict each other; give one of them")
     for endpoint in endpoints:
-        if identity is not None and not endpoint.startswith(_ENCRYPTED):
+        if identity is not None and not is_encrypted(endpoint):
             raise ValueError(f"{endpoint} is not encrypted; with --keys write tls/… or quic/…")
-        if identity is None and endpoint.startswith(_ENCRYPTED):
+        if identity is None and is_encrypted(endpoint):
             raise ValueError(f"{endpoint} needs keys; give --keys DIR, which 'swarm keys' makes")
         if identity is None and not unencrypted and not is_loopback(endpoint):
             raise ValueError(

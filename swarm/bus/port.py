@@ -128,6 +128,9 @@ class Inbox:
         self._ready = asyncio.Event()
         self.dropped = 0
         """Events dropped because the reader was too slow."""
+        self.admits: Callable[[BusEvent], bool] | None = None
+        """What is not to be taken in at all; asked by whichever thread brings an event, one at
+        a time. None to take everything."""
 
     def offer_threadsafe(self, event: BusEvent, *, latest: bool = False) -> None:
         """Hand ``event`` over from a foreign thread; returns at once.
@@ -174,6 +177,8 @@ class Inbox:
 
     def _put(self, event: BusEvent, latest: bool) -> None:
         """Append under the lock, making room if there is none."""
+        if self.admits is not None and not self.admits(event):
+            return
         if latest and isinstance(event, Sample):
             if event.key not in self._latest and len(self._latest) >= self._capacity:
                 del self._latest[next(iter(self._latest))]

@@ -38,6 +38,8 @@ from swarm.bus.port import (
 from swarm.bus.writer import Writer
 from swarm.bus.zenoh_session import (
     close_session,
+    endpoints_of,
+    mode_of,
     open_session,
     plain_error,
     session_config,
@@ -45,6 +47,7 @@ from swarm.bus.zenoh_session import (
 )
 from swarm.errors import BusError
 from swarm.log import get_logger
+from swarm.sealing import seal_of
 from swarm.wire.seal import Seal
 
 __all__ = ["ZenohBus", "open_zenoh_bus"]
@@ -53,6 +56,8 @@ REPLY_WITHIN_S = 10.0
 """A query nobody has answered for this long is given up: who asked waits no longer."""
 FLUSH_LIMIT_S = 0.7
 """How long closing waits for what is published; a blocked link gives up after 0.5 s."""
+LOOK_GAP_S = 0.005
+"""Shortest interval between two looks at the links [wall s]."""
 CLOSE_LIMIT_S = 1.2
 """How long closing waits for the session to say goodbye."""
 
@@ -74,8 +79,29 @@ async def open_zenoh_bus(
         BusError: the bus cannot be reached in time, or the own endpoint is taken.
         InputError: the user's configuration file is wrong.
     """
-    session = await open_session(_zenoh_config(config), timeout_s=timeout_s)
-    return ZenohBus(session, Inbox(asyncio.get_running_loop(), inbox_capacity))
+    session = await _open(config, timeout_s)
+    inbox = Inbox(asyncio.get_running_loop(), inbox_capacity)
+    return ZenohBus(session, inbox, seal_of(config.identity))
+
+
+async def _open(config: BusConfig, timeout_s: float) -> zenoh.Session:
+    settings, identity = _zenoh_config(config), config.identity
+    if identity is None:
+        return await open_session(settings, timeout_s=timeout_s)
+    # Loaded by those alone that have keys.
+    from swarm.bus.refusal import why_refused
+    from swarm.bus.secure import secure
+
+    mode = mode_of(settings)
+    secure(settings, identity, mode, identity.roster)
+    try:
+        return await open_session(settings, timeout_s=timeout_s)
+    except BusError as fault:
+        routers = endpoints_of(settings, "connect")
+        if mode != "client" or not routers:
+            raise
+        reason = await why_refused(routers, identity)
+        raise BusError(f"cannot reach the bus within {timeout_s:g} s: {reason}") from fault
 
 
 def _zenoh_config(config: BusConfig) -> zenoh.Config:
@@ -91,13 +117,17 @@ def _zenoh_config(config: BusConfig) -> zenoh.Config:
 class _LinkWatch:
     """Tells the first and the last transport from the others; used on Zenoh's threads."""
 
-    def __init__(self, session: zenoh.Session, inbox: Inbox) -> None:
+    def __init__(
+        self, session: zenoh.Session, inbox: Inbox, loop: asyncio.AbstractEventLoop
+    ) -> None:
         self._session = session
         self._inbox = inbox
+        self._loop = loop
         self._lock = threading.Lock()
         self._others: set[str] = set()
         self._linked = False
         self._changes = 0
+        self._look_again_s = 0.0
 
     def on_event(self, event: zenoh.TransportEvent) -> None:
         """A transport to one of the others came or went."""
@@ -111,11 +141,16 @@ class _LinkWatch:
             self._set(bool(self._others))
 
     def look(self) -> None:
-        """Notice a lost link before its event: tokens go a little earlier than transports."""
+        """Notice a lost link before its event: tokens go a little earlier than transports.
+
+        Not for every token of a flood: looking takes a while, and all else waits meanwhile.
+        """
+        now_s = self._loop.time()
         with self._lock:
             changes = self._changes
-            if not self._linked:
+            if not self._linked or now_s < self._look_again_s:
                 return
+            self._look_again_s = now_s + LOOK_GAP_S
         if self._session.info.links():  # not under the lock: it may wait for Zenoh's
             return
         with self._lock:
@@ -180,7 +215,7 @@ class ZenohBus:
         # A thread that comes back from Zenoh while the interpreter ends aborts the process.
         atexit.register(self.close)
         self._replies: weakref.WeakSet[_Reply] = weakref.WeakSet()
-        self._links = _LinkWatch(session, inbox)
+        self._links = _LinkWatch(session, inbox, self._loop)
         self._call(
             lambda: session.info.declare_transport_events_listener(
                 _direct(self._links.on_event), history=True

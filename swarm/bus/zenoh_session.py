@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -22,7 +22,16 @@ from swarm.errors import BusError
 from swarm.log import get_logger
 from swarm.process import call_in_background
 
-__all__ = ["close_session", "open_session", "plain_error", "session_config", "session_config_file"]
+__all__ = [
+    "close_session",
+    "endpoints_of",
+    "lay_over",
+    "mode_of",
+    "open_session",
+    "plain_error",
+    "session_config",
+    "session_config_file",
+]
 
 OPEN_TIMEOUT_S = 2.0
 """How long an endpoint that does not answer delays the next one; a bad link needs about 1 s."""
@@ -33,6 +42,8 @@ BLOCKED_CLOSE_S = 0.5
 """A link whose queue does not move for this long is closed, so that one hung reader holds
 the others up no longer."""
 HEADERS_BYTES = 64 << 10
+DEFAULT_MODE = "peer"
+"""Of a Zenoh configuration file that names none."""
 
 
 def session_config(
@@ -71,9 +82,14 @@ def session_config(
         "transport/unicast/accept_timeout": _ms(OPEN_TIMEOUT_S),
     }
     config = zenoh.Config()
+    lay_over(config, settings)
+    return config
+
+
+def lay_over(config: zenoh.Config, settings: Mapping[str, object]) -> None:
+    """Put ``settings``, by path, in the place of what ``config`` says."""
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
-    return config
 
 
 def session_config_file(path: Path) -> zenoh.Config:
@@ -90,13 +106,29 @@ def session_config_file(path: Path) -> zenoh.Config:
         raise config_file_fault(path, plain_error(fault)) from fault
 
 
+def mode_of(config: zenoh.Config) -> str:
+    """``client``, ``peer`` or ``router``."""
+    return str(json.loads(config.get_json("mode")) or DEFAULT_MODE)
+
+
+def endpoints_of(config: zenoh.Config, side: str) -> list[str]:
+    """Endpoints that a session of ``config`` has on one side: ``connect`` or ``listen``."""
+    mode = mode_of(config)
+    if side == "listen" and mode == "client":
+        return []
+    named = json.loads(config.get_json(f"{side}/endpoints")) or []
+    if isinstance(named, dict):
+        named = named.get(mode) or []
+    return [str(each) for each in named]
+
+
 async def open_session(config: zenoh.Config, *, timeout_s: float) -> zenoh.Session:
     """Open a session; a client waits until one of its routers is there.
 
     Raises:
         BusError: it could not be opened within ``timeout_s``, or at all.
     """
-    waits = json.loads(config.get_json("mode") or '""') == "client"
+    waits = mode_of(config) == "client"
     problem = "no answer"
     try:
         async with asyncio.timeout(timeout_s):

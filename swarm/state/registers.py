@@ -9,6 +9,7 @@ follows from the registers (swarm.state.board, swarm.state.claims).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 
 from swarm.wire.codec import encode
@@ -27,7 +28,10 @@ from swarm.wire.messages import (
     TaskOrder,
 )
 
-__all__ = ["Replica"]
+__all__ = ["MOST_UNPOSTED", "Replica"]
+
+MOST_UNPOSTED = 1000
+"""Tasks that nobody has posted of which one writer may tell the outcome."""
 
 
 class Replica:
@@ -62,6 +66,10 @@ class Replica:
         All have one writer, so their stamps tell which is the newest of several."""
         self.stale = 0
         """Statements that were older than what was known."""
+        self.overfull = 0
+        """Outcomes of tasks that nobody has posted, of writers that told of too many such."""
+        self._unposted: Counter[str] = Counter()
+        """By writer, outcomes that were taken in when their task was not on the board."""
         self.board_version = 0
         """Grows with every change of brief or board."""
         self.task_version = 0
@@ -80,6 +88,9 @@ class Replica:
             if _says_more(message, known):
                 self._registers[key] = message
                 self._changed.add(key)
+            return False
+        if known is None and self._is_overfull(message):
+            self.overfull += 1
             return False
         self._registers[key] = message
         self._changed.add(key)
@@ -105,6 +116,18 @@ class Replica:
             case Command(target=target) as command:
                 self.commands[target] = message.stamp, command
         return True
+
+    def _is_overfull(self, message: Message) -> bool:
+        """Whether its writer has told of too many tasks that there are not.
+
+        An honest one may tell of some before the board is known here; what of that is left out
+        comes again, as everything that is not known. Others must not cost memory without end.
+        """
+        body, writer = message.body, message.writer
+        if not isinstance(body, Outcome) or body.task in self.board:
+            return False
+        self._unposted[writer] += self._unposted[writer] < MOST_UNPOSTED
+        return self._unposted[writer] == MOST_UNPOSTED
 
     def ordered(self, task: str) -> TaskOrder | None:
         """The operator's order about ``task`` in this flight; None if there is none."""

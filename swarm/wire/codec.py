@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Final
@@ -230,7 +230,7 @@ class Codec:
         self.dropped: Counter[str] = Counter()
         """Messages dropped so far, by reason."""
         self.newer: set[str] = set()
-        """Kinds of messages heard with more in them than this release understands."""
+        """Kinds of messages that were heard with more in them than this release understands."""
 
     # -- for the bus ----------------------------------------------------------------
 
@@ -294,6 +294,17 @@ class Codec:
             data: the answer.
             nonce: of the question, where the bus has keys.
         """
+        opened = self.open_answer(key, data, nonce)
+        if opened is None:
+            return None
+        snapshot, registers = opened
+        read = [self.decode_register(register) for register in registers]
+        return replace(snapshot, messages=tuple(said for said in read if said is not None))
+
+    def open_answer(
+        self, key: str, data: bytes, nonce: bytes = b""
+    ) -> tuple[Snapshot, tuple[object, ...]] | None:
+        """As `decode_snapshot`, the registers apart and each yet for `decode_register`."""
         signer = None
         try:
             _require(len(data) <= SNAPSHOT_LIMIT_BYTES, "too large")
@@ -307,7 +318,15 @@ class Codec:
         except UnacceptableError as fault:
             self.dropped[fault.reason] += 1
             return None
-        return replace(snapshot, messages=tuple(self._acceptable(registers, self._answered)))
+        return snapshot, registers
+
+    def decode_register(self, register: object) -> Message | None:
+        """The message in one register of an answer; None when it must be left out."""
+        try:
+            return self._answered(register)
+        except UnacceptableError as fault:
+            self.dropped[fault.reason] += 1
+            return None
 
     def _may_speak(self, signer: str, writer: str) -> bool:
         return self._seal is not None and self._seal.may_speak_for(signer, writer)
@@ -351,15 +370,6 @@ class Codec:
         _require_size(message)
         return message
 
-    def _acceptable(
-        self, registers: Iterable[object], read: Callable[[object], Message]
-    ) -> Iterator[Message]:
-        for register in registers:
-            try:
-                yield read(register)
-            except UnacceptableError as fault:
-                self.dropped[fault.reason] += 1
-
     # -- from the own memory --------------------------------------------------------
 
     def decode_memory(self, key: str, data: bytes) -> Snapshot | None:
@@ -372,7 +382,13 @@ class Codec:
         except UnacceptableError as fault:
             self.dropped[fault.reason] += 1
             return None
-        return replace(snapshot, messages=tuple(self._acceptable(registers, self._recalled)))
+        messages = []
+        for register in registers:
+            try:
+                messages.append(self._recalled(register))
+            except UnacceptableError as fault:
+                self.dropped[fault.reason] += 1
+        return replace(snapshot, messages=tuple(messages))
 
     def _recalled(self, register: object) -> Message:
         if not isinstance(register, bytes):

@@ -1,4 +1,4 @@
-"""Which endpoints stay on this machine.
+"""Which endpoints nobody else can listen in on: those on this machine, and encrypted ones.
 
 Leaves out: whether an endpoint is well formed (swarm.bus.config).
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ipaddress
 
-__all__ = ["is_loopback"]
+__all__ = ["is_encrypted", "is_loopback"]
 
 
 def is_loopback(endpoint: str) -> bool:
@@ -31,3 +31,8 @@ def is_loopback(endpoint: str) -> bool:
         return False
     mapped = address.ipv4_mapped if isinstance(address, ipaddress.IPv6Address) else None
     return (mapped or address).is_loopback
+
+
+def is_encrypted(endpoint: str) -> bool:
+    """Whether what goes by ``endpoint`` is encrypted, and both ends prove who they are."""
+    return endpoint.startswith(("tls/", "quic/"))

@@ -1,0 +1,158 @@
+"""How much of whom a process takes in: token buckets, before anything is decoded.
+
+Honest processes stay far below the limits, in mission seconds, so that a mission flown
+faster than the wall may say as much; who floods loses its own words, not those of others.
+What an honest one loses in a storm comes back: registers are repeated, and told to whoever
+asks. Leaves out: what the routers hold back already (swarm.bus.access), and the size of what
+is said (swarm.wire.codec).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Final
+
+from swarm.bus.port import BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
+from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR
+from swarm.wire.keys import Keys
+from swarm.wire.seal import NOT_SIGNED, NOT_THE_SIGNERS, SIGNER_UNKNOWN, Seal, open_envelope
+
+__all__ = ["TOO_MANY", "Gate", "Limiter"]
+
+TOO_MANY: Final = "too many"
+"""Reason under which is counted what came too fast."""
+
+UAV_HZ, UAV_BURST = 100.0, 1000
+"""Of one UAV. It says some 10 a second; when a partition heals, it greets every other one with
+up to 5."""
+SEAT_HZ, SEAT_BURST = 2000.0, 20_000
+"""Of coordinator, operator and authority: a board is posted all at once."""
+TOKEN_HZ, TOKEN_BURST = 20.0, 100
+"""Of one token: two for each blink of a router."""
+ASKER_HZ, ASKER_BURST = 10.0, 30
+"""Questions of one asker, where it has signed them; it asks at most 5 a second."""
+QUESTION_HZ, QUESTION_BURST = 100.0, 1000
+"""Questions of everybody together, where nobody knows who asks."""
+_NOBODY: Final = ""
+
+
+class Limiter:
+    """One token bucket for each of many sources.
+
+    Args:
+        rate_hz: how many each may send for good.
+        burst: how many at once.
+        most_sources: of how many it keeps a record; further ones wait until some have been
+            quiet, so that made-up names cost no memory.
+    """
+
+    def __init__(self, rate_hz: float, burst: int, *, most_sources: int = 4096) -> None:
+        self._rate_hz = rate_hz
+        self._burst = burst
+        self._most_sources = most_sources
+        self._buckets: dict[str, tuple[float, float]] = {}
+        """What is left to each source, and when that was so [s]."""
+
+    def allows(self, source: str, now_s: float) -> bool:
+        """Whether one more from ``source`` may come in now."""
+        known = self._buckets.get(source)
+        if known is None:
+            if len(self._buckets) >= self._most_sources and not self._forget_quiet(now_s):
+                return False
+            left = float(self._burst)
+        else:
+            left, at_s = known
+            left = min(self._burst, left + self._rate_hz * max(0.0, now_s - at_s))
+        allowed = left >= 1.0
+        self._buckets[source] = (left - allowed, now_s)
+        return allowed
+
+    def _forget_quiet(self, now_s: float) -> bool:
+        """Forget whose bucket is full again; whether there was any."""
+        full_s = self._burst / self._rate_hz
+        quiet = [source for source, (_, at_s) in self._buckets.items() if at_s + full_s <= now_s]
+        for source in quiet:
+            del self._buckets[source]
+        return bool(quiet)
+
+
+class Gate:
+    """Decides what of all that arrives one process takes in; called from any thread, in turn.
+
+    Where there are keys, a source is who claims to have signed, if that one may write the key:
+    nobody uses up what another may say but by its forged name, for which it needs the key of
+    that other one at the routers. Else it is whose key it is.
+
+    Args:
+        keys: of the mission.
+        seal: of the process; None without keys.
+        now_s: its clock [s].
+    """
+
+    def __init__(self, keys: Keys, seal: Seal | None, now_s: Callable[[], float]) -> None:
+        self.refused: Counter[str] = Counter()
+        """What was not let in, by reason."""
+        self._keys = keys
+        self._seal = seal
+        self._now_s = now_s
+        self._uavs = Limiter(UAV_HZ, UAV_BURST)
+        self._seats = Limiter(SEAT_HZ, SEAT_BURST)
+        self._tokens = Limiter(TOKEN_HZ, TOKEN_BURST)
+        askers = seal is not None
+        self._questions = Limiter(
+            ASKER_HZ if askers else QUESTION_HZ, ASKER_BURST if askers else QUESTION_BURST
+        )
+
+    def admits(self, event: BusEvent) -> bool:
+        """Whether the process shall see ``event``; counted when not."""
+        reason = self._fault(event)
+        if reason is not None:
+            self.refused[reason] += 1
+        return reason is None
+
+    def _fault(self, event: BusEvent) -> str | None:
+        match event:
+            case Sample(key, payload):
+                return self._fault_of_sample(key, payload)
+            case Query(payload=payload):
+                return self._fault_of_question(payload)
+            case TokenSeen(key) | TokenGone(key):
+                return self._fault_of_token(key)
+            case LinkUp() | LinkDown():
+                return None
+
+    def _fault_of_sample(self, key: str, payload: bytes) -> str | None:
+        writer = self._keys.writer_of(key) or _NOBODY
+        if self._seal is None or writer == AUTHORITY:
+            return self._too_many(writer, writer)
+        envelope = open_envelope(payload)
+        if envelope is None:
+            return NOT_SIGNED
+        if self._seal.roster.entry(envelope.signer) is None:
+            return SIGNER_UNKNOWN
+        if not self._seal.may_speak_for(envelope.signer, writer):
+            return NOT_THE_SIGNERS
+        return self._too_many(writer, envelope.signer)
+
+    def _too_many(self, writer: str, source: str) -> str | None:
+        seat = writer in (AUTHORITY, COORDINATOR, OPERATOR)
+        limiter = self._seats if seat else self._uavs
+        return None if limiter.allows(source, self._now_s()) else TOO_MANY
+
+    def _fault_of_question(self, payload: bytes) -> str | None:
+        source = _NOBODY
+        if self._seal is not None:
+            envelope = open_envelope(payload)
+            if envelope is None:
+                return NOT_SIGNED
+            if self._seal.roster.entry(envelope.signer) is None:
+                return SIGNER_UNKNOWN
+            source = envelope.signer
+        return None if self._questions.allows(source, self._now_s()) else TOO_MANY
+
+    def _fault_of_token(self, key: str) -> str | None:
+        writer = self._keys.writer_of_token(key) or _NOBODY
+        if self._seal is not None and not self._seal.knows(writer):
+            return SIGNER_UNKNOWN
+        return None if self._tokens.allows(writer, self._now_s()) else TOO_MANY

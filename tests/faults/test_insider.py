@@ -1,0 +1,159 @@
+"""Somebody with valid keys lies about all others: they fly as if nothing had been said."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from coordinator.observer import MissionResult
+from sim.chaos.insider import Insider
+from sim.event_queue import EventQueue
+from sim.faults.case import TIMING, Case, Verdict, limit_s, play, quick_plan
+from sim.faults.schedule import parse_schedule
+from sim.rough_network import Conditions
+from sim.sealed_network import SealedNetwork
+from sim.world import Setting, World
+from swarm.model import UavId
+from swarm.wire.seal import Seal
+from tests.keyring import Keyring
+
+LIAR = "u0"
+EVERY_S = 0.05
+"""Between two lies."""
+
+
+@dataclass(slots=True)
+class Flight:
+    """One case, flown behind seals."""
+
+    case: Case
+    lies: bool = True
+    keys: Keyring = field(init=False)
+    verdict: Verdict = field(init=False)
+    network: SealedNetwork = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.keys = keys_of(self.case)
+        self.verdict = play(self.case, join=self._join)
+
+    def _join(self, queue: EventQueue, conditions: Conditions, seed: int) -> SealedNetwork:
+        self.network = sealed(self.keys, queue, conditions, seed)
+        if self.lies:
+            self._set_liar_on(self.network, queue, self.keys.seal(LIAR))
+        return self.network
+
+    def _set_liar_on(self, network: SealedNetwork, queue: EventQueue, seal: Seal) -> None:
+        mission = self.case.flown()
+        others = [uav.id for uav in mission.uavs if uav.id != LIAR]
+        tasks = [task.id for task in mission.tasks]
+        rng = np.random.default_rng([self.case.seed, 8])
+        insider = Insider(mission.name, seal, others, tasks, rng)
+        network.overheard = insider.overhear
+
+        def amend(writer: str, answer: bytes, nonce: bytes) -> bytes:
+            return insider.amended(answer, nonce) if writer == LIAR else answer
+
+        def lie() -> None:
+            told = insider.lie()
+            network.lie(told.key, told.payload)
+            queue.after(EVERY_S, lie)
+
+        network.amend = amend
+        queue.after(EVERY_S, lie)
+
+
+def keys_of(case: Case) -> Keyring:
+    mission = case.flown()
+    return Keyring(*(uav.id for uav in mission.uavs), mission=mission.name)
+
+
+def sealed(keys: Keyring, queue: EventQueue, conditions: Conditions, seed: int) -> SealedNetwork:
+    return SealedNetwork(
+        queue,
+        conditions,
+        seed,
+        keys.roster.mission,
+        functools.cache(keys.seal),
+        keys.seal("dashboard"),
+    )
+
+
+def case(seed: int, *lines: str) -> Case:
+    drawn = Case(seed, 4, 10, popups=2)
+    names = drawn.processes()
+    tasks = [task.id for task in drawn.flown().tasks]
+    return replace(drawn, schedule=parse_schedule(lines, "the test", names, tasks))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_all_fly_as_without_the_liar(seed: int) -> None:
+    honest, lied_to = Flight(case(seed), lies=False), Flight(case(seed))
+
+    assert lied_to.verdict.broken is None
+    result = lied_to.verdict.world.observer.result()
+    assert result == honest.verdict.world.observer.result()
+    assert result.open == ()
+    assert honest.network.ear.dropped == {}
+    dropped = lied_to.network.ear.dropped
+    assert dropped.keys() == {
+        "not the signer's to say",
+        "wrongly signed",
+        "not signed",
+        "said on another's key",
+    }
+    assert min(dropped.values()) > 20
+
+
+FAULTS = [
+    "5 crash u1 for 3 with disk",
+    "8 cut u2 u3 for 4",
+    "12 crash coordinator for 4 with disk",
+    "15 lose u3",
+    "18 crash u2 for 2 with none",
+    "20 weather by 0.3 for 5",
+]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_whatever_else_goes_wrong_no_invariant_breaks(seed: int) -> None:
+    verdict = Flight(case(seed, *FAULTS)).verdict
+
+    assert verdict.broken is None
+    assert verdict.world.observer.result().open == ()
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None:
+    """Its token and its words count no longer, so it is as good as lost; what it had done by
+    then stays done."""
+    flown = case(seed)
+    keys, networks = keys_of(flown), list[SealedNetwork]()
+
+    def join(queue: EventQueue) -> SealedNetwork:
+        networks.append(sealed(keys, queue, Conditions(), seed))
+        return networks[0]
+
+    world = World(
+        flown.flown(),
+        quick_plan,
+        method=flown.method,
+        seed=seed,
+        timing=TIMING,
+        setting=Setting(network=join, plan_s=0.05, telemetry_gap_s=0.2),
+    )
+    before: list[MissionResult] = []
+
+    def revoke() -> None:
+        before.append(world.observer.result())
+        networks[0].revoke(keys.signed(keys.without(LIAR)))
+
+    world.queue.at(14.0, revoke)
+
+    assert world.run(limit_s(flown))
+    result = world.observer.result()
+    assert result.open == ()
+    assert before[0].executed_routes[UavId(LIAR)] == result.executed_routes[UavId(LIAR)]
+    assert networks[0].ear.dropped["signer unknown"] > 0

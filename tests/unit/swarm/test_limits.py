@@ -1,0 +1,126 @@
+"""Who floods loses its own words, and nobody else's."""
+
+from __future__ import annotations
+
+import pytest
+
+from swarm.bus.port import BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
+from swarm.limits import ASKER_BURST, TOKEN_BURST, UAV_BURST, UAV_HZ, Gate, Limiter
+from swarm.wire.codec import Codec, encode
+from swarm.wire.keys import Keys
+from swarm.wire.question import NONCE_BYTES, encode_question
+from swarm.wire.seal import Seal
+from tests.builders import MISSION, held, message
+from tests.keyring import Keyring
+from tests.shell_play import HandClock
+
+KEYS = Keys(MISSION)
+RING = Keyring("u0", "u1", "u2")
+
+
+def claim_of(uav: str, *, signer: str | None = None) -> Sample:
+    said = message(uav, held("t0", 1.0))
+    return Sample(said.key, RING.seal(signer or uav).wrap(encode(said)))
+
+
+def question_of(name: str) -> Query:
+    payload = encode_question({}, bytes(NONCE_BYTES), RING.seal(name))
+    return Query(KEYS.state("u0"), lambda _: None, payload)
+
+
+def admitted(gate: Gate, event: BusEvent, times: int) -> int:
+    return sum(gate.admits(event) for _ in range(times))
+
+
+def test_a_burst_passes_and_then_as_much_as_the_rate_lets() -> None:
+    limiter = Limiter(10.0, 5)
+
+    assert [limiter.allows("u0", 0.0) for _ in range(7)] == [True] * 5 + [False] * 2
+    assert [limiter.allows("u0", 0.2) for _ in range(3)] == [True, True, False]
+    assert sum(limiter.allows("u0", 100.0) for _ in range(50)) == 5
+
+
+def test_a_clock_that_goes_back_gives_nothing() -> None:
+    limiter = Limiter(10.0, 1)
+    assert limiter.allows("u0", 100.0)
+
+    assert not limiter.allows("u0", 0.0)
+
+
+def test_made_up_sources_cost_no_memory_without_end() -> None:
+    limiter = Limiter(1.0, 2, most_sources=3)
+
+    assert [limiter.allows(name, 0.0) for name in "abcd"] == [True, True, True, False]
+    assert limiter.allows("d", 2.5), "the others have been quiet by then"
+
+
+@pytest.mark.parametrize("seal", [None, RING.seal("u0")], ids=["plain", "keys"])
+def test_one_uav_that_floods_silences_itself_alone(seal: Seal | None) -> None:
+    clock = HandClock()
+    gate = Gate(KEYS, seal, clock.now_s)
+
+    assert admitted(gate, claim_of("u1"), 2 * UAV_BURST) == UAV_BURST
+    assert gate.refused == {"too many": UAV_BURST}
+    assert gate.admits(claim_of("u2"))
+    clock.time_s = 1.0
+    assert admitted(gate, claim_of("u1"), 2 * UAV_BURST) == UAV_HZ
+
+
+def test_what_a_uav_signs_on_anothers_key_takes_no_room_of_that_one() -> None:
+    gate = Gate(KEYS, RING.seal("u0"), HandClock().now_s)
+
+    assert admitted(gate, claim_of("u2", signer="u1"), 5 * UAV_BURST) == 0
+    assert gate.refused == {"not the signer's to say": 5 * UAV_BURST}
+    assert gate.admits(claim_of("u2"))
+
+
+def test_what_is_not_signed_or_by_nobody_is_not_taken_in_where_there_are_keys() -> None:
+    gate = Gate(KEYS, RING.seal("u0", RING.without("u2")), HandClock().now_s)
+    said = message("u1", held("t0", 1.0))
+
+    assert not gate.admits(Sample(said.key, encode(said)))
+    assert not gate.admits(claim_of("u2"))
+    assert not gate.admits(Query(KEYS.state("u0"), lambda _: None))
+    assert not gate.admits(question_of("u2"))
+    assert not gate.admits(TokenSeen(KEYS.alive("u2")))
+    assert not gate.admits(TokenSeen(KEYS.alive("ghost")))
+    assert gate.refused == {"not signed": 2, "signer unknown": 4}
+
+
+def test_one_that_asks_too_much_is_not_answered_and_the_others_are() -> None:
+    gate = Gate(KEYS, RING.seal("u0"), HandClock().now_s)
+
+    assert admitted(gate, question_of("u1"), 1000) == ASKER_BURST
+    assert gate.admits(question_of("u2"))
+
+
+def test_a_token_that_flickers_is_soon_believed_no_more() -> None:
+    gate = Gate(KEYS, RING.seal("u0"), HandClock().now_s)
+
+    seen, gone = TokenSeen(KEYS.alive("u1")), TokenGone(KEYS.alive("u1"))
+    assert admitted(gate, seen, 500) + admitted(gate, gone, 500) == TOKEN_BURST
+    assert gate.admits(TokenSeen(KEYS.alive("u2")))
+
+
+def test_the_own_link_and_rosters_always_pass() -> None:
+    gate = Gate(KEYS, RING.seal("u0"), HandClock().now_s)
+
+    assert all(gate.admits(event) for event in (LinkUp(), LinkDown()) for _ in range(5000))
+    assert gate.admits(Sample(KEYS.roster, b"whatever"))
+
+
+def test_what_has_no_key_of_the_mission_shares_one_small_room() -> None:
+    gate = Gate(KEYS, None, HandClock().now_s)
+
+    passed = sum(gate.admits(Sample(f"swarm/other/uav/u{n}/claim", b"")) for n in range(5000))
+    assert passed == UAV_BURST
+
+
+def test_a_gate_reads_nothing_of_what_is_signed() -> None:
+    """It costs a look at the envelope, and the codec then finds the signature wrong."""
+    sample = claim_of("u1")
+    broken = Sample(sample.key, sample.payload[:-1] + b"\x00")
+    gate = Gate(KEYS, RING.seal("u0"), HandClock().now_s)
+
+    assert gate.admits(broken)
+    assert Codec(MISSION, RING.seal("u0")).decode(broken.key, broken.payload) is None
