@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
-from swarm.bus.loopback import is_loopback
+from swarm.bus.privacy import is_loopback
 from swarm.cli import check
 from swarm.errors import Fault, InputError
 from swarm.identity import load_identity
