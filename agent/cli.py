@@ -232,6 +232,7 @@ def agent(
             return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
 
         async with stop_requests(lifeline=lifeline) as stop:
+            SERVICE.waiting(f"{uav}: looks for the bus")
             place = await seat_or_stop(lambda: open_zenoh_bus(config), stop, no_seat_yet)
             if place is None:
                 return stop.exit_status or 0

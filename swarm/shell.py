@@ -44,6 +44,7 @@ from swarm.events import (
     Publish,
     PublishLast,
     Save,
+    Stop,
     Tick,
 )
 from swarm.limits import TOO_MANY, Gate
@@ -230,6 +231,8 @@ class Shell(Generic[E, A]):
             )
             for name in gone:  # a token cannot be signed: it counts no longer
                 self.step(self._from_bus(PeerGone(name)))
+            if not seal.is_in_force:  # nobody believes it any more, so it takes no further part
+                self.step(self._from_bus(Stop("its keys were revoked or replaced")))
 
     def _guard(self, act: Callable[[], None]) -> None:
         """Act and reschedule; a bug ends the process rather than half of it."""

@@ -9,7 +9,7 @@ reach confirm nothing. Leaves out: the seat on the bus (swarm.identity.publishin
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from swarm.events import Ask, BusFact, Finish, Learned, LinkChanged, PeerSeen, Publish, Wish
 from swarm.model.ids import AUTHORITY
@@ -37,18 +37,20 @@ class Herald:
 
     Args:
         message: the register ``roster``.
+        writers: everyone who, by that roster, may show a token.
         patience_s: how long to wait for everyone who is there.
     """
 
-    def __init__(self, message: Message, patience_s: float) -> None:
+    def __init__(self, message: Message, writers: Collection[str], patience_s: float) -> None:
         self.seen: set[str] = set()
-        """Writers whose tokens were seen."""
+        """Those of the roster whose tokens were seen."""
         self.has: set[str] = set()
         """Those that have the roster."""
         self.other_version: int | None = None
         """Of a roster that somebody has and that this one cannot replace; None as long as
         nobody has."""
         self._message = message
+        self._writers = writers
         self._patience_s = patience_s
         self._replica = Replica()
         self._replica.join(message)
@@ -75,7 +77,7 @@ class Herald:
     def step(self, fact: BusFact, now_s: float) -> list[Wish]:
         """Take note of one fact."""
         match fact:
-            case PeerSeen(writer):
+            case PeerSeen(writer) if writer in self._writers:
                 self.seen.add(writer)
             case LinkChanged(up=True):
                 self._settled_at_s = max(self._settled_at_s, now_s + AGAIN_S)

@@ -17,7 +17,10 @@ from swarm.clock import SystemClock
 from swarm.errors import SwarmError
 from swarm.events import BusFact, Wish
 from swarm.identity.herald import Herald, roster_message
+from swarm.identity.roles import Role
+from swarm.identity.roster import Roster
 from swarm.log import LogLevel, configure_logging
+from swarm.model.ids import COORDINATOR
 from swarm.shell import Shell, take_seat
 
 __all__ = ["CONFIRM_S", "CONNECT_S", "publish"]
@@ -52,8 +55,8 @@ def publish(config: BusConfig, change: Callable[[], bytes]) -> list[str]:
         )
     if herald.lacking:
         raise SwarmError(
-            f"not confirmed within {CONFIRM_S:g} s by {', '.join(herald.lacking)}; once in reach "
-            "they learn it from the others"
+            f"published, but within {CONFIRM_S:g} s not confirmed by {', '.join(herald.lacking)}: "
+            "out of reach, from where they learn it of the others later, or with replaced keys"
         )
     return sorted(herald.has)
 
@@ -64,11 +67,13 @@ async def _tell(config: BusConfig, change: Callable[[], bytes]) -> Herald:
         identity, seal = config.identity, bus.seal
         if identity is None or seal is None:
             raise ValueError("a roster is told on a bus with keys alone")
+        before = seal.roster
         signed = change()
         with suppress(OSError):  # its folder may have been taken away
             seal.put_in_force(signed.decode("ascii"))
-        version = seal.read_roster(signed.decode("ascii")).version
-        herald = Herald(roster_message(identity.mission, version, signed), CONFIRM_S)
+        roster = seal.read_roster(signed.decode("ascii"))
+        message = roster_message(identity.mission, roster.version, signed)
+        herald = Herald(message, _writers(roster, before), CONFIRM_S)
         shell: Shell[BusFact, Wish] = Shell(
             herald,
             bus,
@@ -85,3 +90,12 @@ async def _tell(config: BusConfig, change: Callable[[], bytes]) -> Herald:
         return herald
     finally:
         bus.close()
+
+
+def _writers(roster: Roster, before: Roster) -> set[str]:
+    """Who may show a token and answer questions with the keys that they had before."""
+    return {
+        COORDINATOR if entry.role is Role.COORDINATOR else entry.name
+        for entry in roster.entries
+        if entry.role in (Role.UAV, Role.COORDINATOR) and entry == before.entry(entry.name)
+    }

@@ -19,7 +19,7 @@ def answer(writer: str, *messages: Message) -> Snapshot:
 
 
 def herald_with(*writers: str) -> Herald:
-    herald = Herald(NEW, PATIENCE_S)
+    herald = Herald(NEW, {"uav1", "uav2", "coordinator"}, PATIENCE_S)
     assert herald.start(0.0) == []
     for writer in writers:
         herald.step(PeerSeen(writer), 0.1)
@@ -86,6 +86,13 @@ def test_a_fleet_that_is_further_on_ends_it() -> None:
 
         assert herald.step(Learned((answer("uav1", roster),)), 0.3) == [Finish(0)]
         assert herald.other_version == roster.stamp.incarnation
+
+
+def test_it_waits_for_no_one_who_is_out() -> None:
+    herald = herald_with("uav1", "uav3")
+
+    assert herald.step(Learned((answer("uav1"),)), SETTLE_S) == [Finish(0)]
+    assert herald.seen == {"uav1"}
 
 
 def test_its_own_word_confirms_nothing() -> None:
