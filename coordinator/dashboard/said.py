@@ -19,13 +19,14 @@ from swarm.wire.messages import CommandKind
 
 __all__ = ["CommandSaid", "PlayerSaid", "TaskSaid", "WithdrawalSaid", "fault_of"]
 
-_CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
-"""A page is of the same release as its server: what it says too much is a mistake."""
-
 Reason = Annotated[str, Strict(), Len(0, 150)]
 """What is told of a command has to have room in a status."""
 Rate = Annotated[float, Strict(), Gt(0.0), Le(1000.0)]
 Moment = Annotated[float, Strict(), Ge(0.0), Le(1e9)]
+
+
+_CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
+"""A page is served by the process it speaks to, so it has no fields of a newer release."""
 
 
 @dataclass(frozen=True, slots=True)
