@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from sim.bench.flooding import Poured
 from sim.bench.machine import this_machine
 from sim.bench.process_costs import LAUNCHER, Costs, ProcessCosts, kind_of
 from sim.bench.secure import CostFlight, SecureBench, Way, in_turn
 from sim.bench.secure_report import secure_as_json, secure_as_rich
-from sim.chaos.flooder import Sent
 from sim.launch.launch import Launch
 from tests.builders import mission, task, uav
 from tests.unit.sim.test_launch_fleet import OPTIONS
@@ -31,7 +31,7 @@ PLAIN = CostFlight(
     tasks=5,
     as_planned=True,
     refused={},
-    flood=None,
+    poured_hz=0.0,
     load=0.5,
 )
 SECURE = replace(
@@ -100,22 +100,25 @@ def test_a_task_left_or_an_honest_message_refused_is_a_failure(broken: CostFligh
 
 def test_a_flood_is_refused_and_the_others_are_quick_all_the_same() -> None:
     flooded = replace(
-        SECURE,
-        way=Way.FLOODED,
-        refused={"too many": 900},
-        flood=Sent(own=50_000, others=50_000, unsent=99_000, questions=9, answers=0, seconds=10.0),
-        target_ms=(99.0,),
+        SECURE, way=Way.FLOODED, refused={"too many": 900}, poured_hz=9999.6, target_ms=(99.0,)
     )
     bench = replace(BENCH, flights=(PLAIN, SECURE, flooded))
 
     assert bench.ok
     text = shown(bench)
     assert "p99 of next target sent below 100 ms, flooded: held" in text
-    assert (
-        "flooded with 10000 messages a second; 100 a second left the hostile agent, and 900" in text
-    )
+    assert "flooded with 10000 messages a second; 900 were refused behind the router" in text
     slow = replace(flooded, target_ms=(101.0,))
     assert "flooded: NOT held" in shown(replace(bench, flights=(PLAIN, SECURE, slow)))
+
+
+def test_a_hostile_process_tells_how_much_it_has_sent() -> None:
+    poured = Poured()
+    for line in ('{"sent": 100, "wall_s": 1.0}', "Traceback", "[1]", '{"sent": 500, "wall_s": 4}'):
+        poured.hear("hostile", line)
+
+    assert poured.rate_hz == 125.0
+    assert Poured().rate_hz == 0.0
 
 
 def test_programs_are_told_the_same() -> None:
