@@ -11,6 +11,7 @@ from agent.mavlink.config import CommandStyle
 from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
+    CheckOption,
     LifelineOption,
     LogFormatOption,
     LogLevelOption,
@@ -157,6 +158,7 @@ def agent(
     ] = False,
     seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
+    check: CheckOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
@@ -181,7 +183,7 @@ def agent(
     from agent.mavlink.link_address import parse_forward, parse_link
     from agent.mavlink.signing_key import load_signing_key
     from agent.mavlink.vehicle import MavlinkVehicle
-    from agent.runner import Vehicle, run_agent, seat_or_stop
+    from agent.runner import Vehicle, pause_between_lives, run_agent, seat_or_stop
     from agent.vehicle import Report
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, incarnation
@@ -190,6 +192,7 @@ def agent(
     from swarm.model import Origin
     from swarm.process import stop_requests
     from swarm.store import Store
+    from swarm.watchdog import SERVICE
 
     # A life begins with its process: of two agents of one UAV the one started last counts.
     life = incarnation()
@@ -202,7 +205,13 @@ def agent(
         parse_forward(url)
     own_system_id, own_component_id = _ground_ids(ground_id)
     key = None if signing_key is None else load_signing_key(signing_key)
+    if check:
+        return 0
     log = get_logger(uav)
+
+    def no_seat_yet(reason: str) -> None:
+        log.warning("no bus yet", reason=reason)
+        SERVICE.waiting(f"{uav}: no bus yet: {reason}")
 
     async def run() -> int:
         clock = ScaledClock(speedup)
@@ -223,13 +232,11 @@ def agent(
             return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
 
         async with stop_requests(lifeline=lifeline) as stop:
-            place = await seat_or_stop(
-                lambda: open_zenoh_bus(config),
-                stop,
-                lambda reason: log.warning("no bus yet", reason=reason),
-            )
+            SERVICE.waiting(f"{uav}: looks for the bus")
+            place = await seat_or_stop(lambda: open_zenoh_bus(config), stop, no_seat_yet)
             if place is None:
                 return stop.exit_status or 0
+            SERVICE.ready(f"{uav}: on the bus, in mission {mission}")
             # Only now: waiting for a seat may have taken long.
             memory = None if store is None else store.load()
             core = AgentCore(
@@ -244,7 +251,7 @@ def agent(
             )
             save = None if store is None else store.save
             try:
-                return await run_agent(
+                status = await run_agent(
                     core,
                     mission,
                     place,
@@ -256,6 +263,8 @@ def agent(
                 )
             finally:
                 place.close()
+            await pause_between_lives(stop)
+            return status
 
     store = None if state is None else Store(state, mission, uav, speedup=speedup)
     # What has been imported stays: a full collection would look through all of it for tens of

@@ -9,6 +9,7 @@ Publishes ``uav/<id>/claim``, ``…/outcome/<task>``, ``…/status`` and ``…/c
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Protocol
@@ -24,12 +25,15 @@ from swarm.events import Stop
 from swarm.model import Origin
 from swarm.process import StopRequest
 from swarm.shell import Shell, take_seat
+from swarm.watchdog import SERVICE, Service
 from swarm.wire.messages import Snapshot
 
-__all__ = ["Vehicle", "run_agent", "seat_or_stop"]
+__all__ = ["Vehicle", "pause_between_lives", "run_agent", "seat_or_stop"]
 
 RETRY_S = 0.5
 """Wall time between a failed try for a seat on the bus and the next."""
+NEXT_LIFE_S = 30.0
+"""Wall time from having left a mission in order to looking for the next one."""
 FAREWELL_S = 15.0
 """Longest wall time from being told to stop to leaving: what it takes to find a vehicle, and
 to see it return."""
@@ -101,6 +105,19 @@ async def seat_or_stop(
         for task in (trying, stopped):
             task.cancel()
         await asyncio.gather(trying, stopped, return_exceptions=True)
+
+
+async def pause_between_lives(stop: StopRequest, manager: Service = SERVICE) -> None:
+    """Wait a little before leaving where a service manager starts this process again at once.
+
+    A coordinator stays until all agents have left: one that comes back every second
+    would keep it.
+    """
+    if manager.supervised and stop.exit_status is None:
+        manager.ready(f"left its mission; looks for the next in {NEXT_LIFE_S:g} s")
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(NEXT_LIFE_S):
+                await stop.wait()
 
 
 async def _seat(open_bus: Callable[[], Awaitable[Bus]], on_wait: Callable[[str], None]) -> Bus:

@@ -21,6 +21,7 @@ from swarm.complete import among
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
+    CheckOption,
     JsonOption,
     LifelineOption,
     LogFormatOption,
@@ -263,6 +264,7 @@ def coordinator(
         ),
     ] = None,
     json: JsonOption = False,
+    check: CheckOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
@@ -298,6 +300,7 @@ def coordinator(
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
     from swarm.store import Store
+    from swarm.watchdog import SERVICE
 
     configure_logging(log_level, log_format)
     check_online_method(method)
@@ -331,6 +334,8 @@ def coordinator(
 
     place = None if dashboard is None else parse_place(dashboard, must_be_free=False)
     page = page_beside(place, mission.name, seat, speedup=speedup)
+    if check:
+        return 0
     for line in () if place is None else place.lines:
         print(line, file=sys.stderr)
     store = None if state is None else Store(state, mission.name, COORDINATOR, speedup=speedup)
@@ -355,7 +360,9 @@ def coordinator(
 
     async def work() -> int:
         async with page:
-            return await coordinate()
+            status = await coordinate()
+        # Whoever supervises it must not take a mission's end for a failure, and fly it again.
+        return 0 if SERVICE.supervised else status
 
     try:
         return asyncio.run(run_until_stopped(work(), lifeline=lifeline))

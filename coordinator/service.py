@@ -18,6 +18,7 @@ from swarm.clock import Clock
 from swarm.config import Timing
 from swarm.model import Mission, Plan
 from swarm.store import Store
+from swarm.watchdog import SERVICE
 from swarm.wire.messages import Snapshot
 
 __all__ = ["Service"]
@@ -61,6 +62,8 @@ class Service:
 
     async def _serve(self, core: CoordinatorCore | StandbyCore) -> int:
         seat = await self.open_bus()
+        stands_by = isinstance(core, StandbyCore)
+        SERVICE.ready(f"{'stands by for' if stands_by else 'coordinates'} {self.mission.name}")
         try:
             return await run_coordinator(
                 core,

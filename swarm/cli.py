@@ -31,7 +31,7 @@ import swarm
 from swarm.errors import Fault, InputError, SwarmError
 from swarm.help import Panels, explain_family, help_text
 
-__all__ = ["COMMAND_GROUP", "console_main", "main"]
+__all__ = ["COMMAND_GROUP", "check", "console_main", "main"]
 
 COMMAND_GROUP = "peckorder.commands"
 _COMPLETE = "_SWARM_COMPLETE"
@@ -82,6 +82,31 @@ def main(
     finally:
         sys.stdout = stdout  # typer swaps it when a pipe breaks
     return status
+
+
+def check(arguments: Sequence[str]) -> Mapping[str, Any]:
+    """See whether a command line is right, by the very command it is for; nothing is begun.
+
+    Args:
+        arguments: after ``swarm``, of a command that has ``--check``.
+
+    Returns:
+        What every parameter of the command comes to, defaults included.
+
+    Raises:
+        InputError: something is wrong with it.
+    """
+    name, *words = arguments
+    commands = _installed_commands()
+    app = typer.Typer(rich_markup_mode=None)
+    app.command(name)(commands[name].load())
+    command: Any = typer.main.get_command(app)
+    try:
+        parameters = dict(command.make_context(f"swarm {name}", list(words)).params)
+    except typer.TyperException as error:
+        raise InputError(_usage_fault(error, name)) from error
+    _run([name, *words, "--check"], commands)
+    return parameters
 
 
 def console_main() -> int:

@@ -23,7 +23,7 @@ PANELS: Mapping[str, tuple[str, ...]] = {
     "Watch and command": ("status", "dashboard", "task", "hold", "resume", "return", "abort"),
     "Record and replay": ("record", "replay", "explain"),
     "Study and test": ("reproduce", "study", "bench", "soak"),
-    "Fit for the field": ("keys",),
+    "Fit for the field": ("keys", "install"),
     "Helpers": ("doctor",),
 }
 """Commands by what one wants to do; those of no panel come with the last one."""

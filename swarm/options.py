@@ -9,8 +9,9 @@ Names: `ScenarioArgument` (a `pathlib.Path`; give it to
 `swarm.scenario.load_scenario`), `OptionalScenarioArgument` (that or None), `JsonOption`
 (bool), `SeedOption` (int), `TimeLimitOption` (float or None), `LogLevelOption` and
 `LogFormatOption` (for `swarm.log.configure_logging`; defaults `LogLevel.INFO`,
-`LogFormat.AUTO`), the hidden `LifelineOption` (bool), `SpeedupOption`, `MissionOption` and,
-for those that can find the mission, `SomeMissionOption` (str or None); `BusOption`,
+`LogFormat.AUTO`), `CheckOption` and the hidden `LifelineOption` (bool), `SpeedupOption`,
+`MissionOption` and, for those that can find the mission, `SomeMissionOption` (str or None);
+`BusOption`,
 `ListenOption`, `ConnectOption`, `KeysOption` and `UnencryptedOption`; `LinkOption` and
 `LeaseOption` (for `swarm.config.preset`; defaults `Link.NORMAL` and None), all of which a
 command has by one parameter of the kind `swarm.bus.seat.Seat`; `StateOption` (a folder or
@@ -32,6 +33,7 @@ from swarm.scenario.shipped import resolve_scenario, shipped_scenarios
 
 __all__ = [
     "BusOption",
+    "CheckOption",
     "ConnectOption",
     "JsonOption",
     "KeysOption",
@@ -118,6 +120,12 @@ LogFormatOption = Annotated[
     LogFormat,
     typer.Option("--log-format", envvar="SWARM_LOG_FORMAT", help="What a log line looks like."),
 ]
+
+CheckOption = Annotated[
+    bool,
+    typer.Option("--check", help="Only see whether these options are right, keys included."),
+]
+"""Leave with status 0 where the process would begin to touch anything."""
 
 LifelineOption = Annotated[bool, typer.Option("--lifeline", hidden=True)]
 """End when standard input does: the parent process holds its other end."""

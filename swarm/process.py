@@ -16,6 +16,7 @@ from concurrent.futures import Future
 from typing import Any, NoReturn, TypeVar
 
 from swarm.lifeline import parent_gone
+from swarm.watchdog import SERVICE
 
 __all__ = [
     "EXIT_INTERRUPTED",
@@ -52,6 +53,7 @@ class StopRequest:
         if self.exit_status is None:
             self.exit_status = exit_status
             self._told.set()
+            SERVICE.stopping()
 
     async def wait(self) -> int:
         """Return the exit status as soon as somebody asks to stop."""
@@ -66,7 +68,8 @@ async def stop_requests(*, lifeline: bool) -> AsyncIterator[StopRequest]:
 
     For daemons that have something to finish first, such as bringing a vehicle
     home. Use from the main thread. The first SIGINT asks; another one, a second or
-    more later, kills.
+    more later, kills. A service manager, if there is one, is shown meanwhile that the
+    event loop turns (swarm.watchdog).
     """
     loop = asyncio.get_running_loop()
     stop = StopRequest()
@@ -88,7 +91,8 @@ async def stop_requests(*, lifeline: bool) -> AsyncIterator[StopRequest]:
     loop.add_signal_handler(signal.SIGTERM, stop.request, EXIT_STOPPED)
     watch = asyncio.create_task(watch_parent()) if lifeline else None
     try:
-        yield stop
+        async with SERVICE.beating():
+            yield stop
     finally:
         if watch is not None:
             watch.cancel()

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
+from swarm import __version__
 from swarm.bus.port import (
     Answer,
     Bus,
@@ -194,6 +195,7 @@ class Shell(Generic[E, A]):
             self._done.set_exception(fault)
 
     def _start(self) -> None:
+        self._log.info("begins", release=__version__)
         for action in self._core.start(self._clock.now_s()):
             self._carry_out(action)
         if self._seal is not None:  # what is in its folder is as if it had been heard

@@ -14,6 +14,7 @@ from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
+    CheckOption,
     JsonOption,
     LifelineOption,
     LogFormatOption,
@@ -87,6 +88,7 @@ def dashboard(
     seat: Seat = DEFAULT_SEAT,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
+    check: CheckOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
@@ -120,6 +122,7 @@ def dashboard(
     from swarm.clock import ScaledClock
     from swarm.log import configure_logging
     from swarm.process import run_until_stopped
+    from swarm.watchdog import SERVICE
 
     configure_logging(log_level, log_format)
     network = seat.network
@@ -128,6 +131,8 @@ def dashboard(
     token = read_token(token_file, os.environ)
     access, made = access_for(host, allow_host or (), token)
     display = _display(access.token is not None, tiles, tiles_credit)
+    if check:
+        return 0
     taken = take_port(host, port)
     url = url_of(host, taken.getsockname()[1])
     if json:
@@ -146,6 +151,7 @@ def dashboard(
     async def work() -> int:
         served = create_app(source, access, display)
         async with serving(served.app, taken):
+            SERVICE.ready(f"shows {mission or 'any mission'} at {url}")
             try:
                 await served.beside(source.run())
             finally:

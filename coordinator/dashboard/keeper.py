@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Sequence
@@ -97,6 +98,8 @@ async def _run(arguments: Sequence[str]) -> int:
     child = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "swarm", "dashboard", *arguments, "--lifeline"),
         stdin=asyncio.subprocess.PIPE,
+        # A service manager supervises the parent alone.
+        env={name: value for name, value in os.environ.items() if name != "NOTIFY_SOCKET"},
         stdout=asyncio.subprocess.DEVNULL,  # that is for the parent's results
         start_new_session=True,
     )

@@ -16,6 +16,7 @@ from swarm.bus.config import DEFAULT_ROUTER, DEFAULT_SECURE_ROUTER
 from swarm.config import Link, preset
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
+    CheckOption,
     JsonOption,
     KeysOption,
     LeaseOption,
@@ -63,6 +64,7 @@ def router(
     link: LinkOption = Link.NORMAL,
     lease_s: LeaseOption = None,
     json: JsonOption = False,
+    check: CheckOption = False,
     lifeline: LifelineOption = False,
     log_level: LogLevelOption = LogLevel.INFO,
     log_format: LogFormatOption = LogFormat.AUTO,
@@ -100,18 +102,24 @@ def router(
         raise InputError(
             Fault("swarm router", "", problem, remedy or "see 'swarm router --help'")
         ) from None
+    if check:
+        return 0
     return asyncio.run(run_until_stopped(_serve(settings, quiet=json), lifeline=lifeline))
 
 
 async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
+    from swarm import __version__
     from swarm.bus.router import open_router
     from swarm.log import get_logger
+    from swarm.watchdog import SERVICE
 
     serving = await open_router(settings)
     try:
         print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
+        SERVICE.ready(f"serves at {', '.join(serving.endpoints)}")
         if not quiet:
-            get_logger("router").info(f"router ready at {', '.join(serving.endpoints)}")
+            ready = f"router ready at {', '.join(serving.endpoints)}"
+            get_logger("router").info(ready, release=__version__)
         await serving.serve()
         return 0
     finally:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Fleet", "enact", "told", "written"]
 
+Publish = Callable[["BusConfig", Callable[[], bytes]], Collection[str]]
+
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
@@ -64,10 +66,27 @@ class Fleet:
         return bus_config(self.bus, self.listen, self.connect or (), identity=identity)
 
 
+def _publish(config: BusConfig, change: Callable[[], bytes]) -> Collection[str]:
+    from swarm.identity.publishing import publish
+
+    return publish(config, change)
+
+
 def enact(
-    authority: Authority, change: Callable[[], None], fleet: Fleet, names: Collection[str]
+    authority: Authority,
+    change: Callable[[], object],
+    fleet: Fleet,
+    names: Collection[str],
+    publish: Publish = _publish,
 ) -> str:
     """Make a change of ``names``, and tell the fleet if there is one to be told.
+
+    Args:
+        authority: whose folder is changed.
+        change: makes it.
+        fleet: where it is told.
+        names: whose keys change.
+        publish: tells it; see `swarm.identity.publishing.publish`.
 
     Returns:
         A line about who knows of it.
@@ -88,10 +107,8 @@ def enact(
         folder = authority.directory
         return (
             f"roster version {authority.roster.version}; "
-            f"tell a running fleet: swarm keys publish {folder}"
+            f"tell a running fleet: swarm keys publish {folder} --connect ENDPOINT"
         )
-    from swarm.identity.publishing import publish
-
     version = authority.roster.version
     config = fleet.config(authority.roster_bytes(), names)
     try:
@@ -105,8 +122,8 @@ def enact(
 
 def told(version: int, confirmed: Collection[str]) -> str:
     """A line about who has confirmed a new roster."""
-    who = ", ".join(confirmed) or "nobody: no one is there who could"
-    return f"roster version {version} published; confirmed by {who}"
+    who = f"confirmed by {', '.join(confirmed)}" if confirmed else "nobody is there to confirm it"
+    return f"roster version {version} published; {who}"
 
 
 @contextmanager

@@ -55,8 +55,8 @@ def publish(config: BusConfig, change: Callable[[], bytes]) -> list[str]:
         )
     if herald.lacking:
         raise SwarmError(
-            f"not confirmed within {CONFIRM_S:g} s by {', '.join(herald.lacking)}; once in reach "
-            "they learn it from the others"
+            f"published, but within {CONFIRM_S:g} s not confirmed by {', '.join(herald.lacking)}: "
+            "out of reach, from where they learn it of the others later, or with replaced keys"
         )
     return sorted(herald.has)
 
@@ -67,12 +67,13 @@ async def _tell(config: BusConfig, change: Callable[[], bytes]) -> Herald:
         identity, seal = config.identity, bus.seal
         if identity is None or seal is None:
             raise ValueError("a roster is told on a bus with keys alone")
+        before = seal.roster
         signed = change()
         with suppress(OSError):  # its folder may have been taken away
             seal.put_in_force(signed.decode("ascii"))
         roster = seal.read_roster(signed.decode("ascii"))
         message = roster_message(identity.mission, roster.version, signed)
-        herald = Herald(message, _writers(roster), CONFIRM_S)
+        herald = Herald(message, _writers(roster, before), CONFIRM_S)
         shell: Shell[BusFact, Wish] = Shell(
             herald,
             bus,
@@ -91,10 +92,10 @@ async def _tell(config: BusConfig, change: Callable[[], bytes]) -> Herald:
         bus.close()
 
 
-def _writers(roster: Roster) -> set[str]:
-    """Who may show a token and answers questions."""
+def _writers(roster: Roster, before: Roster) -> set[str]:
+    """Who may show a token and answer questions with the keys that they had before."""
     return {
         COORDINATOR if entry.role is Role.COORDINATOR else entry.name
         for entry in roster.entries
-        if entry.role in (Role.UAV, Role.COORDINATOR)
+        if entry.role in (Role.UAV, Role.COORDINATOR) and entry == before.entry(entry.name)
     }

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,8 @@ class ByHand:
         mission: flown.
         speedup: mission seconds per second of the wall's clock.
         keys: folder of the mission's authority; None to fly without keys.
+        programs: words that start `swarm` for the process of that name, where they are others
+            than for everybody.
     """
 
     def __init__(
@@ -41,11 +44,13 @@ class ByHand:
         mission: Mission,
         speedup: int = 2,
         keys: Path | None = None,
+        programs: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         self.folder = folder
         self.mission = mission
         self.uavs: list[str] = [uav.id for uav in mission.uavs]
         self._stack = stack
+        self._programs = programs or {}
         self._scenario = folder / "scenario.toml"
         self._scenario.write_text(format_scenario(mission))
         self._keys = keys
@@ -74,8 +79,9 @@ class ByHand:
 
     def start(self, name: str, arguments: list[str]) -> subprocess.Popen[str]:
         log = self._stack.enter_context((self.folder / f"{name}.log").open("w"))
+        program = self._programs.get(name, (sys.executable, "-m", "swarm"))
         process = subprocess.Popen(
-            [sys.executable, "-m", "swarm", *arguments],
+            [*program, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=log,

@@ -19,8 +19,9 @@ from tests.process.by_hand import ByHand
 pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
 
 UAVS = ["uav1", "uav2", "uav3"]
-OUT_LIMIT_S = 1.0
-"""From the first who hears of it to the last, a router's new beginning included."""
+OUT_LIMIT_S = 5.0
+"""From the first who hears of it to the last, a router's new beginning included: much more than
+the tenths of a second it takes, as a machine of the tests may be busy."""
 
 
 def _flown() -> Mission:

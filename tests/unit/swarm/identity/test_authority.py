@@ -273,6 +273,29 @@ def test_no_certificate_outlives_its_authority(authority: Authority) -> None:
     assert open_authority(authority.directory).issued["uav1"].generation == 1
 
 
+def test_a_renewal_that_is_refused_changes_nothing(authority: Authority) -> None:
+    before = {path: path.read_bytes() for path in authority.directory.iterdir() if path.is_file()}
+
+    with pytest.raises(InputError, match="would outlive"):
+        authority.renew(now_s=NOW_S, days=4000)
+
+    for path, data in before.items():
+        assert path.read_bytes() == data, path
+
+
+def test_a_mavlink_key_does_not_outlive_a_revocation_that_was_cut_short(
+    authority: Authority,
+) -> None:
+    table, phrase = authority.mavlink_table.read_bytes(), phrases(authority)
+    authority.revoke(["uav1"])
+    authority.mavlink_table.write_bytes(table)
+
+    authority.issue({"uav1": Role.UAV}, now_s=NOW_S)
+
+    assert phrases(authority)["uav1"] != phrase["uav1"]
+    assert phrases(authority)["uav2"] == phrase["uav2"]
+
+
 def test_commands_at_one_time_do_not_undo_each_other(authority: Authority) -> None:
     def add(name: str) -> None:
         open_authority(authority.directory).issue({name: Role.UAV}, now_s=NOW_S)

@@ -59,7 +59,9 @@ async def _run(shell: Shell[BusFact, Wish], bus: MemoryBus) -> None:
         bus.close()
 
 
-def told(roster: Roster, *, seals: dict[str, Seal]) -> tuple[Herald, dict[str, Member]]:
+def told(
+    roster: Roster, *, seals: dict[str, Seal], writers: Sequence[str] = UAVS
+) -> tuple[Herald, dict[str, Member]]:
     """What comes of it when the operator tells ``roster`` to those with ``seals``."""
     members = {name: Member() for name in seals}
 
@@ -89,7 +91,7 @@ def told(roster: Roster, *, seals: dict[str, Seal]) -> tuple[Herald, dict[str, M
         signed = KEYS.signed(roster).encode()
         seal = KEYS.seal("operator")
         seal.put_in_force(signed.decode())
-        herald = Herald(roster_message(MISSION, roster.version, signed), set(UAVS), 100.0)
+        herald = Herald(roster_message(MISSION, roster.version, signed), writers, 100.0)
         bus = network.join("operator", seal=seal)
         telling: Shell[BusFact, Wish] = Shell(
             herald,
@@ -131,8 +133,10 @@ def test_who_flies_with_keys_that_were_issued_anew_stops() -> None:
     after = Entry("u1", before.role, 2, bytes(32), before.not_after_s)
     entries = tuple(sorted((*others, after), key=lambda entry: entry.name))
 
-    _, members = told(replace(KEYS.roster, version=2, entries=entries), seals=seals)
+    roster = replace(KEYS.roster, version=2, entries=entries)
+    herald, members = told(roster, seals=seals, writers=("u0", "u2"))
 
+    assert herald.lacking == []
     assert members["u1"].stopped
     assert not members["u0"].stopped
 
