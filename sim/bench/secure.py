@@ -1,9 +1,9 @@
 """What identities, encryption and signatures cost a fleet: flights with and without, in turn.
 
-The same mission is flown with real processes, plain and secure alternately, so that both meet
-the same moods of the machine. Of each flight: processor time and memory by kind of process,
-the turnarounds of the agents, and how long it took to take off. Leaves out: single messages
-(sim.bench.hop), the flood (sim.bench.secure_flood), and how it is shown
+The same mission is flown with real processes, plain, secure, and secure under a flood, one after
+the other, so that all meet the same moods of the machine. Of each flight: processor time and
+memory by kind of process, the turnarounds of the agents, and how long it took to take off. Leaves
+out: single messages (sim.bench.hop), the hostile agent (sim.bench.flooding), and how it is shown
 (sim.bench.secure_report).
 """
 
@@ -12,34 +12,45 @@ from __future__ import annotations
 import asyncio
 import math
 import os
-from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any
 
 from coordinator.observer import Observer
 from coordinator.view.security import refusals
+from sim.bench.flooding import while_it_flies
 from sim.bench.hop import SPEAKER, measure_hops
 from sim.bench.process_costs import Costs, ProcessCosts
 from sim.bench.turnaround import listen
+from sim.chaos.insider_flood import FLOODER
 from sim.launch.fleet import BusKind, LaunchOptions
-from sim.launch.keys import fresh_keys
 from sim.launch.protection import protected
 from sim.launch.run import Run, open_run
 from swarm.model import Mission
 from swarm.wire.messages import EpochPhase
 
-__all__ = ["CostFlight", "SecureBench", "Settings", "in_turn", "measure_secure"]
+__all__ = ["CostFlight", "SecureBench", "Settings", "Way", "in_turn", "measure_secure"]
 
 _HOP_ROUNDS = 4
 """Routers each way over which claims are sent, in turn."""
+
+
+class Way(StrEnum):
+    """How a mission is flown."""
+
+    PLAIN = "plain"
+    SECURE = "secure"
+    FLOODED = "flooded"
+    """Secure, while a hostile agent with valid keys floods the bus."""
 
 
 @dataclass(frozen=True, slots=True)
 class CostFlight:
     """One flight."""
 
-    secure: bool
+    way: Way
     start: Costs
     """Until the mission began: interpreters, imports, keys, preparation, take-off."""
     whole: Costs
@@ -55,6 +66,8 @@ class CostFlight:
     as_planned: bool
     """Whether every list flown was the one planned."""
     refused: Mapping[str, int]
+    poured_hz: float
+    """Messages a second of the hostile agent; 0 without one."""
     load: float
     """Processes that wanted to run during the last minute of the flight."""
 
@@ -76,6 +89,8 @@ class Settings:
     """Flights each way."""
     claims: int
     """Claims through a router each way."""
+    flood_hz: float
+    """Messages a second of the hostile agent; 0: there are no flooded flights."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,23 +104,28 @@ class SecureBench:
     bus: str
     seed: int
     flights: tuple[CostFlight, ...]
-    """In the order in which they were flown, plain and secure."""
-    hops_s: Mapping[bool, tuple[float, ...]]
-    """Times of single claims through a router, by whether they were secure."""
+    """In the order in which they were flown."""
+    hops_s: Mapping[Way, tuple[float, ...]]
+    """Times of single claims through a router, plain and secure."""
 
     @property
     def ok(self) -> bool:
         """Whether every task of every flight was done and nothing honest was refused."""
-        return all(each.ok and not each.refused for each in self.flights)
+        return all(
+            each.ok and (each.way is Way.FLOODED or not each.refused) for each in self.flights
+        )
 
-    def of(self, *, secure: bool) -> list[CostFlight]:
+    def of(self, way: Way) -> list[CostFlight]:
         """The flights of one way."""
-        return [each for each in self.flights if each.secure is secure]
+        return [each for each in self.flights if each.way is way]
 
 
-def in_turn(rounds: int) -> list[bool]:
-    """Whether each of so many pairs of flights is secure; who comes first takes turns, too."""
-    return [secure for pair in range(rounds) for secure in ((False, True), (True, False))[pair % 2]]
+_UNDISTURBED = (Way.PLAIN, Way.SECURE)
+
+
+def in_turn(ways: Sequence[Way], rounds: int) -> list[Way]:
+    """Every way so many times; the order is reversed in every other round."""
+    return [way for number in range(rounds) for way in ways[:: -1 if number % 2 else 1]]
 
 
 def measure_secure(
@@ -128,19 +148,19 @@ def measure_secure(
     """
     tell = on_progress or (lambda _: None)
     flights: list[CostFlight] = []
-    for number, secure in enumerate(in_turn(settings.rounds), 1):
-        way = "secure" if secure else "plain"
-        tell(f"{mission.name}: flight {number} of {2 * settings.rounds}, {way}")
-        with protected(mission, options, secure=secure, keys=None) as chosen:
-            flights.append(asyncio.run(_fly(mission, chosen)))
-    hops_s: dict[bool, list[float]] = {}
-    routed = replace(options, bus=BusKind.ROUTER)
-    for secure in in_turn(_HOP_ROUNDS) if settings.claims else ():
-        tell(f"claims through a router, {'secure' if secure else 'plain'}")
-        with fresh_keys(mission, strangers=[SPEAKER]) if secure else nullcontext() as keys:
-            chosen = replace(routed, keys=keys)
-            count = math.ceil(settings.claims / _HOP_ROUNDS)
-            hops_s.setdefault(secure, []).extend(asyncio.run(measure_hops(mission, chosen, count)))
+    order = in_turn(list(Way) if settings.flood_hz else _UNDISTURBED, settings.rounds)
+    for number, way in enumerate(order, 1):
+        tell(f"{mission.name}: flight {number} of {len(order)}, {way}")
+        flood_hz = settings.flood_hz if way is Way.FLOODED else 0.0
+        with _prepared(mission, options, way) as chosen:
+            flights.append(asyncio.run(_fly(mission, chosen, way, flood_hz)))
+    hops_s: dict[Way, list[float]] = {}
+    routed = replace(options, bus=BusKind.ROUTER, routers=1)
+    for way in in_turn(_UNDISTURBED, _HOP_ROUNDS) if settings.claims else ():
+        tell(f"claims through a router, {way}")
+        count = math.ceil(settings.claims / _HOP_ROUNDS)
+        with _prepared(mission, routed, way) as chosen:
+            hops_s.setdefault(way, []).extend(asyncio.run(measure_hops(mission, chosen, count)))
     return SecureBench(
         scenario=mission.name,
         uavs=len(mission.uavs),
@@ -149,11 +169,20 @@ def measure_secure(
         bus=options.bus,
         seed=options.seed,
         flights=tuple(flights),
-        hops_s={secure: tuple(times_s) for secure, times_s in hops_s.items()},
+        hops_s={way: tuple(times_s) for way, times_s in hops_s.items()},
     )
 
 
-async def _fly(mission: Mission, options: LaunchOptions) -> CostFlight:
+def _prepared(
+    mission: Mission, options: LaunchOptions, way: Way
+) -> AbstractContextManager[LaunchOptions]:
+    """``options`` with keys where there are to be any."""
+    strangers = (SPEAKER, FLOODER)
+    secure = way is not Way.PLAIN
+    return protected(mission, options, secure=secure, keys=None, strangers=strangers)
+
+
+async def _fly(mission: Mission, options: LaunchOptions, way: Way, flood_hz: float) -> CostFlight:
     """Fly ``mission`` once and count what it costs."""
     told: list[dict[str, Any]] = []
     meter = _Meter()
@@ -164,13 +193,14 @@ async def _fly(mission: Mission, options: LaunchOptions) -> CostFlight:
         on_log=lambda _name, line: told.extend(listen(line)),
     ) as run:
         meter.run = run
-        await run.finish()
+        async with while_it_flies(run, flood_hz) as sent:
+            await run.finish()
     flight = run.flight()
     planned = {} if flight.plan is None else flight.plan.routes
     takeoff_s = 0.0 if flight.takeoff_s is None else flight.takeoff_s
     start = meter.costs.costs() if meter.start is None else meter.start
     return CostFlight(
-        secure=options.keys is not None,
+        way=way,
         start=start,
         whole=start if meter.end is None else meter.end,
         takeoff_wall_s=takeoff_s / options.speedup,
@@ -183,6 +213,7 @@ async def _fly(mission: Mission, options: LaunchOptions) -> CostFlight:
             for uav, route in flight.result.executed_routes.items()
         ),
         refused=refusals(flight.dropped),
+        poured_hz=sum(each.rate_hz for each in sent),
         load=os.getloadavg()[0],
     )
 

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from sim.bench.trouble_commands import bus_of, progress
+from swarm.errors import Fault, InputError
 from swarm.options import JsonOption, SeedOption, SpeedupOption
 from swarm.scenario.shipped import resolve_scenario
 
@@ -19,15 +20,16 @@ __all__ = ["SECURE_HELP", "secure"]
 
 SECURE_HELP = """Fly with keys and without in turn, and set what it costs side by side.
 
-Flies a scenario with real processes, plain and by --secure of swarm run alternately: processor
-time and memory by kind of process, the time from each arrival to the next target sent, the time
-to take off; and the time single claims take through a router. Exit status 0: every task was done
-and nothing honest was refused.
+Flies a scenario with real processes in turn plain, by --secure of swarm run, and secure while a
+hostile agent with valid keys floods the bus: processor time and memory by kind of process, the
+time from each arrival to the next target sent, the time to take off; and the time single claims
+take through a router. Exit status 0: every task was done, and nothing was refused without a flood.
 
 \b
 Examples:
     swarm bench secure
     swarm bench secure --speedup 10 --rounds 3
+    swarm bench secure --flood-hz 0 --bus mesh
     swarm bench secure table-1 --claims 0 --json
 """
 
@@ -55,6 +57,16 @@ def secure(
             help="Claims sent through a router each way, 20 a second.",
         ),
     ] = 400,
+    flood_hz: Annotated[
+        float,
+        typer.Option(
+            "--flood-hz",
+            min=0.0,
+            max=1e6,
+            metavar="HZ",
+            help="Messages a second of the hostile agent; 0: no flooded flights.",
+        ),
+    ] = 10_000.0,
     speedup: SpeedupOption = 4.0,
     bus: Annotated[
         str, typer.Option("--bus", metavar="mesh|router", help="How the processes talk.")
@@ -85,6 +97,9 @@ def secure(
     from swarm.log import LogFormat
     from swarm.scenario import load_scenario
 
+    if flood_hz > 0.0 and bus != "router":
+        problem = "the hostile agent is a router's client"
+        raise InputError(Fault("--flood-hz", f"{flood_hz:g}", problem, "give 0 with --bus mesh"))
     path = scenario or resolve_scenario("valley-survey")
     mission = load_scenario(path)
     defaults = defaults_for(Simulated(), len(mission.uavs))
@@ -101,7 +116,7 @@ def secure(
     )
     machine = this_machine()
     with progress() as tell:
-        done = measure_secure(mission, options, Settings(rounds, claims), tell)
+        done = measure_secure(mission, options, Settings(rounds, claims, flood_hz), tell)
     if json:
         typer.echo(dumps(secure_as_json(machine, done), allow_nan=False))
     else:

@@ -14,12 +14,13 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 
 from sim.bench.machine import Machine
-from sim.bench.secure import CostFlight, SecureBench
+from sim.bench.secure import CostFlight, SecureBench, Way
 from sim.bench.turnaround import TARGET_MS, quantiles_ms
+from sim.chaos.insider_flood import LIMIT_MS
 
 __all__ = ["secure_as_json", "secure_as_rich"]
 
-_WAYS = {False: "plain", True: "secure"}
+_UNDISTURBED = (Way.PLAIN, Way.SECURE)
 
 
 def secure_as_json(machine: Machine, done: SecureBench) -> dict[str, Any]:
@@ -34,13 +35,14 @@ def secure_as_json(machine: Machine, done: SecureBench) -> dict[str, Any]:
         "bus": done.bus,
         "ok": done.ok,
         "target_ms": TARGET_MS,
-        **{word: _way_as_json(done, secure) for secure, word in _WAYS.items()},
+        "flooded_ms": LIMIT_MS,
+        **{way: _way_as_json(done, way) for way in Way},
         "flights": [_flight_as_json(done, each) for each in done.flights],
     }
 
 
-def _way_as_json(done: SecureBench, secure: bool) -> dict[str, Any]:
-    flights = done.of(secure=secure)
+def _way_as_json(done: SecureBench, way: Way) -> dict[str, Any]:
+    flights = done.of(way)
     return {
         "flight_cpu_s": {
             kind: _mean(f.flight_cpu_s(kind) for f in flights) for kind in _kinds(done)
@@ -55,15 +57,16 @@ def _way_as_json(done: SecureBench, secure: bool) -> dict[str, Any]:
         "takeoff_wall_s": _mean(f.takeoff_wall_s for f in flights),
         "turnaround_ms": {
             "count": sum(len(f.target_ms) for f in flights),
-            **_target_ms(done, secure=secure),
+            **_target_ms(done, way),
         },
-        "hop_ms": {"count": len(done.hops_s.get(secure, ())), **_hop_ms(done, secure=secure)},
+        "hop_ms": {"count": len(done.hops_s.get(way, ())), **_hop_ms(done, way)},
+        "poured_hz": _mean(f.poured_hz for f in flights),
     }
 
 
 def _flight_as_json(done: SecureBench, flight: CostFlight) -> dict[str, Any]:
     return {
-        "secure": flight.secure,
+        "way": flight.way,
         "done": flight.done,
         "tasks": flight.tasks,
         "as_planned": flight.as_planned,
@@ -78,7 +81,7 @@ def _flight_as_json(done: SecureBench, flight: CostFlight) -> dict[str, Any]:
 
 def secure_as_rich(machine: Machine, done: SecureBench) -> RenderableType:
     """Everything, for people."""
-    n_flight = len(done.flights) // 2
+    n_flight = len(done.of(Way.SECURE))
     head = (
         f"{done.scenario}, {done.uavs} UAVs × {done.tasks} tasks at {done.speedup:g} times wall "
         f"speed, bus {done.bus}; {n_flight} flight{'s' if n_flight > 1 else ''} each way, in turn; "
@@ -103,17 +106,17 @@ _COSTS: tuple[tuple[str, Getter, str, int], ...] = (
 
 def _costs(done: SecureBench) -> Table:
     """Processor time and memory, plain beside secure."""
-    headings = [f"{name}, {way}" for name, *_ in _COSTS for way in _WAYS.values()]
+    headings = [f"{name}, {way}" for name, *_ in _COSTS for way in _UNDISTURBED]
     table = _table("process", "number", *headings)
     for kind in _kinds(done):
         number = max(each.whole.processes.get(kind, 0) for each in done.flights)
         cells = [
-            f"{_mean(getter(flight, kind) for flight in done.of(secure=secure)):.{digits}f} {unit}"
+            f"{_mean(getter(flight, kind) for flight in done.of(way)):.{digits}f} {unit}"
             for _, getter, unit, digits in _COSTS
-            for secure in _WAYS
+            for way in _UNDISTURBED
         ]
         table.add_row(kind, str(number), *cells)
-    totals = [f"{_total_s(done.of(secure=secure)):.2f} s" for secure in _WAYS]
+    totals = [f"{_total_s(done.of(way)):.2f} s" for way in _UNDISTURBED]
     table.add_row("all", "", *totals)
     return table
 
@@ -121,20 +124,22 @@ def _costs(done: SecureBench) -> Table:
 def _times(done: SecureBench) -> Table:
     """Turnarounds and the time to take off, plain beside secure."""
     table = _table("next target sent", "arrivals", "p50", "p90", "p99", "max", "take-off after")
-    for secure, way in _WAYS.items():
-        flights = done.of(secure=secure)
+    for way in Way:
+        flights = done.of(way)
+        if not flights:
+            continue
         count = sum(len(each.target_ms) for each in flights)
         takeoff_s = _mean(each.takeoff_wall_s for each in flights)
-        cells = [_ms(time_ms) for time_ms in _target_ms(done, secure=secure).values()]
+        cells = [_ms(time_ms) for time_ms in _target_ms(done, way).values()]
         table.add_row(way, str(count), *cells, f"{takeoff_s:.1f} s")
     return table
 
 
 def _hops(done: SecureBench) -> Table:
     table = _table("through a router", "claims", "p50", "p90", "p99", "max")
-    for secure, way in _WAYS.items():
-        count = str(len(done.hops_s.get(secure, ())))
-        cells = [_ms(time_ms) for time_ms in _hop_ms(done, secure=secure).values()]
+    for way in _UNDISTURBED:
+        count = str(len(done.hops_s.get(way, ())))
+        cells = [_ms(time_ms) for time_ms in _hop_ms(done, way).values()]
         table.add_row(way, count, *cells)
     return table
 
@@ -144,7 +149,7 @@ def _flights(done: SecureBench) -> Table:
     for number, each in enumerate(done.flights, 1):
         table.add_row(
             str(number),
-            _WAYS[each.secure],
+            each.way,
             f"{each.done} of {each.tasks}",
             "as planned" if each.as_planned else "differ",
             f"{sum(each.flight_cpu_s(kind) for kind in _kinds(done)):.2f} s",
@@ -158,14 +163,19 @@ def _flights(done: SecureBench) -> Table:
 def _verdict(done: SecureBench) -> list[str]:
     """What it comes to, beside what is wanted."""
     lines = []
-    plain_s, secure_s = (_total_s(done.of(secure=secure)) for secure in _WAYS)
+    plain_s, secure_s = (_total_s(done.of(way)) for way in _UNDISTURBED)
     if plain_s > 0.0:
         lines.append(f"processor time in flight: {secure_s / plain_s:.3f} times that of plain")
-    times = _target_ms(done, secure=True)["p99"]
-    if times is not None:
-        held = "held" if times < TARGET_MS else "NOT held"
+    for way, limit_ms in ((Way.SECURE, TARGET_MS), (Way.FLOODED, LIMIT_MS)):
+        p99_ms = _target_ms(done, way)["p99"]
+        if p99_ms is not None:
+            held = "held" if p99_ms < limit_ms else "NOT held"
+            lines.append(f"wanted: p99 of next target sent below {limit_ms:g} ms, {way}: {held}")
+    if flooded := done.of(Way.FLOODED):
+        rate_hz = _mean(each.poured_hz for each in flooded)
+        refused = sum(sum(each.refused.values()) for each in flooded)
         lines.append(
-            f"wanted: p99 of next target sent below {TARGET_MS:g} ms, secure as well: {held}"
+            f"flooded by {rate_hz:.0f} messages a second; behind the router {refused} were refused"
         )
     if done.flights:
         lines.append("every task was done, and nothing honest was refused" if done.ok else "FAILED")
@@ -178,14 +188,14 @@ def _kinds(done: SecureBench) -> list[str]:
     return sorted(names, key=lambda kind: -sum(f.flight_cpu_s(kind) for f in done.flights))
 
 
-def _target_ms(done: SecureBench, *, secure: bool) -> dict[str, float | None]:
+def _target_ms(done: SecureBench, way: Way) -> dict[str, float | None]:
     """Turnarounds of all flights of one way."""
-    return quantiles_ms(time for each in done.of(secure=secure) for time in each.target_ms)
+    return quantiles_ms(time for each in done.of(way) for time in each.target_ms)
 
 
-def _hop_ms(done: SecureBench, *, secure: bool) -> dict[str, float | None]:
+def _hop_ms(done: SecureBench, way: Way) -> dict[str, float | None]:
     """Times of claims through the router."""
-    return quantiles_ms(1e3 * time_s for time_s in done.hops_s.get(secure, ()))
+    return quantiles_ms(1e3 * time_s for time_s in done.hops_s.get(way, ()))
 
 
 def _total_s(flights: Sequence[CostFlight]) -> float:

@@ -95,6 +95,8 @@ class LaunchOptions:
     """Where a page shows the run; nowhere if None."""
     keys: RunKeys | None = None
     """With which the processes prove who they are; None: whoever reaches the bus is believed."""
+    router_file: Path | None = None
+    """Zenoh configuration file of the routers, instead of what their keys say."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -179,7 +181,8 @@ class Layout:
         """Arguments of a router's process."""
         dialed = _repeated("--connect", self._dialed(name))
         listen = ["--listen", self._endpoints[name]]
-        trust = self._trust(name)
+        file = self._options.router_file
+        trust = self._trust(name) if file is None else ["--config", str(file)]
         return ["router", "--json", *listen, *dialed, *trust, *self._link(), *self._log()]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:

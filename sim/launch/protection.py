@@ -6,7 +6,7 @@ Leaves out: the keys themselves (sim.launch.keys).
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +23,12 @@ _UNSIGNED = "MAVLink is not signed, as the vehicles have been given no keys: see
 
 @contextlib.contextmanager
 def protected(
-    mission: Mission, options: LaunchOptions, *, secure: bool, keys: Path | None
+    mission: Mission,
+    options: LaunchOptions,
+    *,
+    secure: bool,
+    keys: Path | None,
+    strangers: Sequence[str] = (),
 ) -> Iterator[LaunchOptions]:
     """``options`` with keys, if any are asked for; new ones are gone when the context ends.
 
@@ -34,6 +39,7 @@ def protected(
         options: without keys.
         secure: make new keys where there are none.
         keys: the folder of keys made before.
+        strangers: see `fresh_keys`.
 
     Raises:
         InputError: the keys do not fit, or cannot be made.
@@ -43,7 +49,7 @@ def protected(
         return
     mesh = options.bus.for_fleet(len(mission.uavs)) is BusKind.MESH
     made = (
-        fresh_keys(mission, routers=options.routers, mesh=mesh)
+        fresh_keys(mission, routers=options.routers, mesh=mesh, strangers=strangers)
         if keys is None
         else contextlib.nullcontext(keys_in(keys, mission, mesh=mesh))
     )

@@ -18,9 +18,9 @@ from swarm.identity.folder import shown_time
 
 __all__ = ["accepts", "why_refused"]
 
-DIAL_S = 1.5
+DIAL_S = 3.0
 """How long a connection may take [wall s]."""
-ALERT_S = 0.4
+ALERT_S = 1.0
 """How long an alert may take after a handshake that succeeded [wall s]."""
 _TLS = re.compile(r"tls/(\[[^\]]+\]|[^:]+):(\d+)")
 _NOT_YET_VALID, _EXPIRED = 9, 10

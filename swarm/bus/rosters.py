@@ -1,4 +1,4 @@
-"""The newest roster a router knows of: from its folder, and by what is said on the bus.
+"""Whom a router knows: by the newest roster of its folder or the bus, less who floods it.
 
 Leaves out: what the router makes of it (swarm.bus.router).
 """
@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 
 from swarm.identity import Identity, Roster
 from swarm.identity.folder import ROSTER_FILE
+from swarm.limits import Limiter
 from swarm.log import get_logger
 from swarm.model.ids import AUTHORITY
 from swarm.sealing import seal_of
@@ -24,6 +26,9 @@ LOOK_S = 1.0
 """How often the folder is looked into [wall s]."""
 TELL_S = 30.0
 """How often the roster is repeated on the bus [wall s]."""
+FLOOD_HZ, FLOOD_BURST = 500.0, 3000
+"""What a UAV may say, samples and changes of its token together, before it is shut out; an honest
+one says some 10 a second, and up to 1000 at once when a partition heals."""
 
 
 class Rosters:
@@ -31,14 +36,16 @@ class Rosters:
 
     Args:
         identity: whose folder it is, and whose authority counts.
+        look_s: how often the folder is looked into [wall s].
 
     Raises:
         OSError: its roster cannot be read any more.
         ValueError: that has been changed since the identity was loaded.
     """
 
-    def __init__(self, identity: Identity) -> None:
+    def __init__(self, identity: Identity, look_s: float = LOOK_S) -> None:
         self.identity = identity
+        self._look_s = look_s
         seal = seal_of(identity)
         if seal is None:
             raise ValueError("there are no keys")
@@ -46,7 +53,9 @@ class Rosters:
         self._codec = Codec(identity.mission, seal)
         self._path = identity.folder / ROSTER_FILE
         self._seen: tuple[int, int] | None = None
-        self._newer = asyncio.Event()
+        self._changed = asyncio.Event()
+        self._shut_out: set[str] = set()
+        self._heard = Limiter(FLOOD_HZ, FLOOD_BURST)
         self._log = get_logger("router")
         self.key = Keys(identity.mission).roster
         """Where rosters are said."""
@@ -55,6 +64,31 @@ class Rosters:
     def roster(self) -> Roster:
         """In force."""
         return self._seal.roster
+
+    @property
+    def let_in(self) -> Roster:
+        """The same without those who are shut out."""
+        kept = (each for each in self.roster.entries if each.common_name not in self._shut_out)
+        return replace(self.roster, entries=tuple(kept))
+
+    def is_flood(self, uav: str, now_s: float) -> bool:
+        """Count one saying of a UAV's; whether there were too many of late.
+
+        May be called on any thread.
+        """
+        return not self._heard.allows(uav, now_s)
+
+    def shut_out(self, uav: str) -> None:
+        """Let a UAV's present keys in no more, for as long as this process lives."""
+        entry = self.roster.entry(uav)
+        if entry is None or entry.common_name in self._shut_out:
+            return
+        self._shut_out.add(entry.common_name)
+        self._changed.set()
+        self._log.error(
+            f"{uav} floods the bus and is shut out; give it new keys, or start this router anew",
+            limit_hz=FLOOD_HZ,
+        )
 
     def hear(self, key: str, data: bytes) -> None:
         """Somebody says on ``key`` that this is the roster."""
@@ -76,25 +110,25 @@ class Rosters:
         except OSError as fault:
             self._log.debug("the roster cannot be read", problem=fault.strerror or str(fault))
 
-    async def wait_for_newer(self, tell: Callable[[str, bytes], None]) -> None:
-        """Return as soon as there is a newer roster than the last time; repeats it meanwhile.
+    async def wait_for_change(self, tell: Callable[[str, bytes], None]) -> None:
+        """Return as soon as others are to be let in than the last time; repeats the roster.
 
         Args:
             tell: says something on a key.
         """
         loop = asyncio.get_running_loop()
-        tell_at_s = loop.time() + LOOK_S  # those who were linked before are back by then
-        while not self._newer.is_set():
+        tell_at_s = loop.time() + self._look_s  # those who were linked before are back by then
+        while not self._changed.is_set():
             self.look()
             if loop.time() >= tell_at_s:
                 tell(self.key, self._said())
                 tell_at_s = loop.time() + TELL_S
             try:
-                async with asyncio.timeout(LOOK_S):
-                    await self._newer.wait()
+                async with asyncio.timeout(self._look_s):
+                    await self._changed.wait()
             except TimeoutError:
                 continue
-        self._newer.clear()
+        self._changed.clear()
 
     def _said(self) -> bytes:
         seal = self._seal
@@ -112,4 +146,4 @@ class Rosters:
             problem = fault.strerror or str(fault)
             self._log.warning("the newest roster cannot be kept", problem=problem)
         if self.roster.version != before:
-            self._newer.set()
+            self._changed.set()

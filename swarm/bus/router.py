@@ -1,8 +1,8 @@
 """A Zenoh router inside this process, for clients that have no mesh.
 
-With keys it lets in who is in the newest roster, and passes on what that lets each say. Zenoh
-cannot change this while a session is open, so on a newer roster the router opens another
-one in its place. Leaves out: the command around it (swarm.bus.cli), and who may say what
+With keys it lets in who is in the newest roster, and passes on what that lets each say; who
+floods it is shut out. Zenoh cannot change this while a session is open, so the router opens
+another one in its place. Leaves out: the command around it (swarm.bus.cli), and who may say what
 (swarm.bus.access). A Python session in router mode serves clients, so nothing else need be
 installed.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+from collections.abc import Callable
 
 import zenoh
 from zenoh.handlers import Callback
@@ -26,6 +27,7 @@ from swarm.bus.zenoh_session import (
 )
 from swarm.errors import BusError
 from swarm.log import get_logger
+from swarm.wire.keys import Keys
 
 __all__ = ["Router", "open_router"]
 
@@ -65,12 +67,12 @@ class Router:
             return
         while True:
             self._hear(rosters)
-            await rosters.wait_for_newer(self._tell)
+            await rosters.wait_for_change(self._tell)
             roster, own = rosters.roster, rosters.identity
             entry = roster.entry(own.name)
             if entry is None or entry.common_name != own.common_name:
                 raise BusError(f"roster {roster.version} revokes the keys of this router")
-            get_logger("router").info(f"roster {roster.version} is in force; opening anew")
+            get_logger("router").info(f"opening anew, by roster {roster.version}")
             await self._reopen(rosters)
 
     def close(self) -> None:
@@ -80,15 +82,30 @@ class Router:
             close_session(self._session, limit_s=CLOSE_LIMIT_S)
 
     def _hear(self, rosters: Rosters) -> None:
+        """Listen for rosters, and for who floods; callbacks are Zenoh's threads'."""
         loop = asyncio.get_running_loop()
+        root = Keys(rosters.identity.mission).root
 
-        def on_sample(sample: zenoh.Sample) -> None:
+        def on_roster(sample: zenoh.Sample) -> None:
             key, data = str(sample.key_expr), sample.payload.to_bytes()
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 loop.call_soon_threadsafe(rosters.hear, key, data)
 
-        self._session.declare_subscriber(
-            rosters.key, Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
+        def on_saying(sample: zenoh.Sample) -> None:
+            uav = str(sample.key_expr).split("/", 4)[3]
+            if rosters.is_flood(uav, loop.time()):
+                with contextlib.suppress(RuntimeError):
+                    loop.call_soon_threadsafe(rosters.shut_out, uav)
+
+        def listen(key_expr: str, on_sample: Callable[[zenoh.Sample], None]) -> None:
+            call = Callback(on_sample, indirect=False)
+            remote = zenoh.Locality.REMOTE
+            self._session.declare_subscriber(key_expr, call, allowed_origin=remote)
+
+        listen(rosters.key, on_roster)
+        listen(f"{root}/uav/**", on_saying)
+        self._session.liveliness().declare_subscriber(
+            f"{root}/alive/*", Callback(on_saying, indirect=False)
         )
 
     def _tell(self, key: str, data: bytes) -> None:
@@ -138,7 +155,7 @@ async def _open(
         return await open_session(zenoh_config, timeout_s=OPEN_LIMIT_S)
     from swarm.bus.secure import door_of, secure
 
-    roster = rosters.roster
+    roster = rosters.let_in
     with door_of(rosters.identity, roster) as door:
         secure(zenoh_config, rosters.identity, "router", roster, door)
         return await open_session(zenoh_config, timeout_s=OPEN_LIMIT_S)

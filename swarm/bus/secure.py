@@ -23,7 +23,7 @@ from swarm.errors import Fault, InputError
 from swarm.identity import Identity, Role, Roster
 from swarm.identity.door import door_dictionary
 
-__all__ = ["door_of", "secure"]
+__all__ = ["door_of", "secure", "secure_settings"]
 
 _TLS: Final = "transport/link/tls"
 _DOOR: Final = "transport/auth/usrpwd"
@@ -55,12 +55,13 @@ def secure(
                 problem = f"{endpoint} is not encrypted"
                 remedy = f"with --keys write tls/… or quic/… among {side}/endpoints"
                 raise InputError(Fault("Zenoh configuration", "", problem, remedy))
-    lay_over(config, _settings(identity, mode, roster, door))
+    lay_over(config, secure_settings(identity, mode, roster, door))
 
 
-def _settings(
-    identity: Identity, mode: str, roster: Roster, door: Path | None
+def secure_settings(
+    identity: Identity, mode: str, roster: Roster, door: Path | None = None
 ) -> dict[str, object]:
+    """What keys entail for a session, by path of Zenoh's configuration; see `secure`."""
     certificate, key = str(identity.certificate_path), str(identity.private_key_path)
     settings: dict[str, object] = {
         # Nobody who is reached otherwise has proven anything.

@@ -56,6 +56,8 @@ REPLY_WITHIN_S = 10.0
 """A query nobody has answered for this long is given up: who asked waits no longer."""
 FLUSH_LIMIT_S = 0.7
 """How long closing waits for what is published; a blocked link gives up after 0.5 s."""
+LOOK_GAP_S = 0.005
+"""Shortest interval between two looks at the links [wall s]."""
 CLOSE_LIMIT_S = 1.2
 """How long closing waits for the session to say goodbye."""
 
@@ -115,13 +117,17 @@ def _zenoh_config(config: BusConfig) -> zenoh.Config:
 class _LinkWatch:
     """Tells the first and the last transport from the others; used on Zenoh's threads."""
 
-    def __init__(self, session: zenoh.Session, inbox: Inbox) -> None:
+    def __init__(
+        self, session: zenoh.Session, inbox: Inbox, loop: asyncio.AbstractEventLoop
+    ) -> None:
         self._session = session
         self._inbox = inbox
+        self._loop = loop
         self._lock = threading.Lock()
         self._others: set[str] = set()
         self._linked = False
         self._changes = 0
+        self._look_again_s = 0.0
 
     def on_event(self, event: zenoh.TransportEvent) -> None:
         """A transport to one of the others came or went."""
@@ -135,11 +141,16 @@ class _LinkWatch:
             self._set(bool(self._others))
 
     def look(self) -> None:
-        """Notice a lost link before its event: tokens go a little earlier than transports."""
+        """Notice a lost link before its event: tokens go a little earlier than transports.
+
+        Not for every token of a flood: looking takes a while, and all else waits meanwhile.
+        """
+        now_s = self._loop.time()
         with self._lock:
             changes = self._changes
-            if not self._linked:
+            if not self._linked or now_s < self._look_again_s:
                 return
+            self._look_again_s = now_s + LOOK_GAP_S
         if self._session.info.links():  # not under the lock: it may wait for Zenoh's
             return
         with self._lock:
@@ -204,7 +215,7 @@ class ZenohBus:
         # A thread that comes back from Zenoh while the interpreter ends aborts the process.
         atexit.register(self.close)
         self._replies: weakref.WeakSet[_Reply] = weakref.WeakSet()
-        self._links = _LinkWatch(session, inbox)
+        self._links = _LinkWatch(session, inbox, self._loop)
         self._call(
             lambda: session.info.declare_transport_events_listener(
                 _direct(self._links.on_event), history=True

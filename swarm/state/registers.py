@@ -2,7 +2,8 @@
 
 A `Replica` keeps of every register the statement with the highest stamp.
 Joining is commutative, associative and idempotent, so loss, duplication and
-reordering delay agreement and never break it. On the board the operator's word about a
+reordering delay agreement and never break it. Claims and outcomes count of UAVs that the
+brief names. On the board the operator's word about a
 task comes before the coordinator's. Leaves out: who is alive and what
 follows from the registers (swarm.state.board, swarm.state.claims).
 """
@@ -57,9 +58,10 @@ class Replica:
         self.task_orders: dict[str, TaskOrder] = {}
         """By task id, what the operator says, orders for other flights among it."""
         self.claims: dict[str, Claim] = {}
-        """By UAV id."""
+        """By UAV id, of those in the brief; of all as long as there is none."""
         self.outcomes: dict[tuple[str, str], Outcome] = {}
-        """By UAV id and task id."""
+        """By UAV id and task id, of those in the brief likewise."""
+        self._fleet: set[str] | None = None
         self.commands: dict[str, tuple[Stamp, Command]] = {}
         """By target, those for other flights of the mission among them; see swarm.state.commands.
 
@@ -109,10 +111,8 @@ class Replica:
             case TaskOrder(task=task) as order:
                 self.task_orders[task] = order
                 self._settle(task)
-            case Claim() as claim:
-                self.claims[message.writer] = claim
-            case Outcome(task=task) as outcome:
-                self.outcomes[message.writer, task] = outcome
+            case Claim() | Outcome() if self._takes_part(message.writer):
+                self._note(message)
             case Command(target=target) as command:
                 self.commands[target] = message.stamp, command
         return True
@@ -126,8 +126,10 @@ class Replica:
         body, writer = message.body, message.writer
         if not isinstance(body, Outcome) or body.task in self.board:
             return False
-        self._unposted[writer] += self._unposted[writer] < MOST_UNPOSTED
-        return self._unposted[writer] == MOST_UNPOSTED
+        if self._unposted[writer] >= MOST_UNPOSTED:
+            return True
+        self._unposted[writer] += 1
+        return False
 
     def ordered(self, task: str) -> TaskOrder | None:
         """The operator's order about ``task`` in this flight; None if there is none."""
@@ -140,8 +142,29 @@ class Replica:
         if before is None or before.run != brief.run:
             for task in self.task_orders:
                 self._settle(task)
+        if before is None or before.uavs != brief.uavs:
+            self._fleet = {uav.id for uav in brief.uavs}
+            self.claims.clear()
+            self.outcomes.clear()
+            for message in self._registers.values():
+                if self._takes_part(message.writer):
+                    self._note(message)
         self.board_version += 1
         self.task_version += 1
+
+    def _takes_part(self, writer: str) -> bool:
+        """Whether what that UAV claims and has done counts: it must be one of those briefed."""
+        return self._fleet is None or writer in self._fleet
+
+    def _note(self, message: Message) -> None:
+        """What a UAV that takes part claims, or has done."""
+        match message.body:
+            case Claim() as claim:
+                self.claims[message.writer] = claim
+            case Outcome(task=task) as outcome:
+                self.outcomes[message.writer, task] = outcome
+            case _:
+                pass
 
     def _settle(self, task: str) -> None:
         """Find out anew what counts of all that is said of ``task``."""

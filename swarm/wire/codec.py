@@ -278,8 +278,10 @@ class Codec:
     def decode(self, key: str, data: bytes) -> Message | None:
         """The message in ``data``, heard on ``key``; None when it must be dropped."""
         try:
-            _require(len(data) <= LARGE_LIMIT_BYTES + ENVELOPE_BYTES, "too large")
-            message = self._believed(data) if is_envelope(data) else self._unsigned(key, data)
+            sealed = is_envelope(data)
+            limit_bytes = LARGE_LIMIT_BYTES + (ENVELOPE_BYTES if sealed else 0)
+            _require(len(data) <= limit_bytes, "too large")
+            message = self._believed(data) if sealed else self._unsigned(key, data)
             _require(message.key == key, "said on another's key")
         except UnacceptableError as fault:
             self.dropped[fault.reason] += 1

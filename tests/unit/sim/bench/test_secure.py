@@ -13,14 +13,14 @@ from rich.console import Console
 
 from sim.bench.machine import this_machine
 from sim.bench.process_costs import LAUNCHER, Costs, ProcessCosts, kind_of
-from sim.bench.secure import CostFlight, SecureBench, in_turn
+from sim.bench.secure import CostFlight, SecureBench, Way, in_turn
 from sim.bench.secure_report import secure_as_json, secure_as_rich
 from sim.launch.launch import Launch
 from tests.builders import mission, task, uav
 from tests.unit.sim.test_launch_fleet import OPTIONS
 
 PLAIN = CostFlight(
-    secure=False,
+    way=Way.PLAIN,
     start=Costs({"agent": 2, "router": 1}, {"agent": 3.0, "router": 0.5}, {"agent": 8e7}),
     whole=Costs({"agent": 2, "router": 1}, {"agent": 5.0, "router": 1.5}, {"agent": 8e7}),
     takeoff_wall_s=9.0,
@@ -30,16 +30,17 @@ PLAIN = CostFlight(
     tasks=5,
     as_planned=True,
     refused={},
+    poured_hz=0.0,
     load=0.5,
 )
 SECURE = replace(
     PLAIN,
-    secure=True,
+    way=Way.SECURE,
     whole=Costs({"agent": 2, "router": 1}, {"agent": 5.5, "router": 1.6}, {"agent": 9e7}),
     target_ms=(2.0, 4.0),
 )
 BENCH = SecureBench(
-    "table-1", 2, 5, 4.0, "router", 0, (PLAIN, SECURE), {False: (0.001,), True: (0.002,)}
+    "table-1", 2, 5, 4.0, "router", 0, (PLAIN, SECURE), {Way.PLAIN: (0.001,), Way.SECURE: (0.002,)}
 )
 
 
@@ -51,8 +52,12 @@ def shown(bench: SecureBench) -> str:
 
 
 def test_who_flies_first_takes_turns() -> None:
-    assert in_turn(0) == []
-    assert in_turn(3) == [False, True, True, False, False, True]
+    plain, secure, flooded = Way
+    assert in_turn([plain, secure], 0) == []
+    assert in_turn([plain, secure, flooded], 2) == [
+        *(plain, secure, flooded),
+        *(flooded, secure, plain),
+    ]
 
 
 def test_processes_are_counted_by_their_command() -> None:
@@ -76,7 +81,7 @@ def test_both_ways_stand_side_by_side() -> None:
     text = shown(BENCH)
 
     assert "processor time in flight: 1.200 times that of plain" in text
-    assert "p99 of next target sent below 20 ms, secure as well: held" in text
+    assert "p99 of next target sent below 20 ms, secure: held" in text
     assert "every task was done, and nothing honest was refused" in text
     (agents,) = [line.split() for line in text.splitlines() if line.startswith("agent")]
     assert agents[1:6] == ["2", "2.00", "s", "2.50", "s"]
@@ -90,6 +95,20 @@ def test_a_task_left_or_an_honest_message_refused_is_a_failure(broken: CostFligh
 
     assert not bench.ok
     assert "FAILED" in shown(bench)
+
+
+def test_a_flood_is_refused_and_the_others_are_quick_all_the_same() -> None:
+    flooded = replace(
+        SECURE, way=Way.FLOODED, refused={"too many": 900}, poured_hz=9999.6, target_ms=(99.0,)
+    )
+    bench = replace(BENCH, flights=(PLAIN, SECURE, flooded))
+
+    assert bench.ok
+    text = shown(bench)
+    assert "p99 of next target sent below 100 ms, flooded: held" in text
+    assert "flooded by 10000 messages a second; behind the router 900 were refused" in text
+    slow = replace(flooded, target_ms=(101.0,))
+    assert "flooded: NOT held" in shown(replace(bench, flights=(PLAIN, SECURE, slow)))
 
 
 def test_programs_are_told_the_same() -> None:
