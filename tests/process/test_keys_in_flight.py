@@ -25,8 +25,8 @@ OUT_LIMIT_S = 1.0
 
 def _flown() -> Mission:
     rng = np.random.default_rng(5)
-    places = [(float(x), float(y), 0.0) for x, y in rng.uniform(0.0, 100.0, (7, 2))]
-    tasks = [Task(TaskId(f"t{n}"), place, 1.0, service_s=5.0) for n, place in enumerate(places)]
+    places = [(float(x), float(y), 0.0) for x, y in rng.uniform(0.0, 60.0, (6, 2))]
+    tasks = [Task(TaskId(f"t{n}"), place, 1.0, service_s=8.0) for n, place in enumerate(places)]
     uavs = [Uav(UavId(u), (12.0 * n, 0.0, 0.0), 10.0) for n, u in enumerate(UAVS)]
     return Mission("revoked", 600.0, tuple(uavs), tuple(tasks), origin=Origin(46.8, 9.7, 1100.0))
 
