@@ -13,17 +13,18 @@ import asyncio
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from coordinator.observer import Observer
 from coordinator.view.security import refusals
-from sim.bench.flooding import HOSTILE, Poured, flooded
+from sim.bench.flooding import while_it_flies
 from sim.bench.hop import SPEAKER, measure_hops
 from sim.bench.process_costs import Costs, ProcessCosts
 from sim.bench.turnaround import listen
+from sim.chaos.insider_flood import FLOODER
 from sim.launch.fleet import BusKind, LaunchOptions
 from sim.launch.protection import protected
 from sim.launch.run import Run, open_run
@@ -176,7 +177,7 @@ def _prepared(
     mission: Mission, options: LaunchOptions, way: Way
 ) -> AbstractContextManager[LaunchOptions]:
     """``options`` with keys where there are to be any."""
-    strangers = (SPEAKER, HOSTILE)
+    strangers = (SPEAKER, FLOODER)
     secure = way is not Way.PLAIN
     return protected(mission, options, secure=secure, keys=None, strangers=strangers)
 
@@ -192,7 +193,7 @@ async def _fly(mission: Mission, options: LaunchOptions, way: Way, flood_hz: flo
         on_log=lambda _name, line: told.extend(listen(line)),
     ) as run:
         meter.run = run
-        async with flooded(run, flood_hz) if flood_hz else nullcontext(Poured()) as poured:
+        async with while_it_flies(run, flood_hz) as sent:
             await run.finish()
     flight = run.flight()
     planned = {} if flight.plan is None else flight.plan.routes
@@ -212,7 +213,7 @@ async def _fly(mission: Mission, options: LaunchOptions, way: Way, flood_hz: flo
             for uav, route in flight.result.executed_routes.items()
         ),
         refused=refusals(flight.dropped),
-        poured_hz=poured.rate_hz,
+        poured_hz=sum(each.rate_hz for each in sent),
         load=os.getloadavg()[0],
     )
 

@@ -37,7 +37,16 @@ from swarm.log import LogFormat
 from swarm.model import Mission, UavId
 from swarm.scenario.write import format_scenario
 
-__all__ = ["FLOODER", "LIMIT_MS", "RATE_HZ", "InsiderFlood", "fly_beside_flooder"]
+__all__ = [
+    "FLOODER",
+    "LIMIT_MS",
+    "QUESTIONS_HZ",
+    "RATE_HZ",
+    "Flooding",
+    "InsiderFlood",
+    "flooded",
+    "fly_beside_flooder",
+]
 
 FLOODER = "stolen"
 """Name of the UAV whose keys the flooder has."""
@@ -135,7 +144,7 @@ async def fly_beside_flooder(
                 limit_s=READY_S,
                 what="all agents there",
             )
-            async with _flooder(run, mission, keys, rate_hz, questions_hz, seed) as flooding:
+            async with flooded(run, mission, keys, rate_hz, questions_hz, seed) as flooding:
                 tell("flooding")
                 await run.until(
                     lambda: len(run.observer.result().done) >= len(mission.tasks) - 1,
@@ -174,16 +183,28 @@ def _unguarded(folder: Path, keys: RunKeys) -> Path:
 
 
 @dataclass(slots=True)
-class _Flooding:
+class Flooding:
+    """A flood that is going on."""
+
     sent: Sent | None = None
+    """What the flooder has done; None until it is over."""
 
 
 @contextlib.asynccontextmanager
-async def _flooder(
+async def flooded(
     run: Run, mission: Mission, keys: RunKeys, rate_hz: float, questions_hz: float, seed: int
-) -> AsyncIterator[_Flooding]:
-    """A flooder at work until the context is left, if there is to be one."""
-    flooding = _Flooding()
+) -> AsyncIterator[Flooding]:
+    """A flooder at work until the context is left, if there is to be one.
+
+    Args:
+        run: has routers.
+        mission: being flown.
+        keys: of the run; `FLOODER` is among them.
+        rate_hz: messages of the flooder; 0 for none.
+        questions_hz: its questions.
+        seed: of what it says.
+    """
+    flooding = Flooding()
     if not rate_hz:
         yield flooding
         return

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json as json_format
 import sys
 from collections.abc import Iterable
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,6 +50,8 @@ _PLACES = {
 }
 _DAYS_HELP = "How long the certificates are valid."
 _MOST_DAYS = 3650
+_MOST_ROWS = 12
+"""More folders of one role than that are told in one row."""
 DaysOption = Annotated[
     int | None,
     typer.Option(
@@ -238,9 +241,13 @@ def revoke(
     add` gives the name new keys. An autopilot that fell into other hands knows its own pass
     phrase alone.
 
+    With --connect a fleet that flies shuts them out at once and goes on; routers begin anew for
+    that. An agent that was revoked and hears of it comes home. Nothing is changed if the fleet
+    cannot be reached; exit status 1 also if somebody who was there did not confirm it.
+
     Examples:
         swarm keys revoke keys uav3
-        swarm keys revoke keys uav3 dashboard
+        swarm keys revoke keys uav3 dashboard --connect tls/192.168.1.2:7447
     """
     from swarm.identity.authority import open_authority
 
@@ -293,10 +300,7 @@ def publish(
 
 
 @keys.command("renew")
-def renew(
-    directory: DirectoryArgument,
-    days: DaysOption = None,
-) -> int:
+def renew(directory: DirectoryArgument, days: DaysOption = None) -> int:
     """Issue everything anew, so that nothing from before counts.
 
     Between flights, for the whole fleet: all certificates get the next generation and a new end.
@@ -366,9 +370,16 @@ def _tell_folders(authority: Authority, entries: Iterable[Entry]) -> None:
     """Say which folder goes where, and until when it is good."""
     from swarm.identity.folder import shown_time
 
-    told = sorted(entries, key=lambda entry: (list(Role).index(entry.role), entry.name))
-    width = max(len(str(authority.folder(entry.name))) for entry in told)
-    for entry in told:
-        folder = str(authority.folder(entry.name))
-        print(f"  {folder:<{width}}  {_PLACES[entry.role]}")
-    print(f"valid until {shown_time(told[0].not_after_s)}; keep the folders private on the way")
+    by_role = sorted(entries, key=lambda entry: (list(Role).index(entry.role), entry.name))
+    rows = []
+    for role, alike in groupby(by_role, key=lambda entry: entry.role):
+        names = [entry.name for entry in alike]
+        if len(names) > _MOST_ROWS:
+            ends = f"{authority.folder(names[0])} … {names[-1]}"
+            rows.append((f"{ends} ({len(names)})", f"each {_PLACES[role]}"))
+        else:
+            rows += [(str(authority.folder(name)), _PLACES[role]) for name in names]
+    width = max(len(folder) for folder, _ in rows)
+    for folder, place in rows:
+        print(f"  {folder:<{width}}  {place}")
+    print(f"valid until {shown_time(by_role[0].not_after_s)}; keep the folders private on the way")

@@ -68,7 +68,7 @@ class Herald:
         return self._replica.digest()
 
     def start(self, now_s: float) -> list[Wish]:
-        """Ask who is there."""
+        """Wait a moment for the tokens of those who are there."""
         self._leave_at_s = now_s + self._patience_s
         self._settled_at_s = now_s + SETTLE_S
         self._again_at_s = now_s + FIRST_S

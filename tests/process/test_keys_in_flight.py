@@ -26,8 +26,8 @@ the tenths of a second it takes, as a machine of the tests may be busy."""
 
 def _flown() -> Mission:
     rng = np.random.default_rng(5)
-    places = [(float(x), float(y), 0.0) for x, y in rng.uniform(0.0, 100.0, (7, 2))]
-    tasks = [Task(TaskId(f"t{n}"), place, 1.0, service_s=5.0) for n, place in enumerate(places)]
+    places = [(float(x), float(y), 0.0) for x, y in rng.uniform(0.0, 60.0, (6, 2))]
+    tasks = [Task(TaskId(f"t{n}"), place, 1.0, service_s=8.0) for n, place in enumerate(places)]
     uavs = [Uav(UavId(u), (12.0 * n, 0.0, 0.0), 10.0) for n, u in enumerate(UAVS)]
     return Mission("revoked", 600.0, tuple(uavs), tuple(tasks), origin=Origin(46.8, 9.7, 1100.0))
 
@@ -55,7 +55,7 @@ def test_a_revoked_agent_is_out_at_once_and_comes_home_and_the_others_finish(
         assert coordinator.wait(60) == 0, by_hand.log("coordinator")
         assert [agent.wait(60) for agent in by_hand.agents] == [0, 0, 0]
         told = [_time_s(by_hand.log(name), "newer roster in force") for name in UAVS]
-        told.append(_time_s(by_hand.log("router"), "roster 3 is in force"))
+        told.append(_time_s(by_hand.log("router"), "roster 3"))
         assert max(told) - min(told) < OUT_LIMIT_S
         assert "its keys were revoked or replaced" in by_hand.log("uav3")
         assert set(by_hand.done()) == {task.id for task in by_hand.mission.tasks}

@@ -15,6 +15,8 @@ from swarm.clock import unix_s
 from swarm.identity import Role, load_identity
 from swarm.identity.authority import open_authority
 from swarm.identity.founding import found_authority
+from swarm.model.frames import DEFAULT_ORIGIN
+from swarm.scenario.blank import Blank, blank_scenario
 
 COMMANDS = {"keys": EntryPoint("keys", "swarm.identity.cli:keys", "peckorder.commands")}
 DAY_S = 86_400.0
@@ -54,6 +56,19 @@ def test_init_makes_keys_for_everyone_of_the_scenario_and_says_where_they_go(
     assert "keep this folder off the vehicles" in told
     assert str(folder / "mavlink-keys.csv") in told
     assert f"next: swarm router --keys {folder / 'router'}" in told
+
+
+def test_the_folders_of_a_large_fleet_are_told_in_one_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fleet = tmp_path / "fleet.toml"
+    fleet.write_text(blank_scenario(Blank("fleet", 13, 0, DEFAULT_ORIGIN)))
+
+    assert run("init", fleet, "--out", tmp_path / "keys") == 0
+
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  ")]
+    assert len(rows) == 5
+    assert rows[0].endswith(" (13)  each to its companion computer, for swarm agent --keys")
 
 
 def test_no_command_shows_a_secret(keys: Path, capsys: pytest.CaptureFixture[str]) -> None:
