@@ -13,18 +13,17 @@ import asyncio
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from coordinator.observer import Observer
 from coordinator.view.security import refusals
-from sim.bench.flooding import while_it_flies
+from sim.bench.flooding import HOSTILE, Poured, flooded
 from sim.bench.hop import SPEAKER, measure_hops
 from sim.bench.process_costs import Costs, ProcessCosts
 from sim.bench.turnaround import listen
-from sim.chaos.insider_flood import FLOODER
 from sim.launch.fleet import BusKind, LaunchOptions
 from sim.launch.protection import protected
 from sim.launch.run import Run, open_run
@@ -177,7 +176,7 @@ def _prepared(
     mission: Mission, options: LaunchOptions, way: Way
 ) -> AbstractContextManager[LaunchOptions]:
     """``options`` with keys where there are to be any."""
-    strangers = (SPEAKER, FLOODER)
+    strangers = (SPEAKER, HOSTILE)
     secure = way is not Way.PLAIN
     return protected(mission, options, secure=secure, keys=None, strangers=strangers)
 
@@ -193,7 +192,7 @@ async def _fly(mission: Mission, options: LaunchOptions, way: Way, flood_hz: flo
         on_log=lambda _name, line: told.extend(listen(line)),
     ) as run:
         meter.run = run
-        async with while_it_flies(run, flood_hz) as sent:
+        async with flooded(run, flood_hz) if flood_hz else nullcontext(Poured()) as poured:
             await run.finish()
     flight = run.flight()
     planned = {} if flight.plan is None else flight.plan.routes
@@ -213,7 +212,7 @@ async def _fly(mission: Mission, options: LaunchOptions, way: Way, flood_hz: flo
             for uav, route in flight.result.executed_routes.items()
         ),
         refused=refusals(flight.dropped),
-        poured_hz=sum(each.rate_hz for each in sent),
+        poured_hz=poured.rate_hz,
         load=os.getloadavg()[0],
     )
 

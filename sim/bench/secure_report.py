@@ -16,10 +16,11 @@ from rich.table import Table
 from sim.bench.machine import Machine
 from sim.bench.secure import CostFlight, SecureBench, Way
 from sim.bench.turnaround import TARGET_MS, quantiles_ms
-from sim.chaos.insider_flood import LIMIT_MS
 
 __all__ = ["secure_as_json", "secure_as_rich"]
 
+FLOOD_MS = 100.0
+"""What 99 of 100 turnarounds of the others shall not exceed while somebody floods."""
 _UNDISTURBED = (Way.PLAIN, Way.SECURE)
 
 
@@ -35,7 +36,7 @@ def secure_as_json(machine: Machine, done: SecureBench) -> dict[str, Any]:
         "bus": done.bus,
         "ok": done.ok,
         "target_ms": TARGET_MS,
-        "flooded_ms": LIMIT_MS,
+        "flood_ms": FLOOD_MS,
         **{way: _way_as_json(done, way) for way in Way},
         "flights": [_flight_as_json(done, each) for each in done.flights],
     }
@@ -166,7 +167,7 @@ def _verdict(done: SecureBench) -> list[str]:
     plain_s, secure_s = (_total_s(done.of(way)) for way in _UNDISTURBED)
     if plain_s > 0.0:
         lines.append(f"processor time in flight: {secure_s / plain_s:.3f} times that of plain")
-    for way, limit_ms in ((Way.SECURE, TARGET_MS), (Way.FLOODED, LIMIT_MS)):
+    for way, limit_ms in ((Way.SECURE, TARGET_MS), (Way.FLOODED, FLOOD_MS)):
         p99_ms = _target_ms(done, way)["p99"]
         if p99_ms is not None:
             held = "held" if p99_ms < limit_ms else "NOT held"
@@ -175,7 +176,7 @@ def _verdict(done: SecureBench) -> list[str]:
         rate_hz = _mean(each.poured_hz for each in flooded)
         refused = sum(sum(each.refused.values()) for each in flooded)
         lines.append(
-            f"flooded by {rate_hz:.0f} messages a second; behind the router {refused} were refused"
+            f"flooded with {rate_hz:.0f} messages a second; {refused} were refused behind the router"
         )
     if done.flights:
         lines.append("every task was done, and nothing honest was refused" if done.ok else "FAILED")

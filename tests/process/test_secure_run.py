@@ -14,10 +14,11 @@ from swarm.cli import main
 from swarm.clock import unix_s
 from swarm.identity.founding import found_authority
 from swarm.scenario.write import format_scenario
+from tests.process.feed_reader import post
 from tests.process.mission import SwarmRun
 from tests.process.test_status import router_of
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
 
 FAST = ["--speedup", "20"]
 
@@ -58,11 +59,14 @@ def test_keys_made_before_serve_a_run_and_only_operators_command_it(tmp_path: Pa
     found_authority(keys, mission.name, uavs, now_s=unix_s(), routers=2, days=1)
     folder.mkdir()
     words = [str(scenario), "--keys", str(keys), "--bus", "router", "--routers", "2", *FAST]
+    words += ["--dashboard", "0"]
     with SwarmRun(words, folder) as run:
         viewer = swarm("abort", "--yes", *FAST, "--keys", str(keys / "dashboard"))
         run.wait_for_line("epoch 1")
         seat = ["--connect", router_of(run), "--keys", str(keys / "operator")]
-        operator = swarm("abort", "--yes", *FAST, *seat)
+        operator = swarm("return", uavs[0], *FAST, *seat)
+        url = run.lines[0].removeprefix("dashboard: ")
+        assert post(url, "api/command", {"command": "abort", "reason": "storm"})[0] == 200
         status, told = run.result()
 
     assert viewer.returncode == 2
@@ -70,7 +74,9 @@ def test_keys_made_before_serve_a_run_and_only_operators_command_it(tmp_path: Pa
     assert "whose role is viewer" in viewer.stderr
     assert (operator.returncode, operator.stderr) == (0, "")
     assert status == 1
-    assert any("operator aborts the mission" in line["text"] for line in told["story"])
+    story = " ".join(line["text"] for line in told["story"])
+    assert f"operator sends {uavs[0]} home" in story
+    assert "operator aborts the mission: storm" in story
     assert told["security"]["refused"] == {}
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from sim.bench.flooding import Poured
 from sim.bench.machine import this_machine
 from sim.bench.process_costs import LAUNCHER, Costs, ProcessCosts, kind_of
 from sim.bench.secure import CostFlight, SecureBench, Way, in_turn
@@ -106,9 +107,18 @@ def test_a_flood_is_refused_and_the_others_are_quick_all_the_same() -> None:
     assert bench.ok
     text = shown(bench)
     assert "p99 of next target sent below 100 ms, flooded: held" in text
-    assert "flooded by 10000 messages a second; behind the router 900 were refused" in text
+    assert "flooded with 10000 messages a second; 900 were refused behind the router" in text
     slow = replace(flooded, target_ms=(101.0,))
     assert "flooded: NOT held" in shown(replace(bench, flights=(PLAIN, SECURE, slow)))
+
+
+def test_a_hostile_process_tells_how_much_it_has_sent() -> None:
+    poured = Poured()
+    for line in ('{"sent": 100, "wall_s": 1.0}', "Traceback", "[1]", '{"sent": 500, "wall_s": 4}'):
+        poured.hear("hostile", line)
+
+    assert poured.rate_hz == 125.0
+    assert Poured().rate_hz == 0.0
 
 
 def test_programs_are_told_the_same() -> None:
