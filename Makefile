@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
-.PHONY: demo test browser lint format kernels sanitize soak chaos fuzz clean help
+.PHONY: demo test browser lint format kernels sanitize soak chaos fuzz check-units clean help
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
@@ -18,6 +18,7 @@ help:
 	@echo "make soak    play 10000 random missions with faults in virtual time (SEEDS=N for more)"
 	@echo "make chaos   kill and restart real processes at random moments of whole missions, 60 flights"
 	@echo "make fuzz    throw a million hostile inputs of each firmware at a bridge (STEPS=N for more)"
+	@echo "make check-units  boot systemd in a container, and kill and freeze the services of a fleet (root)"
 	@echo "make clean   remove what was built and installed here"
 
 demo: $(VENV)/.installed
@@ -97,6 +98,10 @@ STEPS ?= 1000000
 SEED ?= 1
 fuzz: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.fuzz_bridge --steps $(STEPS) --seed $(SEED)
+
+# A real systemd in a container; as root on a machine with debootstrap and systemd-nspawn.
+check-units: $(VENV)/.installed-dev
+	deploy/checks/units.sh
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
