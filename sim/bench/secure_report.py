@@ -176,7 +176,7 @@ def _verdict(done: SecureBench) -> list[str]:
         rate_hz = _mean(each.poured_hz for each in flooded)
         refused = sum(sum(each.refused.values()) for each in flooded)
         lines.append(
-            f"flooded with {rate_hz:.0f} messages a second; {refused} were refused behind the router"
+            f"flooded with {rate_hz:.0f} messages a second; {refused} refused behind the router"
         )
     if done.flights:
         lines.append("every task was done, and nothing honest was refused" if done.ok else "FAILED")
