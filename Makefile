@@ -6,18 +6,24 @@ BIN := $(VENV)/bin
 
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
-.PHONY: demo test browser lint format kernels sanitize soak chaos fuzz check-units clean help
+.PHONY: demo test browser lint audit format kernels sanitize soak chaos fuzz clean help
+.PHONY: dist check-dist sbom wheels check-units
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
 	@echo "make test    checks and the whole test suite"
-	@echo "make lint    the checks alone: ruff, mypy, import-linter"
+	@echo "make lint    the checks alone: ruff, mypy, import-linter, known weaknesses of packages"
+	@echo "make audit   ask whether weaknesses of what is installed are known"
 	@echo "make format  put the sources into shape"
 	@echo "make kernels build the C++ kernels again and write their type stub"
 	@echo "make sanitize  test the kernels under the address and undefined-behaviour sanitizers"
 	@echo "make soak    play 10000 random missions with faults in virtual time (SEEDS=N for more)"
 	@echo "make chaos   kill and restart real processes at random moments of whole missions, 60 flights"
 	@echo "make fuzz    throw a million hostile inputs of each firmware at a bridge (STEPS=N for more)"
+	@echo "make dist    source distribution and a wheel for this machine, into dist/"
+	@echo "make check-dist  install both elsewhere, use them, and build them again to the same bytes"
+	@echo "make sbom    bill of materials of that wheel, into dist/"
+	@echo "make wheels  wheels for all machines, into dist/wheels/; needs Docker or Podman"
 	@echo "make check-units  boot systemd in a container, and kill and freeze the services of a fleet (root)"
 	@echo "make clean   remove what was built and installed here"
 
@@ -46,6 +52,10 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m tests.release.audit
+
+audit: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.release.audit --must-answer
 
 format: $(VENV)/.installed-dev
 	$(BIN)/ruff format .
@@ -86,6 +96,27 @@ $(VENV)/.installed: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/py
 $(VENV)/.installed-dev: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-release: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,release]'
+	@touch $@
+
+# The same commit gives the same bytes on every day: files carry the time of the commit.
+RELEASE := SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct)
+
+dist: $(VENV)/.installed-release
+	rm -rf dist
+	$(RELEASE) $(BIN)/python -m build
+
+check-dist: dist
+	$(BIN)/python -m cibuildwheel --platform linux --print-build-identifiers
+	$(BIN)/python -m tests.release.check_dist dist
+
+sbom: $(VENV)/.installed-release
+	$(BIN)/python -m tests.release.bill dist/*.whl
+
+wheels: $(VENV)/.installed-release
+	$(RELEASE) $(BIN)/python -m cibuildwheel --output-dir dist/wheels
 
 SEEDS ?= 10000
 soak: $(VENV)/.installed

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from statistics import median_high
 
 from agent.events import Action
 from agent.learning import Learning
@@ -98,7 +99,7 @@ class Hearing:
                 actions += self._take_in(message, now_s)
         self._expect_claimants(now_s)
         self._echoes.clear()
-        self._learn_clock([snapshot.mission_s for snapshot in snapshots], now_s)
+        self._learn_clock(snapshots, now_s)
         somebody_knows = any(isinstance(message.body, Brief) for message in told)
         self.learning.take(enough=somebody_knows and not self.at_work)
         self._answered.update(snapshot.writer for snapshot in snapshots)
@@ -133,7 +134,7 @@ class Hearing:
         """An earlier life of this agent knew so."""
         actions = [a for message in memory.messages for a in self._take_in(message, now_s)]
         self._expect_claimants(now_s)
-        self._learn_clock([memory.mission_s], now_s)
+        self._learn_clock([memory], now_s)
         return actions
 
     def yields_to(self, snapshots: Iterable[Snapshot]) -> bool:
@@ -185,10 +186,12 @@ class Hearing:
         self._awake(now_s)
         return [Note("mission runs", {"mission_s": epoch.mission_s})]
 
-    def _learn_clock(self, told_s: Iterable[float | None], now_s: float) -> None:
-        known_s = [mission_s for mission_s in told_s if mission_s is not None]
+    def _learn_clock(self, told: Iterable[Snapshot], now_s: float) -> None:
+        """The coordinator's word counts; else one odd clock among many must not set the time."""
+        known_s = {each.writer: each.mission_s for each in told if each.mission_s is not None}
         if known_s and self._replica.epoch is not None:
-            self._picture.set_clock(max(known_s), now_s)
+            mission_s = known_s.get(COORDINATOR, median_high(known_s.values()))
+            self._picture.set_clock(mission_s, now_s)
 
     # -- who is there -----------------------------------------------------------------
 

@@ -95,9 +95,9 @@ def run(
         Path | None,
         typer.Option(
             "--signing-key",
-            metavar="FILE",
+            metavar="PATH",
             help="Sign what is said to the vehicles, and believe nothing that is not; see swarm "
-            "agent.",
+            "agent. Of a folder made by swarm keys, each vehicle has its UAV's own.",
             show_default=False,
         ),
     ] = None,
@@ -205,6 +205,23 @@ def run(
             show_default=False,
         ),
     ] = None,
+    secure: Annotated[
+        bool,
+        typer.Option(
+            "--secure",
+            help="Fly with new keys, made for this run alone: encrypted links, access control, "
+            "signed statements and, with simulated autopilots, signed MAVLink.",
+        ),
+    ] = False,
+    keys: Annotated[
+        Path | None,
+        typer.Option(
+            "--keys",
+            metavar="DIR",
+            help="The same with keys made before: the folder in which swarm keys init made them.",
+            show_default=False,
+        ),
+    ] = None,
     report: ReportOption = None,
     record: RecordOption = None,
     logs: Annotated[
@@ -231,6 +248,7 @@ def run(
         swarm run table-1
         swarm run valley-survey --speedup 20 --report flight.md --logs logs
         swarm run valley-survey --dashboard 8080
+        swarm run valley-survey --secure --speedup 20
         swarm run valley-survey --autopilot sim-px4 --command mission --speedup 20
         swarm run valley-survey --speedup 20 --fault uav03:pilot@60
         swarm run meadow --autopilot ardupilot --firmware ~/ardupilot/build/sitl/bin/arducopter
@@ -256,6 +274,7 @@ def run(
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
     from sim.launch.kept_logs import KeptLogs
+    from sim.launch.protection import protected, security_of
     from sim.launch.run import fly
     from swarm.config import preset
     from swarm.log import LogFormat, LogLevel, configure_logging
@@ -282,7 +301,7 @@ def run(
     )
     check_handed_on(handed_on, autopilots, uavs)
     defaults = defaults_for(autopilots, len(uavs))
-    options = LaunchOptions(
+    plain = LaunchOptions(
         scenario=scenario,
         method=method,
         seed=seed,
@@ -313,16 +332,16 @@ def run(
     def say(line: str) -> None:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
 
-    for line in () if options.dashboard is None else options.dashboard.lines:
+    for line in () if plain.dashboard is None else plain.dashboard.lines:
         say(line)
 
-    async def work() -> int:
+    async def work(options: LaunchOptions) -> int:
         about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))
         try:
             with (
                 kept or contextlib.nullcontext(),
                 recording_or_none(record, about, wall_ns(), say) as recorder,
-                LiveView(console, speedup=speedup) as view,
+                LiveView(console, speedup=speedup, secure=options.keys is not None) as view,
             ):
                 flight = await fly(
                     mission,
@@ -343,11 +362,13 @@ def run(
             wall_s=flight.wall_s,
             speedup=speedup,
             fates=flight.fates,
+            security=security_of(options, mission, flight.dropped),
         )
         status = tell(told, json=json, report=report)
         return status or int(recorder is not None and recorder.fault is not None)
 
-    return asyncio.run(run_until_stopped(work()))
+    with protected(mission, plain, secure=secure, keys=keys) as options:
+        return asyncio.run(run_until_stopped(work(options)))
 
 
 def _bus_kind(text: str) -> BusKind:

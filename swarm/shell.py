@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
+from swarm import __version__
 from swarm.bus.port import (
     Answer,
     Bus,
@@ -43,6 +44,7 @@ from swarm.events import (
     Publish,
     PublishLast,
     Save,
+    Stop,
     Tick,
 )
 from swarm.limits import TOO_MANY, Gate
@@ -193,6 +195,7 @@ class Shell(Generic[E, A]):
             self._done.set_exception(fault)
 
     def _start(self) -> None:
+        self._log.info("begins", release=__version__)
         for action in self._core.start(self._clock.now_s()):
             self._carry_out(action)
         if self._seal is not None:  # what is in its folder is as if it had been heard
@@ -228,6 +231,8 @@ class Shell(Generic[E, A]):
             )
             for name in gone:  # a token cannot be signed: it counts no longer
                 self.step(self._from_bus(PeerGone(name)))
+            if not seal.is_in_force:  # nobody believes it any more, so it takes no further part
+                self.step(self._from_bus(Stop("its keys were revoked or replaced")))
 
     def _guard(self, act: Callable[[], None]) -> None:
         """Act and reschedule; a bug ends the process rather than half of it."""

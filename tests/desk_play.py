@@ -38,6 +38,7 @@ class DeskPlay:
         self.time_s = 0.0
         self.speedup = 1.0
         self.player: Player | None = None
+        self.may_order = True
         self.said: list[Message] = []
         """What the desk has published."""
         self.wishes: list[Wish] = []
@@ -125,7 +126,7 @@ class DeskPlay:
 
     @property
     def orders(self) -> DeskPlay | None:
-        return self if self.player is None else None
+        return self if self.may_order and self.player is None else None
 
     def give(self, wish: OperatorWish, who: str) -> int:
         n = self.desk.give(wish, who, self.time_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -49,8 +50,12 @@ class Keyring:
         kept = tuple(entry for entry in self.roster.entries if entry.name not in names)
         return replace(self.roster, version=self.roster.version + 1, entries=kept)
 
-    def seal(self, name: str, roster: Roster | None = None) -> Seal:
-        """Of ``name``, with the present roster or another one."""
+    def seal(
+        self,
+        name: str,
+        roster: Roster | None = None,
+        keep: Callable[[bytes], object] = bytes,
+    ) -> Seal:
+        """Of ``name``, with the present roster or another one; ``keep`` is its disk."""
         public = self.authority.public_key().public_bytes_raw()
-        kept: list[bytes] = []
-        return Seal(name, self.private[name].sign, self.signed(roster), public, kept.append)
+        return Seal(name, self.private[name].sign, self.signed(roster), public, keep)

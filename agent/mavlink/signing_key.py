@@ -2,7 +2,7 @@
 
 A file that everyone on the machine can read is refused, not warned of: each of them could
 command the vehicle, a warning in a log is read after the flight, and `chmod o= FILE` mends
-it. Leaves out: making keys and giving them to vehicles.
+it. Leaves out: making keys (`swarm keys`) and giving them to vehicles.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ from pathlib import Path
 from agent.mavlink.signing import KEY_BYTES, SigningKey
 from swarm.errors import Fault, InputError
 
-__all__ = ["load_signing_key"]
+__all__ = ["MAVLINK_KEY", "load_signing_key", "signing_key_of"]
+
+MAVLINK_KEY = "mavlink.key"
+"""A vehicle's key in the folder of its UAV, as `swarm keys` makes it."""
 
 _LONGEST_BYTES = 4096
 _HEX_DIGITS = 2 * KEY_BYTES
@@ -22,6 +25,11 @@ _REMEDY = (
     f"give a file of {KEY_BYTES} bytes or {_HEX_DIGITS} hexadecimal digits, "
     "such as (umask 077; openssl rand -hex 32 > FILE) makes"
 )
+
+
+def signing_key_of(uav: str, path: Path) -> Path:
+    """The file with that UAV's key: ``path`` itself, or in a mission's keys the UAV's own."""
+    return path / uav / MAVLINK_KEY if path.is_dir() else path
 
 
 def load_signing_key(path: Path) -> SigningKey:

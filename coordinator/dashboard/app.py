@@ -236,7 +236,9 @@ class Dashboard:
 
     def _give(self, said: CommandSaid | TaskSaid | WithdrawalSaid, who: str) -> dict[str, int]:
         if (orders := self._source.orders) is None:
-            raise _HttpError(403, "a recording takes no orders")
+            recorded = self._source.player is not None
+            keys = "these keys only look on: start swarm dashboard with an operator's"
+            raise _HttpError(403, "a recording takes no orders" if recorded else keys)
         n = orders.give(said.wish, who)
         self.hub.nudge()
         return {"n": n}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
-from swarm.errors import Fault, InputError
+from swarm.errors import BusError, Fault, InputError
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
     CheckOption,
@@ -98,7 +98,8 @@ def dashboard(
     Joins a mission as an onlooker, or waits for one, and serves a page with map, UAVs, tasks
     and decisions; tasks are added and withdrawn there, and UAVs stopped or brought home, with
     or without a coordinator. Nobody flies any differently while nobody asks for it. It needs
-    no internet. Ctrl-C ends it, and nothing else.
+    no internet. With keys it takes orders only if they are an operator's. Ctrl-C ends it, and
+    nothing else.
 
     Examples:
         swarm dashboard
@@ -117,10 +118,10 @@ def dashboard(
     from coordinator.dashboard.live import LiveMission
     from coordinator.dashboard.serve import serving
     from coordinator.joining import check_mission
-    from coordinator.status.watch import FOREVER_S
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock
-    from swarm.log import configure_logging
+    from swarm.identity import Role
+    from swarm.log import configure_logging, get_logger
     from swarm.process import run_until_stopped
     from swarm.watchdog import SERVICE
 
@@ -144,9 +145,21 @@ def dashboard(
     clock = ScaledClock(speedup)
 
     async def open_bus() -> Bus:
-        return await open_zenoh_bus(config, timeout_s=FOREVER_S)
+        while True:
+            try:
+                return await open_zenoh_bus(config)
+            except BusError as fault:
+                get_logger("dashboard").warning("no bus yet", reason=str(fault))
 
-    source = LiveMission(mission or config.mission, open_bus, network, clock, speedup)
+    identity = config.identity
+    source = LiveMission(
+        mission or config.mission,
+        open_bus,
+        network,
+        clock,
+        speedup,
+        may_order=identity is None or identity.role is Role.OPERATOR,
+    )
 
     async def work() -> int:
         served = create_app(source, access, display)

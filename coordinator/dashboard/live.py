@@ -39,6 +39,7 @@ class LiveMission:
         network: timers.
         clock: gives ``now_s``.
         speedup: of that clock.
+        may_order: whether what is ordered here would be believed.
     """
 
     def __init__(
@@ -48,7 +49,10 @@ class LiveMission:
         network: LinkPreset,
         clock: Clock,
         speedup: float,
+        *,
+        may_order: bool = True,
     ) -> None:
+        self._may_order = may_order
         self._mission = mission
         self._open_bus = open_bus
         self._network = network
@@ -130,9 +134,9 @@ class LiveMission:
         return [*self._before, *(() if self._desk is None else self._desk.rows)]
 
     @property
-    def orders(self) -> LiveMission:
-        """Takes orders."""
-        return self
+    def orders(self) -> LiveMission | None:
+        """Takes orders; None where the keys are no operator's."""
+        return self if self._may_order else None
 
     @property
     def player(self) -> Player | None:

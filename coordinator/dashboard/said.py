@@ -6,7 +6,7 @@ Leaves out: how it arrives (coordinator.dashboard.app).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import Strict, ValidationError
@@ -14,7 +14,7 @@ from pydantic import Strict, ValidationError
 from coordinator.operator.commanding import CommandWish
 from coordinator.operator.task_orders import NewTask, Withdrawal
 from swarm.model.ids import FLEET
-from swarm.wire.bounds import CHECKED, Duration, Flag, Id, Point, Value
+from swarm.wire.bounds import Duration, Flag, Id, Point, Value
 from swarm.wire.messages import CommandKind
 
 __all__ = ["CommandSaid", "PlayerSaid", "TaskSaid", "WithdrawalSaid", "fault_of"]
@@ -25,11 +25,15 @@ Rate = Annotated[float, Strict(), Gt(0.0), Le(1000.0)]
 Moment = Annotated[float, Strict(), Ge(0.0), Le(1e9)]
 
 
+_CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
+"""A page is served by the process it speaks to, so it has no fields of a newer release."""
+
+
 @dataclass(frozen=True, slots=True)
 class CommandSaid:
     """Body of ``/api/command``."""
 
-    __pydantic_config__: ClassVar = CHECKED
+    __pydantic_config__: ClassVar = _CHECKED
 
     command: CommandKind
     uav: Id | None = None
@@ -51,7 +55,7 @@ class CommandSaid:
 class TaskSaid:
     """Body of ``/api/task``."""
 
-    __pydantic_config__: ClassVar = CHECKED
+    __pydantic_config__: ClassVar = _CHECKED
 
     position: Point
     """East, north, up [m; mission origin]."""
@@ -72,7 +76,7 @@ class TaskSaid:
 class WithdrawalSaid:
     """Body of ``/api/task/withdraw``."""
 
-    __pydantic_config__: ClassVar = CHECKED
+    __pydantic_config__: ClassVar = _CHECKED
 
     id: Id
     reason: Reason = ""
@@ -87,7 +91,7 @@ class WithdrawalSaid:
 class PlayerSaid:
     """Body of ``/api/recording``."""
 
-    __pydantic_config__: ClassVar = CHECKED
+    __pydantic_config__: ClassVar = _CHECKED
 
     playing: Flag | None = None
     speed: Rate | None = None

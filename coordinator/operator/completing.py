@@ -10,17 +10,21 @@ import asyncio
 import contextlib
 import re
 import socket
+from typing import TYPE_CHECKING
 
 import typer
 
-from swarm.bus.config import DEFAULT_ROUTER
+from swarm.bus.config import DEFAULT_ROUTER, DEFAULT_SECURE_ROUTER
+
+if TYPE_CHECKING:
+    from swarm.bus.config import BusConfig
 
 __all__ = ["complete_uav"]
 
 _DIAL_S = 0.1
 _OPEN_S = 0.5
 _LOOK_S = 0.3
-_TCP = re.compile(r"tcp/(\[[^\]]+\]|[^:]+):(\d+)")
+_TCP = re.compile(r"(?:tcp|tls)/(\[[^\]]+\]|[^:]+):(\d+)")
 
 
 def complete_uav(ctx: typer.Context, incomplete: str) -> list[str]:
@@ -38,14 +42,17 @@ def complete_uav(ctx: typer.Context, incomplete: str) -> list[str]:
 
 def _writers(ctx: typer.Context) -> set[tuple[str, str]]:
     """Mission and name of whoever shows a token; nobody where no router is at hand."""
-    endpoints = list(ctx.params.get("connect") or ()) or [DEFAULT_ROUTER]
+    keys, clear = ctx.params.get("keys"), bool(ctx.params.get("unencrypted"))
+    default = DEFAULT_ROUTER if keys is None else DEFAULT_SECURE_ROUTER
+    endpoints = list(ctx.params.get("connect") or ()) or [default]
     near = [endpoint for endpoint in endpoints if _accepts(endpoint)]
     if not near:
         return set()
+    from swarm.bus.seat import Seat
     from swarm.errors import SwarmError
 
     with contextlib.suppress(SwarmError, OSError):
-        return asyncio.run(_look(near))
+        return asyncio.run(_look(Seat(connect=near, keys=keys, unencrypted=clear).config()))
     return set()
 
 
@@ -60,15 +67,14 @@ def _accepts(endpoint: str) -> bool:
     return True
 
 
-async def _look(endpoints: list[str]) -> set[tuple[str, str]]:
-    from swarm.bus.config import bus_config
+async def _look(config: BusConfig) -> set[tuple[str, str]]:
     from swarm.bus.port import TokenSeen
     from swarm.bus.zenoh_bus import open_zenoh_bus
-    from swarm.wire.keys import ANY_TOKEN, mission_of_token
+    from swarm.wire.keys import ANY_TOKEN, Keys, mission_of_token
 
-    bus = await open_zenoh_bus(bus_config("router", "", endpoints), timeout_s=_OPEN_S)
+    bus = await open_zenoh_bus(config, timeout_s=_OPEN_S)
     try:
-        bus.watch_tokens(ANY_TOKEN)
+        bus.watch_tokens(ANY_TOKEN if config.mission is None else Keys(config.mission).alive("*"))
         await asyncio.sleep(_LOOK_S)
         tokens = [event.key for event in bus.inbox.take() if isinstance(event, TokenSeen)]
     finally:

@@ -20,6 +20,7 @@ from coordinator.view.alerts import alerts
 from coordinator.view.fleet_table import fit, fleet_table, lists, table_width
 from coordinator.view.map_panel import ideal_width, map_panel
 from coordinator.view.scene import Scene, scene_of
+from coordinator.view.security import refusals
 from coordinator.view.signs import BAD, Signs, signs_for
 from coordinator.view.story import clean, is_trouble, shown_value, story_line, story_style
 from swarm.state.board import TaskState
@@ -48,6 +49,7 @@ def picture(
     width: int,
     height: int,
     speedup: float = 1.0,
+    secure: bool = False,
     ascii_only: bool = False,
 ) -> RenderableType:
     """What ``observer`` knows, as exactly ``height`` lines of at most ``width`` cells.
@@ -58,12 +60,14 @@ def picture(
         width: columns.
         height: lines; from 8 on everything has a place.
         speedup: mission seconds per wall second, shown when not 1.
+        secure: say that the mission has keys, and how much was refused.
         ascii_only: for consoles without UTF-8.
     """
     signs = signs_for(ascii_only)
     scene = scene_of(observer, now_s)
     body = _wide if width >= _WIDE else _narrow
-    lines = [title(scene, width, speedup, signs)]
+    refused = sum(refusals(observer.dropped.values()).values()) if secure else None
+    lines = [title(scene, width, speedup, signs, refused)]
     lines += body(observer, scene, width, height - 1, signs)
     lines += [Text() for _ in range(height - len(lines))]
     for line in lines:
@@ -82,11 +86,13 @@ class LiveView:
     Args:
         console: where to; standard error, so that results have standard output alone.
         speedup: mission seconds per wall second.
+        secure: see `picture`.
     """
 
-    def __init__(self, console: Console, *, speedup: float = 1.0) -> None:
+    def __init__(self, console: Console, *, speedup: float = 1.0, secure: bool = False) -> None:
         self._console = console
         self._speedup = speedup
+        self._secure = secure
         self._told = 0
         self._noticed = ""
         self._cut = False
@@ -128,6 +134,7 @@ class LiveView:
             width=width,
             height=min(_TALLEST, max(1, height - 1)),
             speedup=self._speedup * observer.pace,
+            secure=self._secure,
             ascii_only=self._ascii_only,
         )
         self._show(frame)
@@ -221,13 +228,18 @@ def _beside(left: list[Text], right: list[Text]) -> list[Text]:
 # -- parts --------------------------------------------------------------------------
 
 
-def title(scene: Scene, width: int, speedup: float, signs: Signs) -> Text:
-    """One line: mission, phase, time and pecking order."""
+def title(
+    scene: Scene, width: int, speedup: float, signs: Signs, refused: int | None = None
+) -> Text:
+    """One line: mission, phase, time and pecking order; with keys, what has been refused."""
     line = Text().append(clean(scene.mission.name), "bold")
     between = f" {signs.dot} "
     line.append(between)
     aborted = scene.aborted and scene.phase is not EpochPhase.ENDED
     line.append("ABORTED" if aborted else scene.phase.upper(), _PHASE_STYLE[scene.phase])
+    if refused is not None:
+        line.append(f"{between}secure", "green")
+        line.append(f", {refused} refused" if refused else "", BAD)
     if scene.mission_s is not None:
         horizon_s = scene.mission.horizon_s
         line.append(f"{between}mission time {scene.mission_s:.1f} s")

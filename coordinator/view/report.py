@@ -20,6 +20,7 @@ from coordinator.observer import Happening, MissionResult
 from coordinator.plan_report import plan_as_json
 from coordinator.view.comparison import Fact, compare_lists, facts, verdict, worth
 from coordinator.view.report_text import report_text
+from coordinator.view.security import Security
 from coordinator.view.signs import signs_for
 from coordinator.view.story import clean, shown_s, shown_value, told_at
 from swarm.errors import Fault, InputError
@@ -62,6 +63,8 @@ class MissionReport:
     """When and why UAVs were lost, as far as that is known: in a simulation."""
     value: float | None = None
     """What was flown is worth by what was drawn in a simulation [value·s]; None if unknown."""
+    security: Security | None = None
+    """What protected it; None if nothing did, or nothing had to."""
     hint: str = _HINT
     """How to get more; the last line of `render`."""
 
@@ -93,6 +96,7 @@ class MissionReport:
             "wall_s": self.wall_s,
             "speedup": self.speedup,
             "processes": list(self.fates),
+            "security": None if self.security is None else self.security.as_json(),
             "story": [{"mission_s": line.mission_s, "text": line.text} for line in self.story],
             "lost_because": dict(self.lost_because),
             "value": self.value,
@@ -147,6 +151,8 @@ class MissionReport:
             spent.append(f"whole run {shown_s(self.wall_s)} s of wall time{fast}")
         if spent:
             found.append(Fact("time", "; ".join(spent)))
+        if self.security is not None:
+            found.append(self.security.fact)
         found += [Fact("process", clean(fate), bad=True) for fate in self.fates]
         return found
 

@@ -5,6 +5,7 @@ Leaves out: everything but options and output.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -76,9 +77,10 @@ def autopilot(
         Path | None,
         typer.Option(
             "--signing-key",
-            metavar="FILE",
+            metavar="PATH",
             help="Key of every vehicle, 32 bytes or 64 hexadecimal digits: it signs what it "
-            "says and hears nobody who does not.",
+            "says and hears nobody who does not. Of a folder made by swarm keys, each takes its "
+            "UAV's own.",
             show_default=False,
         ),
     ] = None,
@@ -158,7 +160,7 @@ def autopilot(
     import asyncio
     import math
 
-    from agent.mavlink.signing_key import load_signing_key
+    from agent.mavlink.signing_key import load_signing_key, signing_key_of
     from sim.autopilot.config import BatteryFailsafe
     from sim.autopilot.endpoint import ENDPOINT_RULE, parse_endpoint
     from sim.autopilot.fleet import Physics, fleet_of
@@ -182,7 +184,6 @@ def autopilot(
             error
         )
     wanted = [UavId(name) for name in dict.fromkeys(uav)] if uav else None
-    key = None if signing_key is None else load_signing_key(signing_key)
     require_finite(
         acceleration_m_s2=acceleration_m_s2,
         gust_m_s=gust_m_s,
@@ -201,9 +202,12 @@ def autopilot(
     check_wind(math.hypot(*physics.wind_enu_m_s), fleet_of(mission, wanted, system_id))
     faults = faults_by_uav(fault or (), known)
     fleet = fleet_of(mission, wanted, system_id, physics)
+    keys: dict[str, SigningKey] = {}
+    if signing_key is not None:
+        keys = {each.uav: load_signing_key(signing_key_of(each.uav, signing_key)) for each in fleet}
     return asyncio.run(
         run_until_stopped(
-            _serve(fleet, faults, endpoint, flavour, speedup, key, quiet=json), lifeline=lifeline
+            _serve(fleet, faults, endpoint, flavour, speedup, keys, quiet=json), lifeline=lifeline
         )
     )
 
@@ -214,7 +218,7 @@ async def _serve(
     endpoint: Endpoint,
     flavour: FlavourName,
     speedup: float,
-    key: SigningKey | None,
+    keys: Mapping[str, SigningKey],
     *,
     quiet: bool,
 ) -> int:
@@ -230,7 +234,6 @@ async def _serve(
     from swarm.errors import Fault, InputError
 
     clock = ScaledClock(speedup)
-    secret = None if key is None else key.secret
     servers: list[VehicleServer] = []
     try:
         for place, member in enumerate(fleet):
@@ -239,6 +242,8 @@ async def _serve(
             own_faults = faults.get(member.uav)
             vehicle: Machine = FaultyVehicle(sound, own_faults, start_s) if own_faults else sound
             own = endpoint.shifted(place)
+            key = keys.get(member.uav)
+            secret = None if key is None else key.secret
             server = VehicleServer(vehicle, own, clock, signing_secret=secret)
             servers.append(server)
             try:

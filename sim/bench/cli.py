@@ -2,9 +2,9 @@
 
 Leaves out: the commands about fleets that fly (`sim.bench.trouble_commands`,
 `sim.bench.turnaround_command`, `sim.bench.missions_command`), about simulated vehicles
-(`sim.bench.autopilot_commands`) and about the dashboard (`sim.bench.dashboard_command`), what
-the others do (`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown
-(`sim.bench.plan_report`, `sim.bench.plan_plot`).
+(`sim.bench.autopilot_commands`), about the dashboard (`sim.bench.dashboard_command`) and about
+keys (`sim.bench.secure_command`), what the others do (`sim.bench.plan_bench`,
+`sim.bench.decide`) and how it is shown (`sim.bench.plan_report`, `sim.bench.plan_plot`).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import typer
 from sim.bench.autopilot_commands import AUTOPILOT_HELP, autopilot
 from sim.bench.dashboard_command import DASHBOARD_HELP, dashboard
 from sim.bench.missions_command import MISSIONS_HELP, missions
+from sim.bench.secure_command import SECURE_HELP, secure
 from sim.bench.trouble_commands import FAILOVER_HELP, FLOOD_HELP, failover, flood
 from sim.bench.turnaround_command import TURNAROUND_HELP, turnaround
 from sim.bench.words import each, size_of
@@ -232,6 +233,9 @@ bench.command("dashboard", help=DASHBOARD_HELP, short_help="Measure what a dashb
     dashboard
 )
 bench.command("autopilot", help=AUTOPILOT_HELP, short_help="Measure simulated vehicles.")(autopilot)
+bench.command("secure", help=SECURE_HELP, short_help="Measure what keys and encryption cost.")(
+    secure
+)
 bench.command(
     "turnaround", help=TURNAROUND_HELP, short_help="Time from each arrival to the next target."
 )(turnaround)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sim.bench.failover import What
     from sim.launch.fleet import BusKind
 
-__all__ = ["FAILOVER_HELP", "FLOOD_HELP", "failover", "flood", "progress"]
+__all__ = ["FAILOVER_HELP", "FLOOD_HELP", "bus_of", "failover", "flood", "progress"]
 
 _LONGEST_S = 86_400.0
 FAILOVER_HELP = """Measure fleets of real processes in trouble.
@@ -105,7 +105,7 @@ def failover(
     settings = Settings(
         trials=trials,
         link=link,
-        bus=_bus(bus),
+        bus=bus_of(bus),
         watch_s=watch_s,
         relay=relay,
         parted_s=parted_s,
@@ -145,7 +145,7 @@ def flood(
     from sim.bench.machine import this_machine
     from sim.chaos.flood import fly_flooded, times_for
 
-    kind, machine = _bus(bus), this_machine()
+    kind, machine = bus_of(bus), this_machine()
     with progress() as tell:
         done = asyncio.run(fly_flooded(times_for(seconds), seed=seed, bus=kind, on_progress=tell))
     if json:
@@ -178,7 +178,12 @@ def _what(flag: str, word: str) -> What:
         raise InputError(Fault(flag, word, "cannot be measured", remedy)) from None
 
 
-def _bus(word: str) -> BusKind:
+def bus_of(word: str) -> BusKind:
+    """The bus of that name.
+
+    Raises:
+        InputError: it is none.
+    """
     from sim.launch.fleet import BusKind
 
     if word not in (BusKind.MESH, BusKind.ROUTER):

@@ -35,7 +35,15 @@ from swarm.scenario.write import format_scenario
 from swarm.wire.codec import Codec
 from swarm.wire.keys import Keys
 
-__all__ = ["RATE_HZ", "Flood", "fly_flooded", "long_mission", "times_for"]
+__all__ = [
+    "RATE_HZ",
+    "STATUS",
+    "Flood",
+    "fly_flooded",
+    "long_mission",
+    "times_for",
+    "told_status",
+]
 
 RATE_HZ = 24.0
 """Messages of each kind per second."""
@@ -179,14 +187,14 @@ async def fly_flooded(
                     limit_s=READY_S,
                     what="all agents there",
                 )
-                before = await _status(run, mission.name)
+                before = await told_status(run, mission.name)
                 tell("flooding")
                 seconds = await peer.flood_until(
                     lambda: len(run.observer.result().done) >= len(mission.tasks) - 2,
                     limit_s=READY_S + 10.0 * times,
                 )
                 await asyncio.sleep(SETTLE_S)
-                after = await _status(run, mission.name)
+                after = await told_status(run, mission.name)
                 tell("waiting for the end")
                 await run.finish()
         flight = run.flight()
@@ -272,7 +280,7 @@ async def _hostile(run: Run, mission: Mission, rng: np.random.Generator) -> Asyn
         bus.close()
 
 
-async def _status(run: Run, mission: str) -> Mapping[str, Any]:
+async def told_status(run: Run, mission: str) -> Mapping[str, Any]:
     """What `swarm status` tells."""
     words = ["status", "--mission", mission, "--json"]
     words += run.launch.layout.seat_arguments(STATUS)

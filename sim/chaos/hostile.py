@@ -153,6 +153,8 @@ class Hostile:
                 parts[-1][field] = wrong[int(self._rng.integers(len(wrong)))]
                 payload = msgpack.packb(parts)
             case Kind.LONG:
+                said = replace(said, writer=self._uav(), body=self._claim())
+                key, parts = said.key, msgpack.unpackb(encode(said))
                 parts[-1]["padding"] = bytes(SMALL_LIMIT_BYTES)
                 payload = msgpack.packb(parts)
             case Kind.HUGE:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
+import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,9 +21,11 @@ from sim.doctor.probes import listen_problem, port_holder
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology, bus_config
 from swarm.bus.endpoints import free_loopback_endpoints
 from swarm.bus.port import Bus, LinkUp, Query, TokenSeen
+from swarm.bus.privacy import is_encrypted
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.errors import SwarmError
 from swarm.wire.keys import ANY_TOKEN, Keys, mission_of_token
+from swarm.wire.question import NONCE_BYTES, encode_question
 
 __all__ = ["Found", "Reached", "check_bus", "check_session", "check_zenoh", "judge_dial"]
 
@@ -35,7 +38,8 @@ ANSWER_S = 1.0
 SLOW_S = 0.25
 """Round trip from which on `--link bad` suits better [s]."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|quic)/(\[[^\]]+\]|[^:]+):(\d+)")
-_START_ROUTER = "start one there: swarm router --listen tcp/0.0.0.0:{port}"
+_START_ROUTER = "start one there: swarm router --listen tcp/0.0.0.0:{port} --unencrypted"
+_START_SECURE_ROUTER = "start one there: swarm router --keys DIR --listen tls/0.0.0.0:{port}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,10 +138,10 @@ async def check_bus(config: BusConfig, mission: str | None, *, asked_for: bool) 
     try:
         bus = await open_zenoh_bus(config, timeout_s=2.0 * DIAL_S)
     except SwarmError as fault:
-        remedy = "see that a router runs there, and that this machine may reach it"
+        remedy = "see that a router runs there, and lets this machine and its keys in"
         return [*findings, fails("session", str(fault), remedy)]
     try:
-        found = await _look(bus, mission)
+        found = await _look(bus, mission, config.mission)
     finally:
         bus.close()
     return [*findings, *check_session(found, mission)]
@@ -154,7 +158,8 @@ def judge_dial(reached: Reached, *, enough: bool) -> Finding:
     if reached.problem is None:
         return fine(what, f"accepts connections, after {_ms(reached.took_s)}")
     port = reached.endpoint.rpartition(":")[2]
-    remedy = f"see that this machine reaches it, or {_START_ROUTER.format(port=port)}"
+    start = _START_SECURE_ROUTER if is_encrypted(reached.endpoint) else _START_ROUTER
+    remedy = f"see that this machine reaches it, or {start.format(port=port)}"
     return (warns if enough else fails)(what, reached.problem, remedy)
 
 
@@ -206,9 +211,10 @@ async def dial(endpoint: str) -> Reached:
     return Reached(endpoint, took_s, None)
 
 
-async def _look(bus: Bus, mission: str | None) -> Found:
+async def _look(bus: Bus, mission: str | None, only: str | None) -> Found:
+    """What there is to see; with keys only their mission is."""
     loop = asyncio.get_running_loop()
-    bus.watch_tokens(ANY_TOKEN)
+    bus.watch_tokens(ANY_TOKEN if only is None else Keys(only).alive("*"))
     linked, tokens = False, set[str]()
     until_s = loop.time() + SETTLE_S
     while (left_s := until_s - loop.time()) > 0.0:
@@ -220,13 +226,14 @@ async def _look(bus: Bus, mission: str | None) -> Found:
             if isinstance(event, TokenSeen):
                 tokens.add(event.key)
     missions = sorted({name for token in tokens if (name := mission_of_token(token))})
-    looked_at = mission or (missions[0] if len(missions) == 1 else None)
+    looked_at = mission or only or (missions[0] if len(missions) == 1 else None)
     if looked_at is None or looked_at not in missions:
         return Found(linked, tuple(missions), (), 0, None)
     keys = Keys(looked_at)
     writers = sorted(name for token in tokens if (name := keys.writer_of_token(token)))
     asked_s = loop.time()
-    answers = await bus.query(keys.state("*"), timeout_s=ANSWER_S)
+    question = encode_question({}, secrets.token_bytes(NONCE_BYTES), bus.seal)
+    answers = await bus.query(keys.state("*"), question, timeout_s=ANSWER_S)
     first_s = min((answer.arrived_s for answer in answers), default=None)
     round_trip_s = None if first_s is None else first_s - asked_s
     return Found(linked, tuple(missions), tuple(writers), len(answers), round_trip_s)

@@ -6,7 +6,7 @@ Leaves out: every check (the modules beside this one).
 from __future__ import annotations
 
 import sys
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sim.doctor.finding import Finding
     from sim.doctor.link import Vehicle
     from swarm.bus.config import BusConfig
+    from swarm.identity import Identity
     from swarm.model import Mission
 
 __all__ = ["doctor"]
@@ -100,7 +101,7 @@ def doctor(
     """Check all that a flight leans on, and say what to do.
 
     Looks at Python and its packages, the compiled kernels, the machine's clock and limits and
-    Zenoh; at the scenario, ports, bus, autopilots, signing key and state folder that are
+    Zenoh; at the scenario, ports, keys, bus, autopilots, signing key and state folder that are
     named. One line per check: ok, warning or fails, what was found, and what to do.
     Exit status 0: nothing fails.
 
@@ -119,12 +120,20 @@ def doctor(
     from coordinator.joining import check_mission
     from sim.doctor.finding import State, as_json, print_findings
     from sim.doctor.link import parse_vehicle
+    from swarm.clock import unix_s
     from swarm.log import LogLevel, configure_logging
     from swarm.process import run_until_stopped
 
     configure_logging(LogLevel.ERROR)
     check_mission(mission)
-    config = seat.config(mission=mission)
+    identity: Identity | None = None
+    keyed: list[Finding] = []
+    if seat.keys is not None:
+        from sim.doctor.keys import read_keys
+
+        identity, keyed = read_keys(seat.keys, mission, unix_s())
+    usable = seat.keys is None or identity is not None
+    config = seat.config(mission=mission) if usable else None
     vehicles = [parse_vehicle(text) for text in mavlink or ()]
     found: list[Finding] = []
     console = Console(highlight=False)
@@ -134,6 +143,7 @@ def doctor(
             scenario,
             mission,
             config,
+            keyed,
             vehicles,
             signing_key,
             state,
@@ -154,7 +164,8 @@ def doctor(
 async def _checks(
     scenario: Path | None,
     mission: str | None,
-    config: BusConfig,
+    config: BusConfig | None,
+    keyed: Sequence[Finding],
     vehicles: list[Vehicle],
     key_file: Path | None,
     state: Path | None,
@@ -167,6 +178,7 @@ async def _checks(
     import asyncio
 
     from sim.doctor.bus import check_bus, check_zenoh
+    from sim.doctor.keys import check_roster
     from sim.doctor.link import check_vehicle
     from sim.doctor.machine import check_clock, check_limits, check_port, check_state
     from sim.doctor.probes import (
@@ -176,6 +188,7 @@ async def _checks(
         read_folder,
         read_limits,
     )
+    from swarm.clock import unix_s
 
     for finding in _software():
         yield finding
@@ -194,8 +207,14 @@ async def _checks(
         holder = None if problem is None else port_holder(each, datagrams=False)
         yield check_port("port", str(each), problem, holder)
     yield await check_zenoh()
-    for finding in await check_bus(config, mission, asked_for=asked_for):
+    for finding in keyed:
         yield finding
+    if config is not None:  # else the keys say what is wrong
+        if config.identity is not None:
+            uavs = [uav.id for uav in flown.uavs] if flown else []
+            yield check_roster(config.identity, uavs, unix_s())
+        for finding in await check_bus(config, mission, asked_for=asked_for):
+            yield finding
     key = None
     if key_file is not None:
         key, finding = _key(key_file)

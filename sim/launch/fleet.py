@@ -16,10 +16,12 @@ from coordinator.dashboard.place import Place
 from sim.launch.autopilots import Autopilots, Running, Simulated
 from sim.launch.firmware import Firmware
 from sim.launch.handed_on import HandedOn
+from sim.launch.keys import RunKeys
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology, Topology
 from swarm.bus.endpoints import free_loopback_endpoints
 from swarm.bus.privacy import is_loopback
 from swarm.config import Link, preset
+from swarm.identity import load_identity
 from swarm.log import LogFormat
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
@@ -91,6 +93,10 @@ class LaunchOptions:
     """What a line of a process's log looks like."""
     dashboard: Place | None = None
     """Where a page shows the run; nowhere if None."""
+    keys: RunKeys | None = None
+    """With which the processes prove who they are; None: whoever reaches the bus is believed."""
+    router_file: Path | None = None
+    """Zenoh configuration file of the routers, instead of what their keys say."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
@@ -138,7 +144,8 @@ class Layout:
         """Names of the routers; none in a mesh."""
         listeners = self.routers or (*self._seats, *self._onlookers)
         ports = [each.rpartition(":")[2] for each in free_loopback_endpoints(len(listeners), rng)]
-        endpoints = [f"tcp/{options.address}:{port}" for port in ports]
+        protocol = "tcp" if options.keys is None else "tls"
+        endpoints = [f"{protocol}/{options.address}:{port}" for port in ports]
         self._endpoints = dict(zip(listeners, endpoints, strict=True))
         self._diverted: dict[DialedLink, str] = {}
         self.state: Path | None = None
@@ -166,21 +173,17 @@ class Layout:
             topology = ClientTopology(dialed)
         else:
             topology = MeshTopology(self._endpoints[name], dialed)
-        return BusConfig(topology, lease_s, unencrypted=bool(self._unencrypted()))
+        if (folder := self._keys_of(name)) is None:
+            return BusConfig(topology, lease_s, unencrypted=self._unencrypted)
+        return BusConfig(topology, lease_s, load_identity(folder, mission=self._mission.name))
 
     def router(self, name: str) -> list[str]:
         """Arguments of a router's process."""
         dialed = _repeated("--connect", self._dialed(name))
         listen = ["--listen", self._endpoints[name]]
-        return [
-            "router",
-            "--json",
-            *listen,
-            *dialed,
-            *self._unencrypted(),
-            *self._link(),
-            *self._log(),
-        ]
+        file = self._options.router_file
+        trust = self._trust(name) if file is None else ["--config", str(file)]
+        return ["router", "--json", *listen, *dialed, *trust, *self._link(), *self._log()]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
@@ -251,20 +254,38 @@ class Layout:
     def _memory(self) -> list[str]:
         return [] if self.state is None else ["--state", str(self.state)]
 
-    def _unencrypted(self) -> list[str]:
-        """What lets processes talk in the clear beyond loopback, as on networks made for a test."""
+    @property
+    def _unencrypted(self) -> bool:
+        """Whether processes talk in the clear beyond loopback, as on networks made for a test."""
         clear = [*self._endpoints.values(), *self._diverted.values()]
-        return [] if all(map(is_loopback, clear)) else ["--unencrypted"]
+        return self._options.keys is None and not all(map(is_loopback, clear))
 
     def _link(self) -> list[str]:
         return ["--link", self._options.link]
 
     def seat_arguments(self, name: str) -> list[str]:
         """Arguments with which a process, or an onlooker by that name, finds the bus."""
-        dialed = [*_repeated("--connect", self._dialed(name)), *self._unencrypted(), *self._link()]
+        rest = [*_repeated("--connect", self._dialed(name)), *self._trust(name), *self._link()]
         if self.routers:
-            return ["--bus", "router", *dialed]
-        return ["--bus", "mesh", "--listen", self._endpoints[name], *dialed]
+            return ["--bus", "router", *rest]
+        return ["--bus", "mesh", "--listen", self._endpoints[name], *rest]
+
+    def _trust(self, name: str) -> list[str]:
+        """Arguments by which a process knows whom to trust: its keys, or whoever is there."""
+        if (folder := self._keys_of(name)) is not None:
+            return ["--keys", str(folder)]
+        return ["--unencrypted"] if self._unencrypted else []
+
+    def _keys_of(self, name: str) -> Path | None:
+        """The folder of keys of the process, or onlooker, by that name; None without keys."""
+        keys = self._options.keys
+        if keys is None:
+            return None
+        if name in self.routers:
+            return keys.of_router(self.routers.index(name))
+        if name in self._seats:
+            return keys.of_seat(name)
+        return keys.of_operator() if name == DASHBOARD else keys.of_onlooker(name)
 
     def _dialed(self, name: str) -> tuple[str, ...]:
         """Endpoints that a process is told to dial."""

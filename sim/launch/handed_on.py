@@ -12,7 +12,7 @@ from pathlib import Path
 
 from agent.mavlink.config import CommandStyle
 from agent.mavlink.link_address import parse_forward
-from agent.mavlink.signing_key import load_signing_key
+from agent.mavlink.signing_key import load_signing_key, signing_key_of
 from sim.autopilot.options import faults_by_uav
 from sim.launch.autopilots import Autopilots, Simulated
 from sim.launch.fence import Fence
@@ -32,6 +32,7 @@ class HandedOn:
     """By UAV; the others get the default of `swarm agent`."""
     forward: tuple[str, ...] = ()
     signing_key: Path | None = None
+    """Of all vehicles, or a folder with each UAV's own."""
     battery_reserve: float | None = None
     fence: Fence | None = None
     without_bus_s: float | None = None
@@ -40,23 +41,21 @@ class HandedOn:
 
     def to_agent(self, uav: str) -> list[str]:
         """Arguments of the agent of ``uav``."""
-        style = self.command.get(uav)
+        style, key = self.command.get(uav), self.signing_key
         return [
             *([] if style is None else ["--command", style]),
             *(word for url in self.forward for word in ("--forward", url)),
             *_given("--battery-reserve", self.battery_reserve),
             *([] if self.fence is None else self.fence.to_agent()),
             *_given("--without-bus-s", self.without_bus_s),
-            *self._signing(),
+            *([] if key is None else ["--signing-key", str(signing_key_of(uav, key))]),
         ]
 
     def to_autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
         faults = [fault for fault in self.faults if fault.partition(":")[0] in uavs]
-        return [*(word for fault in faults for word in ("--fault", fault)), *self._signing()]
-
-    def _signing(self) -> list[str]:
-        return [] if self.signing_key is None else ["--signing-key", str(self.signing_key)]
+        key = [] if self.signing_key is None else ["--signing-key", str(self.signing_key)]
+        return [*(word for fault in faults for word in ("--fault", fault)), *key]
 
 
 def _given(option: str, value: float | None) -> list[str]:
@@ -105,7 +104,8 @@ def check_handed_on(handed_on: HandedOn, autopilots: Autopilots, uavs: Sequence[
     for url in handed_on.forward:
         parse_forward(url)
     if handed_on.signing_key is not None:
-        load_signing_key(handed_on.signing_key)
+        for path in dict.fromkeys(signing_key_of(uav, handed_on.signing_key) for uav in uavs):
+            load_signing_key(path)
     if handed_on.faults and not isinstance(autopilots, Simulated):
         remedy = "use --autopilot sim or sim-px4"
         problem = "only befalls simulated autopilots"

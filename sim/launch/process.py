@@ -37,6 +37,8 @@ KILL_TIMEOUT_S = 4.0
 """Wall time the kernel may take to end it and close its pipes after SIGKILL; then it is left."""
 KEPT_LINES = 200
 """Lines of a child's log that are kept to explain its end."""
+KEYS_VARIABLE = "SWARM_KEYS"
+"""Stands for `--keys` of a command; each child has keys of its own, or none."""
 LINE_LIMIT_BYTES = 4 * 1024 * 1024
 """Longest line a child may write: a plan of a large mission on one line."""
 
@@ -124,7 +126,7 @@ class Child:
         self._process = await asyncio.create_subprocess_exec(
             *command,
             cwd=None if setting is None else setting.folder,
-            env=None if setting is None else {**os.environ, **setting.environment},
+            env=self._environment(),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
@@ -133,6 +135,11 @@ class Child:
         )
         loop = asyncio.get_running_loop()
         self._readers = [loop.create_task(self._read_out()), loop.create_task(self._read_err())]
+
+    def _environment(self) -> dict[str, str]:
+        """Variables of this process, but for those that would speak to each child alike."""
+        inherited = {name: value for name, value in os.environ.items() if name != KEYS_VARIABLE}
+        return inherited if self.setting is None else {**inherited, **self.setting.environment}
 
     async def ready(self, count: int = 1) -> list[dict[str, Any]]:
         """The first ``count`` JSON objects it prints.

@@ -11,7 +11,7 @@ import asyncio
 import contextlib
 import math
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,6 +59,8 @@ class Flight:
     wall_s: float
     fates: tuple[str, ...]
     """How processes ended that should not have, in words."""
+    dropped: tuple[Mapping[str, int], ...]
+    """What each UAV, and the onlooker, has dropped, by reason."""
 
 
 class Run:
@@ -89,6 +91,8 @@ class Run:
         self.observer = Observer(mission, timing.scaled(options.speedup))
         self.fates: list[str] = []
         """How processes ended that should not have, in words."""
+        self.dropped: Mapping[str, int] = {}
+        """What the onlooker itself has dropped so far, by reason."""
         self._on_frame = on_frame or (lambda _observer, _now_s: None)
         self._zero_s: float | None = None
         self._told: set[Child] = set()
@@ -139,6 +143,7 @@ class Run:
             takeoff_s=self._zero_s,
             wall_s=self.clock.now_s() / self.launch.options.speedup,
             fates=tuple(self.fates),
+            dropped=(*self.observer.dropped.values(), dict(self.dropped)),
         )
 
     def _hear_plan(self, said: dict[str, Any]) -> None:
@@ -312,6 +317,7 @@ async def _watching(run: Run) -> AsyncIterator[None]:
         execute=lambda _: None,
         snapshot=None,
     )
+    run.dropped = shell.dropped
     take_seat(bus, mission, None, status=True, every_status=recorder is not None)
     watch = asyncio.get_running_loop().create_task(shell.run())
     try:

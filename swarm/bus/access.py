@@ -37,8 +37,9 @@ _HEAR: Final = (
 )
 _EVERYTHING: Final = (*_HEAR, "delete")
 
-STATUS_HZ: Final = 100.0
-"""Of each UAV's status, which has to be the newest alone; honest ones say it 5 times a second."""
+STATUS_HZ: Final = 200.0
+"""Of each UAV's status, of which the newest counts; said 5 times a second, and 10 ms apart at
+least (measured, 10 UAVs and 60 tasks at 20 times the pace)."""
 CHOICE_HZ: Final = 200.0
 """Of each UAV's choices, one for each decision; lost ones are missed by nobody who flies."""
 QUESTIONS_HZ: Final = 50.0

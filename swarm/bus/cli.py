@@ -108,6 +108,7 @@ def router(
 
 
 async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
+    from swarm import __version__
     from swarm.bus.router import open_router
     from swarm.log import get_logger
     from swarm.watchdog import SERVICE
@@ -117,7 +118,8 @@ async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
         print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
         SERVICE.ready(f"serves at {', '.join(serving.endpoints)}")
         if not quiet:
-            get_logger("router").info(f"router ready at {', '.join(serving.endpoints)}")
+            ready = f"router ready at {', '.join(serving.endpoints)}"
+            get_logger("router").info(ready, release=__version__)
         await serving.serve()
         return 0
     finally:

@@ -148,6 +148,8 @@ class RouterConfig:
         _check_endpoints(self.listen, self.connect)
         _check_lease(self.lease_s)
         endpoints = (*self.listen, *self.connect)
+        if self.path is not None and self.identity is None:  # the file may have certificates
+            endpoints = tuple(each for each in endpoints if not is_encrypted(each))
         _check_encryption(endpoints, self.identity, unencrypted=self.unencrypted)
 
 

@@ -36,14 +36,16 @@ class Rosters:
 
     Args:
         identity: whose folder it is, and whose authority counts.
+        look_s: how often the folder is looked into [wall s].
 
     Raises:
         OSError: its roster cannot be read any more.
         ValueError: that has been changed since the identity was loaded.
     """
 
-    def __init__(self, identity: Identity) -> None:
+    def __init__(self, identity: Identity, look_s: float = LOOK_S) -> None:
         self.identity = identity
+        self._look_s = look_s
         seal = seal_of(identity)
         if seal is None:
             raise ValueError("there are no keys")
@@ -115,14 +117,14 @@ class Rosters:
             tell: says something on a key.
         """
         loop = asyncio.get_running_loop()
-        tell_at_s = loop.time() + LOOK_S  # those who were linked before are back by then
+        tell_at_s = loop.time() + self._look_s  # those who were linked before are back by then
         while not self._changed.is_set():
             self.look()
             if loop.time() >= tell_at_s:
                 tell(self.key, self._said())
                 tell_at_s = loop.time() + TELL_S
             try:
-                async with asyncio.timeout(LOOK_S):
+                async with asyncio.timeout(self._look_s):
                     await self._changed.wait()
             except TimeoutError:
                 continue

@@ -19,16 +19,21 @@ import zenoh
 from swarm.bus.access import access_settings
 from swarm.bus.privacy import is_encrypted
 from swarm.bus.zenoh_session import endpoints_of, lay_over
+from swarm.clock import unix_s
 from swarm.errors import Fault, InputError
 from swarm.identity import Identity, Role, Roster
 from swarm.identity.door import door_dictionary
+from swarm.identity.folder import shown_time
+from swarm.log import get_logger
 
-__all__ = ["door_of", "secure"]
+__all__ = ["door_of", "secure", "secure_settings"]
 
 _TLS: Final = "transport/link/tls"
 _DOOR: Final = "transport/auth/usrpwd"
 SEATS_PER_IDENTITY: Final = 8
 """Sessions at once, such as that of an agent and those of commands on the same machine."""
+EXPIRES_SOON_S: Final = 86_400.0
+"""Keys that expire sooner might do so in flight."""
 PENDING: Final = 100
 """Sessions that are being opened at once."""
 
@@ -55,12 +60,16 @@ def secure(
                 problem = f"{endpoint} is not encrypted"
                 remedy = f"with --keys write tls/… or quic/… among {side}/endpoints"
                 raise InputError(Fault("Zenoh configuration", "", problem, remedy))
-    lay_over(config, _settings(identity, mode, roster, door))
+    if identity.not_after_s - unix_s() < EXPIRES_SOON_S:
+        ends = shown_time(identity.not_after_s)
+        get_logger("swarm.bus").warning("these keys expire soon, and every link with them", at=ends)
+    lay_over(config, secure_settings(identity, mode, roster, door))
 
 
-def _settings(
-    identity: Identity, mode: str, roster: Roster, door: Path | None
+def secure_settings(
+    identity: Identity, mode: str, roster: Roster, door: Path | None = None
 ) -> dict[str, object]:
+    """What keys entail for a session, by path of Zenoh's configuration; see `secure`."""
     certificate, key = str(identity.certificate_path), str(identity.private_key_path)
     settings: dict[str, object] = {
         # Nobody who is reached otherwise has proven anything.

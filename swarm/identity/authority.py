@@ -46,6 +46,7 @@ from swarm.identity.mavlink_keys import decode_table, encode_table, mavlink_key,
 from swarm.identity.private_files import (
     replace_private,
     swap_in_folder,
+    sync,
 )
 from swarm.identity.reading import checked, decoded, read_private
 from swarm.identity.roles import Role
@@ -58,7 +59,6 @@ __all__ = [
     "DAY_S",
     "EARLY_S",
     "MAVLINK_TABLE_FILE",
-    "OWN_FILES",
     "Authority",
     "new_door_key",
     "open_authority",
@@ -71,7 +71,7 @@ DAY_S: Final = 86_400
 EARLY_S: Final = DAY_S
 """How far a certificate's beginning lies back, for machines whose clocks are behind."""
 _RESTORE: Final = "put a copy of the authority's folder back"
-OWN_FILES: Final = frozenset(
+_OWN_FILES: Final = frozenset(
     {
         AUTHORITY_KEY_FILE,
         AUTHORITY_FILE,
@@ -186,12 +186,17 @@ class Authority:
         keys stay, as the autopilots know them.
         """
         with self._locked():
-            replace_private(self.directory / DOOR_KEY_FILE, new_door_key())
             names = {entry.name: entry.role for entry in self.roster.entries}
-            return self._issue(names, secrets.token_bytes(SERIES_BYTES), now_s, days)
+            series = secrets.token_bytes(SERIES_BYTES)
+            return self._issue(names, series, now_s, days, door_key=new_door_key())
 
     def _issue(
-        self, names: Mapping[str, Role], series: bytes, now_s: float, days: float | None
+        self,
+        names: Mapping[str, Role],
+        series: bytes,
+        now_s: float,
+        days: float | None,
+        door_key: bytes | None = None,
     ) -> Roster:
         from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
@@ -203,24 +208,29 @@ class Authority:
         require_fit(names, self._ledger, str(self.directory))
         ledger = self._ledger.with_next(names)
         keys = {name: Ed25519PrivateKey.generate() for name in names}
-        entries = {entry.name: entry for entry in self.roster.entries}
+        before = self.roster
+        entries = {entry.name: entry for entry in before.entries}
         for name, key in keys.items():
             generation = ledger.issued[name].generation
             entries[name] = Entry(name, names[name], generation, public_bytes(key), not_after_s)
         ordered = tuple(entry for _, entry in sorted(entries.items()))
-        roster = Roster(self.mission, series, self.roster.version + 1, ordered)
+        roster = Roster(self.mission, series, before.version + 1, ordered)
         data = encode_roster(roster, self._key)  # before anything is written: may be too large
         self._write_ledger(ledger)
         self._enact(roster, data)
+        if door_key is not None:
+            replace_private(self.directory / DOOR_KEY_FILE, door_key)
         phrases = self._phrases()
-        lacking = [each for each in names if names[each] is Role.UAV and each not in phrases]
-        if lacking:
-            phrases |= {uav: new_phrase() for uav in lacking}
+        uavs = [name for name, role in names.items() if role is Role.UAV]
+        fresh = [uav for uav in uavs if uav not in phrases or before.entry(uav) is None]
+        if fresh:
+            phrases |= {uav: new_phrase() for uav in fresh}
             replace_private(self.mavlink_table, encode_table(phrases))
         for name, key in keys.items():
             files = self._files_of(entries[name], key, not_before_s, phrases.get(name))
             files[ROSTER_FILE] = data
             swap_in_folder(self.folder(name), files)
+        sync(self.directory)
         return roster
 
     def _files_of(
@@ -327,12 +337,31 @@ def open_authority(directory: Path) -> Authority:
 def require_fit(
     names: Mapping[str, Role], ledger: Ledger, source: str, remedy: str = "choose another name"
 ) -> None:
-    """See that something can be issued for each of ``names``."""
-    faults = [
-        Fault(source, "", problem, remedy)
-        for name, role in names.items()
-        if (problem := ledger.why_unfit(name, role, OWN_FILES)) is not None
-    ]
+    """See that something can be issued for each of ``names``, in a folder of its own.
+
+    Args:
+        names: role by name.
+        ledger: what was issued before.
+        source: where the names come from, for the fault.
+        remedy: what to do about a name that is unfit.
+
+    Raises:
+        InputError: for one of them nothing can be.
+    """
+    firsts: dict[str, str] = {}
+    for name in (*_OWN_FILES, *ledger.issued, *names):
+        firsts.setdefault(name.casefold(), name)  # some disks do not tell capitals apart
+    faults = []
+    for name, role in names.items():
+        first = firsts[name.casefold()]
+        if name in _OWN_FILES:
+            problem: str | None = f"{name!r} is the name of a file of the authority"
+        elif first != name:
+            problem = f"{name!r} differs from {first!r} in capital letters alone"
+        else:
+            problem = ledger.why_unfit(name, role)
+        if problem is not None:
+            faults.append(Fault(source, "", problem, remedy))
     if faults:
         raise InputError(*faults)
 

@@ -1,22 +1,24 @@
-"""The commands `swarm keys init`, `add`, `revoke`, `renew` and `list`.
+"""The commands `swarm keys init`, `add`, `revoke`, `renew`, `publish` and `list`.
 
-Leaves out: what they do (swarm.identity.founding, swarm.identity.authority).
+Leaves out: what they do (swarm.identity.founding, swarm.identity.authority), and telling a
+running fleet (swarm.identity.publishing).
 """
 
 from __future__ import annotations
 
 import json as json_format
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm.identity.changing import Fleet, enact, told, written
 from swarm.identity.founding import DEFAULT_DAYS
 from swarm.identity.roles import Role
-from swarm.options import JsonOption, ScenarioArgument
+from swarm.options import BusOption, ConnectOption, JsonOption, ListenOption, ScenarioArgument
 
 if TYPE_CHECKING:
     from swarm.identity.authority import Authority
@@ -48,6 +50,8 @@ _PLACES = {
 }
 _DAYS_HELP = "How long the certificates are valid."
 _MOST_DAYS = 3650
+_MOST_ROWS = 12
+"""More folders of one role than that are told in one row."""
 DaysOption = Annotated[
     int | None,
     typer.Option(
@@ -66,6 +70,27 @@ def _count(what: str) -> typer.models.OptionInfo:
         f"--{what}s", min=0, max=100, metavar="N", help=f"How many {what}s get keys."
     )
     return option
+
+
+TellOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--connect",
+        metavar="ENDPOINT",
+        help="Tell a running fleet, too, through this router, such as tls/192.168.1.2:7447; with "
+        "--bus mesh through these peers; may be repeated.",
+        show_default=False,
+    ),
+]
+AsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--as",
+        metavar="DIR",
+        help="Keys to tell it with, an operator's or a coordinator's. Default: DIR/operator.",
+        show_default=False,
+    ),
+]
 
 
 @keys.command("init")
@@ -118,7 +143,7 @@ def init(
     from swarm.scenario import load_scenario
 
     mission = load_scenario(scenario)
-    with _written(out):
+    with written(out):
         authority = found_authority(
             out,
             mission.name,
@@ -153,6 +178,10 @@ def add(
         ),
     ] = None,
     days: DaysOption = None,
+    connect: TellOption = None,
+    as_: AsOption = None,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
 ) -> int:
     """Issue keys for a new name, or anew for a known one.
 
@@ -161,8 +190,11 @@ def add(
     that was revoked since it got its MAVLink key gets a new one, whose pass phrase its autopilot
     must be given; else it keeps it.
 
+    With --connect a fleet that flies lets the new ones in, and the ones before out, at once.
+
     Examples:
         swarm keys add keys uav9 --role uav
+        swarm keys add keys uav9 --role uav --connect tls/192.168.1.2:7447
         swarm keys add keys recorder --role viewer
         swarm keys add keys uav3 --days 30
     """
@@ -180,20 +212,28 @@ def add(
             raise InputError(Fault(str(directory), "", f"{name!r} is new and has no role", remedy))
         wanted[name] = given
     autopilots = authority.mavlink_uavs()
-    with _written(directory):
+
+    def issue() -> None:
         roster = authority.issue(wanted, now_s=unix_s(), days=days)
-    _tell_folders(authority, (entry for entry in roster.entries if entry.name in wanted))
-    fresh = sorted(authority.mavlink_uavs() - autopilots)
-    if fresh:
-        print(
-            f"{authority.mavlink_table}: new pass phrases for the autopilots of {', '.join(fresh)}"
-        )
-    _tell_spreading(authority)
+        _tell_folders(authority, (entry for entry in roster.entries if entry.name in wanted))
+        if fresh := sorted(authority.mavlink_uavs() - autopilots):
+            names = ", ".join(fresh)
+            print(f"{authority.mavlink_table}: new pass phrases for the autopilots of {names}")
+
+    fleet = Fleet(bus, listen, connect, as_ or directory / "operator")
+    print(enact(authority, issue, fleet, wanted))
     return 0
 
 
 @keys.command("revoke")
-def revoke(directory: DirectoryArgument, names: NamesArgument) -> int:
+def revoke(
+    directory: DirectoryArgument,
+    names: NamesArgument,
+    connect: TellOption = None,
+    as_: AsOption = None,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+) -> int:
     """Take the keys of stolen, lost or sold machines out of force.
 
     Makes the next roster, in which they are missing. Whoever has it lets them in no more and
@@ -201,26 +241,67 @@ def revoke(directory: DirectoryArgument, names: NamesArgument) -> int:
     add` gives the name new keys. An autopilot that fell into other hands knows its own pass
     phrase alone.
 
+    With --connect a fleet that flies shuts them out at once and goes on; routers begin anew for
+    that. An agent that was revoked and hears of it comes home. Nothing is changed if the fleet
+    cannot be reached; exit status 1 also if somebody who was there did not confirm it.
+
     Examples:
         swarm keys revoke keys uav3
-        swarm keys revoke keys uav3 dashboard
+        swarm keys revoke keys uav3 dashboard --connect tls/192.168.1.2:7447
     """
     from swarm.identity.authority import open_authority
 
     authority = open_authority(directory)
-    with _written(directory):
+
+    def take_out() -> None:
         authority.revoke(names)
-    print(f"revoked: {', '.join(dict.fromkeys(names))}")
-    _tell_spreading(authority)
+        print(f"revoked: {', '.join(dict.fromkeys(names))}")
+
+    fleet = Fleet(bus, listen, connect, as_ or directory / "operator")
+    print(enact(authority, take_out, fleet, names))
+    return 0
+
+
+@keys.command("publish")
+def publish(
+    directory: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR",
+            help="The authority's folder, or that of an operator or a coordinator.",
+            file_okay=False,
+        ),
+    ],
+    connect: ConnectOption = None,
+    as_: AsOption = None,
+    bus: BusOption = "router",
+    listen: ListenOption = "",
+) -> int:
+    """Tell a running fleet the roster of a folder.
+
+    For changes that were made without --connect, such as on a machine that reaches no fleet.
+    Who gets it goes by it at once, keeps it, and tells who comes later. Exit status 1: somebody
+    who was there did not confirm it.
+
+    Examples:
+        swarm keys publish keys --connect tls/192.168.1.2:7447
+        swarm keys publish ~/operator
+    """
+    from swarm.identity.folder import AUTHORITY_KEY_FILE, ROSTER_FILE
+    from swarm.identity.listing import read_lists
+    from swarm.identity.publishing import publish as tell
+
+    roster, _ = read_lists(directory)
+    own = directory / "operator" if (directory / AUTHORITY_KEY_FILE).exists() else directory
+    signed = (directory / ROSTER_FILE).read_bytes()
+    config = Fleet(bus, listen, connect, as_ or own).config(signed)
+    print(told(roster.version, tell(config, lambda: signed)))
     return 0
 
 
 @keys.command("renew")
-def renew(
-    directory: DirectoryArgument,
-    days: DaysOption = None,
-) -> int:
-    """Issue everything anew: certificates, passwords and a new series.
+def renew(directory: DirectoryArgument, days: DaysOption = None) -> int:
+    """Issue everything anew, so that nothing from before counts.
 
     Between flights, for the whole fleet: all certificates get the next generation and a new end.
     What was signed before is worth nothing afterwards, so nobody can replay what they recorded,
@@ -235,7 +316,7 @@ def renew(
     from swarm.identity.authority import open_authority
 
     authority = open_authority(directory)
-    with _written(directory):
+    with written(directory):
         roster = authority.renew(now_s=unix_s(), days=days)
     _tell_folders(authority, roster.entries)
     print("every folder from before is worthless now: give all machines their new ones")
@@ -285,32 +366,20 @@ def list_keys(
     return 0
 
 
-@contextmanager
-def _written(directory: Path) -> Iterator[None]:
-    """Say in one line why something could not be written."""
-    from swarm.errors import Fault, InputError
-
-    try:
-        yield
-    except OSError as error:
-        where = error.filename or directory
-        problem = f"cannot be written: {error.strerror or error}"
-        remedy = "choose a place that can, and see that the disk has room"
-        raise InputError(Fault(str(where), "", problem, remedy)) from error
-
-
 def _tell_folders(authority: Authority, entries: Iterable[Entry]) -> None:
     """Say which folder goes where, and until when it is good."""
     from swarm.identity.folder import shown_time
 
-    told = sorted(entries, key=lambda entry: (list(Role).index(entry.role), entry.name))
-    width = max(len(str(authority.folder(entry.name))) for entry in told)
-    for entry in told:
-        folder = str(authority.folder(entry.name))
-        print(f"  {folder:<{width}}  {_PLACES[entry.role]}")
-    print(f"valid until {shown_time(told[0].not_after_s)}; keep the folders private on the way")
-
-
-def _tell_spreading(authority: Authority) -> None:
-    """Say how the others learn of a new roster."""
-    print(f"roster version {authority.roster.version}: copy {authority.directory}/*/roster.json")
+    by_role = sorted(entries, key=lambda entry: (list(Role).index(entry.role), entry.name))
+    rows = []
+    for role, alike in groupby(by_role, key=lambda entry: entry.role):
+        names = [entry.name for entry in alike]
+        if len(names) > _MOST_ROWS:
+            ends = f"{authority.folder(names[0])} … {names[-1]}"
+            rows.append((f"{ends} ({len(names)})", f"each {_PLACES[role]}"))
+        else:
+            rows += [(str(authority.folder(name)), _PLACES[role]) for name in names]
+    width = max(len(folder) for folder, _ in rows)
+    for folder, place in rows:
+        print(f"  {folder:<{width}}  {place}")
+    print(f"valid until {shown_time(by_role[0].not_after_s)}; keep the folders private on the way")

@@ -48,25 +48,13 @@ class Ledger:
             issued[name] = Issued(role, 1 if before is None else before.generation + 1)
         return replace(self, issued=issued)
 
-    def why_unfit(self, name: str, role: Role, taken: frozenset[str]) -> str | None:
-        """Why nothing can be issued for ``name``; None if it can.
-
-        Args:
-            name: of whom.
-            role: of whom.
-            taken: names of files beside the folders of identities.
-        """
+    def why_unfit(self, name: str, role: Role) -> str | None:
+        """Why nothing can be issued for ``name`` in ``role``; None if it can."""
         before = self.issued.get(name)
         if before is not None and before.role is not role:
             return f"{name!r} is the name of a {before.role}, and no {role} can get it"
-        if name in taken:
-            return f"{name!r} is the name of a file of the authority"
-        for other in (*self.issued, *taken):
-            if other != name and other.casefold() == name.casefold():
-                return f"{name!r} differs from {other!r} in capital letters alone"
-        generation = 1 if before is None else before.generation + 1
         try:
-            Entry(name, role, generation, bytes(32), 0)
+            Entry(name, role, 1 if before is None else before.generation + 1, bytes(32), 0)
         except ValueError as fault:
             return str(fault)
         return None

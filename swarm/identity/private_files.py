@@ -12,7 +12,7 @@ import secrets
 import shutil
 from pathlib import Path
 
-__all__ = ["make_private_folder", "replace_private", "swap_in_folder", "write_private"]
+__all__ = ["make_private_folder", "replace_private", "swap_in_folder", "sync", "write_private"]
 
 _FILE_MODE = 0o600
 _FOLDER_MODE = 0o700
@@ -49,17 +49,19 @@ def replace_private(path: Path, data: bytes) -> None:
     draft = _beside(path)
     try:
         write_private(draft, data)
-        _sync(draft)
+        sync(draft)
         draft.replace(path)
     except OSError:
         with contextlib.suppress(OSError):
             draft.unlink()
         raise
-    _sync(path.parent)
+    sync(path.parent)
 
 
 def swap_in_folder(path: Path, files: dict[str, bytes]) -> None:
     """Put a private folder with ``files`` in the place of ``path``, which need not be there.
+
+    After a loss of power it may be the old one, or hold empty files.
 
     Raises:
         OSError: it cannot be written.
@@ -76,7 +78,6 @@ def swap_in_folder(path: Path, files: dict[str, bytes]) -> None:
         shutil.rmtree(draft, ignore_errors=True)
         raise
     shutil.rmtree(old, ignore_errors=True)
-    _sync(path.parent)
 
 
 def _beside(path: Path) -> Path:
@@ -84,7 +85,7 @@ def _beside(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}")
 
 
-def _sync(path: Path) -> None:
+def sync(path: Path) -> None:
     """Have the disk keep the file or, of a folder, the names in it."""
     handle = os.open(path, os.O_RDONLY)
     try:

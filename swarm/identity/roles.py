@@ -60,6 +60,6 @@ def fleet_names(
     for role, count in counts.items():
         for name in numbered(_FIRST_NAMES[role], count):
             if name in names:
-                raise ValueError(f"UAV id {name!r} is the name of a {role}'s keys")
+                raise ValueError(f"UAV id {name!r} is the name of the {role}'s keys")
             names[name] = role
     return names

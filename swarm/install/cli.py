@@ -70,10 +70,10 @@ def agent(
 ) -> int:
     """Run an agent on this companion computer, always.
 
-    For root, such as by sudo. Takes the options of `swarm agent`, checks them as that would, and writes a unit of systemd,
-    a file with the options, and copies of the keys that only the service can read. Installed
-    again without options it keeps those it has, for upgrades. Prints what to do next; where
-    systemd does not run, the command line to run by hand.
+    Takes the options of `swarm agent`, checks them as that would, and writes a unit of systemd,
+    a file with the options, and copies of the keys that only the service can read; root alone
+    may. Installed again without options it keeps those it has, for upgrades. Prints what to do
+    next; where systemd does not run, the command line to run by hand.
 
     Examples:
       swarm install agent --uav uav1 --mission field --mavlink serial:/dev/ttyAMA0:921600

@@ -2,7 +2,8 @@
 
 A `Replica` keeps of every register the statement with the highest stamp.
 Joining is commutative, associative and idempotent, so loss, duplication and
-reordering delay agreement and never break it. On the board the operator's word about a
+reordering delay agreement and never break it. Claims and outcomes count of UAVs that the
+brief names. On the board the operator's word about a
 task comes before the coordinator's. Leaves out: who is alive and what
 follows from the registers (swarm.state.board, swarm.state.claims).
 """
@@ -21,6 +22,7 @@ from swarm.wire.messages import (
     Claim,
     Command,
     Epoch,
+    EpochPhase,
     Message,
     Outcome,
     Stamp,
@@ -57,9 +59,10 @@ class Replica:
         self.task_orders: dict[str, TaskOrder] = {}
         """By task id, what the operator says, orders for other flights among it."""
         self.claims: dict[str, Claim] = {}
-        """By UAV id."""
+        """By UAV id, of those in the brief; of all as long as there is none."""
         self.outcomes: dict[tuple[str, str], Outcome] = {}
-        """By UAV id and task id."""
+        """By UAV id and task id, of those in the brief likewise."""
+        self._fleet: set[str] | None = None
         self.commands: dict[str, tuple[Stamp, Command]] = {}
         """By target, those for other flights of the mission among them; see swarm.state.commands.
 
@@ -109,10 +112,8 @@ class Replica:
             case TaskOrder(task=task) as order:
                 self.task_orders[task] = order
                 self._settle(task)
-            case Claim() as claim:
-                self.claims[message.writer] = claim
-            case Outcome(task=task) as outcome:
-                self.outcomes[message.writer, task] = outcome
+            case Claim() | Outcome() if self._takes_part(message.writer):
+                self._note(message)
             case Command(target=target) as command:
                 self.commands[target] = message.stamp, command
         return True
@@ -126,8 +127,24 @@ class Replica:
         body, writer = message.body, message.writer
         if not isinstance(body, Outcome) or body.task in self.board:
             return False
-        self._unposted[writer] += self._unposted[writer] < MOST_UNPOSTED
-        return self._unposted[writer] == MOST_UNPOSTED
+        if self._unposted[writer] >= MOST_UNPOSTED:
+            return True
+        self._unposted[writer] += 1
+        return False
+
+    def is_premature(self, message: Message) -> bool:
+        """Whether it briefs for another flight, by a coordinator that has not taken charge.
+
+        One that starts and finds nobody begins a flight of its own until it learns of the one
+        that is on, whose brief it restates then. What the operator has ordered counts on. Ask
+        while a mission runs, and do not join what is premature.
+        """
+        body, known, epoch, stamp = message.body, self.brief, self.epoch, self.epoch_stamp
+        if not isinstance(body, Brief) or known is None:
+            return False
+        if epoch is None or stamp is None or epoch.phase is EpochPhase.ENDED:
+            return False
+        return body.run != known.run and stamp.incarnation < message.stamp.incarnation
 
     def ordered(self, task: str) -> TaskOrder | None:
         """The operator's order about ``task`` in this flight; None if there is none."""
@@ -140,8 +157,29 @@ class Replica:
         if before is None or before.run != brief.run:
             for task in self.task_orders:
                 self._settle(task)
+        if before is None or before.uavs != brief.uavs:
+            self._fleet = {uav.id for uav in brief.uavs}
+            self.claims.clear()
+            self.outcomes.clear()
+            for message in self._registers.values():
+                if self._takes_part(message.writer):
+                    self._note(message)
         self.board_version += 1
         self.task_version += 1
+
+    def _takes_part(self, writer: str) -> bool:
+        """Whether what that UAV claims and has done counts: it must be one of those briefed."""
+        return self._fleet is None or writer in self._fleet
+
+    def _note(self, message: Message) -> None:
+        """What a UAV that takes part claims, or has done."""
+        match message.body:
+            case Claim() as claim:
+                self.claims[message.writer] = claim
+            case Outcome(task=task) as outcome:
+                self.outcomes[message.writer, task] = outcome
+            case _:
+                pass
 
     def _settle(self, task: str) -> None:
         """Find out anew what counts of all that is said of ``task``."""

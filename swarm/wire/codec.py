@@ -16,9 +16,8 @@ makes `SCHEMA_VERSION` grow, and then neither release hears the other.
 
 from __future__ import annotations
 
-import dataclasses
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Final
@@ -27,7 +26,20 @@ import msgpack
 from pydantic import TypeAdapter, ValidationError
 
 from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR, valid_id
-from swarm.wire.choice import Basis, Candidate
+from swarm.wire.encoding import (
+    FIELDS,
+    KINDS,
+    LARGE,
+    LARGE_LIMIT_BYTES,
+    NAMES,
+    SMALL_LIMIT_BYTES,
+    SNAPSHOT_LIMIT_BYTES,
+    encode,
+    encode_memory,
+    fit,
+    fit_memory,
+    snapshot_bytes,
+)
 from swarm.wire.keys import Keys
 from swarm.wire.messages import (
     LATEST_S,
@@ -40,7 +52,6 @@ from swarm.wire.messages import (
     Claim,
     Command,
     Epoch,
-    Fleet,
     Message,
     Outcome,
     SignedRoster,
@@ -73,140 +84,16 @@ __all__ = [
     "fit_memory",
 ]
 
-SMALL_LIMIT_BYTES: Final = 4 * 1024
-LARGE_LIMIT_BYTES: Final = 1024 * 1024
-SNAPSHOT_LIMIT_BYTES: Final = 4 * 1024 * 1024
-"""As much as a bus carries at once."""
 SIGNED_HERE: Final = "signed, but no keys here"
 
-_KINDS: Final[dict[str, type[Body]]] = {
-    "brief": Brief,
-    "epoch": Epoch,
-    "board": Board,
-    "claim": Claim,
-    "outcome": Outcome,
-    "status": Status,
-    "choice": Choice,
-    "command": Command,
-    "task": TaskOrder,
-    "roster": SignedRoster,
-}
-_NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in _KINDS.items()}
-_FIELDS: Final[dict[type, tuple[str, ...]]] = {
-    part: tuple(field.name for field in dataclasses.fields(part))
-    for part in (*_KINDS.values(), Fleet, Basis, Candidate)
-}
-"""Of everything that a message is made of."""
-_LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
 WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {}
 """By kind, what a field means that an older release does not say; of fields that were added
 to the end of a body under the `SCHEMA_VERSION` in force."""
 
 
-# -- writing ------------------------------------------------------------------------------
-
-
-def encode(what: Message | Snapshot) -> bytes:
-    """The bytes of a message or snapshot, as a bus without keys carries them.
-
-    A message that was heard gives the very bytes that were heard.
-    """
-    if isinstance(what, Snapshot):
-        return _snapshot_bytes(what, [encode(message) for message in what.messages])
-    if what.said is None:
-        as_heard(what, _message_bytes(what))
-    return what.said or b""
-
-
-def encode_memory(snapshot: Snapshot) -> bytes:
-    """``snapshot`` with the envelopes of its messages, for `decode_memory` of a later life."""
-    return _snapshot_bytes(snapshot, [_remembered(message) for message in snapshot.messages])
-
-
-def fit_memory(snapshot: Snapshot) -> Snapshot:
-    """What of ``snapshot`` there is room for in a memory; see `fit`."""
-    return fit(snapshot, SNAPSHOT_LIMIT_BYTES, _remembered)
-
-
-def fit(
-    snapshot: Snapshot,
-    limit_bytes: int = SNAPSHOT_LIMIT_BYTES,
-    as_bytes: Callable[[Message], bytes] = encode,
-) -> Snapshot:
-    """``snapshot``, without some of the registers when there is no room for all.
-
-    Those of its own writer stay before those of others, for which others answer too.
-
-    Args:
-        snapshot: to be shortened.
-        limit_bytes: how long it may be.
-        as_bytes: what becomes of each message in it.
-    """
-    parts = [as_bytes(message) for message in snapshot.messages]
-    if len(_snapshot_bytes(snapshot, parts)) <= limit_bytes:
-        return snapshot
-    room = limit_bytes - len(_snapshot_bytes(snapshot, ())) - 4  # a longer array head
-    kept = []
-    for message, part in sorted(
-        zip(snapshot.messages, parts, strict=True),
-        key=lambda each: each[0].writer != snapshot.writer,
-    ):
-        if len(part) <= room:
-            room -= len(part)
-            kept.append(message)
-    return replace(snapshot, messages=tuple(kept))
-
-
-def _message_bytes(message: Message) -> bytes:
-    parts = [
-        SCHEMA_VERSION,
-        message.mission,
-        message.writer,
-        message.stamp.incarnation,
-        message.stamp.counter,
-        _NAMES[type(message.body)],
-        message.body,
-    ]
-    packed: bytes = msgpack.packb(parts, default=_fields_of)
-    return packed
-
-
-def _snapshot_bytes(snapshot: Snapshot, registers: Sequence[bytes]) -> bytes:
-    head = (
-        SCHEMA_VERSION,
-        snapshot.mission,
-        snapshot.writer,
-        snapshot.incarnation,
-        snapshot.mission_s,
-    )
-    packed: list[bytes] = [msgpack.packb(part) for part in head]
-    return _array([*packed, _array(registers)])
-
-
-def _array(parts: Sequence[bytes]) -> bytes:
-    """An array of what is MessagePack already."""
-    head: bytes = msgpack.Packer().pack_array_header(len(parts))
-    return head + b"".join(parts)
-
-
-def _remembered(message: Message) -> bytes:
-    if message.envelope is None:
-        return encode(message)
-    packed: bytes = msgpack.packb(message.envelope)
-    return packed
-
-
-def _fields_of(part: object) -> dict[str, object]:
-    """A body, or a dataclass within one, by the names of its fields."""
-    return {name: getattr(part, name) for name in _FIELDS[type(part)]}
-
-
-# -- reading ------------------------------------------------------------------------------
-
-
 @cache
 def _bodies(kind: str) -> TypeAdapter[Body]:
-    return TypeAdapter(_KINDS[kind])
+    return TypeAdapter(KINDS[kind])
 
 
 @cache
@@ -262,7 +149,7 @@ class Codec:
         told = [message for message in snapshot.messages if self.pack(message) is not None]
         believed = replace(snapshot, messages=tuple(told))
         fitted = fit(believed, SNAPSHOT_LIMIT_BYTES - ENVELOPE_BYTES, self._register)
-        said = _snapshot_bytes(fitted, [self._register(message) for message in fitted.messages])
+        said = snapshot_bytes(fitted, [self._register(message) for message in fitted.messages])
         return seal.wrap(said, ANSWER + nonce), len(told) - len(fitted.messages)
 
     def _register(self, message: Message) -> bytes:
@@ -278,8 +165,10 @@ class Codec:
     def decode(self, key: str, data: bytes) -> Message | None:
         """The message in ``data``, heard on ``key``; None when it must be dropped."""
         try:
-            _require(len(data) <= LARGE_LIMIT_BYTES + ENVELOPE_BYTES, "too large")
-            message = self._believed(data) if is_envelope(data) else self._unsigned(key, data)
+            sealed = is_envelope(data)
+            limit_bytes = LARGE_LIMIT_BYTES + (ENVELOPE_BYTES if sealed else 0)
+            _require(len(data) <= limit_bytes, "too large")
+            message = self._believed(data) if sealed else self._unsigned(key, data)
             _require(message.key == key, "said on another's key")
         except UnacceptableError as fault:
             self.dropped[fault.reason] += 1
@@ -423,11 +312,11 @@ class Codec:
         _require(version == SCHEMA_VERSION, "unknown version")
         _require(mission == self._mission, "another mission")
         _require(isinstance(writer, str) and valid_id(writer), "malformed")
-        if not isinstance(kind, str) or kind not in _KINDS:
+        if not isinstance(kind, str) or kind not in KINDS:
             raise UnacceptableError("unknown kind")
         if not isinstance(fields, dict):
             raise UnacceptableError("malformed")
-        known = _FIELDS[_KINDS[kind]]
+        known = FIELDS[KINDS[kind]]
         if fields.keys() != set(known) or len(parts) > 7:
             fields = self._understood(kind, fields, known)
         try:
@@ -473,7 +362,7 @@ def _require(condition: bool, reason: str) -> None:
 
 def _require_size(message: Message) -> None:
     """What is in the envelope counts, so that keys leave the room for words as it is."""
-    large = _NAMES[type(message.body)] in _LARGE
+    large = NAMES[type(message.body)] in LARGE
     limit_bytes = LARGE_LIMIT_BYTES if large else SMALL_LIMIT_BYTES
     _require(len(encode(message)) <= limit_bytes, "too large")
 

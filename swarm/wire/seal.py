@@ -159,6 +159,7 @@ class Seal:
         """Those read lately; everyone repeats the same."""
         self._signed_roster = signed_roster
         self._roster = decode_roster(signed_roster.encode(), authority_public_key)
+        self._own = self._roster.entry(name)
         self._genuine: OrderedDict[bytes, None] = OrderedDict()
         """Hashes of envelopes found genuine under the roster in force."""
 
@@ -205,6 +206,12 @@ class Seal:
         self._roster, self._signed_roster = roster, signed
         self._keep_roster(signed.encode())
         return True
+
+    @property
+    def is_in_force(self) -> bool:
+        """Whether the roster still knows this process by the key that it signs with."""
+        own, before = self._roster.entry(self.name), self._own
+        return own is not None and before is not None and own.public_key == before.public_key
 
     @property
     def may_publish_roster(self) -> bool:

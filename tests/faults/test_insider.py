@@ -13,10 +13,13 @@ from sim.chaos.insider import Insider
 from sim.event_queue import EventQueue
 from sim.faults.case import TIMING, Case, Verdict, limit_s, play, quick_plan
 from sim.faults.schedule import parse_schedule
-from sim.rough_network import Conditions
+from sim.network import Seat
+from sim.rough_network import Conditions, RoughNetwork
 from sim.sealed_network import SealedNetwork
 from sim.world import Setting, World
+from swarm.limits import Limiter
 from swarm.model import UavId
+from swarm.wire.messages import Message
 from swarm.wire.seal import Seal
 from tests.keyring import Keyring
 
@@ -157,3 +160,33 @@ def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None
     assert result.open == ()
     assert before[0].executed_routes[UavId(LIAR)] == result.executed_routes[UavId(LIAR)]
     assert networks[0].ear.dropped["signer unknown"] > 0
+
+
+class Storm(RoughNetwork):
+    """Lets so little of each writer through that honest registers are lost all the time."""
+
+    def __init__(self, queue: EventQueue, conditions: Conditions, seed: int) -> None:
+        super().__init__(queue, conditions, seed)
+        self.lost = 0
+        self._limiter = Limiter(1.5, 4)
+
+    def publish(self, sender: Seat, message: Message) -> None:
+        if self._limiter.allows(message.writer, self._queue.now_s()):
+            super().publish(sender, message)
+        else:
+            self.lost += 1
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_a_limit_keeps_out_comes_back_by_repetition_and_questions(seed: int) -> None:
+    networks: list[Storm] = []
+
+    def join(queue: EventQueue, conditions: Conditions, seed: int) -> Storm:
+        networks.append(Storm(queue, conditions, seed))
+        return networks[0]
+
+    verdict = play(case(seed, "5 crash u1 for 3 with disk", "15 lose u3"), join=join)
+
+    assert networks[0].lost > 50
+    assert verdict.broken is None
+    assert verdict.world.observer.result().open == ()

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -31,20 +32,34 @@ class ByHand:
         stack: ends the processes.
         mission: flown.
         speedup: mission seconds per second of the wall's clock.
+        keys: folder of the mission's authority; None to fly without keys.
+        programs: words that start `swarm` for the process of that name, where they are others
+            than for everybody.
     """
 
     def __init__(
-        self, folder: Path, stack: contextlib.ExitStack, mission: Mission, speedup: int = 2
+        self,
+        folder: Path,
+        stack: contextlib.ExitStack,
+        mission: Mission,
+        speedup: int = 2,
+        keys: Path | None = None,
+        programs: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         self.folder = folder
         self.mission = mission
         self.uavs: list[str] = [uav.id for uav in mission.uavs]
         self._stack = stack
+        self._programs = programs or {}
         self._scenario = folder / "scenario.toml"
         self._scenario.write_text(format_scenario(mission))
+        self._keys = keys
         (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
-        self.seat = ["--connect", endpoint, "--speedup", str(speedup)]
-        router = self.start("router", ["router", "--listen", endpoint, "--json"])
+        self.endpoint = endpoint if keys is None else endpoint.replace("tcp/", "tls/")
+        """Of the router."""
+        self.seat = ["--connect", self.endpoint, "--speedup", str(speedup)]
+        serving = ["router", "--listen", self.endpoint, "--json", *self.keys_of("router")]
+        router = self.start("router", serving)
         self._line(router)
         chosen = [word for uav in self.uavs for word in ("--uav", uav)]
         listen = ["--listen", "tcp:127.0.0.1:0", "--speedup", str(speedup), "--json"]
@@ -56,12 +71,17 @@ class ByHand:
     def coordinator(self, name: str, *options: str) -> subprocess.Popen[str]:
         """Start a coordinator; ``name`` is that of its log."""
         words = ["coordinator", str(self._scenario), "--method", "greedy", "--json"]
-        return self.start(name, [*words, *self.seat, *options])
+        return self.start(name, [*words, *self.seat, *self.keys_of("coordinator"), *options])
+
+    def keys_of(self, name: str) -> list[str]:
+        """What to tell a process so that it has the keys of ``name``."""
+        return [] if self._keys is None else ["--keys", str(self._keys / name)]
 
     def start(self, name: str, arguments: list[str]) -> subprocess.Popen[str]:
         log = self._stack.enter_context((self.folder / f"{name}.log").open("w"))
+        program = self._programs.get(name, (sys.executable, "-m", "swarm"))
         process = subprocess.Popen(
-            [sys.executable, "-m", "swarm", *arguments],
+            [*program, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=log,
@@ -97,7 +117,7 @@ class ByHand:
         uav = str(vehicle["uav"])
         words = ["agent", "--mission", self.mission.name, "--uav", uav]
         words += ["--mavlink", str(vehicle["url"]), "--system-id", str(vehicle["system_id"])]
-        return self.start(uav, [*words, *self.seat])
+        return self.start(uav, [*words, *self.seat, *self.keys_of(uav)])
 
     @staticmethod
     def _line(process: subprocess.Popen[str]) -> dict[str, object]:

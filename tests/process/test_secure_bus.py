@@ -384,3 +384,34 @@ def test_two_routers_with_keys_are_one_bus(fleet: Fleet) -> None:
 
     with router(*options, "--connect", fleet.endpoint) as (_, other):
         asyncio.run(scenario(other))
+
+
+def test_who_floods_is_shut_out_and_the_others_stay(fleet: Fleet) -> None:
+    """Ten times as many words at once as any UAV has to say."""
+
+    async def scenario() -> None:
+        at_router = ClientTopology((fleet.endpoint,))
+        async with (
+            seated(fleet.identity("uav1"), at_router) as uav,
+            seated(fleet.identity("dashboard"), at_router) as hearer,
+            seated(fleet.identity("uav3"), at_router) as hostile,
+        ):
+            hearer.bus.watch_tokens(KEYS.alive("*"))
+            uav.bus.declare_token(KEYS.alive("uav1"))
+            hostile.bus.declare_token(KEYS.alive("uav3"))
+            for name in ("uav1", "uav3"):
+                await hearer.until_event(TokenSeen(KEYS.alive(name)))
+            hearer.events.clear()
+            for number in range(10_000):
+                hostile.bus.publish(KEYS.outcome("uav3", f"t{number % 100}"), bytes(300))
+                if number % 100 == 0:  # or the own queue overflows
+                    await asyncio.sleep(0.005)
+            await hostile.until_event(LinkDown())
+            await hearer.until_event(TokenSeen(KEYS.alive("uav1")))
+            assert TokenSeen(KEYS.alive("uav3")) not in hearer.events
+            with pytest.raises(BusError, match="still refuses uav3@1"):
+                await open_zenoh_bus(
+                    BusConfig(at_router, identity=fleet.identity("uav3")), timeout_s=REFUSED_S
+                )
+
+    asyncio.run(scenario())

@@ -21,7 +21,19 @@ from swarm.events import (
 )
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Board, Body, ClaimPhase, Outcome, Snapshot, Status, StatusPhase
-from tests.builders import IDLE, MISSION, OUT, done, entry, epoch, held, message, proposed, uav
+from tests.builders import (
+    IDLE,
+    MISSION,
+    OUT,
+    brief,
+    done,
+    entry,
+    epoch,
+    held,
+    message,
+    proposed,
+    uav,
+)
 from tests.lone_agent import ZERO_S, LoneAgent, claims, finishes, notes, orders, outcomes
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
@@ -122,6 +134,7 @@ def test_after_an_outage_it_waits_for_those_whose_link_is_back_later(answered: b
 
 def test_a_claim_known_by_hearsay_counts_no_longer_than_its_writer_may_be_silent() -> None:
     agent = flying(NEAR, FAR, timing=Timing(pause_s=1e6))
+    agent.hear(COORDINATOR, brief(*(uav(f"u{n}") for n in range(3))))
     agent.see("u2")
     agent.learn(message("u2", held("far", 0.0, 0, 5.0)))
     agent.arrive(1.0)

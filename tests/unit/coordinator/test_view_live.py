@@ -12,7 +12,7 @@ from rich.console import Console
 from coordinator.observer import Observer
 from coordinator.view.live import LiveView, picture
 from swarm.model import Task, TaskId, UavId
-from swarm.wire.messages import EpochPhase, Result, StatusPhase
+from swarm.wire.messages import EpochPhase, Result, Status, StatusPhase
 from tests.observed_mission import Teller, random_mission, shipped, watch
 
 SIZES = ((80, 24), (100, 30), (104, 24), (200, 60))
@@ -25,6 +25,7 @@ def shown(
     *,
     ascii_only: bool = False,
     speedup: float = 1.0,
+    secure: bool = False,
 ) -> str:
     """The picture as text, checked to have the size it should have."""
     width, height = size
@@ -38,6 +39,7 @@ def shown(
                 height=height,
                 ascii_only=ascii_only,
                 speedup=speedup,
+                secure=secure,
             )
         )
     text = captured.get()
@@ -116,6 +118,17 @@ def test_large_fleet_says_how_many_are_hidden_and_shows_the_lost_first(
     assert "100 of 1000 done" in text
     assert "99 taken" in text
     assert "uav77 lost; task t177 is open again" in text
+
+
+def test_a_mission_with_keys_is_told_to_be_secure_and_what_was_refused() -> None:
+    teller = Teller(shipped("table-1"))
+    teller.begin()
+    assert "secure" not in shown(teller.observer, 1.0)
+    assert "RUNNING · secure · mission time" in shown(teller.observer, 1.0, secure=True)
+
+    dropped = {"not signed": 4, "stale": 9}
+    teller.say("uav1", Status(StatusPhase.FLYING, None, None, None, None, 1.0, dropped, ""))
+    assert "RUNNING · secure, 4 refused · " in shown(teller.observer, 1.0, secure=True)
 
 
 def test_picture_without_utf8_is_pure_ascii() -> None:

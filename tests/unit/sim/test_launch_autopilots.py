@@ -134,6 +134,22 @@ def test_a_fault_reaches_the_process_of_its_vehicle_alone() -> None:
     assert told.to_autopilot(["uav3"]) == ["--fault", "uav3:silent@9+10"]
 
 
+def test_each_vehicle_and_its_agent_share_a_key_that_no_other_has(tmp_path: Path) -> None:
+    for number, uav in enumerate(UAVS):
+        (tmp_path / uav).mkdir()
+        key = tmp_path / uav / "mavlink.key"
+        key.touch(mode=0o600)
+        key.write_bytes(bytes([number + 1]) * 32)
+    told = HandedOn(signing_key=tmp_path)
+
+    check_handed_on(told, Simulated(), UAVS)
+    assert told.to_agent("uav2") == ["--signing-key", str(tmp_path / "uav2" / "mavlink.key")]
+    assert told.to_autopilot(["uav1", "uav2"]) == ["--signing-key", str(tmp_path)]
+    (tmp_path / "uav3" / "mavlink.key").unlink()
+    with pytest.raises(InputError, match=r"uav3/mavlink\.key: cannot be read"):
+        check_handed_on(told, Simulated(), UAVS)
+
+
 def test_a_fault_of_nobody_is_one_clear_line() -> None:
     with pytest.raises(InputError, match="no UAV 'uav9'"):
         check_handed_on(HandedOn(faults=("uav9:pilot@5",)), Simulated(), UAVS)

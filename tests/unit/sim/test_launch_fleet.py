@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coordinator.dashboard.place import Place
 from sim.launch.fleet import (
     AUTO_MESH_LIMIT,
     ONLOOKER,
@@ -20,6 +21,7 @@ from sim.launch.fleet import (
     autopilot_groups,
     default_position_rate_hz,
 )
+from sim.launch.keys import RunKeys
 from swarm.bus.config import ClientTopology, MeshTopology
 from swarm.model.ids import COORDINATOR
 from tests.builders import MISSION, mission, task, uav
@@ -38,10 +40,19 @@ UAVS = ("u0", "u1", "u2")
 FLEET = mission([uav(name) for name in UAVS], [task("t0", 1.0)])
 
 
-def layout(routers: int = 0, onlookers: Sequence[str] = ()) -> Layout:
+PLACE = Place("127.0.0.1", 8080, "http://127.0.0.1:8080", None)
+KEYS = RunKeys(
+    Path("keys"), routers=("gate",), viewer="onlooking", operator="boss", guests={"spy": "u2"}
+)
+
+
+def layout(
+    routers: int = 0, onlookers: Sequence[str] = (), *, keys: RunKeys | None = None
+) -> Layout:
     """In a mesh, or with so many routers."""
     kind = BusKind.ROUTER if routers else BusKind.MESH
-    options = replace(OPTIONS, bus=kind, routers=max(1, routers))
+    options = replace(OPTIONS, bus=kind, routers=max(1, routers), keys=keys)
+    options = replace(options, dashboard=None if keys is None else PLACE)
     return Layout(options, FLEET, np.random.default_rng(0), onlookers=onlookers)
 
 
@@ -187,6 +198,31 @@ def test_further_onlookers_have_a_place_in_a_mesh() -> None:
     assert isinstance(topology, MeshTopology)
     assert len(topology.dial) == len(UAVS) + 2
     assert topology.listen not in topology.dial
+
+
+@pytest.mark.parametrize("routers", [0, 2])
+def test_with_keys_every_process_has_its_own_and_only_encrypted_links(routers: int) -> None:
+    made = layout(routers, onlookers=("spy", "guest"), keys=KEYS)
+    commands = {
+        "coordinator": made.coordinator(),
+        **{name: made.agent(name, "tcp:127.0.0.1:1", 1) for name in UAVS},
+        "boss": made.dashboard(PLACE, Path()),
+        "u2": made.seat_arguments("spy"),
+        "onlooking": made.seat_arguments("guest"),
+    }
+
+    for name, arguments in commands.items():
+        assert value(arguments, "--keys") == f"keys/{name}"
+        assert all(each.startswith("tls/") for each in values(arguments, "--connect"))
+    for router in made.routers:
+        assert value(made.router(router), "--keys") == "keys/gate"
+        assert value(made.router(router), "--listen").startswith("tls/")
+
+
+def test_without_keys_nobody_is_told_of_any() -> None:
+    made = layout(routers=1)
+    for arguments in (made.router("router 1"), made.coordinator(), made.seat_arguments("u0")):
+        assert "--keys" not in arguments
 
 
 def test_an_agent_is_told_its_mission_its_vehicle_and_the_pace() -> None:

@@ -17,6 +17,7 @@ from swarm.cli import main
         (["--command", "uav9=mission"], "--command: uav9=mission: no UAV 'uav9'; "),
         (["--forward", "tcp:127.0.0.1:1"], "--forward: tcp:127.0.0.1:1: 'tcp' is no kind of link"),
         (["--signing-key", "/no/such/key"], "/no/such/key: cannot be read"),
+        (["--keys", "/no/such/keys"], "/no/such/keys"),
         (["--battery-reserve", "much"], "--battery-reserve"),
         (["--fence-radius-m", "0"], "--fence-radius-m"),
         (["--fence-height-m", "high"], "--fence-height-m"),

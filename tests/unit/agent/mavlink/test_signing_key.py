@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from agent.mavlink.signing_key import load_signing_key
+from agent.mavlink.signing_key import load_signing_key, signing_key_of
 from swarm.errors import InputError
 
 SECRET = bytes(range(32))
@@ -74,3 +74,11 @@ def test_a_file_that_cannot_be_read_is_one_clear_line(tmp_path: Path) -> None:
             load_signing_key(path)
     with pytest.raises(InputError, match="0 bytes that are no signing key"):
         load_signing_key(pipe)
+
+
+def test_of_a_missions_keys_each_uav_takes_its_own(tmp_path: Path) -> None:
+    (tmp_path / "uav1").mkdir()
+    own = written(tmp_path / "uav1" / "mavlink.key", SECRET)
+
+    assert signing_key_of("uav1", tmp_path) == own
+    assert signing_key_of("uav1", own) == signing_key_of("uav2", own) == own

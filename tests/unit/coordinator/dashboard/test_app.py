@@ -252,6 +252,17 @@ def test_before_a_mission_is_known_orders_come_too_early(tmp_path: Path) -> None
             )
 
 
+def test_who_may_only_look_on_is_told_what_orders_need(tmp_path: Path) -> None:
+    play = DeskPlay()
+    play.may_order = False
+    with client(play, tmp_path) as page:
+        answers = [page.post(path, json=body) for path, body in POSTS]
+
+    for answer in answers:
+        assert answer.status_code == 403
+        assert "with an operator's" in answer.json()["error"]
+
+
 def test_a_recording_takes_no_orders_but_is_wound(tmp_path: Path) -> None:
     play = DeskPlay()
     play.player = FakePlayer()

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarm.config import Timing
 from swarm.model.ids import COORDINATOR
 from swarm.state.membership import Membership
 from tests.builders import TIMING
@@ -369,3 +370,21 @@ def test_who_is_known_to_have_claimed_must_speak_though_it_was_never_heard_here(
     assert membership.lost(1.0 + TIMING.silence_s) == ["u1"]
     assert membership.lost(2.0 + TIMING.silence_s) == ["u2"]
     assert membership.mute("u1")
+
+
+def test_a_token_that_somebody_else_shows_keeps_nobodys_claim_longer_than_silence_would() -> None:
+    """Tokens cannot be signed: whoever forges one, or lets it flicker, gains no more than that."""
+    timing = Timing()
+    membership, now_s = Membership(timing), timing.silence_s
+    membership.seen("u1", 0.0)
+    membership.heard("u1", 0.0)
+    membership.spoke("u1")
+    assert membership.is_credible("u1")
+
+    assert membership.lost(now_s) == ["u1"]
+    for _ in range(20):
+        now_s += 1.0
+        membership.gone("u1", now_s)
+        membership.seen("u1", now_s)
+        assert not membership.is_credible("u1")
+        membership.lost(now_s)

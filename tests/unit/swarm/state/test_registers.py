@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.state.board import TaskBoard
 from swarm.state.claims import holders
-from swarm.state.registers import Replica
+from swarm.state.registers import MOST_UNPOSTED, Replica
 from swarm.state.voice import Voice
 from swarm.wire.codec import encode
 from swarm.wire.messages import Body, Brief, Claim, Command, CommandKind, Message, Stamp, TaskOrder
@@ -362,3 +362,41 @@ def test_what_the_coordinator_says_of_an_ordered_task_changes_nothing() -> None:
 
     assert (replica.board["t0"].withdrawn, replica.board_version) == (True, version)
     assert not replica.posted["t0"].withdrawn
+
+
+def test_who_is_not_briefed_claims_nothing_and_has_done_nothing() -> None:
+    """Whoever has keys may speak, but only the fleet takes part; its words are kept for later."""
+    stranger, member = message("u9", held("t0", 1.0)), message("u0", held("t1", 1.0))
+    said = [stranger, message("u9", done("t0")), member, message("u0", done("t1"))]
+    replica = joined(said)
+    assert replica.claims.keys() == {"u0", "u9"}, "as long as nobody knows whose mission it is"
+
+    version = replica.task_version
+    replica.join(message(COORDINATOR, brief(uav("u0"))))
+
+    assert replica.claims.keys() == {"u0"}
+    assert replica.outcomes.keys() == {("u0", "t1")}
+    assert replica.task_version > version
+    assert replica.register(stranger.key) == stranger
+    assert not replica.join(stranger)
+    assert replica.join(message("u9", held("t1", 2.0), counter=7))
+    assert replica.claims.keys() == {"u0"}
+
+    replica.join(message(COORDINATOR, brief(uav("u0"), uav("u9")), counter=2))
+
+    assert replica.claims["u9"] == held("t1", 2.0)
+    assert replica.outcomes.keys() == {("u0", "t1"), ("u9", "t0")}
+
+
+def test_a_writer_may_tell_of_many_tasks_that_nobody_knows_but_not_of_any_number() -> None:
+    replica = Replica()
+    tasks = [f"t{n}" for n in range(MOST_UNPOSTED + 50)]
+    told = [message("u0", done(task), counter=n + 1) for n, task in enumerate(tasks)]
+
+    taken = sum(replica.join(said) for said in told)
+
+    assert taken == MOST_UNPOSTED
+    assert replica.overfull == len(told) - taken
+    assert replica.join(message("u1", done("t9"))), "others have room of their own"
+    replica.join(message(COORDINATOR, entry(tasks[-1])))
+    assert replica.join(told[-1]), "what is on the board always has"

@@ -48,7 +48,7 @@ def test_outcomes_of_strangers_and_of_unknown_tasks_count_for_nobody() -> None:
     state = after_outcomes(fleet.at(40.0).problem, fleet.board)
 
     assert state.survived.tolist() == [1.0, 1.0]
-    assert state.open.tolist() == [True, False, True, True]
+    assert state.open.tolist() == [True, True, True, True]
 
 
 def test_a_claim_is_finished_where_and_when_it_says() -> None:

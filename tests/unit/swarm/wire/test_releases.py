@@ -14,6 +14,7 @@ from swarm.state.registers import Replica
 from swarm.wire import codec as wire
 from swarm.wire.codec import SMALL_LIMIT_BYTES, Codec, encode
 from swarm.wire.digest import fingerprint
+from swarm.wire.encoding import KINDS
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Message, Snapshot
 from tests.builders import MISSION, brief, choice, done, entry, epoch, held, message, status, uav
@@ -22,7 +23,7 @@ from tests.message_strategies import messages
 
 CLAIM = message("u0", held("t0", 1.0))
 STATE = Keys(MISSION).state("u1")
-KINDS = [
+SAID = [
     message("coordinator", brief(uav("u0"))),
     message("coordinator", epoch("u0")),
     message("coordinator", entry("t0")),
@@ -115,7 +116,7 @@ def test_a_changed_copy_says_what_it_says() -> None:
     assert encode(copy) == encode(message("u1", held("t0", 1.0)))
 
 
-@pytest.mark.parametrize("said", KINDS, ids=lambda said: type(said.body).__name__)
+@pytest.mark.parametrize("said", SAID, ids=lambda said: type(said.body).__name__)
 def test_an_older_release_need_not_say_what_has_a_wire_default(
     said: Message, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -134,7 +135,7 @@ def test_an_older_release_need_not_say_what_has_a_wire_default(
 
 def test_wire_defaults_are_of_fields_that_there_are() -> None:
     for kind, defaults in wire.WIRE_DEFAULTS.items():
-        fields = [field.name for field in dataclasses.fields(wire._KINDS[kind])]
+        fields = [field.name for field in dataclasses.fields(KINDS[kind])]
         assert fields[-len(defaults) :] == list(defaults), "new fields stand at the end"
 
 

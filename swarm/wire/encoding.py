@@ -1,0 +1,169 @@
+"""Messages -> bytes: MessagePack as a bus without keys carries it, and what fits into it.
+
+Leaves out: reading, and envelopes (swarm.wire.codec).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import msgpack
+
+from swarm.wire.choice import Basis, Candidate
+from swarm.wire.messages import (
+    SCHEMA_VERSION,
+    Board,
+    Body,
+    Brief,
+    Choice,
+    Claim,
+    Command,
+    Epoch,
+    Fleet,
+    Message,
+    Outcome,
+    SignedRoster,
+    Snapshot,
+    Status,
+    TaskOrder,
+    as_heard,
+)
+
+__all__ = [
+    "FIELDS",
+    "KINDS",
+    "LARGE",
+    "LARGE_LIMIT_BYTES",
+    "NAMES",
+    "SMALL_LIMIT_BYTES",
+    "SNAPSHOT_LIMIT_BYTES",
+    "encode",
+    "encode_memory",
+    "fit",
+    "fit_memory",
+    "snapshot_bytes",
+]
+
+SMALL_LIMIT_BYTES: Final = 4 * 1024
+LARGE_LIMIT_BYTES: Final = 1024 * 1024
+SNAPSHOT_LIMIT_BYTES: Final = 4 * 1024 * 1024
+"""As much as a bus carries at once."""
+
+KINDS: Final[dict[str, type[Body]]] = {
+    "brief": Brief,
+    "epoch": Epoch,
+    "board": Board,
+    "claim": Claim,
+    "outcome": Outcome,
+    "status": Status,
+    "choice": Choice,
+    "command": Command,
+    "task": TaskOrder,
+    "roster": SignedRoster,
+}
+NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in KINDS.items()}
+FIELDS: Final[dict[type, tuple[str, ...]]] = {
+    part: tuple(field.name for field in dataclasses.fields(part))
+    for part in (*KINDS.values(), Fleet, Basis, Candidate)
+}
+"""Of everything that a message is made of."""
+LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
+
+
+def encode(what: Message | Snapshot) -> bytes:
+    """The bytes of a message or snapshot, as a bus without keys carries them.
+
+    A message that was heard gives the very bytes that were heard.
+    """
+    if isinstance(what, Snapshot):
+        return snapshot_bytes(what, [encode(message) for message in what.messages])
+    if what.said is None:
+        as_heard(what, _message_bytes(what))
+    return what.said or b""
+
+
+def encode_memory(snapshot: Snapshot) -> bytes:
+    """``snapshot`` with the envelopes of its messages, for `decode_memory` of a later life."""
+    return snapshot_bytes(snapshot, [_remembered(message) for message in snapshot.messages])
+
+
+def fit_memory(snapshot: Snapshot) -> Snapshot:
+    """What of ``snapshot`` there is room for in a memory; see `fit`."""
+    return fit(snapshot, SNAPSHOT_LIMIT_BYTES, _remembered)
+
+
+def fit(
+    snapshot: Snapshot,
+    limit_bytes: int = SNAPSHOT_LIMIT_BYTES,
+    as_bytes: Callable[[Message], bytes] = encode,
+) -> Snapshot:
+    """``snapshot``, without some of the registers when there is no room for all.
+
+    Those of its own writer stay before those of others, for which others answer too.
+
+    Args:
+        snapshot: to be shortened.
+        limit_bytes: how long it may be.
+        as_bytes: what becomes of each message in it.
+    """
+    parts = [as_bytes(message) for message in snapshot.messages]
+    if len(snapshot_bytes(snapshot, parts)) <= limit_bytes:
+        return snapshot
+    room = limit_bytes - len(snapshot_bytes(snapshot, ())) - 4  # a longer array head
+    kept = []
+    for message, part in sorted(
+        zip(snapshot.messages, parts, strict=True),
+        key=lambda each: each[0].writer != snapshot.writer,
+    ):
+        if len(part) <= room:
+            room -= len(part)
+            kept.append(message)
+    return replace(snapshot, messages=tuple(kept))
+
+
+def _message_bytes(message: Message) -> bytes:
+    parts = [
+        SCHEMA_VERSION,
+        message.mission,
+        message.writer,
+        message.stamp.incarnation,
+        message.stamp.counter,
+        NAMES[type(message.body)],
+        message.body,
+    ]
+    packed: bytes = msgpack.packb(parts, default=_fields_of)
+    return packed
+
+
+def snapshot_bytes(snapshot: Snapshot, registers: Sequence[bytes]) -> bytes:
+    """``snapshot`` with these in the place of its messages."""
+    head = (
+        SCHEMA_VERSION,
+        snapshot.mission,
+        snapshot.writer,
+        snapshot.incarnation,
+        snapshot.mission_s,
+    )
+    packed: list[bytes] = [msgpack.packb(part) for part in head]
+    return _array([*packed, _array(registers)])
+
+
+def _array(parts: Sequence[bytes]) -> bytes:
+    """An array of what is MessagePack already."""
+    head: bytes = msgpack.Packer().pack_array_header(len(parts))
+    return head + b"".join(parts)
+
+
+def _remembered(message: Message) -> bytes:
+    if message.envelope is None:
+        return encode(message)
+    packed: bytes = msgpack.packb(message.envelope)
+    return packed
+
+
+def _fields_of(part: object) -> dict[str, object]:
+    """A body, or a dataclass within one, by the names of its fields."""
+    return {name: getattr(part, name) for name in FIELDS[type(part)]}

@@ -1,0 +1,115 @@
+"""An earlier release and this one fly a mission together, as while a fleet is upgraded.
+
+The earlier one runs from its own sources, on the kernels of this build (tests/releases.py),
+on a bus without keys: it knows none. Everything said on that bus is heard, and read by both
+releases once more, so that what either of them drops shows wherever it was sent.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+import zenoh
+
+import swarm
+from swarm.bus.config import DEFAULT_LEASE_S
+from swarm.bus.zenoh_session import session_config
+from swarm.model.ids import COORDINATOR
+from swarm.scenario import load_scenario
+from swarm.scenario.shipped import resolve_scenario
+from swarm.wire.codec import Codec
+from swarm.wire.keys import Keys
+from swarm.wire.messages import Board, Brief, Claim, Epoch, Outcome, Status
+from tests.process.by_hand import ByHand
+from tests.releases import kept_releases, python_of, unpacked
+
+pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+
+MISSION = "table-1"
+SPEEDUP = 10
+READ = """
+import json
+from swarm.wire.codec import Codec
+
+said, answered = json.load(sys.stdin)
+codec = Codec(sys.argv[1])
+for key, payload in said:
+    codec.decode(key, bytes.fromhex(payload))
+registers = 0
+for key, payload in answered:
+    snapshot = codec.decode_snapshot(key, bytes.fromhex(payload))
+    registers += 0 if snapshot is None else len(snapshot.messages)
+print(json.dumps({"dropped": codec.dropped, "registers": registers}))
+"""
+"""Says what of these messages and answers the release it is run with would drop."""
+
+
+class Listener:
+    """Keeps all that is said on the bus of a mission."""
+
+    def __init__(self, endpoint: str, stack: contextlib.ExitStack) -> None:
+        config = session_config("client", listen=[], connect=[endpoint], lease_s=DEFAULT_LEASE_S)
+        self._session = stack.enter_context(zenoh.open(config))
+        self.said: list[tuple[str, bytes]] = []
+        self.answered: list[tuple[str, bytes]] = []
+        self._session.declare_subscriber(f"{Keys(MISSION).root}/**", self._hear)
+
+    def _hear(self, sample: zenoh.Sample) -> None:
+        self.said.append((str(sample.key_expr), sample.payload.to_bytes()))
+
+    def ask_all(self) -> None:
+        """Ask every process what it knows."""
+        for reply in self._session.get(Keys(MISSION).state("*"), payload=b"", timeout=5.0):
+            assert reply.ok is not None
+            self.answered.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
+
+    def as_json(self) -> str:
+        """Everything, for `READ`."""
+        return json.dumps(
+            [[(key, data.hex()) for key, data in each] for each in (self.said, self.answered)]
+        )
+
+
+@pytest.fixture(scope="module", params=kept_releases())
+def release(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return unpacked(request.param, tmp_path_factory.mktemp("release"))
+
+
+@pytest.mark.parametrize("earlier", ["uav1", COORDINATOR])
+def test_a_process_of_an_earlier_release_takes_its_part(
+    earlier: str, release: Path, tmp_path: Path
+) -> None:
+    mission = load_scenario(resolve_scenario(MISSION))
+    with contextlib.ExitStack() as stack:
+        programs = {earlier: python_of(release)}
+        flight = ByHand(tmp_path, stack, mission, SPEEDUP, programs=programs)
+        listener = Listener(flight.seat[1], stack)
+        coordinating = flight.coordinator(COORDINATOR)
+        flight.wait_for_done(1)
+        listener.ask_all()
+        assert coordinating.wait(100) == 0, flight.log(COORDINATOR)
+        flight.assert_all_done()
+        assert f"event=begins mission={MISSION} release={swarm.__version__} " in flight.log("uav2")
+
+    words = [*python_of(release, READ), MISSION]
+    told = subprocess.run(
+        words, check=False, input=listener.as_json(), capture_output=True, text=True
+    )
+    assert told.returncode == 0, told.stderr
+    theirs = json.loads(told.stdout)
+    ours = Codec(MISSION)
+    heard = [ours.decode(key, data) for key, data in listener.said]
+    answers = [ours.decode_snapshot(key, data) for key, data in listener.answered]
+
+    assert (ours.dropped, theirs["dropped"]) == ({}, {})
+    bodies = [message.body for message in heard if message is not None]
+    assert {type(body) for body in bodies} >= {Brief, Board, Epoch, Claim, Outcome, Status}
+    agents_dropped = [body.dropped for body in bodies if isinstance(body, Status)]
+    assert all(dropped.keys() <= {"stale"} for dropped in agents_dropped), agents_dropped
+    answering = [answer for answer in answers if answer is not None]
+    assert {answer.writer for answer in answering} == {COORDINATOR, *flight.uavs}
+    assert sum(len(answer.messages) for answer in answering) == theirs["registers"] > 0

@@ -1,0 +1,228 @@
+"""Shells on a bus with keys: signed, fresh, and by the newest roster."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+from swarm.bus.memory import MemoryBus, MemoryNetwork
+from swarm.bus.port import Query, Sample
+from swarm.events import (
+    Ask,
+    BusFact,
+    Finish,
+    Heard,
+    Learned,
+    PeerGone,
+    PeerSeen,
+    Publish,
+    Stop,
+    Wish,
+)
+from swarm.model.ids import AUTHORITY, COORDINATOR
+from swarm.shell import Shell, take_seat
+from swarm.wire.codec import Codec, encode
+from swarm.wire.keys import Keys
+from swarm.wire.messages import Message, SignedRoster, Snapshot, Stamp
+from swarm.wire.question import decode_question, encode_question
+from tests.builders import MISSION, epoch, held, message
+from tests.keyring import Keyring
+from tests.shell_play import HandClock, play, until
+
+KEYS = Keys(MISSION)
+RING = Keyring("u0", "u1", "u2")
+CLAIM = message("u1", held("t0", 1.0))
+OWN = message("u0", held("t1", 1.0))
+NONCE = bytes(range(16))
+ROSTER = Message(MISSION, AUTHORITY, Stamp(1, 0), SignedRoster(RING.signed()))
+
+
+class Ear:
+    """Remembers what it heard; does what it is told, and answers by its own claim."""
+
+    def __init__(self) -> None:
+        self.heard: list[BusFact] = []
+
+    def start(self, now_s: float) -> Sequence[Wish]:
+        return ()
+
+    def step(self, event: BusFact, now_s: float) -> Sequence[Wish]:
+        self.heard.append(event)
+        match event:
+            case Stop():
+                return [Finish(0)]
+            case Heard(said) if said == OWN:
+                return [Publish(OWN)]
+        return ()
+
+    def next_deadline_s(self) -> float | None:
+        return None
+
+
+@dataclass(slots=True)
+class Sealed:
+    core: Ear
+    shell: Shell[BusFact, Wish]
+    bus: MemoryBus
+    other: MemoryBus
+    """A seat without a shell."""
+
+
+@asynccontextmanager
+async def sealed(keep: Callable[[bytes], object] = bytes) -> AsyncIterator[Sealed]:
+    network, core = MemoryNetwork(), Ear()
+    bus = network.join("u0", seal=RING.seal("u0", keep=keep))
+    other = network.join("other")
+    shell: Shell[BusFact, Wish] = Shell(
+        core,
+        bus,
+        HandClock(),
+        mission=MISSION,
+        name="u0",
+        from_bus=lambda fact: fact,
+        execute=lambda _: None,
+        snapshot=lambda _: Snapshot(MISSION, "u0", 1, 7.0, (OWN,)),
+        draw_nonce=lambda: NONCE,
+    )
+    take_seat(bus, MISSION, "u0", status=True)
+    running = asyncio.create_task(shell.run())
+    try:
+        await until(lambda: Heard(ROSTER) in core.heard, "knowing the own roster")
+        yield Sealed(core, shell, bus, other)
+    finally:
+        shell.step(Stop("enough"))
+        await running
+        bus.close()
+        other.close()
+
+
+def shown(
+    scenario: Callable[[Sealed], Awaitable[None]], keep: Callable[[bytes], object] = bytes
+) -> None:
+    async def whole() -> None:
+        async with sealed(keep) as seat:
+            await scenario(seat)
+
+    play(whole)
+
+
+def newer(*revoked: str) -> Message:
+    roster = RING.without(*revoked)
+    return Message(MISSION, AUTHORITY, Stamp(2, 0), SignedRoster(RING.signed(roster)))
+
+
+def test_it_says_only_what_is_signed_and_believes_nothing_else() -> None:
+    async def scenario(seat: Sealed) -> None:
+        seat.other.subscribe(f"{KEYS.root}/**")
+        seat.shell.step(Heard(OWN))
+        said = [event for event in seat.other.inbox.take() if isinstance(event, Sample)]
+        assert [Codec(MISSION, RING.seal("u2")).decode(s.key, s.payload) for s in said] == [OWN]
+
+        seat.other.publish(CLAIM.key, encode(CLAIM))
+        seat.other.publish(CLAIM.key, RING.seal("u2").wrap(encode(CLAIM)))
+        seat.other.publish(CLAIM.key, RING.seal("u1").wrap(encode(CLAIM)))
+        await until(lambda: Heard(CLAIM) in seat.core.heard, "hearing the honest one")
+
+        assert seat.core.heard.count(Heard(CLAIM)) == 1
+        assert seat.shell.dropped == {"not signed": 1, "not the signer's to say": 1}
+
+    shown(scenario)
+
+
+def test_it_answers_whom_it_knows_and_only_to_that_question() -> None:
+    async def scenario(seat: Sealed) -> None:
+        asked = encode_question({}, NONCE, RING.seal("dashboard"))
+        [answer] = await seat.other.query(KEYS.state("*"), asked, timeout_s=1.0)
+        codec = Codec(MISSION, RING.seal("u1"))
+        heard = codec.decode_snapshot(answer.key, answer.payload, NONCE)
+        assert heard == Snapshot(MISSION, "u0", 1, 7.0, (OWN,))
+        assert codec.decode_snapshot(answer.key, answer.payload, bytes(16)) is None
+
+        nobody = await seat.other.query(KEYS.state("*"), timeout_s=0.01)
+        assert nobody == ()
+
+    shown(scenario)
+
+
+def test_it_takes_an_answer_to_its_own_question_and_no_older_one() -> None:
+    async def scenario(seat: Sealed) -> None:
+        liar = RING.seal("u1")
+        old, _ = Codec(MISSION, liar).pack_answer(
+            Snapshot(MISSION, "u1", 1, 99.0, (CLAIM,)), bytes(16)
+        )
+        for name in ("u1", "u2"):
+            seat.other.serve(KEYS.state(name))
+        seat.shell._carry_out(Ask())
+        questions: list[Query] = []
+        while len(questions) < 2:
+            await seat.other.inbox.wait()
+            questions += [e for e in seat.other.inbox.take() if isinstance(e, Query)]
+        question = decode_question(questions[0].payload, RING.seal("u2"))
+        assert (question.asker, question.nonce) == ("u0", NONCE)
+        fresh, _ = Codec(MISSION, RING.seal("u2")).pack_answer(
+            Snapshot(MISSION, "u2", 1, 7.0, ()), question.nonce
+        )
+        for event in questions:
+            event.reply(old if event.key == KEYS.state("u1") else fresh)
+        await until(lambda: any(isinstance(f, Learned) for f in seat.core.heard), "the answers")
+
+        [learned] = [fact for fact in seat.core.heard if isinstance(fact, Learned)]
+        assert [snapshot.writer for snapshot in learned.snapshots] == ["u2"]
+        assert seat.shell.dropped == {"wrongly signed": 1}
+
+    shown(scenario)
+
+
+def test_whoever_a_newer_roster_leaves_out_is_gone_and_silent_from_then_on() -> None:
+    async def scenario(seat: Sealed) -> None:
+        seat.other.declare_token(KEYS.alive("u1"))
+        await until(lambda: PeerSeen("u1") in seat.core.heard, "seeing it")
+        said = newer("u1")
+
+        seat.other.publish(said.key, encode(said))
+        await until(lambda: PeerGone("u1") in seat.core.heard, "giving it up")
+        seat.other.publish(CLAIM.key, RING.seal("u1").wrap(encode(CLAIM)))
+        seat.other.publish(said.key, encode(ROSTER))
+        by_coordinator = message(COORDINATOR, epoch("u0"))
+        honest = RING.seal(COORDINATOR).wrap(encode(by_coordinator))
+        seat.other.publish(by_coordinator.key, honest)
+        await until(lambda: Heard(by_coordinator) in seat.core.heard, "hearing the others")
+
+        assert Heard(said) in seat.core.heard, "the replica hands it on"
+        assert Heard(CLAIM) not in seat.core.heard
+        assert seat.shell.dropped == {"signer unknown": 1}
+        assert seat.bus.seal is not None
+        assert seat.bus.seal.roster.version == 2, "an older one changes nothing"
+
+    shown(scenario)
+
+
+def test_a_forged_token_of_nobody_is_not_even_told() -> None:
+    async def scenario(seat: Sealed) -> None:
+        for name in ("ghost", "dashboard", "u2"):
+            seat.other.declare_token(KEYS.alive(name))
+        await until(lambda: PeerSeen("u2") in seat.core.heard, "seeing who may be there")
+
+        seen = [fact for fact in seat.core.heard if isinstance(fact, PeerSeen)]
+        assert seen == [PeerSeen("u2")]
+        assert seat.shell.dropped == {"signer unknown": 2}
+
+    shown(scenario)
+
+
+def test_a_newer_roster_is_kept_for_the_next_life_and_a_full_disk_does_no_harm() -> None:
+    said, kept = newer("u2"), list[bytes]()
+
+    async def scenario(seat: Sealed) -> None:
+        seat.other.publish(said.key, encode(said))
+        await until(lambda: PeerGone("u2") in seat.core.heard, "its effect")
+
+    def full(_: bytes) -> None:
+        raise OSError(28, "No space left on device")
+
+    shown(scenario, kept.append)
+    shown(scenario, full)
+    assert isinstance(said.body, SignedRoster)
+    assert kept == [said.body.signed.encode()]
