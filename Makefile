@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
 .PHONY: demo test browser lint audit format kernels sanitize soak chaos fuzz clean help
-.PHONY: dist check-dist sbom wheels
+.PHONY: dist check-dist sbom wheels check-units
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
@@ -24,6 +24,7 @@ help:
 	@echo "make check-dist  install both elsewhere, use them, and build them again to the same bytes"
 	@echo "make sbom    bill of materials of that wheel, into dist/"
 	@echo "make wheels  wheels for all machines, into dist/wheels/; needs Docker or Podman"
+	@echo "make check-units  boot systemd in a container, and kill and freeze the services of a fleet (root)"
 	@echo "make clean   remove what was built and installed here"
 
 demo: $(VENV)/.installed
@@ -128,6 +129,10 @@ STEPS ?= 1000000
 SEED ?= 1
 fuzz: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.fuzz_bridge --steps $(STEPS) --seed $(SEED)
+
+# A real systemd in a container; as root on a machine with debootstrap and systemd-nspawn.
+check-units: $(VENV)/.installed-dev
+	deploy/checks/units.sh
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -63,7 +63,7 @@ class Picture:
 
     def take_in(self, message: Message) -> News | None:
         """Join another's statement; gives what it changes, None if it was known."""
-        if self._is_premature(message):
+        if self.running and self._replica.is_premature(message):
             return None
         before, epoch = self._replica.claims.get(message.writer), self._replica.epoch
         body, board = message.body, self._replica.board
@@ -84,19 +84,6 @@ class Picture:
                 return News.OPENING
             case _:
                 return News.OTHER
-
-    def _is_premature(self, message: Message) -> bool:
-        """Whether it briefs for another flight, by a coordinator that has not taken charge.
-
-        One that starts and finds nobody begins a flight of its own until it learns of the one
-        that is on, whose brief it restates then. What the operator has ordered counts on.
-        """
-        body, known, ours = message.body, self._replica.brief, self._replica.epoch_stamp
-        if not (isinstance(body, Brief) and known is not None and self.running):
-            return False
-        return body.run != known.run and (
-            ours is None or ours.incarnation < message.stamp.incarnation
-        )
 
     def is_open(self, task: str | None) -> bool:
         """Whether that is a task which is still to be done."""

@@ -353,6 +353,8 @@ class Observer:
         if isinstance(message.body, Choice):
             self._hear_choice(message.writer, message.stamp, message.body, now_s)
             return
+        if self._zero_s is not None and self.replica.is_premature(message):
+            return
         before = self.replica.claims.get(message.writer)
         earlier = self.replica.known(message)
         if not self.replica.join(message):

@@ -151,6 +151,7 @@ class Errands:
             said = self._said_for_this_run(errand, now_s)
             if said is None:
                 continue
+            said = self._said_apart(errand, said, now_s)
             errand.deed.heed(fact, said)
             if errand.again_at_s <= now_s:
                 errand.again_at_s = now_s + self._timing.announce_s
@@ -180,6 +181,11 @@ class Errands:
         if said.body.run == brief.run:
             return said
         return self._say(errand, replace(said.body, run=brief.run), now_s)
+
+    def _said_apart(self, errand: Errand, said: Message, now_s: float) -> Message:
+        """What was said; under another id, if another operator's task has come under the same."""
+        body = errand.deed.apart(said) if isinstance(errand.deed, Ordering) else None
+        return said if body is None else self._say(errand, body, now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick; None while nothing is open."""

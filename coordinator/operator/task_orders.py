@@ -158,20 +158,17 @@ class Ordering:
         return self.entry
 
     def _addition(self, wish: NewTask, brief: Brief) -> Board | Verdict:
-        replica = self._observer.replica
-        board, scenario = replica.board, {task.id for task in self._observer.mission.tasks}
+        board, scenario = self._observer.replica.board, self._in_scenario
         if wish.task is not None and (wish.task in board or wish.task in scenario):
             states = self._observer.board.states
             state = states[wish.task].value if wish.task in board else "yet to appear"
             text = f"{wish.task} is {state}: give another id, or none"
             return Verdict(Result.TAKEN_ID, text)
-        taken = board.keys() | scenario | replica.task_orders.keys()
         values = [entry.value for entry in board.values() if not entry.withdrawn]
         place = wish.place
-        number = max((entry.number for entry in board.values()), default=-1) + 1
         return Board(
-            task=wish.task or next_id(taken),
-            number=min(number, MAX_COUNT),
+            task=wish.task or next_id(self._used_ids),
+            number=self._next_number,
             position_enu_m=(
                 place.enu_m(Origin(*brief.origin)) if isinstance(place, Wgs84) else place
             ),
@@ -195,6 +192,26 @@ class Ordering:
         return replace(entry, withdrawn=True)
 
     # -- what comes of it ---------------------------------------------------------------
+
+    def apart(self, said: Message) -> TaskOrder | None:
+        """Our task under another id, if another operator's new one has come under the same.
+
+        That happens to who adds tasks at the same moment. Theirs counts, as it has the greater
+        stamp; ours moves on, as nobody has chosen its id. None if that is not so: what
+        somebody has made of our own task since is their word about it.
+        """
+        ours, known = self.entry, self._observer.replica.known(said)
+        if not isinstance(self._wish, NewTask) or self._wish.task is not None:
+            return None
+        if ours is None or known is None or known.stamp == said.stamp:
+            return None
+        theirs = known.body
+        if not isinstance(theirs, TaskOrder) or theirs.withdrawn:
+            return None
+        if theirs.position_enu_m == ours.position_enu_m:
+            return None
+        self.entry = replace(ours, task=next_id(self._used_ids), number=self._next_number)
+        return self.entry
 
     def heed(self, fact: BusFact, said: Message) -> None:
         """See who knows of the order."""
@@ -276,6 +293,22 @@ class Ordering:
         if self._claimants:
             return None
         return Verdict(Result.OBEYED, f"{order.task} is withdrawn")
+
+    @property
+    def _in_scenario(self) -> set[str]:
+        return {task.id for task in self._observer.mission.tasks}
+
+    @property
+    def _used_ids(self) -> set[str]:
+        """Ids that no new task may have."""
+        replica = self._observer.replica
+        return self._in_scenario | replica.board.keys() | replica.task_orders.keys()
+
+    @property
+    def _next_number(self) -> int:
+        """The place at the end of the board."""
+        board = self._observer.replica.board.values()
+        return min(max((entry.number for entry in board), default=-1) + 1, MAX_COUNT)
 
     @property
     def task(self) -> str | None:

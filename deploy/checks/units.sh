@@ -6,7 +6,7 @@
 #
 # Needs root, debootstrap and systemd-nspawn (Debian: debootstrap, systemd-container), the
 # project's .venv with its build tools, a package index and a Debian mirror. FOLDER, by default
-# build/check-units, keeps the container's file system for the next time (900 MB). The container
+# build/check-units, keeps the container's file system for the next time (1 GB). The container
 # has processes, mounts, users and journal of its own, and no network but its own loopback.
 #
 # What this cannot show: limits of memory, processor and processes, and which devices a service may
@@ -52,7 +52,7 @@ PATH=$project/.venv/bin:$PATH "$python" -m pip wheel -q --no-deps --no-build-iso
     grep -v '^WARNING: Location' || true
 cp -R "$wheels" "$root/wheels"
 chroot "$root" python3 -m venv /opt/peckorder
-chroot "$root" /opt/peckorder/bin/pip uninstall -q -y peckorder 2>/dev/null
+chroot "$root" /opt/peckorder/bin/pip uninstall -q -y peckorder 2>/dev/null || true
 chroot "$root" /opt/peckorder/bin/pip install -q --no-index --find-links /wheels peckorder
 rm -rf "$root/wheels"
 

@@ -71,15 +71,15 @@ def agent(
     """Run an agent on this companion computer, always.
 
     Takes the options of `swarm agent`, checks them as that would, and writes a unit of systemd,
-    a file with the options, and copies of the keys that only the service can read. Installed
-    again without options it keeps those it has, for upgrades. Prints what to do next; where
-    systemd does not run, the command line to run by hand.
+    a file with the options, and copies of the keys that only the service can read; root alone
+    may. Installed again without options it keeps those it has, for upgrades. Prints what to do
+    next; where systemd does not run, the command line to run by hand.
 
     Examples:
-      sudo swarm install agent --uav uav1 --mission field --mavlink serial:/dev/ttyAMA0:921600
+      swarm install agent --uav uav1 --mission field --mavlink serial:/dev/ttyAMA0:921600
       --keys uav1 --signing-key uav1/mavlink.key --connect tls/192.168.1.2:7447
 
-      sudo swarm install agent --uav uav1
+      swarm install agent --uav uav1
     """
     return _install("agent", ["--uav", uav], context.args, root, program, dry_run, uav)
 
@@ -98,8 +98,8 @@ def coordinator(
     machine.
 
     Examples:
-        sudo swarm install coordinator field.toml --keys coordinator --connect tls/127.0.0.1:7447
-        sudo swarm install coordinator field.toml --keys coordinator-2 --standby
+        swarm install coordinator field.toml --keys coordinator --connect tls/127.0.0.1:7447
+        swarm install coordinator field.toml --keys coordinator-2 --standby
     """
     return _install("coordinator", [], context.args, root, program, dry_run)
 
@@ -116,7 +116,7 @@ def router(
     Takes the options of `swarm router`; see `swarm install agent` for what it makes of them.
 
     Examples:
-        sudo swarm install router --keys router --listen tls/0.0.0.0:7447
+        swarm install router --keys router --listen tls/0.0.0.0:7447
     """
     return _install("router", [], context.args, root, program, dry_run)
 
@@ -133,7 +133,7 @@ def dashboard(
     Takes the options of `swarm dashboard`; see `swarm install agent` for what it makes of them.
 
     Examples:
-        sudo swarm install dashboard --keys dashboard --host 0.0.0.0 --token-file token
+        swarm install dashboard --keys dashboard --host 0.0.0.0 --token-file token
     """
     return _install("dashboard", [], context.args, root, program, dry_run)
 

@@ -17,6 +17,7 @@ __all__ = ["VARIABLE", "kept_words", "option_value", "replaced", "with_words"]
 VARIABLE: Final = "SWARM_OPTIONS"
 _LINE = re.compile(rf"^{VARIABLE}=((?:.*\\\n)*.*)$", re.MULTILINE)
 _ESCAPED = re.compile(r'([\\"`$])')
+_UNESCAPED = re.compile(r'\\([\\"`$])')
 
 
 def option_value(words: Sequence[str], option: str) -> str | None:
@@ -69,6 +70,8 @@ def kept_words(text: str) -> list[str]:
     if found is None:
         raise ValueError(f"there is no {VARIABLE}")
     value = found[1].replace("\\\n", " ").strip()
-    if value[:1] in ("'", '"'):
-        value = " ".join(shlex.split(value))
+    if len(value) > 1 and value[0] == value[-1] == "'":
+        value = value[1:-1]
+    elif len(value) > 1 and value[0] == value[-1] == '"':
+        value = _UNESCAPED.sub(r"\1", value[1:-1])
     return shlex.split(value)

@@ -22,6 +22,7 @@ from swarm.wire.messages import (
     Claim,
     Command,
     Epoch,
+    EpochPhase,
     Message,
     Outcome,
     Stamp,
@@ -130,6 +131,20 @@ class Replica:
             return True
         self._unposted[writer] += 1
         return False
+
+    def is_premature(self, message: Message) -> bool:
+        """Whether it briefs for another flight, by a coordinator that has not taken charge.
+
+        One that starts and finds nobody begins a flight of its own until it learns of the one
+        that is on, whose brief it restates then. What the operator has ordered counts on. Ask
+        while a mission runs, and do not join what is premature.
+        """
+        body, known, epoch, stamp = message.body, self.brief, self.epoch, self.epoch_stamp
+        if not isinstance(body, Brief) or known is None:
+            return False
+        if epoch is None or stamp is None or epoch.phase is EpochPhase.ENDED:
+            return False
+        return body.run != known.run and stamp.incarnation < message.stamp.incarnation
 
     def ordered(self, task: str) -> TaskOrder | None:
         """The operator's order about ``task`` in this flight; None if there is none."""

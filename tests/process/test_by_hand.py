@@ -64,12 +64,13 @@ def test_processes_started_by_hand_fly_the_paper_mission() -> None:
         "coordinator",
     ]
     (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
-    seat = ["--connect", endpoint]
+    pace = ["--speedup", "4"]
+    seat = ["--connect", endpoint, *pace]
     autopilot[autopilot.index("--listen") + 1] = "tcp:127.0.0.1:0"
     with contextlib.ExitStack() as stack:
         serving = stack.enter_context(started([*router, "--listen", endpoint]))
         assert first_line(serving)["endpoints"] == [endpoint]
-        flying = stack.enter_context(started(autopilot))
+        flying = stack.enter_context(started([*autopilot, *pace]))
         urls = [str(first_line(flying)["url"]) for _ in agents]
         planning = stack.enter_context(started([*coordinator, *seat, "--json"]))
         pilots = []

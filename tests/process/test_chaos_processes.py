@@ -111,9 +111,9 @@ def test_the_fleet_rides_out_a_restart_of_its_only_router(tmp_path: Path) -> Non
         await asyncio.sleep(2.0)
         await flight.restart("router 1")
 
-    verdict = play(survey(6, 40), tmp_path, script, bus=BusKind.ROUTER, speedup=SPEEDUP)
+    verdict = play(survey(4, 28), tmp_path, script, bus=BusKind.ROUTER, speedup=SPEEDUP)
 
-    all_done(verdict, 40)
+    all_done(verdict, 28)
     assert verdict.flight.result.lost_uavs == ()
     assert verdict.agreement_s <= AGREE_WITHIN_S
 
@@ -124,8 +124,8 @@ def test_of_two_routers_one_may_die(tmp_path: Path, router: str) -> None:
         await flight.until_done(5)
         await flight.kill(router)
 
-    verdict = play(survey(6, 40), tmp_path, script, bus=BusKind.ROUTER, routers=2, speedup=SPEEDUP)
+    verdict = play(survey(4, 28), tmp_path, script, bus=BusKind.ROUTER, routers=2, speedup=SPEEDUP)
 
-    all_done(verdict, 40)
+    all_done(verdict, 28)
     assert verdict.flight.result.lost_uavs == ()
     assert verdict.duplicates == 0

@@ -39,7 +39,7 @@ FLOWN = _flown()
 @pytest.fixture
 def by_hand(tmp_path: Path) -> Iterator[ByHand]:
     with contextlib.ExitStack() as stack:
-        yield ByHand(tmp_path, stack, FLOWN)
+        yield ByHand(tmp_path, stack, FLOWN, speedup=3)
 
 
 @pytest.mark.parametrize("keeps_state", [True, False])

@@ -1,21 +1,42 @@
-"""The Zenoh files of deploy/ open, and carry the settings the runtime uses by itself."""
+"""The files of deploy/: Zenoh's open and say what the runtime does by itself, containers' parse.
+
+No container is built here: their files are read, and every command in them is tried on the
+command line's own parser. Booting the units: deploy/checks/units.sh.
+"""
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import json
+import re
+import shlex
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer.main
+import yaml
 import zenoh
 
-from swarm.bus.config import DEFAULT_LEASE_S
+from swarm import cli
+from swarm.bus.config import BusConfig, FileTopology
+from swarm.bus.port import TokenSeen
+from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.bus.zenoh_session import session_config
-from tests.process.mission import wait_until
-from tests.process.router_processes import HOLDER, router, started
+from swarm.config import PRESETS, Link
+from swarm.identity import load_identity
+from tests.process.router_processes import router
 
 pytestmark = pytest.mark.process
 
-FOLDER = Path(__file__).parents[2] / "deploy" / "zenoh"
+DEPLOY = Path(__file__).parents[2] / "deploy"
+ZENOH = DEPLOY / "zenoh"
 SETTINGS = (
     "connect/retry",
     "scouting/delay",
@@ -29,36 +50,260 @@ SETTINGS = (
     "transport/unicast/open_timeout",
     "transport/unicast/accept_timeout",
 )
+PATIENT_BY_RADIO = {
+    "transport/link/tx/queue/congestion_control/block/wait_before_close",
+    "transport/unicast/open_timeout",
+    "transport/unicast/accept_timeout",
+}
+FILES = sorted(ZENOH.rglob("*.json5"))
+LIMIT_S = 30.0
 
 
-@pytest.mark.parametrize("mode", ["router", "client"])
-def test_file_says_what_the_runtime_does_by_itself(mode: str) -> None:
-    file = zenoh.Config.from_file(FOLDER / f"{mode}.json5")
-    own = session_config(mode, listen=[], connect=[], lease_s=DEFAULT_LEASE_S)
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of the fleet of the compose file."""
+    folder = tmp_path_factory.mktemp("authority") / "keys"
+    assert cli.main(["keys", "init", "meadow", "--out", str(folder), "--routers", "2"]) == 0
+    return folder
+
+
+# -- Zenoh ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ZENOH)))
+def test_file_says_what_the_runtime_does_by_itself(path: Path) -> None:
+    file = zenoh.Config.from_file(path)
+    mode = "router" if path.stem.startswith("router") else "client"
+    radio = path.parent.name == "radio"
+    lease_s = PRESETS[Link.BAD if radio else Link.NORMAL].lease_s
+    own = session_config(mode, listen=[], connect=[], lease_s=lease_s)
 
     assert json.loads(file.get_json("mode")) == mode
     for setting in SETTINGS:
-        assert file.get_json(setting) == own.get_json(setting), setting
+        if radio and setting in PATIENT_BY_RADIO:
+            assert int(file.get_json(setting)) > int(own.get_json(setting)), setting
+        else:
+            assert file.get_json(setting) == own.get_json(setting), setting
 
 
-def test_fleet_meets_at_a_router_of_the_shipped_files(tmp_path: Path) -> None:
-    with router("--config", str(FOLDER / "router.json5"), "--listen", "tcp/127.0.0.1:0") as (
-        _,
-        endpoint,
-    ):
-        client = tmp_path / "client.json5"
-        text = (FOLDER / "client.json5").read_text()
-        client.write_text(text.replace("tcp/127.0.0.1:7447", endpoint))
-        config = zenoh.Config.from_file(client)
-        with (
-            started("-c", HOLDER, "client", "a/token", endpoint) as holder,
-            zenoh.open(config) as session,
-        ):
-            assert holder.stdout is not None
-            assert holder.stdout.readline() == "ready\n"
+def with_routers(file: Path, folder: Path, endpoints: list[str]) -> Path:
+    """A copy of a client's file that calls the routers of the test instead."""
+    text, changed = re.subn(
+        r'endpoints: \["tls/192[^]]*\]', f"endpoints: {json.dumps(endpoints)}", file.read_text()
+    )
+    assert changed == 1
+    copy = folder / f"{file.parent.name}-{file.name}"
+    copy.write_text(text)
+    return copy
 
-            def tokens() -> list[str]:
-                replies = session.liveliness().get("a/*", timeout=5.0)
-                return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
 
-            wait_until(lambda: tokens() == ["a/token"], 10.0, "the token")
+@pytest.mark.parametrize("kind", [".", "two-routers", "radio"])
+def test_two_uavs_with_keys_meet_at_routers_of_the_shipped_files(
+    kind: str, tmp_path: Path, keys: Path
+) -> None:
+    with contextlib.ExitStack() as routers:
+
+        def start(name: str, file: Path) -> str:
+            words = ("--keys", str(keys / name), "--config", str(file))
+            _, endpoint = routers.enter_context(router(*words, "--listen", "tls/127.0.0.1:0"))
+            return endpoint
+
+        if kind == "two-routers":
+            first = start("router", ZENOH / kind / "router-a.json5")
+            file = with_routers(ZENOH / kind / "router-b.json5", tmp_path, [first])
+            ends = [first, start("router-2", file)]
+        else:
+            ends = [start("router", ZENOH / kind / "router.json5")] * 2
+        asyncio.run(
+            meet(
+                keys,
+                [
+                    with_routers(ZENOH / kind / "client.json5", tmp_path / each, [end])
+                    for each, end in zip(folders(tmp_path), ends, strict=True)
+                ],
+            )
+        )
+
+
+def folders(path: Path) -> Iterator[str]:
+    for name in ("uav1", "uav2"):
+        (path / name).mkdir()
+        yield name
+
+
+async def meet(keys: Path, files: list[Path]) -> None:
+    """One shows its token, and the other sees it."""
+    async with asyncio.timeout(LIMIT_S):
+        buses = [
+            await open_zenoh_bus(
+                BusConfig(FileTopology(file), identity=load_identity(keys / f"uav{i + 1}"))
+            )
+            for i, file in enumerate(files)
+        ]
+        try:
+            buses[0].declare_token("swarm/meadow/alive/uav1")
+            buses[1].watch_tokens("swarm/meadow/alive/*")
+            while True:
+                await buses[1].inbox.wait()
+                if TokenSeen("swarm/meadow/alive/uav1") in buses[1].inbox.take():
+                    return
+        finally:
+            for bus in buses:
+                bus.close()
+
+
+# -- containers ---------------------------------------------------------------------------
+
+
+def parsed(words: list[str]) -> Mapping[str, Any]:
+    """What a command line comes to, by the command's own parser."""
+    root: Any = cli._application()
+    name, *rest = words
+    cli._register(root, name, cli._installed_commands()[name].load())
+    group: Any = typer.main.get_command(root)
+    command = group.commands[name]
+    while hasattr(command, "commands"):
+        name, *rest = rest
+        command = command.commands[name]
+    return dict(command.make_context(f"swarm {name}", list(rest)).params)
+
+
+@pytest.fixture(scope="module")
+def compose() -> dict[str, Any]:
+    loaded = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
+    assert isinstance(loaded, dict)
+    return loaded
+
+
+def test_every_service_of_the_fleet_is_a_command_line_that_its_command_accepts(
+    compose: dict[str, Any], keys: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    token = compose["services"]["dashboard"]["environment"]["SWARM_DASHBOARD_TOKEN"]
+    monkeypatch.setenv("SWARM_DASHBOARD_TOKEN", token.partition(":-")[2].rstrip("}"))
+    services = dict(compose["services"])
+    del services["keys"]
+    for name, service in services.items():
+        mounted = {volume.split(":")[1]: volume.split(":")[0] for volume in service["volumes"]}
+        own = keys / mounted["/keys"].removeprefix("keys-")
+        words = [str(own) + word[5:] if word.startswith("/keys") else word
+                 for word in service["command"]]  # fmt: skip
+        if words[0] == "autopilot":
+            assert parsed(words)["uav"] == [name.removeprefix("autopilot-")]
+        else:
+            cli.check(words)  # opens the keys, too
+        assert service["image"] == compose["services"]["keys"]["image"]
+        assert service["read_only"] is True
+        assert service["cap_drop"] == ["ALL"]
+        assert {volume.split(":")[0] for volume in service["volumes"]} <= set(compose["volumes"])
+
+
+def test_every_uav_of_the_mission_has_agent_and_autopilot(compose: dict[str, Any]) -> None:
+    uavs = {f"uav{n}" for n in (1, 2, 3)}
+    services = compose["services"]
+
+    assert uavs | {f"autopilot-{uav}" for uav in uavs} <= set(services)
+    for uav in uavs:
+        link = services[uav]["command"]
+        assert link[link.index("--mavlink") + 1] == f"tcp:autopilot-{uav}:5760"
+        for service in (uav, f"autopilot-{uav}"):
+            assert services[service]["volumes"][0].startswith(f"keys-{uav}:/keys")
+
+
+def test_keys_are_made_by_a_command_line_that_is_accepted_for_all_who_use_them(
+    compose: dict[str, Any],
+) -> None:
+    service = compose["services"]["keys"]
+    (script,) = service["command"]
+    (made,) = re.findall(r"swarm (keys init .*)", script)
+    names = shlex.split(re.findall(r"for name in (.*); do", script)[0])
+
+    assert str(parsed(shlex.split(made))["scenario"]).endswith("meadow.toml")
+    assert {f"keys-{name}:/keys/{name}" for name in names} < set(service["volumes"])
+    shell = shutil.which("sh")
+    assert shell is not None
+    checked = subprocess.run([shell, "-n", "-c", script.replace("$$", "$")], check=False)
+    assert checked.returncode == 0
+
+
+def test_order_of_the_fleet_waits_for_keys_and_router(compose: dict[str, Any]) -> None:
+    services = compose["services"]
+    for name, service in services.items():
+        after = service.get("depends_on", {})
+        assert set(after) <= set(services)
+        if name != "keys":
+            assert after["keys"]["condition"] == "service_completed_successfully"
+        for other, on in after.items():
+            if on["condition"] == "service_healthy":
+                assert "healthcheck" in services[other]
+
+
+def instructions() -> list[tuple[str, str]]:
+    """Of the Containerfile, continued lines joined."""
+    text = re.sub(r"^\s*#.*\n", "", (DEPLOY / "Containerfile").read_text(), flags=re.MULTILINE)
+    lines = re.sub(r"\\\n\s*", "", text).splitlines()
+    return [(line.split(" ", 1)[0], line.split(" ", 1)[1]) for line in lines if line.strip()]
+
+
+def test_image_has_no_build_tools_and_runs_as_nobody() -> None:
+    steps = instructions()
+    stages = [i for i, (word, _) in enumerate(steps) if word == "FROM"]
+    assert len(stages) == 2
+    final = steps[stages[1] :]
+
+    assert {word for word, _ in steps} <= {
+        *("ARG", "FROM", "RUN", "WORKDIR", "COPY", "ENV", "USER", "ENTRYPOINT", "CMD")
+    }
+    assert not any(tool in said for _, said in final for tool in ("apt-get", "g++", "pip install"))
+    assert [said for word, said in final if word == "COPY"] == [
+        "--from=build /opt/peckorder /opt/peckorder"
+    ]
+    assert [said for word, said in final if word == "USER"] == ["10001:10001"]
+    assert json.loads(dict(final)["ENTRYPOINT"]) == ["swarm"]
+
+
+# -- by hand ------------------------------------------------------------------------------
+
+
+def by_hand(said: str, root: Path) -> list[str]:
+    """The command line that was printed to be run by hand, for a machine that lies in ``root``."""
+    line = said.split("by hand:\n")[1].strip()
+    sudo, _, user, program, *words = shlex.split(line)
+    assert (sudo, user.partition("-")[0]) == ("sudo", "peckorder")
+    assert program == "/opt/peckorder/bin/swarm"
+    return [str(root) + word if word.startswith(("/etc/", "/var/")) else word for word in words]
+
+
+def test_command_line_printed_for_machines_without_systemd_runs(
+    tmp_path: Path, keys: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def install(*words: str) -> list[str]:
+        capsys.readouterr()
+        assert cli.main(["install", *words, "--root", str(tmp_path)]) == 0
+        return by_hand(capsys.readouterr().out, tmp_path)
+
+    serve = install("router", "--keys", str(keys / "router"), "--listen", "tls/127.0.0.1:0")
+    with router(*serve[1:]) as (_, endpoint):
+        own = ("--mission", "meadow", "--uav", "uav1", "--mavlink", "tcp:127.0.0.1:1")
+        fly = install("agent", *own, "--keys", str(keys / "uav1"), "--connect", endpoint)
+        with told(tmp_path / "notify") as manager:
+            agent = subprocess.Popen(
+                [sys.executable, "-m", "swarm", *fly],
+                env={"NOTIFY_SOCKET": manager.getsockname(), "PATH": ""},
+                stderr=subprocess.DEVNULL,
+            )
+            try:
+                manager.settimeout(LIMIT_S)
+                while "READY=1" not in (said := manager.recv(4096).decode()):
+                    pass
+            finally:
+                agent.terminate()
+                assert agent.wait(LIMIT_S) == 0
+    assert said.startswith("STATUS=uav1: on the bus, in mission meadow")
+
+
+@contextlib.contextmanager
+def told(path: Path) -> Iterator[socket.socket]:
+    """A service manager's socket."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
+        listening.bind(str(path))
+        yield listening

@@ -85,7 +85,8 @@ def test_a_process_of_an_earlier_release_takes_its_part(
 ) -> None:
     mission = load_scenario(resolve_scenario(MISSION))
     with contextlib.ExitStack() as stack:
-        flight = ByHand(tmp_path, stack, mission, SPEEDUP, programs={earlier: python_of(release)})
+        programs = {earlier: python_of(release)}
+        flight = ByHand(tmp_path, stack, mission, SPEEDUP, programs=programs)
         listener = Listener(flight.seat[1], stack)
         coordinating = flight.coordinator(COORDINATOR)
         flight.wait_for_done(1)

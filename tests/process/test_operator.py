@@ -47,7 +47,7 @@ def does(by_hand: ByHand, uav: str) -> str:
 
 def test_an_operator_commands_a_fleet_without_a_coordinator(tmp_path: Path) -> None:
     with contextlib.ExitStack() as stack:
-        by_hand = ByHand(tmp_path, stack, MISSION)
+        by_hand = ByHand(tmp_path, stack, MISSION, speedup=4)
         coordinator = by_hand.coordinator("coordinator")
         for uav in UAVS:
             by_hand.wait_for(uav, "event=decided")

@@ -30,7 +30,7 @@ MISSION = Mission(
 
 def test_tasks_are_added_and_withdrawn_without_a_coordinator(tmp_path: Path) -> None:
     with contextlib.ExitStack() as stack:
-        by_hand = ByHand(tmp_path, stack, MISSION)
+        by_hand = ByHand(tmp_path, stack, MISSION, speedup=4)
         coordinator = by_hand.coordinator("coordinator")
         by_hand.wait_for("uav1", "event=decided")
         coordinator.kill()

@@ -9,11 +9,21 @@ from pathlib import Path
 
 import pytest
 
+from swarm.scenario.write import format_scenario
+from tests.process.chaos_play import survey
 from tests.process.mission import SwarmRun, alive, wait_until
 
 pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
 
 LARGE = ["valley-survey", "--speedup", "30"]
+
+
+@pytest.fixture
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """The arguments for a fleet of five, half as large, which is enough to lose a process of."""
+    scenario = tmp_path_factory.mktemp("fleet") / "scenario.toml"
+    scenario.write_text(format_scenario(survey(5, 30)))
+    return [str(scenario), "--speedup", "6"]
 
 
 def kill(pid: int) -> None:
@@ -78,47 +88,51 @@ def test_killed_agents_tasks_are_done_by_the_others(tmp_path: Path) -> None:
         run.assert_nothing_left()
 
 
-def test_fleet_finishes_without_its_coordinator(tmp_path: Path) -> None:
-    with SwarmRun(LARGE, tmp_path) as run:
+def test_fleet_finishes_without_its_coordinator(tmp_path: Path, fleet: list[str]) -> None:
+    with SwarmRun(fleet, tmp_path) as run:
         run.wait_for_line("epoch 1")
         kill(run.child("coordinator"))
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 60
+        assert len(told["done"]) == 30
         assert told["executed_routes"].keys() == told["routes"].keys()
         assert any("coordinator lost" in line for line in run.lines)
         run.assert_nothing_left()
 
 
-def test_dead_autopilot_costs_its_uav_and_no_task(tmp_path: Path) -> None:
-    with SwarmRun(LARGE, tmp_path) as run:
+def test_dead_autopilot_costs_its_uav_and_no_task(tmp_path: Path, fleet: list[str]) -> None:
+    with SwarmRun(fleet, tmp_path) as run:
         run.wait_for_line(" ended ", count=3)
         kill(run.child("autopilot", "uav03"))
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 60
+        assert len(told["done"]) == 30
         assert any("uav03 takes no further part" in line for line in run.lines)
         run.assert_nothing_left()
 
 
-def test_dead_router_is_started_again_and_the_mission_goes_on(tmp_path: Path) -> None:
-    with SwarmRun([*LARGE, "--bus", "router"], tmp_path) as run:
+def test_dead_router_is_started_again_and_the_mission_goes_on(
+    tmp_path: Path, fleet: list[str]
+) -> None:
+    with SwarmRun([*fleet, "--bus", "router"], tmp_path) as run:
         run.wait_for_line(" ended ", count=5)
         kill(run.child("router"))
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 60
+        assert len(told["done"]) == 30
         assert told["lost_uavs"] == []
         assert told["processes"] == ["router 1: killed by SIGKILL"]
         assert any("router 1 killed by SIGKILL; started again" in line for line in run.lines)
         run.assert_nothing_left()
 
 
-def test_fleet_with_two_routers_keeps_one_when_the_other_dies(tmp_path: Path) -> None:
-    with SwarmRun([*LARGE, "--bus", "router", "--routers", "2"], tmp_path) as run:
+def test_fleet_with_two_routers_keeps_one_when_the_other_dies(
+    tmp_path: Path, fleet: list[str]
+) -> None:
+    with SwarmRun([*fleet, "--bus", "router", "--routers", "2"], tmp_path) as run:
         run.wait_for_line(" ended ", count=5)
         routers = {words: pid for words, pid in run.children().items() if words.startswith("rou")}
         assert len(routers) == 2
@@ -126,13 +140,13 @@ def test_fleet_with_two_routers_keeps_one_when_the_other_dies(tmp_path: Path) ->
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 60
+        assert len(told["done"]) == 30
         assert told["lost_uavs"] == []
         run.assert_nothing_left()
 
 
 def test_ctrl_c_ends_every_process(tmp_path: Path) -> None:
-    with SwarmRun(["valley-survey"], tmp_path) as run:
+    with SwarmRun(["valley-survey", "--speedup", "10"], tmp_path) as run:
         run.wait_for_line("epoch 1")
 
         assert run.end(signal.SIGINT) == 130

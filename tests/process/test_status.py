@@ -37,7 +37,8 @@ def router_of(run: SwarmRun) -> str:
 
 
 def test_a_running_mission_is_found_and_told(tmp_path: Path) -> None:
-    with SwarmRun(["valley-survey", "--bus", "router", "--method", "greedy"], tmp_path) as run:
+    arguments = ["valley-survey", "--bus", "router", "--method", "greedy", "--speedup", "3"]
+    with SwarmRun(arguments, tmp_path) as run:
         run.wait_for_line("epoch 1")
         table = status("--connect", router_of(run))
         told = json.loads(status("--connect", router_of(run), "--json").stdout)
@@ -73,6 +74,8 @@ def test_a_mission_is_watched_to_its_end(tmp_path: Path) -> None:
                 )
                 for more in (["--json"], [], [])
             )
+            for watching in (lines, story, stopped):
+                stack.callback(watching.kill)  # none of them ends by itself after a failure
             run.wait_for_line("epoch 1")
             stopped.send_signal(signal.SIGINT)
             assert stopped.wait(20) == 130

@@ -506,3 +506,21 @@ def test_going_home_when_all_is_done_is_no_news() -> None:
     onlooker.happen(leaving(StatusPhase.RETURNING, "every task has ended", 90))
 
     assert onlooker.story == told
+
+
+# -- other flights ------------------------------------------------------------------------
+
+
+def test_a_brief_for_another_flight_counts_once_its_coordinator_has_taken_charge() -> None:
+    onlooker = Onlooker().running()
+    another = replace(brief_of(onlooker.flown), run=2)
+    early, later = (message(COORDINATOR, another, count, incarnation=9) for count in (1, 3))
+
+    onlooker.happen(Heard(early), 5.0)
+    onlooker.happen(Learned((Snapshot(MISSION, COORDINATOR, 9, None, (early,)),)), 5.1)
+    assert onlooker.observer.replica.brief == brief_of(onlooker.flown)
+
+    begun = epoch("u0", "u1", phase=EpochPhase.PREPARING)
+    onlooker.happen(Heard(message(COORDINATOR, begun, 2, incarnation=9)), 6.0)
+    onlooker.happen(Heard(later), 7.0)
+    assert onlooker.observer.replica.brief == another

@@ -347,3 +347,44 @@ def test_when_the_brief_turns_out_to_be_of_another_run_it_says_so_anew() -> None
     assert errand.said is not None
     assert [m.body.run for m in desk.said if isinstance(m.body, TaskOrder)] == [1, 5]
     assert "op1" in desk.observer.replica.board
+
+
+# -- operators at the same moment ---------------------------------------------------------
+
+
+def hear_other(desk: Desk, body: TaskOrder, incarnation: int = 60) -> None:
+    """Another operator, who has not heard of this one's order, says so."""
+    desk.happen(Heard(message(OPERATOR, body, 1, incarnation)))
+
+
+def test_a_task_that_crosses_anothers_under_one_id_gets_the_next_one() -> None:
+    desk = Desk()
+    errand = desk.give(HERE)
+    hear_other(desk, order("op1", 8.0))
+
+    assert [said.body for said in desk.said] == [
+        TaskOrder("op1", 5, (3.0, 4.0, 0.0), 4.0, 0.0, None, False, 1, ""),
+        TaskOrder("op2", 10, (3.0, 4.0, 0.0), 4.0, 0.0, None, False, 1, ""),
+    ]
+    assert desk.said[1].stamp > Stamp(60, 1)
+    assert {"op1", "op2"} <= desk.observer.replica.board.keys()
+    desk.confirm(errand, "u0", "u1")
+    desk.hear("u1", held("op2", 6.0))
+    assert came(errand) == (Result.OBEYED, "op2 is on the board, worth 4; u1 flies there")
+
+
+def test_who_spoke_later_keeps_the_id() -> None:
+    desk = Desk()
+    errand = desk.give(HERE)
+    hear_other(desk, order("op1", 8.0), incarnation=40)
+
+    assert [said.body.task for said in desk.said if isinstance(said.body, TaskOrder)] == ["op1"]
+    assert errand.verdict is None
+
+
+def test_an_id_that_was_chosen_by_hand_is_not_changed() -> None:
+    desk = Desk()
+    errand = desk.give(replace(HERE, task="fire"))
+    hear_other(desk, order("fire", 8.0))
+
+    assert came(errand) == (Result.NOT_OBEYED, "another operator has changed fire meanwhile")

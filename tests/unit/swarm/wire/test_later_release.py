@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import msgpack
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from swarm.model.ids import COORDINATOR
@@ -20,6 +20,7 @@ from tests.builders import MISSION, entry, message
 from tests.message_strategies import messages
 
 LATER: Any = {"limit_m": 120.0, "names": ["north", "south"]}
+SLOW = [HealthCheck.too_slow]  # the first draws, on a busy machine
 NEW_KIND = [1, MISSION, "u1", 1, 1, "weather", {"wind_m_s": 4.0}]
 
 
@@ -48,7 +49,7 @@ def heard(codec: Codec, said: Message) -> Message | None:
     return codec.decode(said.key, said_later(said))
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, suppress_health_check=SLOW)
 @given(said=messages())
 def test_what_it_says_is_understood_and_nothing_is_dropped(said: Message) -> None:
     codec = Codec(MISSION)
@@ -58,7 +59,7 @@ def test_what_it_says_is_understood_and_nothing_is_dropped(said: Message) -> Non
     assert len(codec.newer) == 1
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, suppress_health_check=SLOW)
 @given(said=messages())
 def test_what_it_says_is_repeated_with_what_only_it_understands(said: Message) -> None:
     understood = heard(Codec(MISSION), said)
@@ -68,7 +69,7 @@ def test_what_it_says_is_repeated_with_what_only_it_understands(said: Message) -
     assert fingerprint(understood) != fingerprint(said), "asked again, it would tell its own anew"
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, suppress_health_check=SLOW)
 @given(said=st.lists(messages(), max_size=4))
 def test_its_answers_are_understood_up_to_kinds_that_are_new(said: list[Message]) -> None:
     registers = [msgpack.unpackb(said_later(each)) for each in said]
