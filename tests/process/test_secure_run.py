@@ -13,6 +13,7 @@ from sim.chaos.flood import long_mission
 from swarm.cli import main
 from swarm.clock import unix_s
 from swarm.identity.founding import found_authority
+from swarm.model import Mission
 from swarm.scenario.write import format_scenario
 from tests.process.feed_reader import post
 from tests.process.mission import SwarmRun
@@ -21,22 +22,25 @@ from tests.process.test_status import router_of
 pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
 
 FAST = ["--speedup", "20"]
+"""Of missions that are the paper's, drawn out, so that a busy machine does not change them."""
 
 
 def test_a_mesh_with_new_keys_flies_as_a_plain_one_and_leaves_none_of_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = tmp_path / "flight.mcap"
-    words = ["table-1", "--secure", "--method", "greedy", "--speedup", "10", "--record", str(file)]
-    with SwarmRun([*words, "--bus", "mesh"], tmp_path) as run:
+    file, folder = tmp_path / "flight.mcap", tmp_path / "run"
+    folder.mkdir()
+    words = [written(long_mission(20.0), tmp_path), "--secure", "--method", "greedy"]
+    words += ["--record", str(file), "--bus", "mesh", *FAST]
+    with SwarmRun(words, folder) as run:
         status, told = run.result()
 
         assert status == 0, run.story()
-        run.assert_nothing_left(but="flight.mcap")
+        run.assert_nothing_left()
     assert told["sequence"] == ["uav1", "uav3", "uav2"]
     assert told["executed_routes"] == told["routes"]
-    assert told["objective"] == pytest.approx(118.4939, abs=5e-5)
-    assert told["executed_objective"] == pytest.approx(118.49, rel=0.15)
+    assert told["objective"] == pytest.approx(20.0 * 118.4939, abs=1e-3)
+    assert told["executed_objective"] == pytest.approx(told["objective"], rel=0.1)
     assert (told["lost_uavs"], told["duplicate_visits"], told["epochs"]) == ([], 0, 1)
     assert told["security"]["lacking"] == []
     assert "signed MAVLink" in told["security"]["measures"]
@@ -53,12 +57,19 @@ def test_a_mesh_with_new_keys_flies_as_a_plain_one_and_leaves_none_of_them(
 
 def test_keys_made_before_serve_a_run_and_only_operators_command_it(tmp_path: Path) -> None:
     mission, keys, folder = long_mission(500.0), tmp_path / "keys", tmp_path / "run"
-    scenario = tmp_path / "long.toml"
-    scenario.write_text(format_scenario(mission), encoding="utf-8")
     uavs = [uav.id for uav in mission.uavs]
     found_authority(keys, mission.name, uavs, now_s=unix_s(), routers=2, days=1)
     folder.mkdir()
-    words = [str(scenario), "--keys", str(keys), "--bus", "router", "--routers", "2", *FAST]
+    words = [
+        written(mission, tmp_path),
+        "--keys",
+        str(keys),
+        "--bus",
+        "router",
+        "--routers",
+        "2",
+        *FAST,
+    ]
     words += ["--dashboard", "0"]
     with SwarmRun(words, folder) as run:
         viewer = swarm("abort", "--yes", *FAST, "--keys", str(keys / "dashboard"))
@@ -78,6 +89,13 @@ def test_keys_made_before_serve_a_run_and_only_operators_command_it(tmp_path: Pa
     assert f"operator sends {uavs[0]} home" in story
     assert "operator aborts the mission: storm" in story
     assert told["security"]["refused"] == {}
+
+
+def written(mission: Mission, folder: Path) -> str:
+    """The scenario of ``mission`` as a file there."""
+    scenario = folder / "scenario.toml"
+    scenario.write_text(format_scenario(mission), encoding="utf-8")
+    return str(scenario)
 
 
 def swarm(*words: str) -> subprocess.CompletedProcess[str]:

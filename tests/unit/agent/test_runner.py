@@ -358,8 +358,9 @@ def test_the_core_is_told_what_was_dropped() -> None:
             vehicle = await played.airborne()
             played.coordinator.publish(KEYS.plan, b"nonsense")
             played.coordinator.publish(KEYS.claim("u1"), b"nonsense")
-            played.say(message("u1", IDLE))
-            await until(lambda: "u1" in played.core.replica.claims, "hearing u1")
+            said = message("u1", IDLE)
+            played.say(said)
+            await until(lambda: played.core.replica.known(said) == said, "hearing u1")
             vehicle.dropped["unsigned"] = 3
 
             assert played.core.dropped == {"malformed": 2, "unsigned": 3}
