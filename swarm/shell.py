@@ -47,7 +47,7 @@ from swarm.events import (
     Stop,
     Tick,
 )
-from swarm.limits import TOO_MANY, Gate
+from swarm.limits import TOO_MANY, Asked, Gate
 from swarm.log import get_logger
 from swarm.model.ids import AUTHORITY
 from swarm.wire.codec import Codec
@@ -136,6 +136,7 @@ class Shell(Generic[E, A]):
         self._draw_nonce = draw_nonce
         self._codec = Codec(mission, bus.seal)
         self._gate = Gate(self._keys, bus.seal, clock.now_s)
+        self._asked = Asked(clock.now_s)
         bus.inbox.admits = self._gate.admits
         self._log = get_logger(name, mission=mission)
         self._from_bus = from_bus
@@ -346,6 +347,10 @@ class Shell(Generic[E, A]):
             question = decode_question(payload, self._seal)
         except UnacceptableError as fault:
             self._codec.dropped[fault.reason] += 1
+            return
+        reason = self._asked.fault(question)
+        if reason is not None:
+            self._codec.dropped[reason] += 1
             return
         whole = self._snapshot(self._clock.now_s())
         news = replace(whole, messages=unknown(whole.messages, self._known(), question.known))
