@@ -264,7 +264,8 @@ class Codec:
     def decode_memory(self, key: str, data: bytes) -> Snapshot | None:
         """What `encode_memory` made in an earlier life; envelopes in it need no check.
 
-        They are kept, and are checked before they are ever repeated.
+        They are kept, and are checked before they are ever repeated. A roster is left out: the
+        keys' folder has the one that counts, and this may be that of an authority before it.
         """
         try:
             snapshot, registers = self._snapshot(key, data)
@@ -277,7 +278,8 @@ class Codec:
                 messages.append(self._recalled(register))
             except UnacceptableError as fault:
                 self.dropped[fault.reason] += 1
-        return replace(snapshot, messages=tuple(messages))
+        kept = (said for said in messages if not isinstance(said.body, SignedRoster))
+        return replace(snapshot, messages=tuple(kept))
 
     def _recalled(self, register: object) -> Message:
         if not isinstance(register, bytes):
