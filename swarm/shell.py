@@ -209,15 +209,16 @@ class Shell(Generic[E, A]):
 
     def _heed(self, messages: Iterable[Message], *, answers: bool = False) -> None:
         """Put a newer roster in force; who told an older one is told the newer."""
-        seal = self._seal
+        seal, told = self._seal, False
         if seal is None:
             return
         for message in messages:
             if not isinstance(message.body, SignedRoster):
                 continue
             behind = message.stamp.incarnation < seal.roster.version
-            if behind and answers and seal.may_publish_roster:
+            if behind and answers and not told and seal.may_publish_roster:
                 self._publish(self._roster(seal))
+                told = True  # once, however often the answer repeats an old one
             before = [entry.name for entry in seal.roster.entries]
             try:
                 news = seal.put_in_force(message.body.signed)
