@@ -250,7 +250,7 @@ class Codec:
         if isinstance(register, bytes):
             return self._believed(register)
         message = self._message(register)
-        message = as_heard(message, msgpack.packb(register))
+        message = as_heard(message, _packed(register))
         _require_size(message)
         return message if self._seal is None else self._roster(message)
 
@@ -283,7 +283,7 @@ class Codec:
 
     def _recalled(self, register: object) -> Message:
         if not isinstance(register, bytes):
-            return as_heard(self._message(register), msgpack.packb(register))
+            return as_heard(self._message(register), _packed(register))
         envelope = open_envelope(register)
         if envelope is None:
             raise UnacceptableError("malformed")
@@ -376,3 +376,16 @@ def _unpack(data: bytes) -> object:
     except (ValueError, TypeError, msgpack.exceptions.UnpackException, RecursionError):
         # ValueError covers msgpack's FormatError, StackError, ExtraData and bad UTF-8.
         return None
+
+
+def _packed(register: object) -> bytes:
+    """The bytes of what `_unpack` gave.
+
+    Raises:
+        UnacceptableError: it is nested deeper than this MessagePack can write again.
+    """
+    try:
+        packed: bytes = msgpack.packb(register)
+    except (ValueError, RecursionError):
+        raise UnacceptableError("malformed") from None
+    return packed

@@ -354,3 +354,14 @@ def test_a_roster_of_an_earlier_life_does_not_come_before_that_of_the_keys() -> 
     recalled = Codec(MISSION).decode_memory(STATE, memory)
     assert recalled is not None
     assert recalled.messages == (CLAIM,)
+
+
+@pytest.mark.parametrize("depth", [500, 600, 1000])
+def test_a_register_that_is_nested_as_deep_as_can_be_read_stops_nobody(depth: int) -> None:
+    """Not every release of MessagePack writes again what it has read."""
+    parts = msgpack.unpackb(encode(CLAIM), use_list=False)
+    deep = msgpack.unpackb(b"\x91" * depth + b"\xc0", use_list=False)
+
+    for codec in (Codec(MISSION), Codec(MISSION, KEYS.seal("u1"))):
+        heard = codec.decode_register((*parts, deep))
+        assert heard in (None, CLAIM)
