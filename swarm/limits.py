@@ -9,19 +9,22 @@ is said (swarm.wire.codec).
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Callable
 from typing import Final
 
 from swarm.bus.port import BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
 from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR
 from swarm.wire.keys import Keys
+from swarm.wire.question import Question
 from swarm.wire.seal import NOT_SIGNED, NOT_THE_SIGNERS, SIGNER_UNKNOWN, Seal, open_envelope
 
-__all__ = ["TOO_MANY", "Gate", "Limiter"]
+__all__ = ["TOO_MANY", "Asked", "Gate", "Limiter"]
 
 TOO_MANY: Final = "too many"
 """Reason under which is counted what came too fast."""
+ASKED_BEFORE: Final = "asked before"
+"""Reason under which is counted a question that somebody else says again."""
 
 UAV_HZ, UAV_BURST = 100.0, 1000
 """Of one UAV. It says some 10 a second; when a partition heals, it greets every other one with
@@ -32,9 +35,13 @@ TOKEN_HZ, TOKEN_BURST = 20.0, 100
 """Of one token: two for each blink of a router."""
 ASKER_HZ, ASKER_BURST = 10.0, 30
 """Questions of one asker, where it has signed them; it asks at most 5 a second."""
+CLAIMED_HZ, CLAIMED_BURST = 200.0, 400
+"""Questions under one name before its signature is checked: anybody can write another's name, and
+a router passes on 50 a second of each neighbour."""
 QUESTION_HZ, QUESTION_BURST = 100.0, 1000
 """Questions of everybody together, where nobody knows who asks."""
 _NOBODY: Final = ""
+_KEPT_QUESTIONS: Final = 4096
 
 
 class Limiter:
@@ -99,9 +106,9 @@ class Gate:
         self._uavs = Limiter(UAV_HZ, UAV_BURST)
         self._seats = Limiter(SEAT_HZ, SEAT_BURST)
         self._tokens = Limiter(TOKEN_HZ, TOKEN_BURST)
-        askers = seal is not None
+        claimed = seal is not None
         self._questions = Limiter(
-            ASKER_HZ if askers else QUESTION_HZ, ASKER_BURST if askers else QUESTION_BURST
+            CLAIMED_HZ if claimed else QUESTION_HZ, CLAIMED_BURST if claimed else QUESTION_BURST
         )
 
     def admits(self, event: BusEvent) -> bool:
@@ -156,3 +163,34 @@ class Gate:
         if self._seal is not None and not self._seal.knows(writer):
             return SIGNER_UNKNOWN
         return None if self._tokens.allows(writer, self._now_s()) else TOO_MANY
+
+
+class Asked:
+    """Decides which questions are answered of those that their asker has signed.
+
+    They count only now, so that nobody uses up what another may ask by its forged name, nor by
+    saying its questions again. Where nobody signs, the `Gate` alone counts.
+
+    Args:
+        now_s: clock of the process [s].
+    """
+
+    def __init__(self, now_s: Callable[[], float]) -> None:
+        self._now_s = now_s
+        self._askers = Limiter(ASKER_HZ, ASKER_BURST)
+        self._answered: OrderedDict[tuple[str, bytes], None] = OrderedDict()
+        """Asker and nonce of the last ones."""
+
+    def fault(self, question: Question) -> str | None:
+        """Why ``question`` is not to be answered; None if it is."""
+        if question.asker is None:
+            return None
+        this = question.asker, question.nonce
+        if this in self._answered:
+            return ASKED_BEFORE
+        if not self._askers.allows(question.asker, self._now_s()):
+            return TOO_MANY
+        self._answered[this] = None
+        if len(self._answered) > _KEPT_QUESTIONS:
+            self._answered.popitem(last=False)
+        return None

@@ -47,7 +47,7 @@ from swarm.events import (
     Stop,
     Tick,
 )
-from swarm.limits import TOO_MANY, Gate
+from swarm.limits import TOO_MANY, Asked, Gate
 from swarm.log import get_logger
 from swarm.model.ids import AUTHORITY
 from swarm.wire.codec import Codec
@@ -136,6 +136,7 @@ class Shell(Generic[E, A]):
         self._draw_nonce = draw_nonce
         self._codec = Codec(mission, bus.seal)
         self._gate = Gate(self._keys, bus.seal, clock.now_s)
+        self._asked = Asked(clock.now_s)
         bus.inbox.admits = self._gate.admits
         self._log = get_logger(name, mission=mission)
         self._from_bus = from_bus
@@ -208,15 +209,16 @@ class Shell(Generic[E, A]):
 
     def _heed(self, messages: Iterable[Message], *, answers: bool = False) -> None:
         """Put a newer roster in force; who told an older one is told the newer."""
-        seal = self._seal
+        seal, told = self._seal, False
         if seal is None:
             return
         for message in messages:
             if not isinstance(message.body, SignedRoster):
                 continue
             behind = message.stamp.incarnation < seal.roster.version
-            if behind and answers and seal.may_publish_roster:
+            if behind and answers and not told and seal.may_publish_roster:
                 self._publish(self._roster(seal))
+                told = True  # once, however often the answer repeats an old one
             before = [entry.name for entry in seal.roster.entries]
             try:
                 news = seal.put_in_force(message.body.signed)
@@ -346,6 +348,10 @@ class Shell(Generic[E, A]):
             question = decode_question(payload, self._seal)
         except UnacceptableError as fault:
             self._codec.dropped[fault.reason] += 1
+            return
+        reason = self._asked.fault(question)
+        if reason is not None:
+            self._codec.dropped[reason] += 1
             return
         whole = self._snapshot(self._clock.now_s())
         news = replace(whole, messages=unknown(whole.messages, self._known(), question.known))

@@ -16,6 +16,7 @@ import contextlib
 import math
 import threading
 import weakref
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -54,6 +55,9 @@ __all__ = ["ZenohBus", "open_zenoh_bus"]
 
 REPLY_WITHIN_S = 10.0
 """A query nobody has answered for this long is given up: who asked waits no longer."""
+MOST_ANSWERS = 8
+"""To one question on one key: honest ones are one for each process of that name, and each may be
+as long as a bus carries."""
 FLUSH_LIMIT_S = 0.7
 """How long closing waits for what is published; a blocked link gives up after 0.5 s."""
 LOOK_GAP_S = 0.005
@@ -298,11 +302,16 @@ class ZenohBus:
         if not 0.0 < timeout_s < math.inf:
             raise ValueError(f"timeout_s must be positive and finite, not {timeout_s}")
         answers: list[Answer] = []
+        given: Counter[str] = Counter()
         complete = asyncio.Event()
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                key, data = str(reply.ok.key_expr), reply.ok.payload.to_bytes()
+                key = str(reply.ok.key_expr)
+                given[key] += 1
+                if given[key] > MOST_ANSWERS:
+                    return
+                data = reply.ok.payload.to_bytes()
                 answer = Answer(key, data, self._loop.time())
                 self._hand_over(lambda: answers.append(answer))
 

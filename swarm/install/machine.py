@@ -1,7 +1,9 @@
 """Puts an installation's files onto a machine: users, folders, owners, modes.
 
 A file is written beside its place and renamed into it, and left alone when it is right
-already. Leaves out: what has to be there (swarm.install.steps).
+already. What is below the state's folder belongs to the services: a link that one of them has
+put there is not followed, or it could have any file of the machine given to it. Leaves out:
+what has to be there (swarm.install.steps).
 """
 
 from __future__ import annotations
@@ -79,10 +81,9 @@ class Machine:
     def _put(self, file: File) -> Outcome:
         path = self.at(file.path)
         self._make_folder(file.path.parent, file.owner)
-        there = path.read_bytes() if path.is_file() else None
+        there = path.read_bytes() if path.is_file() and not path.is_symlink() else None
         if there == file.content:
-            path.chmod(file.mode)
-            self._give(path, file.owner)
+            self._set_right(path, file.mode, file.owner)
             return Outcome.UNCHANGED
         draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
         try:
@@ -91,9 +92,9 @@ class Machine:
             ) as new:
                 new.write(file.content)
                 new.flush()
+                self._give(new.fileno(), file.owner)
                 os.fchmod(new.fileno(), file.mode)
                 os.fsync(new.fileno())
-            self._give(draft, file.owner)
             draft.replace(path)
         except OSError:
             draft.unlink(missing_ok=True)
@@ -111,15 +112,27 @@ class Machine:
             path.mkdir(mode=_STATE_MODE if private else _FOLDER_MODE)
             path.chmod(_STATE_MODE if private else _FOLDER_MODE)
         if private:
-            path.chmod(_STATE_MODE)
-            self._give(path, owner)
+            self._set_right(path, _STATE_MODE, owner)
 
-    def _give(self, path: Path, owner: str | None) -> None:
+    def _set_right(self, path: Path, mode: int, owner: str | None) -> None:
+        """Set mode and owner of what is at ``path`` itself.
+
+        Raises:
+            OSError: it is a link.
+        """
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        try:
+            os.fchmod(handle, mode)
+            self._give(handle, owner)
+        finally:
+            os.close(handle)
+
+    def _give(self, handle: int, owner: str | None) -> None:
         """To its owner, whom the machine knows by name; only root can."""
         if not self._is_root:
             return
         user, group = (0, 0) if owner is None else self._ids(owner) or (0, 0)
-        os.chown(path, user, group)
+        os.fchown(handle, user, group)
 
     def _ids(self, name: str) -> tuple[int, int] | None:
         """User and group of that name; None if there is no such user."""

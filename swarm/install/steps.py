@@ -208,7 +208,8 @@ def _place_token(
     if option_value(words, "--token-file") is not None or is_loopback(f"tcp/{host}:1"):
         return words
     there = _at(root, target)
-    token = there.read_bytes() if there.is_file() else f"{secrets.token_urlsafe(24)}\n".encode()
+    kept = there.is_file() and not there.is_symlink()  # which would be another's secret
+    token = there.read_bytes() if kept else f"{secrets.token_urlsafe(24)}\n".encode()
     files.append(File(target, token, _PRIVATE, service.kind.user))
     return replaced(words, "--token-file", str(target))
 

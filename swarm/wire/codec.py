@@ -250,7 +250,7 @@ class Codec:
         if isinstance(register, bytes):
             return self._believed(register)
         message = self._message(register)
-        message = as_heard(message, msgpack.packb(register))
+        message = as_heard(message, _packed(register))
         _require_size(message)
         return message if self._seal is None else self._roster(message)
 
@@ -264,7 +264,8 @@ class Codec:
     def decode_memory(self, key: str, data: bytes) -> Snapshot | None:
         """What `encode_memory` made in an earlier life; envelopes in it need no check.
 
-        They are kept, and are checked before they are ever repeated.
+        They are kept, and are checked before they are ever repeated. A roster is left out: the
+        keys' folder has the one that counts, and this may be that of an authority before it.
         """
         try:
             snapshot, registers = self._snapshot(key, data)
@@ -277,11 +278,12 @@ class Codec:
                 messages.append(self._recalled(register))
             except UnacceptableError as fault:
                 self.dropped[fault.reason] += 1
-        return replace(snapshot, messages=tuple(messages))
+        kept = (said for said in messages if not isinstance(said.body, SignedRoster))
+        return replace(snapshot, messages=tuple(kept))
 
     def _recalled(self, register: object) -> Message:
         if not isinstance(register, bytes):
-            return as_heard(self._message(register), msgpack.packb(register))
+            return as_heard(self._message(register), _packed(register))
         envelope = open_envelope(register)
         if envelope is None:
             raise UnacceptableError("malformed")
@@ -374,3 +376,16 @@ def _unpack(data: bytes) -> object:
     except (ValueError, TypeError, msgpack.exceptions.UnpackException, RecursionError):
         # ValueError covers msgpack's FormatError, StackError, ExtraData and bad UTF-8.
         return None
+
+
+def _packed(register: object) -> bytes:
+    """The bytes of what `_unpack` gave.
+
+    Raises:
+        UnacceptableError: it is nested deeper than this MessagePack can write again.
+    """
+    try:
+        packed: bytes = msgpack.packb(register)
+    except (ValueError, RecursionError):
+        raise UnacceptableError("malformed") from None
+    return packed

@@ -5,10 +5,19 @@ from __future__ import annotations
 import pytest
 
 from swarm.bus.port import BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
-from swarm.limits import ASKER_BURST, TOKEN_BURST, UAV_BURST, UAV_HZ, Gate, Limiter
+from swarm.limits import (
+    ASKER_BURST,
+    CLAIMED_BURST,
+    TOKEN_BURST,
+    UAV_BURST,
+    UAV_HZ,
+    Asked,
+    Gate,
+    Limiter,
+)
 from swarm.wire.codec import Codec, encode
 from swarm.wire.keys import Keys
-from swarm.wire.question import NONCE_BYTES, encode_question
+from swarm.wire.question import NONCE_BYTES, Question, encode_question
 from swarm.wire.seal import Seal
 from tests.builders import MISSION, held, message
 from tests.keyring import Keyring
@@ -87,10 +96,31 @@ def test_what_is_not_signed_or_by_nobody_is_not_taken_in_where_there_are_keys() 
     assert gate.refused == {"not signed": 2, "signer unknown": 4}
 
 
+def asked(name: str, number: int) -> Question:
+    return Question({}, name, number.to_bytes(NONCE_BYTES, "big"))
+
+
 def test_one_that_asks_too_much_is_not_answered_and_the_others_are() -> None:
+    questions = Asked(HandClock().now_s)
+
+    answered = [questions.fault(asked("u1", number)) for number in range(1000)]
+    assert answered == [None] * ASKER_BURST + ["too many"] * (1000 - ASKER_BURST)
+    assert questions.fault(asked("u2", 0)) is None
+
+
+def test_who_says_anothers_questions_again_uses_up_nothing_of_that_one() -> None:
+    questions = Asked(HandClock().now_s)
+    assert questions.fault(asked("u1", 0)) is None
+
+    assert {questions.fault(asked("u1", 0)) for _ in range(10 * ASKER_BURST)} == {"asked before"}
+    assert questions.fault(asked("u1", 1)) is None
+    assert questions.fault(asked("u2", 0)) is None, "who takes over a nonce silences nobody"
+
+
+def test_questions_under_one_name_are_limited_before_anybody_checks_who_asks() -> None:
     gate = Gate(KEYS, RING.seal("u0"), HandClock().now_s)
 
-    assert admitted(gate, question_of("u1"), 1000) == ASKER_BURST
+    assert admitted(gate, question_of("u1"), 1000) == CLAIMED_BURST
     assert gate.admits(question_of("u2"))
 
 

@@ -226,3 +226,30 @@ def test_a_newer_roster_is_kept_for_the_next_life_and_a_full_disk_does_no_harm()
     shown(scenario, full)
     assert isinstance(said.body, SignedRoster)
     assert kept == [said.body.signed.encode()]
+
+
+def test_an_answer_full_of_old_rosters_is_worth_one_word_of_the_new_one() -> None:
+    async def whole() -> None:
+        network = MemoryNetwork()
+        bus = network.join("operator", seal=RING.seal("operator", RING.without("u2")))
+        other = network.join("other")
+        other.subscribe(KEYS.roster)
+        shell: Shell[BusFact, Wish] = Shell(
+            Ear(),
+            bus,
+            HandClock(),
+            mission=MISSION,
+            name="operator",
+            from_bus=lambda fact: fact,
+            execute=lambda _: None,
+            snapshot=None,
+        )
+        try:
+            shell._heed([ROSTER] * 50, answers=True)
+            said = [event for event in other.inbox.take() if isinstance(event, Sample)]
+            assert len(said) == 1
+        finally:
+            bus.close()
+            other.close()
+
+    play(whole)

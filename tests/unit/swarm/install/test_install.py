@@ -208,3 +208,30 @@ def test_zenoh_file_is_copied_to_where_the_service_can_read_it(tmp_path: Path, k
 def test_program_that_services_cannot_reach_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["install", "router", "--program", "/home/pi/.venv/bin/swarm"]) == 2
     assert "where services of this machine cannot reach it" in capsys.readouterr().err
+
+
+def test_a_link_that_a_service_put_into_its_folder_is_not_followed(
+    tmp_path: Path, keys: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert install_agent(tmp_path, keys) == 0
+    copies, elsewhere = tmp_path / "var/lib/peckorder/agent-uav1/keys", tmp_path / "elsewhere"
+    shutil.rmtree(copies)
+    elsewhere.mkdir(mode=0o755)
+    copies.symlink_to(elsewhere)
+
+    assert install_agent(tmp_path, keys) == 2
+    assert "agent-uav1/keys" in capsys.readouterr().err
+    assert list(elsewhere.iterdir()) == []
+    assert stat.S_IMODE(elsewhere.stat().st_mode) == 0o755
+
+
+def test_no_link_makes_anothers_secret_the_token_of_a_dashboard(tmp_path: Path) -> None:
+    folder, secret = tmp_path / "var/lib/peckorder/dashboard", tmp_path / "secret"
+    folder.mkdir(parents=True)
+    secret.write_text("of root alone\n")
+    (folder / "token").symlink_to(secret)
+
+    assert install(tmp_path, "dashboard", "--host", "0.0.0.0") == 0
+    assert not (folder / "token").is_symlink()
+    assert "of root alone" not in (folder / "token").read_text()
+    assert secret.read_text() == "of root alone\n"

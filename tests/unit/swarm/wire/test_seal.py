@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR
-from swarm.wire.codec import Codec, encode
+from swarm.wire.codec import Codec, encode, encode_memory
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Command, CommandKind, Message, SignedRoster, Snapshot, Stamp
 from swarm.wire.seal import ANSWER, Seal, UnacceptableError, open_envelope
@@ -344,3 +344,24 @@ def test_who_is_revoked_is_believed_no_longer_not_even_what_was_known() -> None:
     assert codec.decode(CLAIM.key, data) is None
     assert codec.pack(heard) is None
     assert not seal.knows("u0")
+
+
+def test_a_roster_of_an_earlier_life_does_not_come_before_that_of_the_keys() -> None:
+    """Its authority may have been another one, with more versions than the present one has."""
+    old = Message(MISSION, AUTHORITY, Stamp(57, 0), SignedRoster(OTHERS.signed()))
+    memory = encode_memory(Snapshot(MISSION, "u0", 1, 7.0, (CLAIM, old)))
+
+    recalled = Codec(MISSION).decode_memory(STATE, memory)
+    assert recalled is not None
+    assert recalled.messages == (CLAIM,)
+
+
+@pytest.mark.parametrize("depth", [500, 600, 1000])
+def test_a_register_that_is_nested_as_deep_as_can_be_read_stops_nobody(depth: int) -> None:
+    """Not every release of MessagePack writes again what it has read."""
+    parts = msgpack.unpackb(encode(CLAIM), use_list=False)
+    deep = msgpack.unpackb(b"\x91" * depth + b"\xc0", use_list=False)
+
+    for codec in (Codec(MISSION), Codec(MISSION, KEYS.seal("u1"))):
+        heard = codec.decode_register((*parts, deep))
+        assert heard in (None, CLAIM)
