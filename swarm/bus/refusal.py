@@ -106,6 +106,8 @@ async def accepts(endpoint: str, identity: Identity) -> tuple[bool, str]:
     except OSError as fault:
         if isinstance(fault, ConnectionRefusedError):
             return False, f"nobody listens at {endpoint}"
+        if fault.errno is None:  # the handshake was cut off, which has no words
+            return True, _no_tls(endpoint)
         return False, f"{endpoint} cannot be reached: {fault.strerror or fault}"
     try:
         async with asyncio.timeout(ALERT_S):
@@ -141,5 +143,9 @@ def _alert(endpoint: str, fault: ssl.SSLError) -> str:
     if "EXPIRED" in words:
         return f"the router at {endpoint} takes our certificate for expired: compare the clocks"
     if "WRONG_VERSION_NUMBER" in words or "RECORD_LAYER" in words:
-        return f"who listens at {endpoint} speaks no TLS"
+        return _no_tls(endpoint)
     return f"the router at {endpoint} is another mission's: it does not know our authority"
+
+
+def _no_tls(endpoint: str) -> str:
+    return f"who listens at {endpoint} speaks no TLS; start the router there with --keys, too"
