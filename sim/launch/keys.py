@@ -108,6 +108,10 @@ def keys_in(folder: Path, mission: Mission, *, mesh: bool) -> RunKeys:
     from swarm.model.ids import COORDINATOR
 
     authority = open_authority(folder)
+    if authority.roster.mission != mission.name:
+        theirs = authority.roster.mission
+        problem = f"these keys are for the mission {theirs!r}, not {mission.name!r}"
+        raise InputError(Fault(str(folder), "", problem, "give those of this mission"))
     if mesh and not authority.mesh:
         problem = "these keys are for fleets with routers: nobody else may be dialled with them"
         remedy = "use --bus router, or make them with 'swarm keys init --mesh'"
@@ -136,7 +140,9 @@ def _run_keys(authority: Authority, guests: Mapping[str, str], *, mesh: bool) ->
     for role in (Role.VIEWER, Role.OPERATOR, *(() if mesh else (Role.ROUTER,))):
         if not names[role]:
             problem = f"nobody in the roster is a {role}, and a run has one"
-            remedy = f"give one keys with 'swarm keys add {authority.directory} {role}'"
+            remedy = (
+                f"give one keys with 'swarm keys add {authority.directory} {role} --role {role}'"
+            )
             raise InputError(Fault(str(authority.directory), "", problem, remedy))
     return RunKeys(
         authority.directory,

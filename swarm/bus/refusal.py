@@ -1,7 +1,7 @@
-"""Why a router refuses a process that has keys, which Zenoh does not tell.
+"""Why no router lets a process in, with keys or without, which Zenoh does not tell.
 
-Zenoh only knows that there is no link. A TLS handshake of our own with the same certificates
-tells more. Leaves out: QUIC, by which nothing can be told apart here.
+Zenoh only knows that there is no link. A TLS handshake of our own with the same certificates,
+or with none, tells more. Leaves out: QUIC, by which nothing can be told apart here.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from swarm.clock import unix_s
 from swarm.identity import Identity
 from swarm.identity.folder import shown_time
 
-__all__ = ["accepts", "why_refused"]
+__all__ = ["accepts", "why_refused", "with_keys_only"]
 
 DIAL_S = 3.0
 """How long a connection may take [wall s]."""
 ALERT_S = 1.0
 """How long an alert may take after a handshake that succeeded [wall s]."""
 _TLS = re.compile(r"tls/(\[[^\]]+\]|[^:]+):(\d+)")
+_TCP = re.compile(r"tcp/(\[[^\]]+\]|[^:]+):(\d+)")
 _NOT_YET_VALID, _EXPIRED = 9, 10
 """Verdicts on a certificate (OpenSSL, X509_V_ERR_…)."""
 
@@ -47,6 +48,33 @@ async def why_refused(endpoints: Sequence[str], identity: Identity) -> str:
             )
         reasons.append(reason)
     return "; ".join(dict.fromkeys(reasons))
+
+
+async def with_keys_only(endpoints: Sequence[str]) -> str:
+    """Why a process without keys is not let in, in words; empty if it is not for that.
+
+    Args:
+        endpoints: of routers, which a session could not be opened with.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE  # who it is does not matter, and it is told nothing
+    for endpoint in endpoints:
+        if (match := _TCP.match(endpoint)) is None:
+            continue
+        try:
+            async with asyncio.timeout(DIAL_S):
+                _, writer = await asyncio.open_connection(
+                    match[1].strip("[]"), int(match[2]), ssl=context, server_hostname=""
+                )
+        except OSError:  # of which TimeoutError is one, and ssl.SSLError
+            continue
+        writer.transport.abort()
+        return (
+            f"who listens at {endpoint} speaks encrypted, with those who have keys; "
+            "give --keys DIR, which 'swarm keys' makes"
+        )
+    return ""
 
 
 async def accepts(endpoint: str, identity: Identity) -> tuple[bool, str]:
@@ -78,6 +106,8 @@ async def accepts(endpoint: str, identity: Identity) -> tuple[bool, str]:
     except OSError as fault:
         if isinstance(fault, ConnectionRefusedError):
             return False, f"nobody listens at {endpoint}"
+        if fault.errno is None:  # the handshake was cut off, which has no words
+            return True, _no_tls(endpoint)
         return False, f"{endpoint} cannot be reached: {fault.strerror or fault}"
     try:
         async with asyncio.timeout(ALERT_S):
@@ -102,7 +132,10 @@ def _their_fault(endpoint: str, fault: ssl.SSLCertVerificationError) -> str:
     if fault.verify_code == _NOT_YET_VALID:
         clock = f"set this machine's clock, which says {shown_time(unix_s())}"
         return f"the certificate of the router at {endpoint} is not valid yet: {clock}"
-    return f"who listens at {endpoint} is no router of this mission"
+    return (
+        f"who listens at {endpoint} is no router of this mission: our authority did not make its "
+        "keys; give each machine a folder that the same 'swarm keys init' made"
+    )
 
 
 def _alert(endpoint: str, fault: ssl.SSLError) -> str:
@@ -110,5 +143,9 @@ def _alert(endpoint: str, fault: ssl.SSLError) -> str:
     if "EXPIRED" in words:
         return f"the router at {endpoint} takes our certificate for expired: compare the clocks"
     if "WRONG_VERSION_NUMBER" in words or "RECORD_LAYER" in words:
-        return f"who listens at {endpoint} speaks no TLS"
+        return _no_tls(endpoint)
     return f"the router at {endpoint} is another mission's: it does not know our authority"
+
+
+def _no_tls(endpoint: str) -> str:
+    return f"who listens at {endpoint} speaks no TLS; start the router there with --keys, too"

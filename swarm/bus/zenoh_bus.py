@@ -91,7 +91,7 @@ async def open_zenoh_bus(
 async def _open(config: BusConfig, timeout_s: float) -> zenoh.Session:
     settings, identity = _zenoh_config(config), config.identity
     if identity is None:
-        return await open_session(settings, timeout_s=timeout_s)
+        return await _open_without_keys(settings, timeout_s)
     # Loaded by those alone that have keys.
     from swarm.bus.refusal import why_refused
     from swarm.bus.secure import secure
@@ -105,6 +105,18 @@ async def _open(config: BusConfig, timeout_s: float) -> zenoh.Session:
         if mode != "client" or not routers:
             raise
         reason = await why_refused(routers, identity)
+        raise BusError(f"cannot reach the bus within {timeout_s:g} s: {reason}") from fault
+
+
+async def _open_without_keys(settings: zenoh.Config, timeout_s: float) -> zenoh.Session:
+    try:
+        return await open_session(settings, timeout_s=timeout_s)
+    except BusError as fault:
+        from swarm.bus.refusal import with_keys_only
+
+        reason = await with_keys_only(endpoints_of(settings, "connect"))
+        if mode_of(settings) != "client" or not reason:
+            raise
         raise BusError(f"cannot reach the bus within {timeout_s:g} s: {reason}") from fault
 
 

@@ -169,8 +169,10 @@ def close_session(session: zenoh.Session, *, limit_s: float) -> bool:
 
 
 def plain_error(fault: zenoh.ZError) -> str:
-    """What went wrong, without the places in Zenoh's sources."""
-    return re.sub(r"\s+at /\S+?\.rs:\d+\.?", "", str(fault)).strip()
+    """What went wrong, without the places in Zenoh's sources and its types."""
+    text = re.sub(r"\s+at /\S+?\.rs:\d+\.?", "", str(fault)).strip()
+    text = re.sub(r"\bSingle\(([^()]*)\)", r"\1", text)
+    return re.sub(r"to any of \[([^\[\]]*)\]!", r"to \1:", text)
 
 
 def _close_unwanted(opening: Future[zenoh.Session]) -> None:

@@ -122,6 +122,15 @@ def test_who_does_not_belong_is_refused_and_told_why(
     asyncio.run(scenario())
 
 
+def test_who_forgot_its_keys_is_told_so(fleet: Fleet) -> None:
+    async def scenario() -> None:
+        config = BusConfig(ClientTopology((fleet.endpoint.replace("tls/", "tcp/"),)))
+        with pytest.raises(BusError, match=r"speaks encrypted.*give --keys DIR"):
+            await open_zenoh_bus(config, timeout_s=REFUSED_S)
+
+    asyncio.run(scenario())
+
+
 @pytest.mark.parametrize("protocol", ["tls", "tcp"])
 def test_without_a_certificate_nobody_gets_in(fleet: Fleet, protocol: str) -> None:
     endpoint = fleet.endpoint.replace("tls/", f"{protocol}/")
