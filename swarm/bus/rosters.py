@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 
-from swarm.identity import Identity, Roster
+from swarm.identity import Identity, Role, Roster
 from swarm.identity.folder import ROSTER_FILE
 from swarm.limits import Limiter
 from swarm.log import get_logger
@@ -79,9 +79,12 @@ class Rosters:
         return not self._heard.allows(uav, now_s)
 
     def shut_out(self, uav: str) -> None:
-        """Let a UAV's present keys in no more, for as long as this process lives."""
+        """Let a UAV's present keys in no more, for as long as this process lives.
+
+        A UAV's alone: the coordinator's token is that of several machines.
+        """
         entry = self.roster.entry(uav)
-        if entry is None or entry.common_name in self._shut_out:
+        if entry is None or entry.role is not Role.UAV or entry.common_name in self._shut_out:
             return
         self._shut_out.add(entry.common_name)
         self._changed.set()

@@ -92,8 +92,8 @@ class Router:
                 loop.call_soon_threadsafe(rosters.hear, key, data)
 
         def on_saying(sample: zenoh.Sample) -> None:
-            uav = str(sample.key_expr).split("/", 4)[3]
-            if rosters.is_flood(uav, loop.time()):
+            _, _, _, *rest = str(sample.key_expr).split("/", 4)
+            if rest and rosters.is_flood(uav := rest[0], loop.time()):
                 with contextlib.suppress(RuntimeError):
                     loop.call_soon_threadsafe(rosters.shut_out, uav)
 
@@ -119,7 +119,8 @@ class Router:
             while True:
                 try:
                     self._session = await _open(self._config, rosters, listen)
-                except BusError as fault:  # a session that is still closing has the port
+                # A session that is still closing has the port; a full disk has no place for a door.
+                except (BusError, OSError) as fault:
                     get_logger("router").debug("cannot open anew yet", problem=str(fault))
                     await asyncio.sleep(AGAIN_S)
                 else:
