@@ -209,7 +209,8 @@ def agent(
         return 0
     log = get_logger(uav)
     if config.identity is not None and key is None:
-        hint = f"give the autopilot the pass phrase, and --signing-key {config.identity.mavlink_key_path}"
+        path = config.identity.mavlink_key_path
+        hint = f"give the autopilot its pass phrase, and --signing-key {path}"
         log.warning("what is said to the autopilot is not signed", hint=hint)
 
     def no_seat_yet(reason: str) -> None:
