@@ -15,6 +15,7 @@ from mcap.reader import make_reader
 from coordinator.recording.playback import Playback
 from coordinator.recording.reader import read_recording
 from coordinator.status.table import mission_status
+from swarm.errors import InputError
 from swarm.state.board import TaskState
 from tests.process.mission import SwarmRun, wait_until
 from tests.process.test_status import router_of
@@ -32,17 +33,25 @@ def swarm(*words: str) -> subprocess.Popen[str]:
     )
 
 
+def _holds_anything(file: Path) -> bool:
+    """Whether there is anything in it yet; it may be looked at while it is written."""
+    try:
+        return bool(read_recording(file).entries)
+    except InputError:
+        return False
+
+
 def test_killed_recorders_leave_whole_files_and_the_flight_goes_on(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     by_run, by_onlooker = folder / "run.mcap", tmp_path / "onlooker.mcap"
-    flags = ["--bus", "router", "--method", "greedy", "--speedup", "10", "--record", str(by_run)]
+    flags = ["--bus", "router", "--method", "greedy", "--speedup", "4", "--record", str(by_run)]
     with SwarmRun(["table-1", *flags], folder) as run:
         wait_until(lambda: any(words.startswith("agent") for words in run.children()), 60, "start")
-        onlooker = swarm("record", str(by_onlooker), "--connect", router_of(run), "--speedup", "10")
+        onlooker = swarm("record", str(by_onlooker), "--connect", router_of(run), "--speedup", "4")
         try:
-            wait_until(by_onlooker.exists, 30, "the recording")
             run.wait_for_line("epoch 1")
+            wait_until(lambda: _holds_anything(by_onlooker), 30, "something in the recording")
             time.sleep(1.3)
             onlooker.send_signal(signal.SIGKILL)
             killed_s = time.time()
