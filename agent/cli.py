@@ -242,7 +242,7 @@ def agent(
                 return stop.exit_status or 0
             SERVICE.ready(f"{uav}: on the bus, in mission {mission}")
             # Only now: waiting for a seat may have taken long.
-            memory = None if store is None else store.load()
+            memory = None if store is None else store.load(place.seal)
             core = AgentCore(
                 mission,
                 uav,

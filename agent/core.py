@@ -45,6 +45,7 @@ from swarm.deadline import earliest
 from swarm.events import (
     Finish,
     Heard,
+    KeysReplaced,
     Learned,
     LinkChanged,
     Note,
@@ -230,6 +231,8 @@ class AgentCore:
                 self._actions += self._hearing.see(writer, now_s)
             case PeerGone(writer):
                 self._hearing.miss(writer, now_s)
+            case KeysReplaced(names):
+                self.replica.disown(names)
             case LinkChanged(up):
                 self._solitude.link(up, now_s)
                 self._actions += self._hearing.link(up, now_s)

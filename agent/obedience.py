@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from swarm.state.commands import newest
 from swarm.state.registers import Replica
-from swarm.wire.messages import Command, CommandKind, Stamp
+from swarm.wire.messages import Command, CommandKind
 
 __all__ = ["Obedience"]
 
@@ -26,7 +26,8 @@ class Obedience:
         self._uav = uav
         self._replica = replica
         self._rejoin = rejoin
-        self._heeded: Stamp | None = None
+        self._heeded: Command | None = None
+        """The very one; its stamp goes when its signer loses its keys, see `Replica.disown`."""
 
     def news(self, *, begins: bool) -> Command | None:
         """The newest command, if it has not been given before; an older one means nothing then.
@@ -36,8 +37,9 @@ class Obedience:
                 an earlier one.
         """
         found = newest(self._replica, self._uav)
-        if found is None or found[0] == self._heeded:
+        if found is None or found[1] is self._heeded:
             return None
-        self._heeded, command = found
+        _, command = found
+        self._heeded = command
         overruled = begins and self._rejoin and command.kind is CommandKind.RETURN
         return None if overruled else command

@@ -299,6 +299,7 @@ def coordinator(
     from swarm.model.ids import COORDINATOR
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
+    from swarm.sealing import seal_of
     from swarm.store import Store
     from swarm.watchdog import SERVICE
 
@@ -348,6 +349,7 @@ def coordinator(
         timing=timing,
         answer_s=network.answer_s,
         store=store,
+        seal=seal_of(config.identity),
     )
 
     async def coordinate() -> int:

@@ -33,6 +33,7 @@ from swarm.events import (
     Ask,
     Finish,
     Heard,
+    KeysReplaced,
     Learned,
     LinkChanged,
     Note,
@@ -214,6 +215,8 @@ class CoordinatorCore:
                     self._welcome(writer, now_s)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
+            case KeysReplaced(names):
+                self.replica.disown(names)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
                 self._linked = up

@@ -7,7 +7,7 @@ how any of it is shown.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,17 @@ from swarm.allocation.problem import Problem
 from swarm.asking import Asking
 from swarm.config import Timing
 from swarm.deadline import earliest
-from swarm.events import Ask, BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Wish
+from swarm.events import (
+    Ask,
+    BusFact,
+    Heard,
+    KeysReplaced,
+    Learned,
+    LinkChanged,
+    PeerGone,
+    PeerSeen,
+    Wish,
+)
 from swarm.model import Mission, Plan, Task, TaskId, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.pulse import Pulse
@@ -27,6 +37,7 @@ from swarm.state.commands import in_force
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.wire.messages import (
+    LOWEST,
     Board,
     Brief,
     Choice,
@@ -197,6 +208,8 @@ class Observer:
                     ask |= self._welcome_back(writer, now_s) or self._is_newcomer(writer)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
+            case KeysReplaced(names):
+                self._disown(names)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
                 if up or self.cut_since_s is None:
@@ -400,6 +413,14 @@ class Observer:
         if status.phase in _LEAVING and status.note and unfinished and uav not in self._left:
             self._left.add(uav)
             self._tell(f"{uav} {_LEAVING[status.phase]}: {status.note}", now_s)
+
+    def _disown(self, names: Collection[str]) -> None:
+        """What has been heard under those names is no measure of what is said from now on."""
+        self.replica.disown(names)
+        for uav in self._stamps.keys() & names:
+            self._stamps[uav] = LOWEST
+        if self.replica.epoch_stamp == LOWEST:
+            self._coordinator = None
 
     def _hear_choice(self, uav: str, stamp: Stamp, choice: Choice, now_s: float) -> None:
         if (uav, stamp) in self._chosen:

@@ -20,6 +20,7 @@ from swarm.model import Mission, Plan
 from swarm.store import Store
 from swarm.watchdog import SERVICE
 from swarm.wire.messages import Snapshot
+from swarm.wire.seal import Seal
 
 __all__ = ["Service"]
 
@@ -39,6 +40,8 @@ class Service:
     """How long a question waits for the slowest answer [wall s]."""
     store: Store | None
     """Where it keeps what its next life needs."""
+    seal: Seal | None
+    """Tells whose word of what it kept still counts; None without keys."""
 
     async def coordinate(self) -> tuple[int, str | None]:
         """Coordinate the mission; exit status, and why it stood down if it did."""
@@ -57,7 +60,7 @@ class Service:
             memory, age_s = core.memory(self.clock.now_s()), 0.0
 
     def _recall(self) -> tuple[Snapshot | None, float]:
-        found = None if self.store is None else self.store.load()
+        found = None if self.store is None else self.store.load(self.seal)
         return (None, 0.0) if found is None else (found.snapshot, found.age_s)
 
     async def _serve(self, core: CoordinatorCore | StandbyCore) -> int:

@@ -20,6 +20,7 @@ from swarm.events import (
     Ask,
     Finish,
     Heard,
+    KeysReplaced,
     Learned,
     LinkChanged,
     Note,
@@ -165,6 +166,8 @@ class StandbyCore:
                 self._membership.seen(writer, now_s)
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
+            case KeysReplaced(names):
+                self._replica.disown(names)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
                 self._linked = up

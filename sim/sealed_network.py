@@ -13,7 +13,7 @@ from collections.abc import Callable
 from sim.event_queue import EventQueue
 from sim.network import Seat
 from sim.rough_network import Conditions, RoughNetwork
-from swarm.events import Heard, PeerGone
+from swarm.events import Heard, KeysReplaced, PeerGone
 from swarm.wire.codec import Codec
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Message, Snapshot
@@ -76,13 +76,20 @@ class SealedNetwork(RoughNetwork):
 
     def revoke(self, signed_roster: str) -> None:
         """That roster is in force everywhere from now on."""
-        before = [entry.name for entry in self._seal.roster.entries]
+        before = self._seal.roster
         self._seal.put_in_force(signed_roster)
-        for name in before:
-            if self._seal.roster.entry(name) is None:
-                for seat in list(self._seats):
-                    if seat.writer != name:
-                        seat.receive(PeerGone(name))
+        replaced = self._seal.roster.replaced_since(before)
+        gone = [name for name in sorted(replaced) if self._seal.roster.entry(name) is None]
+        for seat in list(self._seats):
+            if seat.writer not in replaced:
+                seat.receive(KeysReplaced(replaced))
+                for name in gone:
+                    seat.receive(PeerGone(name))
+
+    def reissue(self, writer: str, signed_roster: str) -> None:
+        """By that roster ``writer`` has new keys, with which its next life begins."""
+        self._codecs.pop(writer, None)
+        self.revoke(signed_roster)
 
     def _answer_of(self, seat: Seat) -> Snapshot | None:
         answer = seat.answer()

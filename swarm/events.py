@@ -15,6 +15,7 @@ __all__ = [
     "BusFact",
     "Finish",
     "Heard",
+    "KeysReplaced",
     "Learned",
     "LinkChanged",
     "Note",
@@ -58,6 +59,13 @@ class PeerGone:
 
 
 @dataclass(frozen=True, slots=True)
+class KeysReplaced:
+    """A roster came into force by which these names have other keys, or none any more."""
+
+    names: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
 class LinkChanged:
     """The own link to the bus came up or went down."""
 
@@ -76,7 +84,7 @@ class Tick:
     """A deadline has come."""
 
 
-BusFact = Heard | Learned | PeerSeen | PeerGone | LinkChanged | Stop | Tick
+BusFact = Heard | Learned | PeerSeen | PeerGone | KeysReplaced | LinkChanged | Stop | Tick
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,6 +36,7 @@ from swarm.events import (
     BusFact,
     Finish,
     Heard,
+    KeysReplaced,
     Learned,
     LinkChanged,
     Note,
@@ -219,7 +220,7 @@ class Shell(Generic[E, A]):
             if behind and answers and not told and seal.may_publish_roster:
                 self._publish(self._roster(seal))
                 told = True  # once, however often the answer repeats an old one
-            before = [entry.name for entry in seal.roster.entries]
+            before = seal.roster
             try:
                 news = seal.put_in_force(message.body.signed)
             except OSError as fault:
@@ -227,10 +228,13 @@ class Shell(Generic[E, A]):
                 self._log.warning("cannot keep the newer roster", reason=reason)
             if not news:
                 continue
-            gone = [name for name in before if seal.roster.entry(name) is None]
+            replaced = seal.roster.replaced_since(before)
+            gone = [name for name in sorted(replaced) if seal.roster.entry(name) is None]
             self._log.info(
                 "newer roster in force", version=seal.roster.version, without=", ".join(gone)
             )
+            if replaced:
+                self.step(self._from_bus(KeysReplaced(replaced)))
             for name in gone:  # a token cannot be signed: it counts no longer
                 self.step(self._from_bus(PeerGone(name)))
             if not seal.is_in_force:  # nobody believes it any more, so it takes no further part

@@ -29,6 +29,7 @@ from swarm.log import get_logger
 from swarm.wire.codec import Codec, encode_memory, fit_memory
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Snapshot
+from swarm.wire.seal import Seal
 
 __all__ = ["Memory", "Store"]
 
@@ -86,8 +87,12 @@ class Store:
         self._check_writable()
         self._writer = Writer("state file")
 
-    def load(self) -> Memory | None:
-        """What the file holds; None without one, or when it is no use and was set aside."""
+    def load(self, seal: Seal | None = None) -> Memory | None:
+        """What the file holds; None without one, or when it is no use and was set aside.
+
+        Args:
+            seal: tells whose word of all that is remembered still counts.
+        """
         try:
             data = self.path.read_bytes()
         except FileNotFoundError:
@@ -96,7 +101,7 @@ class Store:
             self._set_aside(fault.strerror or str(fault))
             return None
         try:
-            saved_unix_s, snapshot = self._decode(data)
+            saved_unix_s, snapshot = self._decode(data, seal)
         except ValueError as fault:
             self._set_aside(str(fault))
             return None
@@ -149,7 +154,7 @@ class Store:
             remedy = "name a directory that can be written"
             raise InputError(Fault("--state", str(self._directory), problem, remedy)) from fault
 
-    def _decode(self, data: bytes) -> tuple[float, Snapshot]:
+    def _decode(self, data: bytes, seal: Seal | None) -> tuple[float, Snapshot]:
         """When the snapshot in ``data`` was taken, and the snapshot.
 
         Raises:
@@ -166,7 +171,7 @@ class Store:
                 raise ValueError("it is no state file of this version")
         if checksum != zlib.crc32(payload) or not math.isfinite(saved_unix_s):
             raise ValueError("it is damaged")
-        codec = Codec(self._mission)
+        codec = Codec(self._mission, seal)
         snapshot = codec.decode_memory(self._state_key, payload)
         if snapshot is None:
             raise ValueError(f"what it holds is not ours: {', '.join(codec.dropped)}")

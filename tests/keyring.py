@@ -50,6 +50,18 @@ class Keyring:
         kept = tuple(entry for entry in self.roster.entries if entry.name not in names)
         return replace(self.roster, version=self.roster.version + 1, entries=kept)
 
+    def renewed(self, name: str) -> Roster:
+        """The next roster, in which ``name`` has a new key, with which it signs from now on."""
+        self.private[name] = Ed25519PrivateKey.generate()
+        public = self.private[name].public_key().public_bytes_raw()
+        entries = tuple(
+            replace(entry, generation=entry.generation + 1, public_key=public)
+            if entry.name == name
+            else entry
+            for entry in self.roster.entries
+        )
+        return replace(self.roster, version=self.roster.version + 1, entries=entries)
+
     def seal(
         self,
         name: str,

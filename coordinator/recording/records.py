@@ -19,6 +19,7 @@ from coordinator.plan_report import plan_as_json, plan_from_json
 from swarm.events import (
     BusFact,
     Heard,
+    KeysReplaced,
     Learned,
     LinkChanged,
     PeerGone,
@@ -105,6 +106,16 @@ class _Presence:
     now_s: Instant
     writer: str
     there: Flag
+
+
+@dataclass(frozen=True, slots=True)
+class _Keys:
+    """A newer roster gave these names other keys, or none."""
+
+    __pydantic_config__ = _CHECKED
+
+    now_s: Instant
+    names: tuple[Id, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +214,7 @@ _Answers.__pydantic_config__ = _CHECKED  # type: ignore[attr-defined]  # read by
 _SHAPES: Final[Mapping[str, Any]] = {
     "peckorder.Moment": _Moment,
     "peckorder.Presence": _Presence,
+    "peckorder.Keys": _Keys,
     "peckorder.Link": _Link,
     "peckorder.Answers": _Answers,
     "peckorder.Plan": _Plan,
@@ -233,6 +245,7 @@ def topics_of(mission: str) -> Mapping[str, str]:
     return {
         "peckorder.Moment": f"{root}/recorder/moment",
         "peckorder.Link": f"{root}/recorder/link",
+        "peckorder.Keys": f"{root}/recorder/keys",
         "peckorder.Answers": f"{root}/recorder/answers",
         "peckorder.Plan": f"{root}/recorder/plan",
         "peckorder.Presence": f"{root}/alive",
@@ -267,6 +280,8 @@ def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) 
             schema, shape = "peckorder.Presence", _Presence(now_s, writer, True)
         case PeerGone(writer):
             schema, shape = "peckorder.Presence", _Presence(now_s, writer, False)
+        case KeysReplaced(names):
+            schema, shape = "peckorder.Keys", _Keys(now_s, tuple(sorted(names)))
         case LinkChanged(up):
             schema, shape = "peckorder.Link", _Link(now_s, up)
         case Tick():
@@ -335,6 +350,8 @@ def _meant(schema: str, shape: Any) -> Recorded:
             return Begun() if shape.what == "begun" else Tick()
         case "peckorder.Presence":
             return PeerSeen(shape.writer) if shape.there else PeerGone(shape.writer)
+        case "peckorder.Keys":
+            return KeysReplaced(frozenset(shape.names))
         case "peckorder.Link":
             return LinkChanged(shape.up)
         case "peckorder.Plan":

@@ -124,6 +124,11 @@ class Roster:
         """Whether it takes the place of ``other``, which the same authority has signed."""
         return self.mission == other.mission and self.version > other.version
 
+    def replaced_since(self, before: Roster) -> frozenset[str]:
+        """Names that had another key in the roster ``before``, and this or none by now."""
+        keys = {entry.name: entry.public_key for entry in self.entries}
+        return frozenset(e.name for e in before.entries if keys.get(e.name) != e.public_key)
+
 
 def encode_roster(roster: Roster, authority: Ed25519PrivateKey) -> bytes:
     """``roster`` signed by ``authority``.

@@ -16,6 +16,7 @@ from collections.abc import Collection, Iterable, Iterator
 from swarm.wire.codec import encode
 from swarm.wire.digest import fingerprint
 from swarm.wire.messages import (
+    LOWEST,
     Board,
     Brief,
     Choice,
@@ -28,7 +29,9 @@ from swarm.wire.messages import (
     Stamp,
     Status,
     TaskOrder,
+    disowned,
 )
+from swarm.wire.seal import open_envelope
 
 __all__ = ["MOST_UNPOSTED", "Replica"]
 
@@ -203,6 +206,26 @@ class Replica:
         """Take many in; whether any was news."""
         return sum(self.join(message) for message in messages) > 0
 
+    def disown(self, signers: Collection[str]) -> None:
+        """Of all that ``signers`` have said so far, let any later word be worth more.
+
+        Their keys are replaced or revoked, and who had them may have given its words the largest
+        stamps there are. What they say counts until somebody says otherwise: done stays done.
+        """
+        words = [m for m in self._registers.values() if _signer(m) in signers]
+        for message in words:
+            self._registers[message.key] = disowned(message)
+            self._changed.add(message.key)
+            match message.body:
+                case Epoch():
+                    self.epoch_stamp = LOWEST
+                case Command(target=target) as command:
+                    self.commands[target] = LOWEST, command
+                case _:
+                    pass
+        for writer in {message.writer for message in words}:
+            self.heads[writer] = max(m.stamp for m in self.messages({writer}))
+
     def messages(self, writers: Iterable[str] | None = None) -> Iterator[Message]:
         """All registers, or those of ``writers``, in key order."""
         wanted = None if writers is None else set(writers)
@@ -254,6 +277,12 @@ class Replica:
     def register(self, key: str) -> Message | None:
         """What is known of the register of that key."""
         return self._registers.get(key)
+
+
+def _signer(message: Message) -> str:
+    """Who has signed it; its writer, as far as one can tell, where nobody has."""
+    envelope = None if message.envelope is None else open_envelope(message.envelope)
+    return message.writer if envelope is None else envelope.signer
 
 
 def _entry_of(order: TaskOrder) -> Board:

@@ -60,6 +60,7 @@ from swarm.wire.messages import (
     Status,
     TaskOrder,
     as_heard,
+    disowned,
 )
 from swarm.wire.seal import (
     ANSWER,
@@ -262,10 +263,11 @@ class Codec:
     # -- from the own memory --------------------------------------------------------
 
     def decode_memory(self, key: str, data: bytes) -> Snapshot | None:
-        """What `encode_memory` made in an earlier life; envelopes in it need no check.
+        """What `encode_memory` made in an earlier life.
 
-        They are kept, and are checked before they are ever repeated. A roster is left out: the
-        keys' folder has the one that counts, and this may be that of an authority before it.
+        Where the bus has keys, what bears no good signature by now is remembered as `disowned`.
+        A roster is left out: the keys' folder has the one that counts, and this may be that of
+        an authority before it.
         """
         try:
             snapshot, registers = self._snapshot(key, data)
@@ -287,7 +289,9 @@ class Codec:
         envelope = open_envelope(register)
         if envelope is None:
             raise UnacceptableError("malformed")
-        return as_heard(self._message(_unpack(envelope.said)), envelope.said, register)
+        message = as_heard(self._message(_unpack(envelope.said)), envelope.said, register)
+        genuine = self._seal is None or self._seal.is_genuine(register)
+        return message if genuine else disowned(message)
 
     # -- parts ----------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ bytes and checking (swarm.wire.codec), and what a reader makes of it (swarm.stat
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated, ClassVar
@@ -40,6 +40,7 @@ from swarm.wire.keys import Keys
 
 __all__ = [
     "LATEST_S",
+    "LOWEST",
     "MAX_COUNT",
     "SCHEMA_VERSION",
     "Board",
@@ -63,6 +64,7 @@ __all__ = [
     "StatusPhase",
     "TaskOrder",
     "as_heard",
+    "disowned",
 ]
 
 SCHEMA_VERSION = 1
@@ -81,6 +83,10 @@ class Stamp:
     """Grows whenever the writer's process starts anew."""
     counter: Count
     """Grows with every statement of one incarnation."""
+
+
+LOWEST = Stamp(0, 0)
+"""Nobody says anything under it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -372,6 +378,11 @@ def as_heard(message: Message, said: bytes, envelope: bytes | None = None) -> Me
     object.__setattr__(message, "said", said)
     object.__setattr__(message, "envelope", envelope)
     return message
+
+
+def disowned(message: Message) -> Message:
+    """What ``message`` says, for which nobody stands any more: any other word outdoes it."""
+    return replace(message, stamp=LOWEST)
 
 
 def _key_of(mission: str, writer: str, body: Body) -> str:

@@ -160,8 +160,8 @@ class Seal:
         self._signed_roster = signed_roster
         self._roster = decode_roster(signed_roster.encode(), authority_public_key)
         self._own = self._roster.entry(name)
-        self._genuine: OrderedDict[bytes, None] = OrderedDict()
-        """Hashes of envelopes found genuine under the roster in force."""
+        self._genuine: OrderedDict[bytes, bytes] = OrderedDict()
+        """Of envelopes found genuine: their hash, and the public key that they bear out."""
 
     @property
     def roster(self) -> Roster:
@@ -202,7 +202,8 @@ class Seal:
         roster = self.read_roster(signed)
         if not roster.supersedes(self._roster):
             return False
-        self._genuine.clear()
+        if roster.series != self._roster.series:  # nothing said so far counts any more
+            self._genuine.clear()
         self._roster, self._signed_roster = roster, signed
         self._keep_roster(signed.encode())
         return True
@@ -230,8 +231,8 @@ class Seal:
         """
         signature = self._sign(_signed_bytes(self._roster.series, bound, said))
         envelope: bytes = msgpack.packb([SEALED_MARK, self.name, signature, said])
-        if not bound:
-            self._keep(_hash(envelope))
+        if not bound and self._own is not None:
+            self._keep(_hash(envelope), self._own.public_key)
         return envelope
 
     # -- believing ----------------------------------------------------------------------
@@ -253,14 +254,14 @@ class Seal:
         if member is None:
             raise UnacceptableError(SIGNER_UNKNOWN)
         known = b"" if bound else _hash(data)
-        if known in self._genuine:
+        if self._genuine.get(known) == member.public_key:
             self._genuine.move_to_end(known)
             return envelope
         signed = _signed_bytes(self._roster.series, bound, envelope.said)
         if not _verify(member.public_key, envelope.signature, signed):
             raise UnacceptableError(WRONGLY_SIGNED)
         if known:
-            self._keep(known)
+            self._keep(known, member.public_key)
         return envelope
 
     def is_genuine(self, data: bytes) -> bool:
@@ -290,8 +291,8 @@ class Seal:
         """Whether anyone in the roster may be that writer; of what cannot be signed."""
         return writer in (COORDINATOR, OPERATOR) or self.may_speak_for(writer, writer)
 
-    def _keep(self, known: bytes) -> None:
-        self._genuine[known] = None
+    def _keep(self, known: bytes, public_key: bytes) -> None:
+        self._genuine[known] = public_key
         if len(self._genuine) > _KEPT_VERDICTS:
             self._genuine.popitem(last=False)
 

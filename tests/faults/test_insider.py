@@ -19,8 +19,11 @@ from sim.sealed_network import SealedNetwork
 from sim.world import Setting, World
 from swarm.limits import Limiter
 from swarm.model import UavId
-from swarm.wire.messages import Message
+from swarm.wire.codec import encode
+from swarm.wire.keys import Keys
+from swarm.wire.messages import MAX_COUNT, Message, Outcome, Stamp
 from swarm.wire.seal import Seal
+from tests.builders import OUT
 from tests.keyring import Keyring
 
 LIAR = "u0"
@@ -160,6 +163,42 @@ def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None
     assert result.open == ()
     assert before[0].executed_routes[UavId(LIAR)] == result.executed_routes[UavId(LIAR)]
     assert networks[0].ear.dropped["signer unknown"] > 0
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_who_gets_new_keys_is_heard_whatever_a_thief_of_the_old_ones_has_said(seed: int) -> None:
+    """The largest stamps there are, for instance, which nobody can outdo under the same keys."""
+    flown = case(seed, f"5 crash {LIAR} for 3 with none")
+    keys = keys_of(flown)
+
+    def join(queue: EventQueue, conditions: Conditions, seed: int) -> SealedNetwork:
+        network = SealedNetwork(
+            queue, conditions, seed, flown.flown().name, keys.seal, keys.seal("dashboard")
+        )
+        stolen = keys.seal(LIAR)
+
+        def lie() -> None:
+            said = Message(flown.flown().name, LIAR, Stamp(MAX_COUNT, MAX_COUNT), OUT)
+            network.lie(said.key, stolen.wrap(encode(said)))
+
+        queue.at(6.0, lie)
+        queue.at(7.0, lambda: network.reissue(LIAR, keys.signed(keys.renewed(LIAR))))
+        return network
+
+    verdict = play(flown, join=join)
+
+    assert verdict.broken is None
+    observer = verdict.world.observer
+    assert observer.result().open == ()
+    claimed = observer.replica.register(Keys(flown.flown().name).claim(LIAR))
+    assert claimed is not None
+    assert claimed.stamp < Stamp(MAX_COUNT, MAX_COUNT)
+    done_s = [
+        message.body.completed_s
+        for message in observer.replica.messages({LIAR})
+        if isinstance(message.body, Outcome)
+    ]
+    assert max(done_s) > 8.0, "it has taken tasks again"
 
 
 class Storm(RoughNetwork):

@@ -14,6 +14,7 @@ from swarm.events import (
     BusFact,
     Finish,
     Heard,
+    KeysReplaced,
     Learned,
     PeerGone,
     PeerSeen,
@@ -191,6 +192,7 @@ def test_whoever_a_newer_roster_leaves_out_is_gone_and_silent_from_then_on() -> 
         await until(lambda: Heard(by_coordinator) in seat.core.heard, "hearing the others")
 
         assert Heard(said) in seat.core.heard, "the replica hands it on"
+        assert KeysReplaced(frozenset({"u1"})) in seat.core.heard
         assert Heard(CLAIM) not in seat.core.heard
         assert seat.shell.dropped == {"signer unknown": 1}
         assert seat.bus.seal is not None

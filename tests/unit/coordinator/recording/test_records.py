@@ -12,7 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coordinator.recording.records import SCHEMAS, Begun, UnreadableError, decode, encode, schema_of
-from swarm.events import BusFact, Heard, Learned, LinkChanged, PeerGone, PeerSeen, Stop, Tick
+from swarm.events import (
+    BusFact,
+    Heard,
+    KeysReplaced,
+    Learned,
+    LinkChanged,
+    PeerGone,
+    PeerSeen,
+    Stop,
+    Tick,
+)
 from swarm.model.ids import OPERATOR
 from swarm.wire.messages import Message, Snapshot, TaskOrder
 from tests.builders import MISSION, done, held, message
@@ -58,6 +68,7 @@ facts: st.SearchStrategy[BusFact | Begun] = st.one_of(
     st.lists(snapshots, max_size=2).map(tuple).map(Learned),
     uav_ids.map(PeerSeen),
     uav_ids.map(PeerGone),
+    st.frozensets(uav_ids, max_size=3).map(KeysReplaced),
     st.booleans().map(LinkChanged),
     st.just(Tick()),
     st.just(Begun()),

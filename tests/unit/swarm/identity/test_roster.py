@@ -139,6 +139,17 @@ def test_newer_ones_supersede_older_ones_of_the_same_mission() -> None:
     assert not Roster("n", bytes(16), 9, ()).supersedes(versions[0])
 
 
+def test_it_tells_whose_key_is_another_or_none_since_an_older_one() -> None:
+    def entry(name: str, generation: int, key: int) -> Entry:
+        return Entry(name, Role.UAV, generation, bytes([key]) * 32, 1 << 39)
+
+    before = Roster("m", bytes(16), 1, (entry("a", 1, 1), entry("b", 1, 2), entry("c", 1, 3)))
+    after = Roster("m", bytes(16), 2, (entry("a", 1, 1), entry("b", 2, 4), entry("d", 1, 5)))
+
+    assert after.replaced_since(before) == {"b", "c"}
+    assert after.replaced_since(after) == set()
+
+
 @pytest.mark.parametrize(
     ("name", "role", "generation", "problem"),
     [

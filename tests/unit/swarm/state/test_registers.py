@@ -11,10 +11,22 @@ from hypothesis import strategies as st
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.state.board import TaskBoard
 from swarm.state.claims import holders
+from swarm.state.commands import newest
 from swarm.state.registers import MOST_UNPOSTED, Replica
 from swarm.state.voice import Voice
 from swarm.wire.codec import encode
-from swarm.wire.messages import Body, Brief, Claim, Command, CommandKind, Message, Stamp, TaskOrder
+from swarm.wire.messages import (
+    MAX_COUNT,
+    Body,
+    Brief,
+    Claim,
+    Command,
+    CommandKind,
+    Message,
+    Stamp,
+    TaskOrder,
+    as_heard,
+)
 from tests.builders import (
     IDLE,
     MISSION,
@@ -31,6 +43,7 @@ from tests.builders import (
     status,
     uav,
 )
+from tests.keyring import Keyring
 
 # Few stamps and contents, so that many statements meet of the same age, or with other contents.
 few_stamps = st.builds(Stamp, st.integers(0, 2), st.integers(0, 2))
@@ -219,6 +232,69 @@ def test_stale_statements_are_counted_and_repeated_ones_are_not() -> None:
     replica = joined([new, new, old, old])
 
     assert replica.stale == 2
+
+
+LARGEST = Stamp(MAX_COUNT, MAX_COUNT)
+
+
+@given(crowds, crowds, st.sampled_from(["u0", "u1", COORDINATOR, OPERATOR]))
+def test_after_a_change_of_keys_any_word_outdoes_those_before(
+    before: list[Message], after: list[Message], signer: str
+) -> None:
+    """Who had the keys may have taken the largest stamps; nobody else is touched by that."""
+    before = [replace(m, stamp=LARGEST) if m.writer == signer else m for m in before]
+    # Whoever has the new keys says all it has to say, under honest stamps.
+    after = [replace(m, stamp=Stamp(m.stamp.incarnation + 1, 1)) for m in after]
+    changed = joined(before)
+    digest = changed.digest()
+
+    changed.disown({signer})
+
+    assert changed.digest().keys() == digest.keys()
+    assert {w: n for w, n in changed.digest().items() if w != signer} == {
+        w: n for w, n in digest.items() if w != signer
+    }
+    untouched = joined(before)
+    assert changed.outcomes == untouched.outcomes, "done stays done"
+    assert (changed.brief, changed.board) == (untouched.brief, untouched.board)
+    changed.join_all(after)
+    renewed = joined([m for m in before if m.writer != signer] + after)
+    for register in renewed.messages({signer}):
+        assert changed.known(register) == register
+    assert list(changed.messages(renewed.writers() - {signer})) == list(
+        renewed.messages(renewed.writers() - {signer})
+    )
+    assert changed.heads.items() >= renewed.heads.items()
+
+
+def test_a_command_of_who_had_the_keys_gives_way_to_the_next_one() -> None:
+    hold = Command("u0", CommandKind.HOLD, 1, "")
+    forged = Message(MISSION, OPERATOR, LARGEST, hold)
+    replica = joined([message(COORDINATOR, brief(uav("u0"))), forged])
+    replica.disown({OPERATOR})
+    assert newest(replica, "u0") == (Stamp(0, 0), hold)
+
+    resume = Command("u0", CommandKind.RESUME, 1, "")
+    replica.join(Message(MISSION, OPERATOR, Stamp(5, 1), resume))
+
+    assert newest(replica, "u0") == (Stamp(5, 1), resume)
+
+
+def test_what_another_seat_has_signed_of_the_same_writer_stays() -> None:
+    ring = Keyring("u0")
+    said = {
+        name: as_heard(each, encode(each), ring.seal(name).wrap(encode(each)))
+        for name, each in (
+            (COORDINATOR, message(COORDINATOR, entry("t0"), 7, 7)),
+            ("coordinator-2", message(COORDINATOR, entry("t1"), 7, 7)),
+        )
+    }
+    replica = joined(list(said.values()))
+
+    replica.disown({"coordinator-2"})
+
+    assert [m.stamp for m in replica.messages()] == [Stamp(7, 7), Stamp(0, 0)]
+    assert replica.heads == {COORDINATOR: Stamp(7, 7)}
 
 
 def test_status_is_no_register() -> None:

@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR
 from swarm.wire.codec import Codec, encode, encode_memory
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Command, CommandKind, Message, SignedRoster, Snapshot, Stamp
+from swarm.wire.messages import (
+    Command,
+    CommandKind,
+    Message,
+    SignedRoster,
+    Snapshot,
+    Stamp,
+    as_heard,
+)
 from swarm.wire.seal import ANSWER, Seal, UnacceptableError, open_envelope
 from tests.builders import MISSION, choice, done, entry, epoch, held, message, status
 from tests.keyring import Keyring
@@ -344,6 +352,36 @@ def test_who_is_revoked_is_believed_no_longer_not_even_what_was_known() -> None:
     assert codec.decode(CLAIM.key, data) is None
     assert codec.pack(heard) is None
     assert not seal.knows("u0")
+
+
+def test_what_the_others_have_said_needs_no_new_check_after_a_new_roster(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Or a fleet would check all it knows at once, in the air."""
+    seal, data = KEYS.seal("u1"), envelope(CLAIM, "u0")
+    codec = Codec(MISSION, seal)
+    assert codec.decode(CLAIM.key, data) is not None
+
+    seal.put_in_force(KEYS.signed(KEYS.without("dashboard")))
+    monkeypatch.setattr("swarm.wire.seal._verify", lambda *_: False)
+
+    assert codec.decode(CLAIM.key, data) is not None
+    assert codec.decode(CLAIM.key, envelope(CLAIM, "u0")[:-1] + b"!") is None
+
+
+def test_what_is_remembered_of_who_has_other_keys_by_now_gives_way_to_any_word() -> None:
+    keys = Keyring("u0", "u1")
+    messages = []
+    for writer, signer in (("u0", "u0"), ("u1", "u1")):
+        said = message(writer, held("t0", 1.0), 7, 7)
+        messages.append(as_heard(said, encode(said), envelope(said, signer, keys)))
+    memory = encode_memory(Snapshot(MISSION, "u0", 1, 7.0, tuple(messages)))
+
+    recalled = Codec(MISSION, keys.seal("u1", keys.renewed("u0"))).decode_memory(STATE, memory)
+
+    assert recalled is not None
+    assert [m.body for m in recalled.messages] == [m.body for m in messages]
+    assert [m.stamp for m in recalled.messages] == [Stamp(0, 0), Stamp(7, 7)]
 
 
 def test_a_roster_of_an_earlier_life_does_not_come_before_that_of_the_keys() -> None:
