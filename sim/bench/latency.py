@@ -91,9 +91,10 @@ async def measure_latencies(
     uavs: int = 5,
     tasks: int = 40,
     seed: int = 0,
+    speedup: float = 1.0,
     on_progress: Callable[[str], None] | None = None,
 ) -> Latencies:
-    """Fly a survey and time every decision but the first of each UAV.
+    """Fly a survey and time every decision but the first of each UAV, in wall seconds.
 
     Raises:
         ChildFailedError: a process did not start.
@@ -105,7 +106,9 @@ async def measure_latencies(
     taps: list[Tap] = []
     with options_for(mission, link=Link.NORMAL, bus=BusKind.ROUTER, method=method) as options:
         layout = Layout(
-            replace(options, position_rate_hz=REPORT_HZ), mission, np.random.default_rng(seed)
+            replace(options, position_rate_hz=REPORT_HZ, speedup=speedup),
+            mission,
+            np.random.default_rng(seed),
         )
         async with contextlib.AsyncExitStack() as stack:
             for router in layout.routers:

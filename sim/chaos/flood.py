@@ -141,6 +141,7 @@ def times_for(flood_s: float) -> float:
 async def fly_flooded(
     times: float,
     *,
+    speedup: float = 1.0,
     seed: int = 0,
     bus: BusKind = BusKind.ROUTER,
     on_progress: Callable[[str], None] | None = None,
@@ -152,6 +153,7 @@ async def fly_flooded(
 
     Args:
         times: how long the mission is; see `long_mission`.
+        speedup: mission seconds per wall second.
         seed: of what the hostile peer says.
         bus: how the processes reach each other; `BusKind.ROUTER` or `BusKind.MESH`.
         on_progress: told what is being done.
@@ -170,7 +172,7 @@ async def fly_flooded(
             scenario=scenario,
             method="greedy",
             seed=0,
-            speedup=1.0,
+            speedup=speedup,
             bus=bus,
             position_rate_hz=default_position_rate_hz(len(mission.uavs)),
             acceptance_radius_m=0.5,

@@ -20,13 +20,18 @@ LIMIT_S = 150.0
 
 
 def survey(n_uav: int, n_task: int, *, side_m: float = 300.0, service_s: float = 2.0) -> Mission:
-    """UAVs in a row beside a square of tasks; flown in some 40 s of mission time."""
+    """UAVs in a row amid a square of tasks; flown in some 40 s of mission time."""
     rng = np.random.default_rng(5)
+    home_m = side_m / 2.0
     return Mission(
         "chaos",
         600.0,
         tuple(
-            Uav(UavId(f"uav{number:02}"), (12.0 * number, -10.0, 0.0), 10.0)
+            Uav(
+                UavId(f"uav{number:02}"),
+                (home_m + 12.0 * (number - n_uav / 2.0), home_m, 0.0),
+                10.0,
+            )
             for number in range(1, n_uav + 1)
         ),
         tuple(

@@ -60,8 +60,8 @@ def test_a_restarted_agent_resumes_its_task_while_its_vehicle_flies_on(
         await flight.restart(VICTIM)
 
     # Far away, one for each: nobody is free to take the task over while the agent starts.
-    mission = survey(3, 0)
-    tasks = (Task(TaskId(f"t{n}"), (36.0 * n, 600.0, 0.0), 1.0, service_s=1.0) for n in (1, 2, 3))
+    mission = survey(3, 0, side_m=0.0)
+    tasks = (Task(TaskId(f"t{n}"), (36.0 * n, 600.0, 0.0), 1.0, service_s=1.0) for n in (0, 1, 2))
     mission = replace(mission, tasks=tuple(tasks))
     verdict = play(mission, tmp_path, script, bus=bus, speedup=5.0)
 
