@@ -55,13 +55,18 @@ from swarm.wire.codec import Codec
 from swarm.wire.digest import unknown
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Choice, Message, SignedRoster, Snapshot, Stamp, Status
-from swarm.wire.question import NONCE_BYTES, decode_question, encode_question
+from swarm.wire.question import NONCE_BYTES, bond, decode_question, encode_question
 from swarm.wire.seal import Seal, UnacceptableError
 
 __all__ = ["Core", "Shell", "take_seat"]
 
 TURN = 20
 """Events from the bus between two looks at everything else."""
+MOST_REFUSED = 500
+"""Registers of one answer that may be worth nothing; what follows then is not looked at. An honest
+process repeats only what it believes itself, by a roster that is seldom another."""
+UNREAD = "not read, after so many bad ones"
+"""Reason under which is counted what an answer holds besides."""
 
 E_contra = TypeVar("E_contra", contravariant=True)
 A_co = TypeVar("A_co", covariant=True)
@@ -359,7 +364,7 @@ class Shell(Generic[E, A]):
             return
         whole = self._snapshot(self._clock.now_s())
         news = replace(whole, messages=unknown(whole.messages, self._known(), question.known))
-        answer, left_out = self._codec.pack_answer(news, question.nonce)
+        answer, left_out = self._codec.pack_answer(news, question.bond)
         if left_out:
             self._log.warning("an answer has no room for all registers", left_out=left_out)
         reply(answer)
@@ -370,8 +375,9 @@ class Shell(Generic[E, A]):
         known = {writer: number for writer, number in self._known().items() if writer != self._name}
         nonce = self._draw_nonce()
         question = encode_question(known, nonce, self._seal)
+        expected = bond(None if self._seal is None else self._seal.name, nonce)
         answers = await self._bus.query(self._keys.state("*"), question, timeout_s=self._answer_s)
-        read = [(await self._read(answer, nonce), answer.arrived_s) for answer in answers]
+        read = [(await self._read(answer, expected), answer.arrived_s) for answer in answers]
         now_s, wall_s = self._clock.now_s(), self._loop.time()
         pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
         snapshots = []
@@ -381,9 +387,9 @@ class Shell(Generic[E, A]):
                 snapshots.append(_aged(snapshot, pace * (wall_s - arrived_s)))
         self.step(self._from_bus(Learned(tuple(snapshots))))
 
-    async def _read(self, answer: Answer, nonce: bytes) -> Snapshot | None:
+    async def _read(self, answer: Answer, expected: bytes) -> Snapshot | None:
         """What is in an answer, as far as it is to be believed."""
-        opened = self._codec.open_answer(answer.key, answer.payload, nonce)
+        opened = self._codec.open_answer(answer.key, answer.payload, expected)
         if opened is None:
             return None
         snapshot, registers = opened
@@ -392,6 +398,9 @@ class Shell(Generic[E, A]):
             message = self._codec.decode_register(register)
             if message is not None:
                 messages.append(message)
+            elif number - len(messages) > MOST_REFUSED:
+                self._codec.dropped[UNREAD] += len(registers) - number
+                break
             if number % TURN == 0:
                 await asyncio.sleep(0)
         return replace(snapshot, messages=tuple(messages))

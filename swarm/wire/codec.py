@@ -85,6 +85,10 @@ __all__ = [
     "fit_memory",
 ]
 
+BYTES_EACH: Final = 8
+"""Of an array or map in a large message, with its share of the rest, at least."""
+IN_SEALED_ANSWER: Final = 64
+"""Arrays and maps of an answer in which all registers but the roster are envelopes."""
 SIGNED_HERE: Final = "signed, but no keys here"
 
 WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {}
@@ -137,8 +141,8 @@ class Codec:
         as_heard(message, said, envelope)
         return envelope
 
-    def pack_answer(self, snapshot: Snapshot, nonce: bytes) -> tuple[bytes, int]:
-        """``snapshot`` as an answer to the question with that nonce.
+    def pack_answer(self, snapshot: Snapshot, bond: bytes) -> tuple[bytes, int]:
+        """``snapshot`` as an answer to the question with that bond.
 
         Returns:
             Its bytes, and how many registers had no room in them.
@@ -151,7 +155,7 @@ class Codec:
         believed = replace(snapshot, messages=tuple(told))
         fitted = fit(believed, SNAPSHOT_LIMIT_BYTES - ENVELOPE_BYTES, self._register)
         said = snapshot_bytes(fitted, [self._register(message) for message in fitted.messages])
-        return seal.wrap(said, ANSWER + nonce), len(told) - len(fitted.messages)
+        return seal.wrap(said, ANSWER + bond), len(told) - len(fitted.messages)
 
     def _register(self, message: Message) -> bytes:
         """As it stands in an answer."""
@@ -176,15 +180,15 @@ class Codec:
             return None
         return message
 
-    def decode_snapshot(self, key: str, data: bytes, nonce: bytes = b"") -> Snapshot | None:
+    def decode_snapshot(self, key: str, data: bytes, bond: bytes = b"") -> Snapshot | None:
         """The snapshot in ``data``, answered on ``key``; bad registers in it are left out.
 
         Args:
             key: of who answers.
             data: the answer.
-            nonce: of the question, where the bus has keys.
+            bond: of the question, where the bus has keys.
         """
-        opened = self.open_answer(key, data, nonce)
+        opened = self.open_answer(key, data, bond)
         if opened is None:
             return None
         snapshot, registers = opened
@@ -192,18 +196,19 @@ class Codec:
         return replace(snapshot, messages=tuple(said for said in read if said is not None))
 
     def open_answer(
-        self, key: str, data: bytes, nonce: bytes = b""
+        self, key: str, data: bytes, bond: bytes = b""
     ) -> tuple[Snapshot, tuple[object, ...]] | None:
         """As `decode_snapshot`, the registers apart and each yet for `decode_register`."""
         signer = None
         try:
             _require(len(data) <= SNAPSHOT_LIMIT_BYTES, "too large")
             if self._seal is not None:
-                envelope = self._seal.unwrap(data, ANSWER + nonce)
+                envelope = self._seal.unwrap(data, ANSWER + bond)
                 signer, data = envelope.signer, envelope.said
             else:
                 _require(not is_envelope(data), SIGNED_HERE)
-            snapshot, registers = self._snapshot(key, data)
+            most = None if signer is None else IN_SEALED_ANSWER
+            snapshot, registers = self._snapshot(key, data, most)
             _require(signer is None or self._may_speak(signer, snapshot.writer), NOT_THE_SIGNERS)
         except UnacceptableError as fault:
             self.dropped[fault.reason] += 1
@@ -295,9 +300,11 @@ class Codec:
 
     # -- parts ----------------------------------------------------------------------
 
-    def _snapshot(self, key: str, data: bytes) -> tuple[Snapshot, tuple[object, ...]]:
-        """A snapshot without its registers, and those."""
-        parts = _unpack(data)
+    def _snapshot(
+        self, key: str, data: bytes, most: int | None = None
+    ) -> tuple[Snapshot, tuple[object, ...]]:
+        """A snapshot without its registers, and those; ``most`` as in `_unpack`."""
+        parts = _unpack(data, most)
         if not isinstance(parts, tuple) or len(parts) < 6:
             raise UnacceptableError("malformed")
         version, mission, writer, incarnation, mission_s, registers = parts[:6]
@@ -373,10 +380,44 @@ def _require_size(message: Message) -> None:
     _require(len(encode(message)) <= limit_bytes, "too large")
 
 
-def _unpack(data: bytes) -> object:
-    """What ``data`` holds, with tuples for arrays; None when it is not MessagePack."""
+class _Budget:
+    """Counts the arrays and maps of one piece of MessagePack, until there are too many.
+
+    An empty map is one byte and takes 64 in memory, so that few bytes could fill all of it.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._left = most
+
+    def array(self, items: tuple[object, ...]) -> tuple[object, ...]:
+        """One more array."""
+        self._spend()
+        return items
+
+    def map(self, pairs: Sequence[tuple[object, object]]) -> dict[object, object]:
+        """One more map."""
+        self._spend()
+        return dict(pairs)
+
+    def _spend(self) -> None:
+        self._left -= 1
+        if self._left < 0:
+            raise ValueError("more arrays and maps than a message of that size has")
+
+
+def _unpack(data: bytes, most: int | None = None) -> object:
+    """What ``data`` holds, with tuples for arrays; None when it is not MessagePack.
+
+    Args:
+        data: from the network.
+        most: of arrays and maps in it; by default as many as its length is worth.
+    """
+    hooks = {}
+    if len(data) > SMALL_LIMIT_BYTES:
+        budget = _Budget(1000 + len(data) // BYTES_EACH if most is None else most)
+        hooks = {"list_hook": budget.array, "object_pairs_hook": budget.map}
     try:
-        return msgpack.unpackb(data, use_list=False, max_ext_len=0)
+        return msgpack.unpackb(data, use_list=False, max_ext_len=0, **hooks)
     except (ValueError, TypeError, msgpack.exceptions.UnpackException, RecursionError):
         # ValueError covers msgpack's FormatError, StackError, ExtraData and bad UTF-8.
         return None

@@ -1,8 +1,8 @@
 """What a question says: what the asker knows already, and where the bus has keys who asks.
 
-There a question bears a nonce, to which its answers are bound, so that no old answer can be
-given to it; without keys it is the digest alone. Leaves out: who asks and answers
-(swarm.shell), what is answered (swarm.wire.codec).
+There a question bears a nonce, and its answers are bound to that and to who asks, so that no
+answer to another question can be given to it; without keys it is the digest alone. Leaves out:
+who asks and answers (swarm.shell), what is answered (swarm.wire.codec).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Final
 from swarm.wire.digest import decode_digest, encode_digest
 from swarm.wire.seal import QUESTION, Seal, UnacceptableError
 
-__all__ = ["NONCE_BYTES", "Question", "decode_question", "encode_question"]
+__all__ = ["NONCE_BYTES", "Question", "bond", "decode_question", "encode_question"]
 
 NONCE_BYTES: Final = 16
 
@@ -28,6 +28,16 @@ class Question:
     asker: str | None
     """Who has signed it; None on a bus without keys."""
     nonce: bytes
+
+    @property
+    def bond(self) -> bytes:
+        """What its answers are bound to."""
+        return bond(self.asker, self.nonce)
+
+
+def bond(asker: str | None, nonce: bytes) -> bytes:
+    """What answers are bound to, by who asks and the nonce of the question."""
+    return nonce + (asker or "").encode()
 
 
 def encode_question(known: Mapping[str, int], nonce: bytes, seal: Seal | None) -> bytes:

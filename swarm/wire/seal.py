@@ -50,7 +50,7 @@ SEALED_MARK: Final = "sealed 1"
 ENVELOPE_BYTES: Final = 160
 """By how much an envelope is longer than what is in it, at most."""
 ANSWER: Final = b"answer "
-"""What answers are bound to, before the nonce of the question."""
+"""What answers are bound to, before the `bond` of the question; see swarm.wire.question."""
 QUESTION: Final = b"question"
 """What questions are bound to."""
 SIGNATURE_BYTES: Final = 64

@@ -7,6 +7,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
+import msgpack
+
 from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import Query, Sample
 from swarm.events import (
@@ -23,11 +25,12 @@ from swarm.events import (
     Wish,
 )
 from swarm.model.ids import AUTHORITY, COORDINATOR
-from swarm.shell import Shell, take_seat
+from swarm.shell import MOST_REFUSED, UNREAD, Shell, take_seat
 from swarm.wire.codec import Codec, encode
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Message, SignedRoster, Snapshot, Stamp
-from swarm.wire.question import decode_question, encode_question
+from swarm.wire.messages import SCHEMA_VERSION, Message, SignedRoster, Snapshot, Stamp
+from swarm.wire.question import bond, decode_question, encode_question
+from swarm.wire.seal import ANSWER
 from tests.builders import MISSION, epoch, held, message
 from tests.keyring import Keyring
 from tests.shell_play import HandClock, play, until
@@ -137,9 +140,11 @@ def test_it_answers_whom_it_knows_and_only_to_that_question() -> None:
         asked = encode_question({}, NONCE, RING.seal("dashboard"))
         [answer] = await seat.other.query(KEYS.state("*"), asked, timeout_s=1.0)
         codec = Codec(MISSION, RING.seal("u1"))
-        heard = codec.decode_snapshot(answer.key, answer.payload, NONCE)
+        expected = bond("dashboard", NONCE)
+        heard = codec.decode_snapshot(answer.key, answer.payload, expected)
         assert heard == Snapshot(MISSION, "u0", 1, 7.0, (OWN,))
-        assert codec.decode_snapshot(answer.key, answer.payload, bytes(16)) is None
+        for another in (bond("dashboard", bytes(16)), bond("u1", NONCE), NONCE):
+            assert codec.decode_snapshot(answer.key, answer.payload, another) is None
 
         nobody = await seat.other.query(KEYS.state("*"), timeout_s=0.01)
         assert nobody == ()
@@ -163,7 +168,7 @@ def test_it_takes_an_answer_to_its_own_question_and_no_older_one() -> None:
         question = decode_question(questions[0].payload, RING.seal("u2"))
         assert (question.asker, question.nonce) == ("u0", NONCE)
         fresh, _ = Codec(MISSION, RING.seal("u2")).pack_answer(
-            Snapshot(MISSION, "u2", 1, 7.0, ()), question.nonce
+            Snapshot(MISSION, "u2", 1, 7.0, ()), question.bond
         )
         for event in questions:
             event.reply(old if event.key == KEYS.state("u1") else fresh)
@@ -172,6 +177,34 @@ def test_it_takes_an_answer_to_its_own_question_and_no_older_one() -> None:
         [learned] = [fact for fact in seat.core.heard if isinstance(fact, Learned)]
         assert [snapshot.writer for snapshot in learned.snapshots] == ["u2"]
         assert seat.shell.dropped == {"wrongly signed": 1}
+
+    shown(scenario)
+
+
+def test_of_an_answer_full_of_forged_registers_most_are_not_even_looked_at() -> None:
+    """Each would cost a check of its signature."""
+    forged, more = RING.seal("u1").wrap(encode(OWN)), 700
+
+    async def scenario(seat: Sealed) -> None:
+        seat.other.serve(KEYS.state("u1"))
+        seat.shell._carry_out(Ask())
+        questions: list[Query] = []
+        while not questions:
+            await seat.other.inbox.wait()
+            questions += [e for e in seat.other.inbox.take() if isinstance(e, Query)]
+        [query] = questions
+        question = decode_question(query.payload, RING.seal("u1"))
+        registers = [RING.seal("u1").wrap(encode(CLAIM))] + [forged] * (MOST_REFUSED + more)
+        said = msgpack.packb([SCHEMA_VERSION, MISSION, "u1", 1, 7.0, registers])
+        query.reply(RING.seal("u1").wrap(said, ANSWER + question.bond))
+        await until(lambda: any(isinstance(f, Learned) for f in seat.core.heard), "the answer")
+
+        [learned] = [fact for fact in seat.core.heard if isinstance(fact, Learned)]
+        assert learned.snapshots == (Snapshot(MISSION, "u1", 1, 7.0, (CLAIM,)),)
+        assert seat.shell.dropped == {
+            "not the signer's to say": MOST_REFUSED + 1,
+            UNREAD: more - 1,
+        }
 
     shown(scenario)
 

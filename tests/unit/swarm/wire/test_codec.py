@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
@@ -481,6 +482,37 @@ def test_truncated_snapshots_are_malformed(data: st.DataObject) -> None:
     length = data.draw(st.integers(0, len(whole) - 1))
 
     assert snapshot_drop_reason(whole[:length]) == "malformed"
+
+
+def test_the_largest_fleets_with_the_shortest_names_come_through_whole() -> None:
+    """Though their messages have many small parts for their size."""
+    names = [f"u{number}" for number in range(1000)]
+    order = replace(epoch(*names), routes=dict.fromkeys(names, ()))
+    said = [message(COORDINATOR, order), message(COORDINATOR, brief(*(uav(n) for n in names)))]
+    said += [message(name, held("t", 0.0)) for name in names]
+    said += [message(name, done(f"t{task}")) for name in names for task in range(5)]
+    snapshot = Snapshot(MISSION, "u0", 1, 1.0, tuple(said))
+
+    assert Codec(MISSION).decode_snapshot(STATE_KEY, encode(snapshot)) == snapshot
+
+
+@pytest.mark.parametrize("part", [b"\x80", b"\x81\x00\x00", b"\x91\x00"])
+def test_few_bytes_cannot_fill_the_memory(part: bytes) -> None:
+    head = encode(Snapshot(MISSION, "u0", 1, 1.0, ()))
+    assert head.endswith(b"\x90")
+    count = (SNAPSHOT_LIMIT_BYTES - 100) // len(part)
+    hostile = head[:-1] + b"\xdd" + count.to_bytes(4, "big") + part * count
+    codec = Codec(MISSION)
+
+    tracemalloc.start()
+    try:
+        assert codec.decode_snapshot(STATE_KEY, hostile) is None
+        _, peak_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+    assert codec.dropped == {"malformed": 1}
+    assert peak_bytes < 40 * SNAPSHOT_LIMIT_BYTES
 
 
 @settings(max_examples=300)

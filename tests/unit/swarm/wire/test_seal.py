@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import msgpack
@@ -217,6 +218,24 @@ def test_an_answer_repeats_others_in_their_own_envelopes() -> None:
 
     assert heard == Snapshot(MISSION, "u0", 1, 1.0, (CLAIM, theirs))
     assert [said.envelope is not None for said in heard.messages] == [True, True]
+
+
+def test_of_an_answer_only_envelopes_and_a_roster_are_unpacked() -> None:
+    """A member of the fleet must not fill the others' memory either."""
+    head = encode(Snapshot(MISSION, "u0", 1, 1.0, ()))
+    count = 4_000_000
+    said = head[:-1] + b"\xdd" + count.to_bytes(4, "big") + b"\x80" * count
+    codec, hostile = Codec(MISSION, KEYS.seal("u1")), KEYS.seal("u0").wrap(said, ANSWER + NONCE)
+
+    tracemalloc.start()
+    try:
+        assert codec.decode_snapshot(STATE, hostile, NONCE) is None
+        _, peak_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+    assert codec.dropped == {"malformed": 1}
+    assert peak_bytes < 10 * len(hostile)
 
 
 def test_an_answer_counts_for_its_question_alone() -> None:
