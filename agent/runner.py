@@ -220,7 +220,7 @@ async def run_agent(
         save=keep,
         answer_s=answer_s,
     )
-    core.dropped = shell.dropped
+    core.dropped = _Dropped(shell)
     take_seat(bus, mission, core.uav, status=False)
     flying, leaving = loop.create_task(shell.run()), loop.create_task(farewell())
     try:

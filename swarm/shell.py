@@ -164,7 +164,8 @@ class Shell(Generic[E, A]):
 
     @property
     def dropped(self) -> Mapping[str, int]:
-        """Messages dropped so far, by reason; goes on counting."""
+        """Messages dropped so far, by reason."""
+        self._count()
         return self._codec.dropped
 
     async def run(self) -> int:

@@ -132,15 +132,16 @@ class Inbox:
         """What is not to be taken in at all; asked by whichever thread brings an event, one at
         a time. None to take everything."""
 
-    def offer_threadsafe(self, event: BusEvent, *, latest: bool = False) -> None:
-        """Hand ``event`` over from a foreign thread; returns at once.
+    def offer_threadsafe(self, event: BusEvent, *, latest: bool = False) -> bool:
+        """Hand ``event`` over from a foreign thread; returns at once, whether it was let in.
 
         A loop that has ended takes nothing any more: the event is forgotten.
         """
         with self._lock:
-            self._put(event, latest)
+            if not self._put(event, latest):
+                return False
             if self._waking:
-                return
+                return True
             self._waking = True
         try:
             self._loop.call_soon_threadsafe(self._ready.set)
@@ -150,11 +151,14 @@ class Inbox:
                 self._events.clear()
                 self._latest.clear()
                 self._waking = False
+            return False
+        return True
 
     def offer(self, event: BusEvent, latest: bool = False) -> None:
         """Hand ``event`` over from the loop's own thread."""
         with self._lock:
-            self._put(event, latest)
+            if not self._put(event, latest):
+                return
             self._waking = True
         self._ready.set()
 
@@ -175,16 +179,16 @@ class Inbox:
         """
         await self._ready.wait()
 
-    def _put(self, event: BusEvent, latest: bool) -> None:
-        """Append under the lock, making room if there is none."""
+    def _put(self, event: BusEvent, latest: bool) -> bool:
+        """Append under the lock, making room if there is none; False if it is not let in."""
         if self.admits is not None and not self.admits(event):
-            return
+            return False
         if latest and isinstance(event, Sample):
             if event.key not in self._latest and len(self._latest) >= self._capacity:
                 del self._latest[next(iter(self._latest))]
                 self.dropped += 1
             self._latest[event.key] = event
-            return
+            return True
         if len(self._events) >= self._capacity:
             for place, old in enumerate(self._events):
                 if isinstance(old, Sample | Query):
@@ -194,6 +198,7 @@ class Inbox:
                 self._events.popleft()
             self.dropped += 1
         self._events.append(event)
+        return True
 
 
 def check_payload(payload: bytes) -> bytes:

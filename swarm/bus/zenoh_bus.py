@@ -395,11 +395,13 @@ class ZenohBus:
 
     def _on_query(self, key: str, query: zenoh.Query) -> None:
         reply = _Reply(query, key, self._writer)
+        payload = b"" if query.payload is None else query.payload.to_bytes()
+        if not self._inbox.offer_threadsafe(Query(key, reply, payload)):
+            reply.drop()
+            return
         given_up = weakref.WeakMethod(reply.drop)
         self._hand_over(lambda: self._loop.call_later(REPLY_WITHIN_S, _call_if_alive, given_up))
         self._hand_over(partial(self._replies.add, reply))
-        payload = b"" if query.payload is None else query.payload.to_bytes()
-        self._inbox.offer_threadsafe(Query(key, reply, payload))
 
     def _hand_over(self, call: Callable[[], object]) -> None:
         """Make a call on the loop's thread; an ended loop needs it no more."""
