@@ -18,6 +18,7 @@ from swarm.errors import Fault, InputError
 from swarm.events import BusFact, Wish
 from swarm.model.ids import ID_RULE, valid_id
 from swarm.shell import Core, Shell, take_seat
+from swarm.terminal import say
 
 __all__ = ["check_mission", "joined", "onlooking"]
 
@@ -48,7 +49,7 @@ async def joined(
         SwarmError: there is no mission.
         InputError: none is named, and there are several.
     """
-    bus = await open_zenoh_bus(config, timeout_s=patience_s)
+    bus = await open_zenoh_bus(config, timeout_s=patience_s, on_wait=say)
     try:
         yield mission or config.mission or await only_mission(bus, patience_s), bus
     finally:

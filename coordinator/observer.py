@@ -79,6 +79,8 @@ _LEAVING = {StatusPhase.OUT: "gave its vehicle up", StatusPhase.RETURNING: "goes
 """Parts of an agent's life in which it takes no tasks any more, in words."""
 
 
+NAMES_TOLD = 5
+"""Of those whose keys have changed."""
 CHOICES_KEPT = 2000
 """What an onlooker remembers of why tasks were taken."""
 
@@ -209,7 +211,7 @@ class Observer:
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
             case KeysReplaced(names):
-                self._disown(names)
+                self._disown(names, now_s)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
                 if up or self.cut_since_s is None:
@@ -414,8 +416,10 @@ class Observer:
             self._left.add(uav)
             self._tell(f"{uav} {_LEAVING[status.phase]}: {status.note}", now_s)
 
-    def _disown(self, names: Collection[str]) -> None:
+    def _disown(self, names: Collection[str], now_s: float) -> None:
         """What has been heard under those names is no measure of what is said from now on."""
+        told = ", ".join(sorted(names)[:NAMES_TOLD]) + (", …" if len(names) > NAMES_TOLD else "")
+        self._tell(f"keys revoked or replaced: {told}", now_s)
         self.replica.disown(names)
         for uav in self._stamps.keys() & names:
             self._stamps[uav] = LOWEST

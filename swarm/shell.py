@@ -231,7 +231,9 @@ class Shell(Generic[E, A]):
                 news = seal.put_in_force(message.body.signed)
             except OSError as fault:
                 news, reason = True, fault.strerror or str(fault)
-                self._log.warning("cannot keep the newer roster", reason=reason)
+                self._log.warning(
+                    "cannot keep the newer roster", reason=reason, file=fault.filename
+                )
             if not news:
                 continue
             replaced = seal.roster.replaced_since(before)

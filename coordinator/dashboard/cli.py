@@ -127,13 +127,15 @@ def dashboard(
 
     configure_logging(log_level, log_format)
     network = seat.network
-    config = seat.config(mission=mission)
+    config = seat.config(mission=mission, roles=(Role.VIEWER, Role.OPERATOR, Role.COORDINATOR))
     check_mission(mission)
     token = read_token(token_file, os.environ)
     access, made = access_for(host, allow_host or (), token)
     display = _display(access.token is not None, tiles, tiles_credit)
     if check:
-        return 0
+        from swarm.terminal import checked
+
+        return checked()
     taken = take_port(host, port)
     url = url_of(host, taken.getsockname()[1])
     if json:

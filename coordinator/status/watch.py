@@ -13,7 +13,7 @@ from typing import Protocol
 from coordinator.joining import onlooking
 from coordinator.observer import Observer
 from coordinator.status.onlooker import Onlooker, only_mission
-from swarm.bus.config import BusConfig, ClientTopology
+from swarm.bus.config import BusConfig
 from swarm.bus.port import Bus
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.clock import ScaledClock
@@ -70,7 +70,7 @@ async def watch(
         InputError: none is named, and there are several.
     """
     limit_s = FOREVER_S if patience_s is None else patience_s
-    shows.wait(f"waiting for {_place(config)}")
+    shows.wait(f"waiting for {config.place}")
     bus = await open_zenoh_bus(config, timeout_s=limit_s)
     try:
         shows.wait(f"waiting for {'a mission' if mission is None else f'mission {mission}'}")
@@ -137,10 +137,3 @@ async def _ends(looking: asyncio.Task[int], within_s: float) -> bool:
     """Whether the shell ends in that time, which it does only by a fault; raises that."""
     await asyncio.wait({looking}, timeout=within_s)
     return looking.done() and looking.result() is not None
-
-
-def _place(config: BusConfig) -> str:
-    """What is waited for before there is a bus."""
-    if isinstance(config.topology, ClientTopology):
-        return f"a router at {' or '.join(config.topology.routers)}"
-    return "the bus"

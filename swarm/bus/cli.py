@@ -103,7 +103,9 @@ def router(
             Fault("swarm router", "", problem, remedy or "see 'swarm router --help'")
         ) from None
     if check:
-        return 0
+        from swarm.terminal import checked
+
+        return checked()
     return asyncio.run(run_until_stopped(_serve(settings, quiet=json), lifeline=lifeline))
 
 

@@ -114,6 +114,13 @@ class BusConfig:
         return None if self.identity is None else self.identity.mission
 
     @property
+    def place(self) -> str:
+        """Where the bus is, for who waits for it."""
+        if isinstance(self.topology, ClientTopology):
+            return f"a router at {' or '.join(self.topology.routers)}"
+        return "the bus"
+
+    @property
     def endpoints(self) -> tuple[str, ...]:
         """Those that it listens on and dials; none that a file alone names."""
         match self.topology:

@@ -60,6 +60,8 @@ MOST_ANSWERS = 8
 as long as a bus carries."""
 FLUSH_LIMIT_S = 0.7
 """How long closing waits for what is published; a blocked link gives up after 0.5 s."""
+WORD_AFTER_S = 1.5
+"""Who waits for a bus is told for what, once it has taken so long."""
 LOOK_GAP_S = 0.005
 """Shortest interval between two looks at the links [wall s]."""
 CLOSE_LIMIT_S = 1.2
@@ -67,7 +69,11 @@ CLOSE_LIMIT_S = 1.2
 
 
 async def open_zenoh_bus(
-    config: BusConfig, *, timeout_s: float = 10.0, inbox_capacity: int = 4096
+    config: BusConfig,
+    *,
+    timeout_s: float = 10.0,
+    inbox_capacity: int = 4096,
+    on_wait: Callable[[str], object] | None = None,
 ) -> ZenohBus:
     """Take a seat on the bus, for the running loop.
 
@@ -78,13 +84,23 @@ async def open_zenoh_bus(
         config: how to reach the others.
         timeout_s: how long to try.
         inbox_capacity: events kept for a slow reader.
+        on_wait: told once what is waited for, when it takes longer than a person expects.
 
     Raises:
         BusError: the bus cannot be reached in time, or the own endpoint is taken.
         InputError: the user's configuration file is wrong.
     """
-    session = await _open(config, timeout_s)
-    inbox = Inbox(asyncio.get_running_loop(), inbox_capacity)
+    loop = asyncio.get_running_loop()
+    word = None
+    if on_wait is not None:
+        text = f"waiting for {config.place}, up to {timeout_s:g} s"
+        word = loop.call_later(WORD_AFTER_S, on_wait, text)
+    try:
+        session = await _open(config, timeout_s)
+    finally:
+        if word is not None:
+            word.cancel()
+    inbox = Inbox(loop, inbox_capacity)
     return ZenohBus(session, inbox, seal_of(config.identity))
 
 

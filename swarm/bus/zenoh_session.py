@@ -168,10 +168,15 @@ def close_session(session: zenoh.Session, *, limit_s: float) -> bool:
     return True
 
 
+_TAKEN = re.compile(r"listener bound to (\S+?): .*Address already in use")
+
+
 def plain_error(fault: zenoh.ZError) -> str:
     """What went wrong, without the places in Zenoh's sources and its types."""
     text = re.sub(r"\s+at /\S+?\.rs:\d+\.?", "", str(fault)).strip()
     text = re.sub(r"\bSingle\(([^()]*)\)", r"\1", text)
+    if (taken := _TAKEN.search(text)) is not None:
+        return f"{taken[1]} is already in use by another process"
     return re.sub(r"to any of \[([^\[\]]*)\]!", r"to \1:", text)
 
 

@@ -320,6 +320,7 @@ def renew(directory: DirectoryArgument, days: DaysOption = None) -> int:
         roster = authority.renew(now_s=unix_s(), days=days)
     _tell_folders(authority, roster.entries)
     print("every folder from before is worthless now: give all machines their new ones")
+    print(f"processes that run from folders in {directory} end: start them anew")
     return 0
 
 

@@ -22,6 +22,7 @@ from swarm.identity.roster import Roster
 from swarm.log import LogLevel, configure_logging
 from swarm.model.ids import COORDINATOR
 from swarm.shell import Shell, take_seat
+from swarm.terminal import say
 
 __all__ = ["CONFIRM_S", "CONNECT_S", "publish"]
 
@@ -62,7 +63,7 @@ def publish(config: BusConfig, change: Callable[[], bytes]) -> list[str]:
 
 
 async def _tell(config: BusConfig, change: Callable[[], bytes]) -> Herald:
-    bus = await open_zenoh_bus(config, timeout_s=CONNECT_S)
+    bus = await open_zenoh_bus(config, timeout_s=CONNECT_S, on_wait=say)
     try:
         identity, seal = config.identity, bus.seal
         if identity is None or seal is None:

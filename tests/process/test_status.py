@@ -117,6 +117,17 @@ def test_no_bus_at_all_is_told_in_one_line() -> None:
     assert len(told.stderr.splitlines()) == 1
 
 
+def test_who_waits_for_a_bus_is_told_for_what() -> None:
+    (endpoint,) = free_loopback_endpoints(1, np.random.default_rng())
+
+    told = status("--connect", endpoint, "--timeout-s", "2.5")
+
+    assert told.returncode == 1
+    waits, fails = told.stderr.splitlines()
+    assert waits == f"swarm: waiting for a router at {endpoint}, up to 2.5 s"
+    assert fails.startswith("swarm: cannot reach the bus within 2.5 s")
+
+
 def test_a_mission_that_can_have_no_keys_is_refused() -> None:
     told = status("--mission", "a/b")
 

@@ -14,6 +14,7 @@ from swarm.events import (
     Ask,
     BusFact,
     Heard,
+    KeysReplaced,
     Learned,
     LinkChanged,
     PeerGone,
@@ -23,7 +24,15 @@ from swarm.events import (
 )
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Body, EpochPhase, Message, Snapshot, StatusPhase
+from swarm.wire.messages import (
+    MAX_COUNT,
+    Body,
+    EpochPhase,
+    Message,
+    Snapshot,
+    Stamp,
+    StatusPhase,
+)
 from tests.builders import (
     IDLE,
     MISSION,
@@ -287,6 +296,29 @@ def test_the_newest_status_is_the_one_said_last_and_not_the_one_heard_last() -> 
     for said, east_m in ((newer, 2.0), (older, 2.0), (reborn, 3.0), (newer, 3.0)):
         onlooker.happen(Heard(said))
         assert onlooker.observer.statuses["u0"].position_enu_m == (east_m, 0.0, 0.0)
+
+
+def test_who_has_new_keys_is_heard_whatever_stamps_the_old_ones_bore() -> None:
+    onlooker = Onlooker().running()
+    largest, honest = Stamp(MAX_COUNT, MAX_COUNT), status(position_enu_m=(2.0, 0.0, 0.0))
+    onlooker.happen(Heard(Message(MISSION, "u0", largest, status(position_enu_m=(1.0, 0.0, 0.0)))))
+    onlooker.happen(Heard(Message(MISSION, COORDINATOR, largest, epoch("u0"))))
+
+    onlooker.happen(KeysReplaced(frozenset({"u0", COORDINATOR})))
+    onlooker.happen(Heard(message("u0", honest, 1)))
+    onlooker.happen(Heard(message(COORDINATOR, epoch("u1", "u0", number=2), 2)))
+
+    assert onlooker.observer.statuses["u0"] == honest
+    assert onlooker.observer.replica.epoch is not None
+    assert onlooker.observer.replica.epoch.number == 2
+    assert "keys revoked or replaced: coordinator, u0" in onlooker.story
+
+
+def test_of_many_new_keys_a_few_are_named() -> None:
+    onlooker = Onlooker().running()
+    onlooker.happen(KeysReplaced(frozenset(f"u{number}" for number in range(9))))
+
+    assert onlooker.story[-1] == "keys revoked or replaced: u0, u1, u2, u3, u4, …"
 
 
 def test_what_agents_dropped_is_added_up_over_their_lives() -> None:

@@ -124,7 +124,9 @@ def test_renew_issues_everything_anew(keys: Path, capsys: pytest.CaptureFixture[
 
     assert open_authority(keys).roster.series != series
     assert load_identity(keys / "uav1").generation == 2
-    assert "give all machines their new ones" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "give all machines their new ones" in told
+    assert f"processes that run from folders in {keys} end: start them anew" in told
 
 
 def test_list_shows_everyone_and_warns_of_what_ends(
