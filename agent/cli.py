@@ -206,9 +206,7 @@ def agent(
     own_system_id, own_component_id = _ground_ids(ground_id)
     key = None if signing_key is None else load_signing_key(signing_key)
     if check:
-        from swarm.terminal import checked
-
-        return checked()
+        return 0
     log = get_logger(uav)
     if config.identity is not None and key is None:
         path = config.identity.mavlink_key_path

@@ -336,9 +336,7 @@ def coordinator(
     place = None if dashboard is None else parse_place(dashboard, must_be_free=False)
     page = page_beside(place, mission.name, seat, speedup=speedup)
     if check:
-        from swarm.terminal import checked
-
-        return checked()
+        return 0
     for line in () if place is None else place.lines:
         print(line, file=sys.stderr)
     store = None if state is None else Store(state, mission.name, COORDINATOR, speedup=speedup)

@@ -30,10 +30,12 @@ import typer.main
 import swarm
 from swarm.errors import Fault, InputError, SwarmError
 from swarm.help import Panels, explain_family, help_text
+from swarm.terminal import say
 
 __all__ = ["COMMAND_GROUP", "check", "console_main", "main"]
 
 COMMAND_GROUP = "peckorder.commands"
+_CHECK = "--check"
 _COMPLETE = "_SWARM_COMPLETE"
 """Environment variable by which shells, and the library, ask for completions."""
 _DONE, _FAILED, _WRONG_USAGE, _INTERRUPTED = 0, 1, 2, 130
@@ -64,6 +66,8 @@ def main(
     stdout = sys.stdout
     try:
         status = _run(arguments, found)
+        if status == _DONE and _CHECK in arguments:
+            say("these options are right")
     except InputError as error:
         _complain(str(error))
         status = _WRONG_USAGE
@@ -105,7 +109,7 @@ def check(arguments: Sequence[str]) -> Mapping[str, Any]:
         parameters = dict(command.make_context(f"swarm {name}", list(words)).params)
     except typer.TyperException as error:
         raise InputError(_usage_fault(error, name)) from error
-    _run([name, *words, "--check"], commands)
+    _run([name, *words, _CHECK], commands)
     return parameters
 
 

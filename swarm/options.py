@@ -125,7 +125,7 @@ CheckOption = Annotated[
     bool,
     typer.Option("--check", help="Only see whether these options are right, keys included."),
 ]
-"""Where the process would begin to touch anything, leave with `checked`."""
+"""Leave with status 0 where the process would begin to touch anything."""
 
 LifelineOption = Annotated[bool, typer.Option("--lifeline", hidden=True)]
 """End when standard input does: the parent process holds its other end."""

@@ -133,9 +133,7 @@ def dashboard(
     access, made = access_for(host, allow_host or (), token)
     display = _display(access.token is not None, tiles, tiles_credit)
     if check:
-        from swarm.terminal import checked
-
-        return checked()
+        return 0
     taken = take_port(host, port)
     url = url_of(host, taken.getsockname()[1])
     if json:
