@@ -71,25 +71,27 @@ class Rosters:
         kept = (each for each in self.roster.entries if each.common_name not in self._shut_out)
         return replace(self.roster, entries=tuple(kept))
 
-    def is_flood(self, uav: str, now_s: float) -> bool:
-        """Count one saying of a UAV's; whether there were too many of late.
+    def flooding(self, name: str, now_s: float) -> str | None:
+        """Count one saying; who says too much of late, by the present keys of that name.
 
-        May be called on any thread.
+        A UAV alone: the coordinator's token is that of several machines. May be called on any
+        thread.
         """
-        return not self._heard.allows(uav, now_s)
+        entry = self.roster.entry(name)
+        if entry is None or entry.role is not Role.UAV:
+            return None
+        return None if self._heard.allows(entry.common_name, now_s) else entry.common_name
 
-    def shut_out(self, uav: str) -> None:
-        """Let a UAV's present keys in no more, for as long as this process lives.
-
-        A UAV's alone: the coordinator's token is that of several machines.
-        """
-        entry = self.roster.entry(uav)
-        if entry is None or entry.role is not Role.UAV or entry.common_name in self._shut_out:
+    def shut_out(self, common_name: str) -> None:
+        """Let those keys in no more, for as long as this process lives."""
+        in_force = any(each.common_name == common_name for each in self.roster.entries)
+        if not in_force or common_name in self._shut_out:
             return
-        self._shut_out.add(entry.common_name)
+        self._shut_out.add(common_name)
         self._changed.set()
         self._log.error(
-            f"{uav} floods the bus and is shut out; give it new keys, or start this router anew",
+            f"{common_name} floods the bus and is shut out; give it new keys, or start this "
+            "router anew",
             limit_hz=FLOOD_HZ,
         )
 

@@ -93,9 +93,10 @@ class Router:
 
         def on_saying(sample: zenoh.Sample) -> None:
             _, _, _, *rest = str(sample.key_expr).split("/", 4)
-            if rest and rosters.is_flood(uav := rest[0], loop.time()):
+            flooder = rosters.flooding(rest[0], loop.time()) if rest else None
+            if flooder is not None:
                 with contextlib.suppress(RuntimeError):
-                    loop.call_soon_threadsafe(rosters.shut_out, uav)
+                    loop.call_soon_threadsafe(rosters.shut_out, flooder)
 
         def listen(key_expr: str, on_sample: Callable[[zenoh.Sample], None]) -> None:
             call = Callback(on_sample, indirect=False)
