@@ -1,17 +1,15 @@
 """The asyncio shell that all processes on the bus share: it runs one pure core.
 
 It decodes what the bus brings, steps the core, publishes what the core says,
-answers queries with the core's snapshot and ticks at the core's deadlines. A question
-goes out with a digest of what the core knows, and the answer leaves that out. On a bus
+answers queries with the core's snapshot and ticks at the core's deadlines. On a bus
 with keys it says and believes only what is signed, and puts newer rosters in force.
-Leaves out: what only one kind of process does (agent.runner, coordinator.daemon,
-sim.launch), through `Shell.execute`.
+Leaves out: asking and answering (swarm.questions), and what only one kind of process does
+(agent.runner, coordinator.daemon, sim.launch), through `Shell.execute`.
 """
 
 from __future__ import annotations
 
 import asyncio
-import secrets
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -19,7 +17,6 @@ from typing import Generic, Protocol, TypeVar
 
 from swarm import __version__
 from swarm.bus.port import (
-    Answer,
     Bus,
     BusEvent,
     LinkDown,
@@ -48,35 +45,24 @@ from swarm.events import (
     Stop,
     Tick,
 )
-from swarm.limits import TOO_MANY, Asked, Gate
+from swarm.limits import TOO_MANY, Gate
 from swarm.log import get_logger
 from swarm.model.ids import AUTHORITY
+from swarm.questions import Questions, draw_nonce
 from swarm.wire.codec import Codec
-from swarm.wire.digest import unknown
 from swarm.wire.keys import Keys
 from swarm.wire.messages import Choice, Message, SignedRoster, Snapshot, Stamp, Status
-from swarm.wire.question import NONCE_BYTES, bond, decode_question, encode_question
-from swarm.wire.seal import Seal, UnacceptableError
+from swarm.wire.seal import Seal
 
 __all__ = ["Core", "Shell", "take_seat"]
 
 TURN = 20
 """Events from the bus between two looks at everything else."""
-MOST_REFUSED = 500
-"""Registers of one answer that may be worth nothing; what follows then is not looked at. An honest
-process repeats only what it believes itself, by a roster that is seldom another."""
-UNREAD = "not read, after so many bad ones"
-"""Reason under which is counted what an answer holds besides."""
 
 E_contra = TypeVar("E_contra", contravariant=True)
 A_co = TypeVar("A_co", covariant=True)
 E = TypeVar("E")
 A = TypeVar("A")
-
-
-def draw_nonce() -> bytes:
-    """A nonce that nobody can guess."""
-    return secrets.token_bytes(NONCE_BYTES)
 
 
 class Core(Protocol[E_contra, A_co]):
@@ -137,20 +123,25 @@ class Shell(Generic[E, A]):
         self._clock = clock
         self._mission = mission
         self._keys = Keys(mission)
-        self._name = name
         self._seal = bus.seal
-        self._draw_nonce = draw_nonce
         self._codec = Codec(mission, bus.seal)
         self._gate = Gate(self._keys, bus.seal, clock.now_s)
-        self._asked = Asked(clock.now_s)
         bus.inbox.admits = self._gate.admits
         self._log = get_logger(name, mission=mission)
+        self._questions = Questions(
+            bus,
+            clock,
+            self._codec,
+            mission=mission,
+            name=name,
+            snapshot=snapshot,
+            known=known,
+            answer_s=answer_s,
+            draw_nonce=draw_nonce,
+        )
         self._from_bus = from_bus
         self._execute = execute
-        self._snapshot = snapshot
-        self._known = known
         self._save = save
-        self._answer_s = answer_s
         self._context = context
         self._loop = asyncio.get_running_loop()
         self._done: asyncio.Future[int] = self._loop.create_future()
@@ -350,70 +341,20 @@ class Shell(Generic[E, A]):
             case LinkDown():
                 return LinkChanged(False)
             case Query(reply=reply, payload=payload):
-                self._answer(reply, payload)
+                self._questions.answer(reply, payload)
                 return None
 
-    def _answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
-        if self._snapshot is None:
-            return
-        try:
-            question = decode_question(payload, self._seal)
-        except UnacceptableError as fault:
-            self._codec.dropped[fault.reason] += 1
-            return
-        reason = self._asked.fault(question)
-        if reason is not None:
-            self._codec.dropped[reason] += 1
-            return
-        whole = self._snapshot(self._clock.now_s())
-        news = replace(whole, messages=unknown(whole.messages, self._known(), question.known))
-        answer, left_out = self._codec.pack_answer(news, question.bond)
-        if left_out:
-            self._log.warning("an answer has no room for all registers", left_out=left_out)
-        reply(answer)
-
     async def _ask(self) -> None:
-        asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
-        # What is said in the own name is always told: by who remembers an earlier life, or a twin.
-        known = {writer: number for writer, number in self._known().items() if writer != self._name}
-        nonce = self._draw_nonce()
-        question = encode_question(known, nonce, self._seal)
-        expected = bond(None if self._seal is None else self._seal.name, nonce)
-        answers = await self._bus.query(self._keys.state("*"), question, timeout_s=self._answer_s)
-        read = [(await self._read(answer, expected), answer.arrived_s) for answer in answers]
-        now_s, wall_s = self._clock.now_s(), self._loop.time()
-        pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
-        snapshots = []
-        for snapshot, arrived_s in read:
-            if snapshot is not None:
-                self._heed(snapshot.messages, answers=True)
-                snapshots.append(_aged(snapshot, pace * (wall_s - arrived_s)))
-        self.step(self._from_bus(Learned(tuple(snapshots))))
-
-    async def _read(self, answer: Answer, expected: bytes) -> Snapshot | None:
-        """What is in an answer, as far as it is to be believed."""
-        opened = self._codec.open_answer(answer.key, answer.payload, expected)
-        if opened is None:
-            return None
-        snapshot, registers = opened
-        messages = []
-        for number, register in enumerate(registers, 1):
-            message = self._codec.decode_register(register)
-            if message is not None:
-                messages.append(message)
-            elif number - len(messages) > MOST_REFUSED:
-                self._codec.dropped[UNREAD] += len(registers) - number
-                break
-            if number % TURN == 0:
-                await asyncio.sleep(0)
-        return replace(snapshot, messages=tuple(messages))
-
-
-def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:
-    """``snapshot`` with the mission time to which its own has grown meanwhile."""
-    if snapshot.mission_s is None:
-        return snapshot
-    return replace(snapshot, mission_s=snapshot.mission_s + age_s)
+        before = None if self._seal is None else self._seal.roster
+        snapshots = await self._questions.ask()
+        for snapshot in snapshots:
+            self._heed(snapshot.messages, answers=True)
+        if self._seal is not None and self._seal.roster is not before:  # meanwhile, or by them
+            snapshots = tuple(
+                replace(each, messages=self._codec.by_present_keys(each.messages))
+                for each in snapshots
+            )
+        self.step(self._from_bus(Learned(snapshots)))
 
 
 def take_seat(

@@ -17,7 +17,7 @@ makes `SCHEMA_VERSION` grow, and then neither release hears the other.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Final
@@ -223,6 +223,18 @@ class Codec:
             self.dropped[fault.reason] += 1
             return None
 
+    def by_present_keys(self, messages: Iterable[Message]) -> tuple[Message, ...]:
+        """``messages``, believed by an older roster: those no longer signed well `disowned`."""
+        return tuple(
+            disowned(message)
+            if message.envelope is not None and not self._is_genuine(message.envelope)
+            else message
+            for message in messages
+        )
+
+    def _is_genuine(self, envelope: bytes) -> bool:
+        return self._seal is None or self._seal.is_genuine(envelope)
+
     def _may_speak(self, signer: str, writer: str) -> bool:
         return self._seal is not None and self._seal.may_speak_for(signer, writer)
 
@@ -295,8 +307,7 @@ class Codec:
         if envelope is None:
             raise UnacceptableError("malformed")
         message = as_heard(self._message(_unpack(envelope.said)), envelope.said, register)
-        genuine = self._seal is None or self._seal.is_genuine(register)
-        return message if genuine else disowned(message)
+        return message if self._is_genuine(register) else disowned(message)
 
     # -- parts ----------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgpack
 
@@ -25,7 +25,8 @@ from swarm.events import (
     Wish,
 )
 from swarm.model.ids import AUTHORITY, COORDINATOR
-from swarm.shell import MOST_REFUSED, UNREAD, Shell, take_seat
+from swarm.questions import MOST_REFUSED, UNREAD
+from swarm.shell import Shell, take_seat
 from swarm.wire.codec import Codec, encode
 from swarm.wire.keys import Keys
 from swarm.wire.messages import SCHEMA_VERSION, Message, SignedRoster, Snapshot, Stamp
@@ -205,6 +206,33 @@ def test_of_an_answer_full_of_forged_registers_most_are_not_even_looked_at() -> 
             "not the signer's to say": MOST_REFUSED + 1,
             UNREAD: more - 1,
         }
+
+    shown(scenario)
+
+
+def test_what_old_keys_have_signed_counts_least_in_an_answer_that_brings_the_new_ones() -> None:
+    roster = newer("u1")
+
+    async def scenario(seat: Sealed) -> None:
+        seat.other.serve(KEYS.state("u2"))
+        seat.shell._carry_out(Ask())
+        questions: list[Query] = []
+        while not questions:
+            await seat.other.inbox.wait()
+            questions += [e for e in seat.other.inbox.take() if isinstance(e, Query)]
+        [query] = questions
+        question = decode_question(query.payload, RING.seal("u2"))
+        by_old_keys = RING.seal("u1").wrap(encode(CLAIM))
+        registers = [by_old_keys, msgpack.unpackb(encode(roster))]
+        said = msgpack.packb([SCHEMA_VERSION, MISSION, "u2", 1, 7.0, registers])
+        query.reply(RING.seal("u2").wrap(said, ANSWER + question.bond))
+        await until(lambda: any(isinstance(f, Learned) for f in seat.core.heard), "the answer")
+
+        [learned] = [fact for fact in seat.core.heard if isinstance(fact, Learned)]
+        assert learned.snapshots[0].messages == (replace(CLAIM, stamp=Stamp(0, 0)), roster)
+        assert seat.core.heard.index(KeysReplaced(frozenset({"u1"}))) < (
+            seat.core.heard.index(learned)
+        )
 
     shown(scenario)
 

@@ -554,7 +554,7 @@ def test_a_bug_anywhere_ends_the_run_with_it(where: str, monkeypatch: pytest.Mon
 
         async with at_work(core, execute=execute) as played:
             if where == "snapshot":
-                monkeypatch.setattr(played.shell, "_snapshot", raise_own)
+                monkeypatch.setattr(played.shell._questions, "_snapshot", raise_own)
                 await played.other.query(KEYS.state("*"), timeout_s=0.01)
             with pytest.raises(OwnError):
                 await played.running

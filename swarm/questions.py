@@ -1,0 +1,146 @@
+"""How one process asks the others what they know, and answers when they ask.
+
+A question goes out with a digest of what is known here, and the answer leaves that out. Where
+the bus has keys both are signed, and an answer counts for its question alone. Leaves out: when
+to ask, and what follows from the answers (the cores, by swarm.shell).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Final
+
+from swarm.bus.port import Answer, Bus
+from swarm.clock import Clock
+from swarm.limits import Asked
+from swarm.log import get_logger
+from swarm.wire.codec import Codec
+from swarm.wire.digest import unknown
+from swarm.wire.keys import Keys
+from swarm.wire.messages import Snapshot
+from swarm.wire.question import NONCE_BYTES, bond, decode_question, encode_question
+from swarm.wire.seal import UnacceptableError
+
+__all__ = ["MOST_REFUSED", "UNREAD", "Questions", "draw_nonce"]
+
+TURN: Final = 20
+"""Registers of an answer between two looks at everything else."""
+MOST_REFUSED: Final = 500
+"""Registers of one answer that may be worth nothing; what follows then is not looked at. An honest
+process repeats only what it believes itself, by a roster that is seldom another."""
+UNREAD: Final = "not read, after so many bad ones"
+"""Reason under which is counted what an answer holds besides."""
+
+
+def draw_nonce() -> bytes:
+    """A nonce that nobody can guess."""
+    return secrets.token_bytes(NONCE_BYTES)
+
+
+class Questions:
+    """Asks and answers for one process.
+
+    Args:
+        bus: open.
+        clock: gives ``now_s``.
+        codec: of the process; counts what is worth nothing.
+        mission: mission name.
+        name: writer id of this process.
+        snapshot: answers; None for a process that gives no answers.
+        known: digest of the registers that are known here.
+        answer_s: how long a question waits for the slowest answer [wall s].
+        draw_nonce: makes the nonce of a question, see swarm.wire.question.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        codec: Codec,
+        *,
+        mission: str,
+        name: str,
+        snapshot: Callable[[float], Snapshot] | None,
+        known: Callable[[], Mapping[str, int]],
+        answer_s: float,
+        draw_nonce: Callable[[], bytes] = draw_nonce,
+    ) -> None:
+        self._bus = bus
+        self._seal = bus.seal
+        self._clock = clock
+        self._codec = codec
+        self._everyone = Keys(mission).state("*")
+        self._name = name
+        self._snapshot = snapshot
+        self._known = known
+        self._answer_s = answer_s
+        self._draw_nonce = draw_nonce
+        self._asked = Asked(clock.now_s)
+        self._log = get_logger(name, mission=mission)
+        self._loop = asyncio.get_running_loop()
+
+    def answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
+        """Answer the question ``payload``, if it is one that has an answer here."""
+        if self._snapshot is None:
+            return
+        try:
+            question = decode_question(payload, self._seal)
+        except UnacceptableError as fault:
+            self._codec.dropped[fault.reason] += 1
+            return
+        reason = self._asked.fault(question)
+        if reason is not None:
+            self._codec.dropped[reason] += 1
+            return
+        whole = self._snapshot(self._clock.now_s())
+        news = replace(whole, messages=unknown(whole.messages, self._known(), question.known))
+        answer, left_out = self._codec.pack_answer(news, question.bond)
+        if left_out:
+            self._log.warning("an answer has no room for all registers", left_out=left_out)
+        reply(answer)
+
+    async def ask(self) -> tuple[Snapshot, ...]:
+        """What the others know besides; their mission times brought to now."""
+        asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
+        # What is said in the own name is always told: by who remembers an earlier life, or a twin.
+        known = {writer: number for writer, number in self._known().items() if writer != self._name}
+        nonce = self._draw_nonce()
+        question = encode_question(known, nonce, self._seal)
+        expected = bond(None if self._seal is None else self._seal.name, nonce)
+        answers = await self._bus.query(self._everyone, question, timeout_s=self._answer_s)
+        read = [(await self._read(answer, expected), answer.arrived_s) for answer in answers]
+        now_s, wall_s = self._clock.now_s(), self._loop.time()
+        pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
+        return tuple(
+            _aged(snapshot, pace * (wall_s - arrived_s))
+            for snapshot, arrived_s in read
+            if snapshot is not None
+        )
+
+    async def _read(self, answer: Answer, expected: bytes) -> Snapshot | None:
+        """What is in an answer, as far as it is to be believed."""
+        opened = self._codec.open_answer(answer.key, answer.payload, expected)
+        if opened is None:
+            return None
+        snapshot, registers = opened
+        messages = []
+        for number, register in enumerate(registers, 1):
+            message = self._codec.decode_register(register)
+            if message is not None:
+                messages.append(message)
+            elif number - len(messages) > MOST_REFUSED:
+                self._codec.dropped[UNREAD] += len(registers) - number
+                break
+            if number % TURN == 0:
+                await asyncio.sleep(0)
+        return replace(snapshot, messages=tuple(messages))
+
+
+def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:
+    """``snapshot`` with the mission time to which its own has grown meanwhile."""
+    if snapshot.mission_s is None:
+        return snapshot
+    return replace(snapshot, mission_s=snapshot.mission_s + age_s)
