@@ -232,7 +232,8 @@ class AgentCore:
             case PeerGone(writer):
                 self._hearing.miss(writer, now_s)
             case KeysReplaced(names):
-                self.replica.disown(names)
+                self._hearing.disown(names)
+                self._recall.disown(names)
             case LinkChanged(up):
                 self._solitude.link(up, now_s)
                 self._actions += self._hearing.link(up, now_s)

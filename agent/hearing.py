@@ -7,7 +7,7 @@ what follows for the vehicle (agent.core), for tasks (agent.tasking).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from statistics import median_high
 
 from agent.events import Action
@@ -19,7 +19,7 @@ from agent.tasking import Tasking
 from swarm.config import Timing
 from swarm.events import Note
 from swarm.model.ids import COORDINATOR
-from swarm.state.registers import Replica
+from swarm.state.registers import Replica, without_signers
 from swarm.wire.messages import Body, Brief, ClaimPhase, Epoch, EpochPhase, Message, Snapshot
 
 __all__ = ["Hearing"]
@@ -65,6 +65,11 @@ class Hearing:
         """Whether somebody was lost, and what it leaves open is not known for sure yet."""
         self._echoes: list[Message] = []
         """Heard in the own name, though this life has not said so."""
+
+    def disown(self, signers: Collection[str]) -> None:
+        """See `Replica.disown`."""
+        self._replica.disown(signers)
+        self._echoes = without_signers(signers, self._echoes)
 
     # -- what is said -----------------------------------------------------------------
 

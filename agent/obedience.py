@@ -26,8 +26,9 @@ class Obedience:
         self._uav = uav
         self._replica = replica
         self._rejoin = rejoin
-        self._heeded: Command | None = None
-        """The very one; its stamp goes when its signer loses its keys, see `Replica.disown`."""
+        self._known: list[Command] = []
+        """All that was there when it was looked last. None of them is ever news again, though the
+        order may turn round when a signer loses its keys: see `Replica.disown`."""
 
     def news(self, *, begins: bool) -> Command | None:
         """The newest command, if it has not been given before; an older one means nothing then.
@@ -37,9 +38,9 @@ class Obedience:
                 an earlier one.
         """
         found = newest(self._replica, self._uav)
-        if found is None or found[1] is self._heeded:
+        known, self._known = self._known, [each for _, each in self._replica.commands.values()]
+        if found is None or any(found[1] is each for each in known):
             return None
         _, command = found
-        self._heeded = command
         overruled = begins and self._rejoin and command.kind is CommandKind.RETURN
         return None if overruled else command

@@ -8,8 +8,10 @@ from it (agent.core) and where it is kept (swarm.store).
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from swarm.config import Timing
-from swarm.state.registers import Replica
+from swarm.state.registers import Replica, snapshot_without
 from swarm.wire.messages import Brief, ClaimPhase, EpochPhase, Snapshot
 
 __all__ = ["Recall"]
@@ -43,6 +45,11 @@ class Recall:
     def begin(self, now_s: float) -> None:
         """The new life begins."""
         self._began_s = now_s
+
+    def disown(self, signers: Collection[str]) -> None:
+        """See `Replica.disown`."""
+        if self._memory is not None:
+            self._memory = snapshot_without(signers, self._memory)
 
     def fitting(self, brief: Brief | None, now_s: float, *, last_chance: bool) -> Snapshot | None:
         """The memory, once it is known to count; given once.

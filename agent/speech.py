@@ -13,7 +13,7 @@ from swarm.events import Publish
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Body, Claim, Message, Outcome, Status
+from swarm.wire.messages import NOBODYS, Body, Claim, Message, Outcome, Status
 
 __all__ = ["Speech"]
 
@@ -69,7 +69,7 @@ class Speech:
 
     def hear_echo(self, message: Message) -> list[Publish]:
         """Learn what others remember of this writer: it must never say less than that."""
-        self._voice.outdo(message.stamp)
+        outdone = self._voice.outdo(message.stamp)
         if isinstance(message.body, Outcome):
             self._replica.join(message)
             return []
@@ -77,7 +77,7 @@ class Speech:
         if said is None:
             return []
         self._replica.stale += message.stamp < said.stamp
-        return [self.say(said.body)] if said.stamp < message.stamp else []
+        return [self.say(said.body)] if outdone and said.stamp < message.stamp else []
 
     def announce(self, now_s: float) -> list[Publish]:
         """Repeat the own registers, so that what got lost on the way arrives after all.
@@ -91,7 +91,10 @@ class Speech:
             self._turn = (self._turn + 1) % len(outcomes)
             said.append(outcomes[self._turn])
         self._announce_at_s = now_s + self._timing.announce_s
-        return [Publish(message) for message in said]
+        return [
+            self.say(message.body) if message.stamp.incarnation == NOBODYS else Publish(message)
+            for message in said
+        ]
 
     def repeat(self, status: Callable[[], Status], now_s: float, *, learned: bool) -> list[Publish]:
         """What is due again by now.

@@ -14,7 +14,7 @@ over (coordinator.ending), the board (coordinator.postings), when it plans anew
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from coordinator.beginning import Beginning, Verdict
@@ -48,7 +48,7 @@ from swarm.pulse import Pulse
 from swarm.state.board import TaskBoard
 from swarm.state.commands import aborted, words
 from swarm.state.membership import Membership
-from swarm.state.registers import Replica
+from swarm.state.registers import Replica, snapshot_without, without_signers
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
     Body,
@@ -216,7 +216,7 @@ class CoordinatorCore:
             case PeerGone(writer):
                 self._membership.gone(writer, now_s)
             case KeysReplaced(names):
-                self.replica.disown(names)
+                self._disown(names)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
                 self._linked = up
@@ -232,6 +232,12 @@ class CoordinatorCore:
             case Withdraw(task) if (entry := self.replica.posted.get(task)) is not None:
                 if not entry.withdrawn:
                     self._say(replace(entry, withdrawn=True))
+            case Stop(reason, believed=False):  # the flight is another coordinator's to end
+                self._finished = True
+                self._actions += [
+                    Note("leaves the mission to others", {"reason": reason}),
+                    Finish(1),
+                ]
             case Stop(reason):
                 self._end(reason, now_s)
             case _:
@@ -343,6 +349,14 @@ class CoordinatorCore:
                 self._say(entry)
         if others:
             self._speech.hurry(now_s)
+
+    def _disown(self, names: Collection[str]) -> None:
+        """Whoever has other keys from now on is not bound by what was said under the old ones."""
+        self.replica.disown(names)
+        self._overheard = without_signers(names, self._overheard)
+        self._answers = [snapshot_without(names, answer) for answer in self._answers]
+        if self._memory is not None:
+            self._memory = snapshot_without(names, self._memory)
 
     def _adopt(self, heritage: Heritage, now_s: float) -> None:
         """Make all that is known of the mission one's own, and say it in one's own name."""

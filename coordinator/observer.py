@@ -37,7 +37,7 @@ from swarm.state.commands import in_force
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.wire.messages import (
-    LOWEST,
+    NOBODYS,
     Board,
     Brief,
     Choice,
@@ -422,8 +422,9 @@ class Observer:
         self._tell(f"keys revoked or replaced: {told}", now_s)
         self.replica.disown(names)
         for uav in self._stamps.keys() & names:
-            self._stamps[uav] = LOWEST
-        if self.replica.epoch_stamp == LOWEST:
+            self._stamps[uav] = Stamp(NOBODYS, 0)
+        stamp = self.replica.epoch_stamp
+        if stamp is not None and stamp.incarnation == NOBODYS:
             self._coordinator = None
 
     def _hear_choice(self, uav: str, stamp: Stamp, choice: Choice, now_s: float) -> None:

@@ -33,7 +33,7 @@ from swarm.model.ids import COORDINATOR
 from swarm.pulse import Pulse
 from swarm.state.board import TaskBoard
 from swarm.state.membership import Membership
-from swarm.state.registers import Replica
+from swarm.state.registers import Replica, snapshot_without
 from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
 
 __all__ = ["MakeCoordinator", "StandbyCore"]
@@ -168,6 +168,8 @@ class StandbyCore:
                 self._membership.gone(writer, now_s)
             case KeysReplaced(names):
                 self._replica.disown(names)
+                if self._memory is not None:
+                    self._memory = snapshot_without(names, self._memory)
             case LinkChanged(up):
                 self._membership.link(up, now_s)
                 self._linked = up

@@ -66,7 +66,7 @@ def main(
     stdout = sys.stdout
     try:
         status = _run(arguments, found)
-        if status == _DONE and _CHECK in arguments:
+        if status == _DONE and _CHECK in arguments and not {"--help", "-h"} & {*arguments}:
             say("these options are right")
     except InputError as error:
         _complain(str(error))

@@ -77,6 +77,8 @@ class Stop:
     """Whoever runs this process wants it to end."""
 
     reason: str
+    believed: bool = True
+    """Whether anybody still believes what it says: not once its keys are revoked or replaced."""
 
 
 @dataclass(frozen=True, slots=True)

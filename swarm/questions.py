@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from swarm.bus.port import Answer, Bus
+from swarm.bus.port import Bus
 from swarm.clock import Clock
 from swarm.limits import Asked
 from swarm.log import get_logger
 from swarm.wire.codec import Codec
 from swarm.wire.digest import unknown
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Snapshot
+from swarm.wire.messages import Message, Snapshot
 from swarm.wire.question import NONCE_BYTES, bond, decode_question, encode_question
 from swarm.wire.seal import UnacceptableError
 
@@ -102,8 +102,12 @@ class Questions:
             self._log.warning("an answer has no room for all registers", left_out=left_out)
         reply(answer)
 
-    async def ask(self) -> tuple[Snapshot, ...]:
-        """What the others know besides; their mission times brought to now."""
+    async def ask(self, heed: Callable[[Iterable[Message]], None]) -> tuple[Snapshot, ...]:
+        """What the others know besides; their mission times brought to now.
+
+        Args:
+            heed: told each answer's rosters first: by the newest of them all else is believed.
+        """
         asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
         # What is said in the own name is always told: by who remembers an earlier life, or a twin.
         known = {writer: number for writer, number in self._known().items() if writer != self._name}
@@ -111,22 +115,37 @@ class Questions:
         question = encode_question(known, nonce, self._seal)
         expected = bond(None if self._seal is None else self._seal.name, nonce)
         answers = await self._bus.query(self._everyone, question, timeout_s=self._answer_s)
-        read = [(await self._read(answer, expected), answer.arrived_s) for answer in answers]
+        opened = []
+        for answer in answers:
+            parts = self._codec.open_answer(answer.key, answer.payload, expected)
+            if parts is not None:
+                snapshot, whole = parts
+                rosters, registers = self._rosters_in(whole)
+                heed(rosters)
+                opened.append((rosters, registers, snapshot, answer.arrived_s))
+        read = []
+        for rosters, registers, snapshot, arrived_s in opened:
+            messages = (*rosters, *await self._read(registers))
+            read.append((replace(snapshot, messages=messages), arrived_s))
         now_s, wall_s = self._clock.now_s(), self._loop.time()
         pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
         return tuple(
-            _aged(snapshot, pace * (wall_s - arrived_s))
-            for snapshot, arrived_s in read
-            if snapshot is not None
+            # A newer roster may have come while they were read.
+            replace(_aged(told, pace * (wall_s - at_s)), messages=self._codec.by_present_keys(told))
+            for told, at_s in read
         )
 
-    async def _read(self, answer: Answer, expected: bytes) -> Snapshot | None:
-        """What is in an answer, as far as it is to be believed."""
-        opened = self._codec.open_answer(answer.key, answer.payload, expected)
-        if opened is None:
-            return None
-        snapshot, registers = opened
-        messages = []
+    def _rosters_in(self, registers: Sequence[object]) -> tuple[list[Message], Sequence[object]]:
+        """Rosters, which alone need no envelope where there are keys, and all that is left."""
+        if self._seal is None:
+            return [], registers
+        bare = [each for each in registers if not isinstance(each, bytes)]
+        rosters = [message for message in map(self._codec.decode_register, bare) if message]
+        return rosters, [each for each in registers if isinstance(each, bytes)]
+
+    async def _read(self, registers: Sequence[object]) -> list[Message]:
+        """Those that are to be believed."""
+        messages = list[Message]()
         for number, register in enumerate(registers, 1):
             message = self._codec.decode_register(register)
             if message is not None:
@@ -136,7 +155,7 @@ class Questions:
                 break
             if number % TURN == 0:
                 await asyncio.sleep(0)
-        return replace(snapshot, messages=tuple(messages))
+        return messages
 
 
 def _aged(snapshot: Snapshot, age_s: float) -> Snapshot:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from functools import partial
 from typing import Generic, Protocol, TypeVar
 
 from swarm import __version__
@@ -237,7 +237,7 @@ class Shell(Generic[E, A]):
             for name in gone:  # a token cannot be signed: it counts no longer
                 self.step(self._from_bus(PeerGone(name)))
             if not seal.is_in_force:  # nobody believes it any more, so it takes no further part
-                self.step(self._from_bus(Stop("its keys were revoked or replaced")))
+                self.step(self._from_bus(Stop("its keys were revoked or replaced", believed=False)))
 
     def _guard(self, act: Callable[[], None]) -> None:
         """Act and reschedule; a bug ends the process rather than half of it."""
@@ -345,16 +345,8 @@ class Shell(Generic[E, A]):
                 return None
 
     async def _ask(self) -> None:
-        before = None if self._seal is None else self._seal.roster
-        snapshots = await self._questions.ask()
-        for snapshot in snapshots:
-            self._heed(snapshot.messages, answers=True)
-        if self._seal is not None and self._seal.roster is not before:  # meanwhile, or by them
-            snapshots = tuple(
-                replace(each, messages=self._codec.by_present_keys(each.messages))
-                for each in snapshots
-            )
-        self.step(self._from_bus(Learned(snapshots)))
+        heed = partial(self._heed, answers=True)
+        self.step(self._from_bus(Learned(await self._questions.ask(heed))))
 
 
 def take_seat(

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from swarm.identity import Identity, Role, Roster
 from swarm.identity.folder import ROSTER_FILE
+from swarm.identity.roster import Entry
 from swarm.limits import Limiter
 from swarm.log import get_logger
 from swarm.model.ids import AUTHORITY
@@ -71,13 +72,16 @@ class Rosters:
         kept = (each for each in self.roster.entries if each.common_name not in self._shut_out)
         return replace(self.roster, entries=tuple(kept))
 
-    def flooding(self, name: str, now_s: float) -> str | None:
-        """Count one saying; who says too much of late, by the present keys of that name.
+    def flooding(self, entry: Entry | None, now_s: float) -> str | None:
+        """Count one saying of theirs; the common name of who says too much of late.
 
         A UAV alone: the coordinator's token is that of several machines. May be called on any
         thread.
+
+        Args:
+            entry: of the roster by which they were let in; None if they are not in it.
+            now_s: now.
         """
-        entry = self.roster.entry(name)
         if entry is None or entry.role is not Role.UAV:
             return None
         return None if self._heard.allows(entry.common_name, now_s) else entry.common_name

@@ -85,6 +85,7 @@ class Router:
         """Listen for rosters, and for who floods; callbacks are Zenoh's threads'."""
         loop = asyncio.get_running_loop()
         root = Keys(rosters.identity.mission).root
+        let_in = rosters.roster  # until it is opened anew, whoever else is in force by then
 
         def on_roster(sample: zenoh.Sample) -> None:
             key, data = str(sample.key_expr), sample.payload.to_bytes()
@@ -93,7 +94,7 @@ class Router:
 
         def on_saying(sample: zenoh.Sample) -> None:
             _, _, _, *rest = str(sample.key_expr).split("/", 4)
-            flooder = rosters.flooding(rest[0], loop.time()) if rest else None
+            flooder = rosters.flooding(let_in.entry(rest[0]), loop.time()) if rest else None
             if flooder is not None:
                 with contextlib.suppress(RuntimeError):
                     loop.call_soon_threadsafe(rosters.shut_out, flooder)

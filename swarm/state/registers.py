@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
 
 from swarm.wire.codec import encode
 from swarm.wire.digest import fingerprint
 from swarm.wire.messages import (
-    LOWEST,
     Board,
     Brief,
     Choice,
@@ -26,6 +26,7 @@ from swarm.wire.messages import (
     EpochPhase,
     Message,
     Outcome,
+    Snapshot,
     Stamp,
     Status,
     TaskOrder,
@@ -33,7 +34,7 @@ from swarm.wire.messages import (
 )
 from swarm.wire.seal import open_envelope
 
-__all__ = ["MOST_UNPOSTED", "Replica"]
+__all__ = ["MOST_UNPOSTED", "Replica", "snapshot_without", "without_signers"]
 
 MOST_UNPOSTED = 1000
 """Tasks that nobody has posted of which one writer may tell the outcome."""
@@ -212,18 +213,19 @@ class Replica:
         Their keys are replaced or revoked, and who had them may have given its words the largest
         stamps there are. What they say counts until somebody says otherwise: done stays done.
         """
-        words = [m for m in self._registers.values() if _signer(m) in signers]
-        for message in words:
-            self._registers[message.key] = disowned(message)
+        registers = self._registers.values()
+        words = [(old, new) for old in registers if (new := _without(signers, old)) is not old]
+        for _, message in words:
+            self._registers[message.key] = message
             self._changed.add(message.key)
             match message.body:
                 case Epoch():
-                    self.epoch_stamp = LOWEST
+                    self.epoch_stamp = message.stamp
                 case Command(target=target) as command:
-                    self.commands[target] = LOWEST, command
+                    self.commands[target] = message.stamp, command
                 case _:
                     pass
-        for writer in {message.writer for message in words}:
+        for writer in {message.writer for _, message in words}:
             self.heads[writer] = max(m.stamp for m in self.messages({writer}))
 
     def messages(self, writers: Iterable[str] | None = None) -> Iterator[Message]:
@@ -279,10 +281,21 @@ class Replica:
         return self._registers.get(key)
 
 
-def _signer(message: Message) -> str:
-    """Who has signed it; its writer, as far as one can tell, where nobody has."""
+def without_signers(signers: Collection[str], messages: Iterable[Message]) -> list[Message]:
+    """``messages``, and what ``signers`` have signed of them `disowned`: see `Replica.disown`."""
+    return [_without(signers, message) for message in messages]
+
+
+def snapshot_without(signers: Collection[str], snapshot: Snapshot) -> Snapshot:
+    """``snapshot``, and what ``signers`` have signed in it `disowned`."""
+    return replace(snapshot, messages=tuple(without_signers(signers, snapshot.messages)))
+
+
+def _without(signers: Collection[str], message: Message) -> Message:
     envelope = None if message.envelope is None else open_envelope(message.envelope)
-    return message.writer if envelope is None else envelope.signer
+    # Of recordings, which have no signatures, the writer is the best that is known.
+    signer = message.writer if envelope is None else envelope.signer
+    return disowned(message) if signer in signers else message
 
 
 def _entry_of(order: TaskOrder) -> Board:
@@ -299,12 +312,16 @@ def _entry_of(order: TaskOrder) -> Board:
 
 
 def _says_more(new: Message, known: Message) -> bool:
-    """Whether it is the same statement with more that only newer releases understand.
+    """Whether it is the same statement with a signature that the known one has lost, or with
+    more that only newer releases understand.
 
     An older one that repeats another's statement may have left that out.
     """
-    same = new.stamp == known.stamp and new.body == known.body
-    return same and new.said is not None and new.said > encode(known)
+    if new.stamp != known.stamp or new.body != known.body:
+        return False
+    if known.envelope is None and new.envelope is not None:
+        return True
+    return new.said is not None and new.said > encode(known)
 
 
 def _beats(new: Message, known: Message) -> bool:

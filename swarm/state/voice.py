@@ -29,14 +29,24 @@ class Voice:
             self._stamp = Stamp(incarnation + 1, 1)
         return Message(self.mission, self.writer, self._stamp, body)
 
-    def outdo(self, heard: Stamp) -> None:
+    def outdo(self, heard: Stamp) -> bool:
         """Speak above ``heard``, which others remember of an earlier life of this writer.
 
         The incarnation keeps its last three digits, so that two processes under one name
-        which outdo the same stamp do not come out alike. Only the largest stamp there is
-        cannot be outdone; it takes a forger, against whom access control helps.
+        which outdo the same stamp do not come out alike. The largest stamps there are cannot be
+        outdone, or only to say nothing new ever after; it takes a forger, against whom access
+        control helps, and other keys do away with them (`Replica.disown`).
+
+        Returns:
+            Whether what is said next will be above it.
         """
         if heard > self._stamp:
             own, least = self._stamp.incarnation, heard.incarnation + 1
             above = least + (own - least) % 1000
-            self._stamp = Stamp(above, 0) if above <= MAX_COUNT else heard
+            if above <= MAX_COUNT:
+                self._stamp = Stamp(above, 0)
+            elif heard.counter <= MAX_COUNT // 2:
+                self._stamp = heard
+            else:
+                return False
+        return True

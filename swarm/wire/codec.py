@@ -17,7 +17,7 @@ makes `SCHEMA_VERSION` grow, and then neither release hears the other.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Final
@@ -223,13 +223,13 @@ class Codec:
             self.dropped[fault.reason] += 1
             return None
 
-    def by_present_keys(self, messages: Iterable[Message]) -> tuple[Message, ...]:
-        """``messages``, believed by an older roster: those no longer signed well `disowned`."""
+    def by_present_keys(self, snapshot: Snapshot) -> tuple[Message, ...]:
+        """Its messages, believed by an older roster: those no longer signed well `disowned`."""
         return tuple(
             disowned(message)
             if message.envelope is not None and not self._is_genuine(message.envelope)
             else message
-            for message in messages
+            for message in snapshot.messages
         )
 
     def _is_genuine(self, envelope: bytes) -> bool:
@@ -301,8 +301,11 @@ class Codec:
         return replace(snapshot, messages=tuple(kept))
 
     def _recalled(self, register: object) -> Message:
+        seal = self._seal
         if not isinstance(register, bytes):
-            return as_heard(self._message(register), _packed(register))
+            said = as_heard(self._message(register), _packed(register))
+            own = seal is None or seal.may_speak_for(seal.name, said.writer)
+            return said if own else disowned(said)
         envelope = open_envelope(register)
         if envelope is None:
             raise UnacceptableError("malformed")

@@ -40,8 +40,8 @@ from swarm.wire.keys import Keys
 
 __all__ = [
     "LATEST_S",
-    "LOWEST",
     "MAX_COUNT",
+    "NOBODYS",
     "SCHEMA_VERSION",
     "Board",
     "Body",
@@ -85,8 +85,8 @@ class Stamp:
     """Grows with every statement of one incarnation."""
 
 
-LOWEST = Stamp(0, 0)
-"""Nobody says anything under it."""
+NOBODYS = 0
+"""Incarnation of what nobody stands for any more; processes number their own from 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -381,8 +381,15 @@ def as_heard(message: Message, said: bytes, envelope: bytes | None = None) -> Me
 
 
 def disowned(message: Message) -> Message:
-    """What ``message`` says, for which nobody stands any more: any other word outdoes it."""
-    return replace(message, stamp=LOWEST)
+    """What ``message`` says, for which nobody stands any more: any later word outdoes it.
+
+    Of several such the later ones still come after the earlier, as far as numbers reach.
+    """
+    incarnation, counter = message.stamp.incarnation, message.stamp.counter
+    if incarnation == NOBODYS:
+        return message
+    place = incarnation * 4096 + min(counter, 4095)  # milliseconds since 1970 have room for that
+    return replace(message, stamp=Stamp(NOBODYS, min(place, MAX_COUNT)))
 
 
 def _key_of(mission: str, writer: str, body: Body) -> str:

@@ -18,7 +18,7 @@ from agent.vehicle import (
     ReturnAdvised,
     VehicleReady,
 )
-from swarm.events import Heard, LinkChanged, Save, Stop
+from swarm.events import Heard, KeysReplaced, LinkChanged, Save, Stop
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.wire.messages import ClaimPhase, Command, CommandKind, EpochPhase, StatusPhase
 from tests.builders import PAUSED, entry, epoch, uav
@@ -64,6 +64,27 @@ def test_a_held_uav_gives_its_task_up_stops_and_says_why() -> None:
     agent.happen(Held())
     (status,) = statuses(agent.run_until(5.0))[-1:]
     assert (status.phase, status.note) == (StatusPhase.HOLDING, note)
+
+
+def test_when_an_operator_loses_its_keys_nothing_it_has_said_is_obeyed_again() -> None:
+    agent = on_its_way()
+    tell(agent, HOLD, 2.0)
+    agent.happen(Held())
+    tell(agent, ABORT, 3.0)
+    assert agent.core.phase is StatusPhase.RETURNING
+
+    assert orders(agent.happen(KeysReplaced(frozenset({OPERATOR})))) == []
+    assert agent.core.phase is StatusPhase.RETURNING
+
+
+def test_a_held_uav_stays_held_when_who_held_it_loses_its_keys() -> None:
+    agent = on_its_way()
+    tell(agent, HOLD, 2.0)
+    agent.happen(Held())
+
+    assert orders(agent.happen(KeysReplaced(frozenset({OPERATOR})))) == []
+    assert agent.core.phase is StatusPhase.HOLDING
+    assert orders(tell(agent, RESUME, 4.0)) != []
 
 
 def test_a_held_uav_takes_no_task_whatever_happens() -> None:

@@ -9,17 +9,20 @@ import pytest
 from agent.events import Action
 from agent.vehicle import GoTo, HandedOver, Home, Prepare, Refused, Return, VehicleReady
 from swarm.config import Timing
-from swarm.events import Ask, Learned, Publish, Stop
+from swarm.events import Ask, Heard, KeysReplaced, Learned, Publish, Stop
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import (
+    MAX_COUNT,
     Board,
     Body,
     ClaimPhase,
     EpochPhase,
     Message,
     Snapshot,
+    Stamp,
     Status,
     StatusPhase,
+    disowned,
 )
 from tests.builders import MISSION, done, entry, epoch, held, message, proposed, uav
 from tests.lone_agent import (
@@ -96,6 +99,37 @@ def test_everything_it_says_is_newer_than_what_others_remember() -> None:
     newest = max(said.stamp for said in registers(earlier.log))
     assert registers(agent.log)
     assert all(said.stamp > newest for said in registers(agent.log))
+
+
+def test_it_says_anew_what_it_remembers_having_said_under_other_keys() -> None:
+    """Nobody stands for that any more, and others may have believed a thief instead."""
+    earlier = crashed(timing=AT_ONCE)
+    own = disowned(message("u0", done("gone", 3.0), 9, 9))
+    earlier.core.replica.join(own)
+    agent = earlier.reborn(remembers=True)
+
+    agent.learn_from_nobody()
+    agent.happen(VehicleReady())
+    agent.run_until(agent.now_s + 60.0)
+
+    told = [said for said in registers(agent.log) if said.key == own.key]
+    assert told
+    assert told[0].body == own.body
+    assert all(said.stamp.incarnation > 1 for said in told)
+
+
+def test_keys_that_change_before_it_remembers_change_what_it_remembers() -> None:
+    largest = Stamp(MAX_COUNT, MAX_COUNT)
+    earlier = crashed(others=1)
+    earlier.core.replica.join(Message(MISSION, "u1", largest, held("far", 0.0, 0, 10.0)))
+    agent = earlier.reborn(remembers=True)
+
+    agent.happen(KeysReplaced(frozenset({"u1"})))
+    agent.learn(agent.statement(COORDINATOR, agent.brief), mission_s=6.0)
+    honest = message("u1", proposed("far", 5.0), 1, 2000)
+    agent.happen(Heard(honest))
+
+    assert agent.core.replica.known(honest) == honest
 
 
 def test_with_nobody_there_it_trusts_a_young_memory() -> None:

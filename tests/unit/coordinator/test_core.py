@@ -354,6 +354,18 @@ def ended(*tasks_done: str) -> LoneCoordinator:
     return coordinator
 
 
+def test_when_nobody_believes_it_any_more_it_leaves_and_ends_no_mission() -> None:
+    """Also not in its memory, by which its next life would end it."""
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+
+    actions = coordinator.happen(Stop("its keys were revoked or replaced", believed=False))
+
+    assert coordinator.phase is EpochPhase.RUNNING
+    assert finishes(actions) == [1]
+    assert said(actions, Epoch) == []
+    assert coordinator.core.next_deadline_s() is None
+
+
 def test_it_stays_until_all_have_left_and_then_ends_well_if_all_was_done() -> None:
     coordinator = ended("t0", "t1")
     assert coordinator.phase is EpochPhase.ENDED

@@ -113,7 +113,9 @@ def test_the_roster_is_told_to_who_has_missed_it(authority: Authority) -> None:
 
 def test_who_floods_is_shut_out_until_it_has_new_keys(authority: Authority) -> None:
     async def scenario(rosters: Rosters) -> None:
-        floods = [rosters.flooding("uav1", 0.0) for _ in range(FLOOD_BURST + 1)]
+        floods = [
+            rosters.flooding(rosters.roster.entry("uav1"), 0.0) for _ in range(FLOOD_BURST + 1)
+        ]
         assert floods == [None] * FLOOD_BURST + ["uav1@1"]
         rosters.shut_out("uav1@1")
         rosters.shut_out("uav1@1")
@@ -124,8 +126,8 @@ def test_who_floods_is_shut_out_until_it_has_new_keys(authority: Authority) -> N
         authority.issue({"uav1": rosters.roster.entries[-1].role}, now_s=unix_s())
         await rosters.wait_for_change(tell_nobody)
         rosters.shut_out("uav1@1")  # of its old keys, and told late
-        assert rosters.flooding("uav1", 0.0) is None
-        assert rosters.flooding("coordinator", 0.0) is None
+        assert rosters.flooding(rosters.roster.entry("uav1"), 0.0) is None
+        assert rosters.flooding(rosters.roster.entry("coordinator"), 0.0) is None
 
     assert play(authority, scenario).let_in.entry("uav1") is not None
 
@@ -134,5 +136,5 @@ def test_an_honest_uav_is_never_taken_for_a_flood(authority: Authority) -> None:
     """Not at 200 sayings a second for a minute, nor when it greets 200 others at once."""
     rosters = Rosters(load_identity(authority.folder("router")))
 
-    assert not any(rosters.flooding("uav1", n / 200.0) for n in range(12_000))
-    assert not any(rosters.flooding("uav1", 100.0) for _ in range(1000))
+    assert not any(rosters.flooding(rosters.roster.entry("uav1"), n / 200.0) for n in range(12_000))
+    assert not any(rosters.flooding(rosters.roster.entry("uav1"), 100.0) for _ in range(1000))

@@ -8,7 +8,7 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.state.board import TaskBoard
 from swarm.state.claims import holders
 from swarm.state.commands import newest
@@ -272,12 +272,56 @@ def test_a_command_of_who_had_the_keys_gives_way_to_the_next_one() -> None:
     forged = Message(MISSION, OPERATOR, LARGEST, hold)
     replica = joined([message(COORDINATOR, brief(uav("u0"))), forged])
     replica.disown({OPERATOR})
-    assert newest(replica, "u0") == (Stamp(0, 0), hold)
+    assert newest(replica, "u0") == (Stamp(0, MAX_COUNT), hold)
 
     resume = Command("u0", CommandKind.RESUME, 1, "")
     replica.join(Message(MISSION, OPERATOR, Stamp(5, 1), resume))
 
     assert newest(replica, "u0") == (Stamp(5, 1), resume)
+
+
+def test_of_what_nobody_stands_for_the_later_word_still_comes_after_the_earlier() -> None:
+    hold = Command("u0", CommandKind.HOLD, 1, "")
+    abort = Command(FLEET, CommandKind.ABORT, 1, "")
+    now_ms = 1_790_000_000_000
+    for (first, *first_said), (second, *second_said) in (
+        ((hold, now_ms, 1), (abort, now_ms, 2)),
+        ((abort, now_ms, 2), (hold, now_ms + 1, 1)),
+    ):
+        replica = joined(
+            [
+                message(COORDINATOR, brief(uav("u0"))),
+                Message(MISSION, OPERATOR, Stamp(*first_said), first),
+                Message(MISSION, OPERATOR, Stamp(*second_said), second),
+            ]
+        )
+        before = newest(replica, "u0")
+        replica.disown({OPERATOR})
+        once = newest(replica, "u0")
+        replica.disown({OPERATOR})
+
+        assert before is not None
+        assert once is not None
+        assert once[1] is before[1] is second
+        assert once[0].incarnation == 0
+        assert newest(replica, "u0") == once
+
+
+def test_a_signature_is_worth_more_than_none_under_what_is_otherwise_the_same() -> None:
+    """It can be repeated then, by who could not before."""
+    ring, bare = Keyring("u0"), message("u0", done("t0"))
+    signed = message("u0", done("t0"))
+    as_heard(signed, encode(signed), ring.seal("u0").wrap(encode(signed)))
+    replica = joined([bare])
+    digest = replica.digest()
+
+    assert not replica.join(signed)
+    known = replica.known(bare)
+    assert known is not None
+    assert known.envelope is not None
+    assert replica.digest() == digest
+    assert not replica.join(bare)
+    assert replica.known(bare) is known
 
 
 def test_what_another_seat_has_signed_of_the_same_writer_stays() -> None:
@@ -293,7 +337,7 @@ def test_what_another_seat_has_signed_of_the_same_writer_stays() -> None:
 
     replica.disown({"coordinator-2"})
 
-    assert [m.stamp for m in replica.messages()] == [Stamp(7, 7), Stamp(0, 0)]
+    assert [m.stamp.incarnation for m in replica.messages()] == [7, 0]
     assert replica.heads == {COORDINATOR: Stamp(7, 7)}
 
 

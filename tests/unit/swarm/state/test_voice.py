@@ -25,9 +25,8 @@ def test_every_statement_is_later_than_the_one_before() -> None:
 
 @given(stamps)
 def test_what_others_remember_is_outdone(remembered: Stamp) -> None:
-    assume(remembered != LARGEST)
     voice = Voice(MISSION, "u0", 7)
-    voice.outdo(remembered)
+    assume(voice.outdo(remembered))
 
     assert voice.say(IDLE).stamp > max(remembered, Stamp(7, 0))
 
@@ -36,12 +35,22 @@ def test_what_others_remember_is_outdone(remembered: Stamp) -> None:
 def test_whatever_is_outdone_what_follows_can_be_said(remembered: Stamp) -> None:
     """A forged stamp near the largest must neither raise nor make anyone drop what follows."""
     voice, codec = Voice(MISSION, "u0", 7), Codec(MISSION)
-    voice.outdo(remembered)
+    outdone = voice.outdo(remembered)
     said = [voice.say(IDLE) for _ in range(3)]
 
     assert [codec.decode(message.key, encode(message)) for message in said] == said
-    assert (said[0].stamp > remembered) == (remembered != LARGEST)
-    assert said[0].stamp <= said[1].stamp <= said[2].stamp
+    assert (said[0].stamp > remembered) == outdone
+    assert said[0].stamp < said[1].stamp < said[2].stamp
+
+
+def test_what_leaves_nothing_above_it_is_not_followed() -> None:
+    """Or nothing that is said afterwards could be told from the first of it."""
+    voice = Voice(MISSION, "u0", 7)
+
+    assert not voice.outdo(LARGEST)
+    assert voice.say(IDLE).stamp == Stamp(7, 1)
+    assert voice.outdo(Stamp(MAX_COUNT, MAX_COUNT // 2))
+    assert voice.say(IDLE).stamp > Stamp(MAX_COUNT, MAX_COUNT // 2)
 
 
 def test_two_lives_that_outdo_the_same_do_not_come_out_alike() -> None:

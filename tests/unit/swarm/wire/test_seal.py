@@ -400,7 +400,17 @@ def test_what_is_remembered_of_who_has_other_keys_by_now_gives_way_to_any_word()
 
     assert recalled is not None
     assert [m.body for m in recalled.messages] == [m.body for m in messages]
-    assert [m.stamp for m in recalled.messages] == [Stamp(0, 0), Stamp(7, 7)]
+    assert [m.stamp.incarnation for m in recalled.messages] == [0, 7]
+
+
+def test_what_is_remembered_of_a_flight_without_keys_is_nobodys_but_the_own_word() -> None:
+    said = tuple(message(writer, held("t0", 1.0), 7, 7) for writer in ("u0", "u1"))
+    memory = encode_memory(Snapshot(MISSION, "u0", 1, 7.0, said))
+
+    recalled = Codec(MISSION, KEYS.seal("u0")).decode_memory(STATE, memory)
+
+    assert recalled is not None
+    assert {m.writer: m.stamp.incarnation for m in recalled.messages} == {"u0": 7, "u1": 0}
 
 
 def test_a_roster_of_an_earlier_life_does_not_come_before_that_of_the_keys() -> None:
