@@ -123,17 +123,16 @@ class Questions:
                 rosters, registers = self._rosters_in(whole)
                 heed(rosters)
                 opened.append((rosters, registers, snapshot, answer.arrived_s))
+        roster = None if self._seal is None else self._seal.roster
         read = []
         for rosters, registers, snapshot, arrived_s in opened:
             messages = (*rosters, *await self._read(registers))
             read.append((replace(snapshot, messages=messages), arrived_s))
+        if self._seal is not None and self._seal.roster is not roster:  # it came meanwhile
+            read = [(self._codec.by_present_keys(told), at_s) for told, at_s in read]
         now_s, wall_s = self._clock.now_s(), self._loop.time()
         pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
-        return tuple(
-            # A newer roster may have come while they were read.
-            replace(_aged(told, pace * (wall_s - at_s)), messages=self._codec.by_present_keys(told))
-            for told, at_s in read
-        )
+        return tuple(_aged(told, pace * (wall_s - at_s)) for told, at_s in read)
 
     def _rosters_in(self, registers: Sequence[object]) -> tuple[list[Message], Sequence[object]]:
         """Rosters, which alone need no envelope where there are keys, and all that is left."""

@@ -73,6 +73,7 @@ from swarm.wire.seal import (
     is_envelope,
     open_envelope,
 )
+from swarm.wire.unpacking import repacked, unpacked
 
 __all__ = [
     "LARGE_LIMIT_BYTES",
@@ -85,8 +86,6 @@ __all__ = [
     "fit_memory",
 ]
 
-BYTES_EACH: Final = 8
-"""Of an array or map in a large message, with its share of the rest, at least."""
 IN_SEALED_ANSWER: Final = 64
 """Arrays and maps of an answer in which all registers but the roster are envelopes."""
 SIGNED_HERE: Final = "signed, but no keys here"
@@ -223,14 +222,15 @@ class Codec:
             self.dropped[fault.reason] += 1
             return None
 
-    def by_present_keys(self, snapshot: Snapshot) -> tuple[Message, ...]:
-        """Its messages, believed by an older roster: those no longer signed well `disowned`."""
-        return tuple(
+    def by_present_keys(self, snapshot: Snapshot) -> Snapshot:
+        """``snapshot``, believed by an older roster: what is no longer signed well `disowned`."""
+        messages = (
             disowned(message)
             if message.envelope is not None and not self._is_genuine(message.envelope)
             else message
             for message in snapshot.messages
         )
+        return replace(snapshot, messages=tuple(messages))
 
     def _is_genuine(self, envelope: bytes) -> bool:
         return self._seal is None or self._seal.is_genuine(envelope)
@@ -268,12 +268,12 @@ class Codec:
         if isinstance(register, bytes):
             return self._believed(register)
         message = self._message(register)
-        message = as_heard(message, _packed(register))
+        message = as_heard(message, repacked(register))
         _require_size(message)
         return message if self._seal is None else self._roster(message)
 
     def _read(self, said: bytes) -> Message:
-        message = as_heard(self._message(_unpack(said)), said)
+        message = as_heard(self._message(unpacked(said)), said)
         _require_size(message)
         return message
 
@@ -303,13 +303,13 @@ class Codec:
     def _recalled(self, register: object) -> Message:
         seal = self._seal
         if not isinstance(register, bytes):
-            said = as_heard(self._message(register), _packed(register))
+            said = as_heard(self._message(register), repacked(register))
             own = seal is None or seal.may_speak_for(seal.name, said.writer)
             return said if own else disowned(said)
         envelope = open_envelope(register)
         if envelope is None:
             raise UnacceptableError("malformed")
-        message = as_heard(self._message(_unpack(envelope.said)), envelope.said, register)
+        message = as_heard(self._message(unpacked(envelope.said)), envelope.said, register)
         return message if self._is_genuine(register) else disowned(message)
 
     # -- parts ----------------------------------------------------------------------
@@ -317,8 +317,8 @@ class Codec:
     def _snapshot(
         self, key: str, data: bytes, most: int | None = None
     ) -> tuple[Snapshot, tuple[object, ...]]:
-        """A snapshot without its registers, and those; ``most`` as in `_unpack`."""
-        parts = _unpack(data, most)
+        """A snapshot without its registers, and those; ``most`` as in `unpacked`."""
+        parts = unpacked(data, most)
         if not isinstance(parts, tuple) or len(parts) < 6:
             raise UnacceptableError("malformed")
         version, mission, writer, incarnation, mission_s, registers = parts[:6]
@@ -392,59 +392,3 @@ def _require_size(message: Message) -> None:
     large = NAMES[type(message.body)] in LARGE
     limit_bytes = LARGE_LIMIT_BYTES if large else SMALL_LIMIT_BYTES
     _require(len(encode(message)) <= limit_bytes, "too large")
-
-
-class _Budget:
-    """Counts the arrays and maps of one piece of MessagePack, until there are too many.
-
-    An empty map is one byte and takes 64 in memory, so that few bytes could fill all of it.
-    """
-
-    def __init__(self, most: int) -> None:
-        self._left = most
-
-    def array(self, items: tuple[object, ...]) -> tuple[object, ...]:
-        """One more array."""
-        self._spend()
-        return items
-
-    def map(self, pairs: Sequence[tuple[object, object]]) -> dict[object, object]:
-        """One more map."""
-        self._spend()
-        return dict(pairs)
-
-    def _spend(self) -> None:
-        self._left -= 1
-        if self._left < 0:
-            raise ValueError("more arrays and maps than a message of that size has")
-
-
-def _unpack(data: bytes, most: int | None = None) -> object:
-    """What ``data`` holds, with tuples for arrays; None when it is not MessagePack.
-
-    Args:
-        data: from the network.
-        most: of arrays and maps in it; by default as many as its length is worth.
-    """
-    hooks = {}
-    if len(data) > SMALL_LIMIT_BYTES:
-        budget = _Budget(1000 + len(data) // BYTES_EACH if most is None else most)
-        hooks = {"list_hook": budget.array, "object_pairs_hook": budget.map}
-    try:
-        return msgpack.unpackb(data, use_list=False, max_ext_len=0, **hooks)
-    except (ValueError, TypeError, msgpack.exceptions.UnpackException, RecursionError):
-        # ValueError covers msgpack's FormatError, StackError, ExtraData and bad UTF-8.
-        return None
-
-
-def _packed(register: object) -> bytes:
-    """The bytes of what `_unpack` gave.
-
-    Raises:
-        UnacceptableError: it is nested deeper than this MessagePack can write again.
-    """
-    try:
-        packed: bytes = msgpack.packb(register)
-    except (ValueError, RecursionError):
-        raise UnacceptableError("malformed") from None
-    return packed

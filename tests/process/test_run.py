@@ -146,8 +146,8 @@ def test_fleet_with_two_routers_keeps_one_when_the_other_dies(
         run.assert_nothing_left()
 
 
-def test_ctrl_c_ends_every_process(tmp_path: Path) -> None:
-    with SwarmRun(["valley-survey", "--speedup", "10"], tmp_path) as run:
+def test_ctrl_c_ends_every_process(tmp_path: Path, fleet: list[str]) -> None:
+    with SwarmRun(fleet, tmp_path) as run:
         run.wait_for_line("epoch 1")
 
         assert run.end(signal.SIGINT) == 130

@@ -13,10 +13,12 @@ import numpy as np
 import pytest
 
 from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.scenario.write import format_scenario
+from tests.process.chaos_play import survey
 from tests.process.mission import SwarmRun, wait_until
 from tests.process.router_processes import router
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
 
 
 def status(*words: str) -> subprocess.CompletedProcess[str]:
@@ -24,7 +26,7 @@ def status(*words: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-m", "swarm", "status", *words],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=100,
         check=False,
         stdin=subprocess.DEVNULL,
     )
@@ -37,22 +39,23 @@ def router_of(run: SwarmRun) -> str:
 
 
 def test_a_running_mission_is_found_and_told(tmp_path: Path) -> None:
-    arguments = ["valley-survey", "--bus", "router", "--method", "greedy", "--speedup", "3"]
+    (scenario := tmp_path / "scenario.toml").write_text(format_scenario(survey(5, 30)))
+    arguments = [str(scenario), "--bus", "router", "--method", "greedy", "--speedup", "3"]
     with SwarmRun(arguments, tmp_path) as run:
         run.wait_for_line("epoch 1")
         table = status("--connect", router_of(run))
         told = json.loads(status("--connect", router_of(run), "--json").stdout)
 
         assert (table.returncode, table.stderr) == (0, "")
-        assert table.stdout.startswith("valley-survey · RUNNING · mission time ")
+        assert table.stdout.startswith("chaos · RUNNING · mission time ")
         assert max(len(line) for line in table.stdout.splitlines()) <= 80
-        assert (told["mission"], told["phase"], told["epoch"]) == ("valley-survey", "running", 1)
+        assert (told["mission"], told["phase"], told["epoch"]) == ("chaos", "running", 1)
         assert told["coordinator"]
-        assert len(told["uavs"]) == 10
+        assert len(told["uavs"]) == 5
         # On a busy machine a UAV may not have made it to its start in time.
-        assert sum(uav["does"] in ("flying", "serving") for uav in told["uavs"]) >= 5
+        assert sum(uav["does"] in ("flying", "serving") for uav in told["uavs"]) >= 3
         assert all(uav["position_enu_m"] and uav["link_age_s"] < 3.0 for uav in told["uavs"])
-        assert sum(told["tasks"][state] for state in ("open", "done", "failed")) == 60
+        assert sum(told["tasks"][state] for state in ("open", "done", "failed")) == 30
         assert told["mission_s"] > 0.0
 
 

@@ -403,6 +403,21 @@ def test_what_is_remembered_of_who_has_other_keys_by_now_gives_way_to_any_word()
     assert [m.stamp.incarnation for m in recalled.messages] == [0, 7]
 
 
+def test_what_was_believed_by_an_older_roster_is_nobodys_once_its_signer_has_other_keys() -> None:
+    keys = Keyring("u0", "u1")
+    seal = keys.seal("u1")
+    codec = Codec(MISSION, seal)
+    words = [message(writer, held("t0", 1.0), 7, 7) for writer in ("u0", "u1")]
+    heard = [codec.decode(m.key, envelope(m, m.writer, keys)) for m in words]
+    snapshot = Snapshot(MISSION, "u1", 1, 7.0, tuple(m for m in heard if m))
+    assert codec.by_present_keys(snapshot) == snapshot
+
+    seal.put_in_force(keys.signed(keys.renewed("u0")))
+
+    told = codec.by_present_keys(snapshot).messages
+    assert [(m.body, m.stamp.incarnation) for m in told] == [(words[0].body, 0), (words[1].body, 7)]
+
+
 def test_what_is_remembered_of_a_flight_without_keys_is_nobodys_but_the_own_word() -> None:
     said = tuple(message(writer, held("t0", 1.0), 7, 7) for writer in ("u0", "u1"))
     memory = encode_memory(Snapshot(MISSION, "u0", 1, 7.0, said))
