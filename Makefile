@@ -31,8 +31,7 @@ demo: $(VENV)/.installed
 	$(BIN)/swarm run table-1 --method greedy
 
 test: lint browser
-	$(BIN)/python -m pytest -n 2 tests/unit tests/contract tests/faults
-	$(BIN)/python -m pytest -n 3 --dist worksteal tests/process tests/sitl
+	$(BIN)/python -m tests.whole
 
 # The dashboard is tested in a real browser: Chromium under one of these names.
 CHROMIUM := chromium chromium-browser google-chrome
