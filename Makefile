@@ -31,7 +31,8 @@ demo: $(VENV)/.installed
 	$(BIN)/swarm run table-1 --method greedy
 
 test: lint browser
-	$(BIN)/python -m tests.whole
+	$(BIN)/python -m pytest -n 2 tests/unit tests/contract tests/faults
+	$(BIN)/python -m pytest -n 3 --dist worksteal tests/process tests/sitl
 
 # The dashboard is tested in a real browser: Chromium under one of these names.
 CHROMIUM := chromium chromium-browser google-chrome
