@@ -6,7 +6,7 @@ Leaves out: what follows from it (agent.core), and which commands count for whom
 
 from __future__ import annotations
 
-from swarm.state.commands import newest
+from swarm.state.commands import in_force, newest
 from swarm.state.registers import Replica
 from swarm.wire.messages import Command, CommandKind
 
@@ -27,7 +27,7 @@ class Obedience:
         self._replica = replica
         self._rejoin = rejoin
         self._known: list[Command] = []
-        """All that was there when it was looked last. None of them is ever news again, though the
+        """All of this flight when it was looked last. None of them is ever news again, though the
         order may turn round when a signer loses its keys: see `Replica.disown`."""
 
     def news(self, *, begins: bool) -> Command | None:
@@ -38,7 +38,7 @@ class Obedience:
                 an earlier one.
         """
         found = newest(self._replica, self._uav)
-        known, self._known = self._known, [each for _, each in self._replica.commands.values()]
+        known, self._known = self._known, list(in_force(self._replica).values())
         if found is None or any(found[1] is each for each in known):
             return None
         _, command = found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from agent.events import Action
@@ -75,6 +77,16 @@ def test_when_an_operator_loses_its_keys_nothing_it_has_said_is_obeyed_again() -
 
     assert orders(agent.happen(KeysReplaced(frozenset({OPERATOR})))) == []
     assert agent.core.phase is StatusPhase.RETURNING
+
+
+def test_what_is_said_for_a_flight_before_its_brief_is_obeyed_once_that_is_known() -> None:
+    agent = on_its_way()
+    tell(agent, HOLD, 2.0, run=2)
+    assert orders(agent.run_until(3.0)) == []
+
+    actions = agent.hear(COORDINATOR, replace(agent.brief, run=2))
+
+    assert orders(actions) == [Hold("held by the operator")]
 
 
 def test_a_held_uav_stays_held_when_who_held_it_loses_its_keys() -> None:
