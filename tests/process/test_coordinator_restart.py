@@ -25,7 +25,8 @@ POPUP_S = 30.0
 
 def _flown() -> Mission:
     rng = np.random.default_rng(3)
-    places = [(float(x), float(y), 0.0) for x, y in rng.uniform(0.0, 150.0, (9, 2))]
+    # So many that they are not done, and the UAVs home, before another coordinator has started.
+    places = [(float(x), float(y), 0.0) for x, y in rng.uniform(0.0, 150.0, (14, 2))]
     tasks = [Task(TaskId(f"t{n}"), place, 1.0, service_s=2.0) for n, place in enumerate(places)]
     popup = Task(TaskId("popup"), (60.0, 60.0, 0.0), 1.0, service_s=1.0, appears_s=POPUP_S)
     uavs = [Uav(UavId(u), (12.0 * n, 0.0, 0.0), 10.0) for n, u in enumerate(UAVS)]
