@@ -267,7 +267,7 @@ def test_dead_network_holds_up_neither_the_loop_nor_closing_nor_the_exit() -> No
     slowest_s, asked_s, closed_s, _unsent, answers = (float(word) for word in out.split())
     assert slowest_s < 0.4  # a blocked link alone would take 0.5 s
     assert asked_s < 0.6
-    assert closed_s < 2.5
+    assert closed_s < 5.0  # the session alone would take 10 s
     assert answers == 0
 
 

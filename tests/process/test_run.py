@@ -15,8 +15,6 @@ from tests.process.mission import SwarmRun, alive, wait_until
 
 pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
 
-LARGE = ["valley-survey", "--speedup", "30"]
-
 
 @pytest.fixture
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
@@ -75,16 +73,19 @@ def assert_every_line_tells_whose_it_is(logs: Path) -> None:
 
 
 def test_killed_agents_tasks_are_done_by_the_others(tmp_path: Path) -> None:
-    with SwarmRun(LARGE, tmp_path) as run:
-        run.wait_for_line(" ended ", count=5)
-        kill(run.child("agent", "uav07"))
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text(format_scenario(survey(5, 15, side_m=800.0)))
+    with SwarmRun([str(scenario), "--speedup", "6"], tmp_path) as run:
+        run.wait_for_line(" ended ")  # at 9 s; uav02 is on its way to t07 until 40 s
+        kill(run.child("agent", "uav02"))
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 60
-        assert told["lost_uavs"] == ["uav07"]
-        assert any("uav07 lost; task" in line for line in run.lines)
-        assert any("took over" in line and "from uav07" in line for line in run.lines)
+        assert len(told["done"]) == 15
+        assert told["lost_uavs"] == ["uav02"]
+        assert any("uav02 lost; task t07 is open again" in line for line in run.lines)
+        assert any("took over t07 from uav02" in line for line in run.lines)
+        scenario.unlink()
         run.assert_nothing_left()
 
 

@@ -96,7 +96,6 @@ def test_surveys_are_as_dense_whatever_their_size() -> None:
 
 def flooded(stale: int = 24, executed: Sequence[str] = ("t1",), fates: Sequence[str] = ()) -> Flood:
     routes = {UavId("uav1"): tuple(TaskId(task) for task in executed)}
-    before = {"uavs": [{"id": "uav1", "dropped": {"malformed": 3}}]}
     dropped = {"malformed": 27, "stale": stale}
     return Flood(
         result=MissionResult(routes, {}, 1.0, (TaskId("t1"),), (), (), 0, 1.0, (), 1),
@@ -104,7 +103,7 @@ def flooded(stale: int = 24, executed: Sequence[str] = ("t1",), fates: Sequence[
         sent={Kind.RANDOM: 24, Kind.OLD: 24},
         answers=5,
         flood_s=1.0,
-        before=before,
+        before={"uav1": {"malformed": 3}},
         after={"uavs": [{"id": "uav1", "dropped": dropped}]},
         fates=tuple(fates),
     )
