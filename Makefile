@@ -4,6 +4,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
+# A fleet is many processes, and each starts a third sooner from bytecode.
+unexport PYTHONDONTWRITEBYTECODE
+
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
 .PHONY: demo test browser lint audit format kernels sanitize soak chaos fuzz clean help
