@@ -39,7 +39,7 @@ __all__ = ["REASONS", "Forgery", "Hostile", "Kind"]
 
 NEWEST = MAX_COUNT // 2
 """An incarnation that would beat every honest one, were the message taken."""
-SETTLED_S = 1.0
+SETTLED_S = 3.0
 """A register this old is known to everybody, so that an older statement is old to all."""
 
 

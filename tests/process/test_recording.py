@@ -16,7 +16,9 @@ from coordinator.recording.playback import Playback
 from coordinator.recording.reader import read_recording
 from coordinator.status.table import mission_status
 from swarm.errors import InputError
+from swarm.scenario.write import format_scenario
 from swarm.state.board import TaskState
+from tests.process.chaos_play import survey
 from tests.process.mission import SwarmRun, wait_until
 from tests.process.test_status import router_of
 
@@ -90,15 +92,17 @@ def test_a_recorder_is_stopped_by_its_user_and_by_the_end_of_the_mission(tmp_pat
     files = tmp_path / "ctrl-c.mcap", tmp_path / "to-the-end.mcap"
     folder = tmp_path / "run"
     folder.mkdir()
-    with SwarmRun(["table-1", "--bus", "router", "--speedup", "5"], folder) as run:
+    scenario = tmp_path / "scenario.toml"  # long enough for recorders that start slowly
+    scenario.write_text(format_scenario(survey(3, 16)))
+    with SwarmRun([str(scenario), "--bus", "router", "--speedup", "3"], folder) as run:
         wait_until(lambda: any(words.startswith("agent") for words in run.children()), 60, "start")
         recorders = [
-            swarm("record", str(file), "--connect", router_of(run), "--speedup", "5")
+            swarm("record", str(file), "--connect", router_of(run), "--speedup", "3")
             for file in files
         ]
         try:
             run.wait_for_line("epoch 1")
-            wait_until(lambda: all(file.exists() for file in files), 30, "the recordings")
+            wait_until(lambda: all(file.exists() for file in files), 60, "the recordings")
             recorders[0].send_signal(signal.SIGINT)
             _, said = recorders[0].communicate(timeout=20)
             assert recorders[0].returncode == 0, said
@@ -115,5 +119,5 @@ def test_a_recorder_is_stopped_by_its_user_and_by_the_end_of_the_mission(tmp_pat
     whole = Playback(read_recording(files[1]))
     whole.seek(whole.duration_s)
     assert whole.observer.phase == "ended"
-    assert len(whole.observer.result().done) == 8
+    assert len(whole.observer.result().done) == 16
     assert files[1].stat().st_size > files[0].stat().st_size

@@ -41,6 +41,7 @@ from sim.autopilot.server import VehicleServer
 from sim.autopilot.vehicle import COMPONENT_ID, Vehicle
 from swarm.clock import ScaledClock
 from tests.bridge_flight import ORIGIN
+from tests.lateness import Lateness
 
 pytestmark = pytest.mark.sitl
 
@@ -326,13 +327,13 @@ async def _fly_through_sockets(
     try:
         await vehicle.start()
         vehicle.order(START)
-        async with asyncio.timeout(30.0):
+        async with asyncio.timeout(60.0), Lateness() as late:
             await home.wait()
     finally:
         await vehicle.close()
         await server.close()
     legs_s = [b - a for a, b in itertools.pairwise(times_s)]
-    # Generous, as the machine may be busy: half a wall second in all, one with uploads.
-    slack_s = (0.5 if style is CommandStyle.REPOSITION else 1.0) * speedup
+    # Half a wall second in all, one with uploads, and what a busy machine keeps us waiting.
+    slack_s = ((0.5 if style is CommandStyle.REPOSITION else 1.0) + late.s) * speedup
     assert 9.0 * 0.99 <= sum(legs_s) <= 9.0 + slack_s
     assert server.garbage == 0
