@@ -97,7 +97,7 @@ def story(verdict: Verdict) -> list[str]:
 
 def all_done(verdict: Verdict, n_task: int) -> None:
     """Assert that nothing was lost, no invariant broken and every duplicate counted."""
-    told = "\n".join(story(verdict))
+    told = "\n".join([*story(verdict), *verdict.faults])
     assert verdict.faults == (), told
     assert len(verdict.flight.result.done) == n_task, told
     assert verdict.flight.result.duplicate_visits == verdict.duplicates

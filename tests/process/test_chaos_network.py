@@ -15,7 +15,7 @@ from tests.process.chaos_play import all_done, play, story, survey
 
 pytestmark = [pytest.mark.process, pytest.mark.timeout(200)]
 
-FAR = {f"uav{number:02}" for number in (2, 4, 6, 8, 10)}
+FAR = {f"uav{number:02}" for number in (2, 4, 6)}
 PARTED_S = 6.0
 SPEEDUP = 4.0
 
@@ -31,11 +31,9 @@ def test_parted_halves_of_a_mesh_agree_after_healing_and_lose_nothing(tmp_path: 
         await flight.until_done(5)
         await part_and_heal(flight, FAR)
 
-    verdict = play(
-        survey(10, 70), tmp_path, script, bus=BusKind.MESH, speedup=SPEEDUP, relayed=True
-    )
+    verdict = play(survey(6, 42), tmp_path, script, bus=BusKind.MESH, speedup=SPEEDUP, relayed=True)
 
-    all_done(verdict, 70)
+    all_done(verdict, 42)
     assert verdict.duplicates > 0  # a parting that nobody noticed would prove nothing
     assert verdict.agreement_s <= AGREE_WITHIN_S
 
@@ -49,11 +47,11 @@ def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Pa
             for link in flight.network.links_of("router 2")
             if link.listener == "router 2" and relays[link].n_connection
         }
-        assert len(served) == 5
+        assert len(served) == 3
         await part_and_heal(flight, served | {"router 2"})
 
     verdict = play(
-        survey(10, 70),
+        survey(6, 42),
         tmp_path,
         script,
         bus=BusKind.ROUTER,
@@ -62,7 +60,7 @@ def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Pa
         relayed=True,
     )
 
-    all_done(verdict, 70)
+    all_done(verdict, 42)
     assert verdict.duplicates > 0
     assert verdict.agreement_s <= AGREE_WITHIN_S
 
