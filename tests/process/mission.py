@@ -141,7 +141,7 @@ class SwarmRun:
         """Everything said on standard error."""
         return "\n".join(self.lines)
 
-    def result(self, timeout_s: float = 120.0) -> tuple[int, dict[str, Any]]:
+    def result(self, timeout_s: float = 200.0) -> tuple[int, dict[str, Any]]:
         """Exit status and JSON, once it has ended by itself."""
         deadline_s = time.monotonic() + timeout_s
         while self.process.poll() is None:

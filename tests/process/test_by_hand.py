@@ -17,7 +17,7 @@ import pytest
 
 from swarm.bus.endpoints import free_loopback_endpoints
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process]
 
 README = Path(__file__).parents[2] / "README.md"
 

@@ -13,7 +13,7 @@ from sim.chaos.relay import Quality
 from sim.launch.fleet import BusKind
 from tests.process.chaos_play import all_done, play, story, survey
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(200)]
+pytestmark = [pytest.mark.process]
 
 FAR = {f"uav{number:02}" for number in (2, 4, 6)}
 PARTED_S = 6.0

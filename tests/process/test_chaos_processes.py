@@ -18,7 +18,7 @@ from swarm.model import Task, TaskId
 from swarm.wire.messages import Body, Claim, ClaimPhase, Status
 from tests.process.chaos_play import all_done, play, story, survey
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(200)]
+pytestmark = [pytest.mark.process]
 
 SPEEDUP = 4.0
 VICTIM = "uav03"

@@ -17,7 +17,7 @@ import pytest
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import LIMIT_S, ByHand
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.process]
 
 UAVS = ["uav1", "uav2"]
 POPUP_S = 30.0
@@ -99,7 +99,7 @@ def test_beside_a_living_coordinator_another_one_ends_with_a_clear_line(by_hand:
     by_hand.wait_for_done(1)
     second = by_hand.coordinator("second")
 
-    assert second.wait(30) == 1
+    assert second.wait(60) == 1
     last = by_hand.log("second").splitlines()[-1]
     assert last == "a coordinator is already there; add --standby to wait for its loss"
     assert first.wait(LIMIT_S) == 0

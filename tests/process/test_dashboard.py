@@ -18,9 +18,10 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.scenario.write import format_scenario
 from tests.process.feed_reader import FeedReader, answers, post
 from tests.process.mission import SwarmRun, alive, child_pids, wait_until
+from tests.process.pace import pace
 from tests.process.router_processes import router, started
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(150)]
+pytestmark = [pytest.mark.process]
 
 UAVS = ["uav1", "uav2", "uav3"]
 MISSION = Mission(
@@ -36,7 +37,7 @@ SWARM = "import sys; from swarm.cli import console_main; sys.exit(console_main()
 def test_an_operator_sees_and_steers_a_run(tmp_path: Path) -> None:
     scenario = tmp_path / "shown.toml"
     scenario.write_text(format_scenario(MISSION))
-    flown = ["shown.toml", "--speedup", "6", "--dashboard", "0"]
+    flown = ["shown.toml", "--speedup", f"{pace(6.0):g}", "--dashboard", "0"]
     with SwarmRun(flown, tmp_path) as run:
         run.wait_for_line("dashboard: http://127.0.0.1:")
         url = run.lines[0].removeprefix("dashboard: ")

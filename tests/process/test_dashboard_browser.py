@@ -18,7 +18,7 @@ from tests.process.browser import open_page
 from tests.process.by_hand import ByHand
 from tests.process.mission import wait_until
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.process]
 
 UAVS = ["uav1", "uav2", "uav3"]
 SIDE = 12

@@ -12,7 +12,7 @@ import pytest
 
 from tests.process.router_processes import SWARM, router, started
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process]
 
 
 def doctor(*words: str) -> tuple[int, dict[str, dict[str, Any]]]:

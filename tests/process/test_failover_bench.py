@@ -17,7 +17,7 @@ from sim.bench.takeover import stuck_on_demand
 from sim.bench.trouble import BAD_LINKS, measure_false_losses
 from swarm.config import Link
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(200)]
+pytestmark = [pytest.mark.process]
 
 
 def test_another_holds_the_task_of_a_killed_agent() -> None:

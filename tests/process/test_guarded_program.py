@@ -15,7 +15,7 @@ from sim.launch import guard
 from sim.launch.process import Child, ChildFailedError, Setting
 from tests.process.mission import alive, child_pids, wait_until
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(60)]
+pytestmark = [pytest.mark.process]
 
 SLEEPS = ["/bin/sh", "-c", "echo here; exec sleep 100"]
 STUBBORN = ["/bin/sh", "-c", "trap '' TERM; echo here; while :; do sleep 0.1; done"]

@@ -16,7 +16,7 @@ from swarm.identity.founding import found_authority
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import ByHand
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process]
 
 UAVS = ["uav1", "uav2", "uav3"]
 OUT_LIMIT_S = 5.0
@@ -46,14 +46,14 @@ def test_a_revoked_agent_is_out_at_once_and_comes_home_and_the_others_finish(
 
         words = ["keys", "revoke", str(keys), "uav3", "--connect", by_hand.endpoint]
         revoking = by_hand.start("revoke", words)
-        assert revoking.wait(20) == 0, by_hand.log("revoke")
+        assert revoking.wait(60) == 0, by_hand.log("revoke")
 
         assert revoking.stdout is not None
         assert revoking.stdout.read() == (
             "revoked: uav3\nroster version 3 published; confirmed by coordinator, uav1, uav2\n"
         )
-        assert coordinator.wait(60) == 0, by_hand.log("coordinator")
-        assert [agent.wait(60) for agent in by_hand.agents] == [0, 0, 0]
+        assert coordinator.wait(150) == 0, by_hand.log("coordinator")
+        assert [agent.wait(150) for agent in by_hand.agents] == [0, 0, 0]
         told = [_time_s(by_hand.log(name), "newer roster in force") for name in UAVS]
         told.append(_time_s(by_hand.log("router"), "roster 3"))
         assert max(told) - min(told) < OUT_LIMIT_S

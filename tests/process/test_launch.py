@@ -13,7 +13,7 @@ from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
 from tests.process.mission import alive
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process]
 
 
 def test_processes_are_killed_restarted_and_ended_by_name(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from swarm.wire.messages import Board, Brief, Claim, Epoch, Outcome, Status
 from tests.process.by_hand import ByHand
 from tests.releases import kept_releases, python_of, unpacked
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process]
 
 MISSION = "table-1"
 SPEEDUP = 10

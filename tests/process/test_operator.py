@@ -13,7 +13,7 @@ import pytest
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import ByHand
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.process]
 
 UAVS = ["uav1", "uav2", "uav3"]
 MISSION = Mission(

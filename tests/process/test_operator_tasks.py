@@ -12,7 +12,7 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import ByHand
 from tests.process.test_operator import swarm
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.process]
 
 UAVS = ["uav1", "uav2"]
 LONG = Task(TaskId("t1"), (10.0, 20.0, 0.0), 4.0, service_s=9000.0)

@@ -20,9 +20,10 @@ from swarm.scenario.write import format_scenario
 from swarm.state.board import TaskState
 from tests.process.chaos_play import survey
 from tests.process.mission import SwarmRun, wait_until
+from tests.process.pace import pace
 from tests.process.test_status import router_of
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process]
 
 
 def swarm(*words: str) -> subprocess.Popen[str]:
@@ -47,17 +48,18 @@ def test_killed_recorders_leave_whole_files_and_the_flight_goes_on(tmp_path: Pat
     folder = tmp_path / "run"
     folder.mkdir()
     by_run, by_onlooker = folder / "run.mcap", tmp_path / "onlooker.mcap"
-    flags = ["--bus", "router", "--method", "greedy", "--speedup", "4", "--record", str(by_run)]
+    speed = ["--speedup", f"{pace(4.0):g}"]
+    flags = ["--bus", "router", "--method", "greedy", *speed, "--record", str(by_run)]
     with SwarmRun(["table-1", *flags], folder) as run:
         wait_until(lambda: any(words.startswith("agent") for words in run.children()), 60, "start")
-        onlooker = swarm("record", str(by_onlooker), "--connect", router_of(run), "--speedup", "4")
+        onlooker = swarm("record", str(by_onlooker), "--connect", router_of(run), *speed)
         try:
             run.wait_for_line("epoch 1")
-            wait_until(lambda: _holds_anything(by_onlooker), 30, "something in the recording")
+            wait_until(lambda: _holds_anything(by_onlooker), 100, "something in the recording")
             time.sleep(1.3)
             onlooker.send_signal(signal.SIGKILL)
             killed_s = time.time()
-            onlooker.communicate(timeout=20)
+            onlooker.communicate(timeout=60)
         finally:
             onlooker.kill()
         status, told = run.result()
@@ -94,21 +96,21 @@ def test_a_recorder_is_stopped_by_its_user_and_by_the_end_of_the_mission(tmp_pat
     folder.mkdir()
     scenario = tmp_path / "scenario.toml"  # long enough for recorders that start slowly
     scenario.write_text(format_scenario(survey(3, 16)))
-    with SwarmRun([str(scenario), "--bus", "router", "--speedup", "3"], folder) as run:
+    flown = ["--speedup", f"{pace(3.0):g}"]
+    with SwarmRun([str(scenario), "--bus", "router", *flown], folder) as run:
         wait_until(lambda: any(words.startswith("agent") for words in run.children()), 60, "start")
         recorders = [
-            swarm("record", str(file), "--connect", router_of(run), "--speedup", "3")
-            for file in files
+            swarm("record", str(file), "--connect", router_of(run), *flown) for file in files
         ]
         try:
             run.wait_for_line("epoch 1")
-            wait_until(lambda: all(file.exists() for file in files), 60, "the recordings")
+            wait_until(lambda: all(file.exists() for file in files), 100, "the recordings")
             recorders[0].send_signal(signal.SIGINT)
-            _, said = recorders[0].communicate(timeout=20)
+            _, said = recorders[0].communicate(timeout=60)
             assert recorders[0].returncode == 0, said
             assert str(files[0]) in said.splitlines()[-1]
             assert run.result()[0] == 0
-            _, said = recorders[1].communicate(timeout=30)
+            _, said = recorders[1].communicate(timeout=60)
             assert recorders[1].returncode == 0, said
         finally:
             for recorder in recorders:

@@ -15,15 +15,18 @@ from coordinator.recording.playback import Playback
 from coordinator.recording.reader import read_recording
 from swarm.cli import main
 from tests.process.mission import SwarmRun
+from tests.process.pace import pace
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.process]
 
 
 def test_the_recording_of_a_faultless_flight_is_read_by_others_and_agrees_with_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "flight.mcap"
-    with SwarmRun(["table-1", "--speedup", "10", "--record", str(file)], tmp_path) as run:
+    with SwarmRun(
+        ["table-1", "--speedup", f"{pace(10.0):g}", "--record", str(file)], tmp_path
+    ) as run:
         status, told = run.result()
         assert status == 0, run.story()
 

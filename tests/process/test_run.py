@@ -14,8 +14,9 @@ from sim.chaos.flood import long_mission
 from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
 from tests.process.mission import SwarmRun, alive, wait_until
+from tests.process.pace import pace
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.process]
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     """The arguments for a fleet of five, half as large, which is enough to lose a process of."""
     scenario = tmp_path_factory.mktemp("fleet") / "scenario.toml"
     scenario.write_text(format_scenario(survey(5, 30)))
-    return [str(scenario), "--speedup", "6"]
+    return [str(scenario), "--speedup", f"{pace(6.0):g}"]
 
 
 def kill(pid: int) -> None:
@@ -83,7 +84,7 @@ def assert_every_line_tells_whose_it_is(logs: Path) -> None:
 def test_killed_agents_tasks_are_done_by_the_others(tmp_path: Path) -> None:
     scenario = tmp_path / "scenario.toml"
     scenario.write_text(format_scenario(survey(5, 15, side_m=800.0)))
-    with SwarmRun([str(scenario), "--speedup", "6"], tmp_path) as run:
+    with SwarmRun([str(scenario), "--speedup", f"{pace(6.0):g}"], tmp_path) as run:
         run.wait_for_line(" ended ")  # at 9 s; uav02 is on its way to t07 until 40 s
         kill(run.child("agent", "uav02"))
         status, told = run.result()

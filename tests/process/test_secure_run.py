@@ -19,7 +19,7 @@ from tests.process.feed_reader import post
 from tests.process.mission import SwarmRun
 from tests.process.test_status import router_of
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.process]
 
 FAST = ["--speedup", "20"]
 """Of missions that are the paper's, drawn out, so that a busy machine does not change them."""

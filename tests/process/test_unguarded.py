@@ -9,7 +9,7 @@ import pytest
 from sim.chaos.insider import Trick
 from sim.chaos.unguarded import fly_unguarded
 
-pytestmark = [pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.process]
 
 
 def test_lies_that_a_router_passes_on_are_seen_through_and_counted_by_every_uav() -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from tests.sitl.whole_run import fly
 
-pytestmark = [pytest.mark.sitl, pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.sitl, pytest.mark.process]
 
 REASONS = {
     "pilot": " switched it to ",

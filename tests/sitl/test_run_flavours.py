@@ -18,10 +18,11 @@ import pytest
 from agent.mavlink.config import CommandStyle
 from sim.launch.firmware import FirmwareKind
 from tests.process.mission import alive, wait_until
+from tests.process.pace import pace
 from tests.sitl.firmware_stand_in import arducopter_stand_in, px4_stand_in
 from tests.sitl.whole_run import MEADOW, UAVS, autopilot_of, fly
 
-pytestmark = [pytest.mark.sitl, pytest.mark.process, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.sitl, pytest.mark.process]
 
 
 @pytest.mark.parametrize("style", CommandStyle)
@@ -60,17 +61,18 @@ def test_firmware_is_started_on_the_ports_where_agents_look_for_it(
     scenario.write_text(MEADOW.read_text())
     place = make(programs, str(scenario), list(UAVS))
 
-    flown = fly(work, "--autopilot", kind, "--firmware", str(place), speedup=20.0)
+    flown = fly(work, "--autopilot", kind, "--firmware", str(place), speedup=pace(20.0))
 
     flown.assert_all_done()
     wait_until(lambda: not _vehicles(str(scenario)), 10, "the end of all firmware")
 
 
 def test_vehicles_that_run_already_are_flown_and_left_running(tmp_path: Path) -> None:
+    speedup = pace(20.0)
     vehicles = subprocess.Popen(
         [
             *(sys.executable, "-m", "swarm", "autopilot", str(MEADOW), "--json"),
-            *("--system-id", "41", "--speedup", "20"),
+            *("--system-id", "41", "--speedup", f"{speedup:g}"),
         ],
         stdout=subprocess.PIPE,
         text=True,
@@ -83,7 +85,7 @@ def test_vehicles_that_run_already_are_flown_and_left_running(tmp_path: Path) ->
         }
         first, second, third = (places[uav] for uav in UAVS)
 
-        flown = fly(tmp_path, "--autopilot", f"uav2={second},{first},{third}", speedup=20.0)
+        flown = fly(tmp_path, "--autopilot", f"uav2={second},{first},{third}", speedup=speedup)
 
         flown.assert_all_done()
         assert flown.told["lost_uavs"] == []

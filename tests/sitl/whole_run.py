@@ -15,6 +15,7 @@ from sim.launch.firmware import FirmwareKind
 from swarm.scenario import load_scenario
 from swarm.scenario.shipped import resolve_scenario
 from tests.process.mission import SwarmRun
+from tests.process.pace import pace
 
 __all__ = ["MEADOW", "TASKS", "UAVS", "Autopilot", "Flown", "autopilot_of", "fly"]
 
@@ -46,11 +47,12 @@ class Flown:
         return "\n".join(text for text in texts if text.startswith(f"{uav} "))
 
 
-def fly(folder: Path, *arguments: str, speedup: float = 10.0) -> Flown:
-    """Fly `MEADOW` with these arguments of `swarm run`."""
+def fly(folder: Path, *arguments: str, speedup: float | None = None) -> Flown:
+    """Fly `MEADOW` with these arguments of `swarm run`, ten times as fast where none is said."""
+    speedup = speedup or pace(10.0)
     words = [str(MEADOW), "--speedup", f"{speedup:g}", *arguments]
     with SwarmRun(words, folder) as run:
-        status, told = run.result(timeout_s=170.0)
+        status, told = run.result(timeout_s=220.0)
         run.assert_nothing_left()
         return Flown(status, told, f"{' '.join(words)}\n{run.story()}\n{told['processes']}")
 
@@ -72,4 +74,4 @@ def autopilot_of(kind: FirmwareKind) -> Autopilot:
     if os.environ.get(kind.variable):
         return Autopilot(kind, real=True, speedup=4.0, worth=0.8)
     simulated = "sim" if kind is FirmwareKind.ARDUPILOT else "sim-px4"
-    return Autopilot(simulated, real=False, speedup=20.0, worth=0.93)
+    return Autopilot(simulated, real=False, speedup=pace(20.0), worth=0.93)

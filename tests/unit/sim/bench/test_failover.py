@@ -104,7 +104,8 @@ def flooded(stale: int = 24, executed: Sequence[str] = ("t1",), fates: Sequence[
         answers=5,
         flood_s=1.0,
         before={"uav1": {"malformed": 3}},
-        after={"uavs": [{"id": "uav1", "dropped": dropped}]},
+        after={"uav1": dropped},
+        shown={"uavs": [{"id": "uav1", "dropped": dropped}]},
         fates=tuple(fates),
     )
 
