@@ -27,5 +27,6 @@ def test_malformed_messages_change_no_decision_and_are_all_counted() -> None:
     assert flood.fates == ()
     assert len(flood.counted) == 3
     assert flood.ok, (flood.expected, flood.counted)
+    assert len(flood.shown["uavs"]) == 3
     assert all(uav["dropped"].keys() >= flood.expected.keys() for uav in flood.shown["uavs"])
     assert any(other.startswith("ghost") for other in flood.shown["others"])

@@ -96,11 +96,11 @@ def test_a_recorder_is_stopped_by_its_user_and_by_the_end_of_the_mission(tmp_pat
     folder.mkdir()
     scenario = tmp_path / "scenario.toml"  # long enough for recorders that start slowly
     scenario.write_text(format_scenario(survey(3, 16)))
-    flown = ["--speedup", f"{pace(3.0):g}"]
-    with SwarmRun([str(scenario), "--bus", "router", *flown], folder) as run:
+    speed = ["--speedup", f"{pace(3.0):g}"]
+    with SwarmRun([str(scenario), "--bus", "router", *speed], folder) as run:
         wait_until(lambda: any(words.startswith("agent") for words in run.children()), 60, "start")
         recorders = [
-            swarm("record", str(file), "--connect", router_of(run), *flown) for file in files
+            swarm("record", str(file), "--connect", router_of(run), *speed) for file in files
         ]
         try:
             run.wait_for_line("epoch 1")

@@ -41,16 +41,8 @@ def router_of(run: SwarmRun) -> str:
 
 def test_a_running_mission_is_found_and_told(tmp_path: Path) -> None:
     (scenario := tmp_path / "scenario.toml").write_text(format_scenario(survey(5, 30)))
-    arguments = [
-        str(scenario),
-        "--bus",
-        "router",
-        "--method",
-        "greedy",
-        "--speedup",
-        f"{pace(3.0):g}",
-    ]
-    with SwarmRun(arguments, tmp_path) as run:
+    options = ["--bus", "router", "--method", "greedy", "--speedup", f"{pace(3.0):g}"]
+    with SwarmRun([str(scenario), *options], tmp_path) as run:
         run.wait_for_line("epoch 1")
         table = status("--connect", router_of(run))
         told = json.loads(status("--connect", router_of(run), "--json").stdout)
