@@ -24,6 +24,9 @@ from swarm.wire.messages import Body, Brief, ClaimPhase, Epoch, EpochPhase, Mess
 
 __all__ = ["Hearing"]
 
+_WORTH_TELLING_S = 0.1
+"""A correction of the mission clock by less is the network's."""
+
 
 class Hearing:
     """The ear of the agent of ``uav``.
@@ -91,8 +94,13 @@ class Hearing:
         if not self.at_work and self._is_first(body):
             # Whoever answered before did not know the mission; now somebody may know more.
             self.learning.doubt(now_s)
+        known = self._replica.epoch_stamp
         actions += self._take_in(message, now_s)
-        return actions + (self._start_clock(body, now_s) if isinstance(body, Epoch) else [])
+        # What was said before tells what time it is only to whom nothing else does.
+        is_word = self._replica.epoch_stamp != known or not self._picture.knows_time
+        if is_word and isinstance(body, Epoch) and body.phase is EpochPhase.RUNNING:
+            actions += self._set_clock(body.mission_s, now_s)
+        return actions
 
     def learn(self, snapshots: Sequence[Snapshot], now_s: float) -> list[Action]:
         """The answers to a question."""
@@ -184,19 +192,28 @@ class Hearing:
         """Whose claim is known by hearsay must speak: it may hang since, with a living token."""
         self._peers.membership.expect(self._replica.claims.keys() - {self._uav}, now_s)
 
-    def _start_clock(self, epoch: Epoch, now_s: float) -> list[Action]:
-        runs = epoch.phase is EpochPhase.RUNNING
-        if not (runs and self._picture.set_clock(epoch.mission_s, now_s)):
+    def _set_clock(self, mission_s: float, now_s: float) -> list[Action]:
+        """The coordinator has just said that it is ``mission_s``."""
+        change_s = self._picture.hear_time(mission_s, now_s)
+        if change_s is None:
+            self._awake(now_s)
+            return [Note("mission runs", {"mission_s": mission_s})]
+        if abs(change_s) < _WORTH_TELLING_S:
             return []
-        self._awake(now_s)
-        return [Note("mission runs", {"mission_s": epoch.mission_s})]
+        return [Note("mission clock corrected", {"by_s": change_s, "mission_s": mission_s})]
 
     def _learn_clock(self, told: Iterable[Snapshot], now_s: float) -> None:
-        """The coordinator's word counts; else one odd clock among many must not set the time."""
+        """The coordinator's word counts; else one odd clock among many must not set the time.
+
+        The others may all have it of an odd one, so their word sets only what is not known.
+        """
         known_s = {each.writer: each.mission_s for each in told if each.mission_s is not None}
-        if known_s and self._replica.epoch is not None:
-            mission_s = known_s.get(COORDINATOR, median_high(known_s.values()))
-            self._picture.set_clock(mission_s, now_s)
+        if not known_s or self._replica.epoch is None:
+            return
+        if (mission_s := known_s.get(COORDINATOR)) is not None:
+            self._picture.hear_time(mission_s, now_s)
+        elif not self._picture.knows_time:
+            self._picture.hear_time(median_high(known_s.values()), now_s)
 
     # -- who is there -----------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from enum import Enum
 
 from agent.vehicle import Telemetry
 from swarm.state.board import TaskBoard, TaskState
+from swarm.state.mission_clock import MissionClock
 from swarm.state.registers import Replica
 from swarm.wire.bounds import Point
 from swarm.wire.messages import (
@@ -54,7 +55,7 @@ class Picture:
         """Where the UAV is [m; mission origin], without its height layer."""
         self._uav = uav
         self._replica = replica
-        self._zero_s: float | None = None
+        self._clock = MissionClock()
         self._brief: Brief | None = None
         self._me: Fleet | None = None
         """The UAV's entry in that brief."""
@@ -66,10 +67,12 @@ class Picture:
         if self.running and self._replica.is_premature(message):
             return None
         before, epoch = self._replica.claims.get(message.writer), self._replica.epoch
+        brief = self._replica.brief
         body, board = message.body, self._replica.board
         entry = board.get(body.task) if isinstance(body, Board | TaskOrder) else None
         if not self._replica.join(message):
             return None
+        self._clock.heed(body, brief, epoch)
         match body:
             case Board(task=task) | TaskOrder(task=task) if entry is None and task in board:
                 return News.APPEARANCE
@@ -99,24 +102,32 @@ class Picture:
         """Whether the mission has begun, at a known time, and has not ended."""
         epoch = self._replica.epoch
         over = epoch is None or epoch.phase is EpochPhase.ENDED
-        return self._zero_s is not None and not over
+        return self._clock.is_set and not over
 
     # -- the mission clock ------------------------------------------------------------
 
-    def set_clock(self, mission_s: float, now_s: float) -> bool:
-        """It is ``mission_s`` now; False if the clock was set before, and so stays."""
-        if self._zero_s is not None:
-            return False
-        self._zero_s = now_s - mission_s
-        return True
+    def hear_time(self, mission_s: float, now_s: float) -> float | None:
+        """Somebody says that it is ``mission_s``; see `MissionClock`.
+
+        Returns:
+            By how much the clock was put forward [s], negative if back; None if that set it.
+        """
+        known = self._clock.is_set
+        change_s = self._clock.hear(mission_s, now_s)
+        return change_s if known else None
+
+    @property
+    def knows_time(self) -> bool:
+        """Whether mission time is known."""
+        return self._clock.is_set
 
     def known_mission_s(self, now_s: float) -> float | None:
         """Mission time [s]; None while it is not known."""
-        return None if self._zero_s is None else now_s - self._zero_s
+        return self._clock.mission_s(now_s)
 
     def mission_s(self, now_s: float) -> float:
         """Mission time [s]; 0 as long as the mission is not known to have begun."""
-        return 0.0 if self._zero_s is None else now_s - self._zero_s
+        return self._clock.mission_s(now_s) or 0.0
 
     # -- the UAV ----------------------------------------------------------------------
 

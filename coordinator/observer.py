@@ -35,6 +35,7 @@ from swarm.state.board import TaskBoard, TaskState
 from swarm.state.claims import holders
 from swarm.state.commands import in_force
 from swarm.state.membership import Membership
+from swarm.state.mission_clock import MissionClock
 from swarm.state.registers import Replica
 from swarm.wire.messages import (
     NOBODYS,
@@ -150,7 +151,8 @@ class Observer:
         self.pace = 1.0
         """Mission seconds per second of ``now_s``; see `keep_time`."""
         self._membership = Membership(timing)
-        self._zero_s: float | None = None
+        self._clock = MissionClock()
+        """Against ``now_s`` times the pace."""
         self._orphans: dict[str, str] = {}
         self._epochs: set[tuple[object, ...]] = set()
         self._stamps: dict[str, Stamp] = {}
@@ -195,8 +197,9 @@ class Observer:
             case Learned(snapshots):
                 self._joining, told = self.replica.brief is None, len(self.story)
                 for snapshot in snapshots:
-                    if self._zero_s is None and snapshot.mission_s is not None:
-                        self._zero_s = now_s - snapshot.mission_s / self.pace
+                    is_word = snapshot.writer == COORDINATOR or not self._clock.is_set
+                    if is_word and snapshot.mission_s is not None:
+                        self._clock.hear(snapshot.mission_s, now_s * self.pace)
                     for message in snapshot.messages:
                         self._hear(message, now_s)
                 if self._joining:
@@ -257,7 +260,7 @@ class Observer:
 
     def mission_s(self, now_s: float) -> float | None:
         """Mission time; None before the start."""
-        return None if self._zero_s is None else (now_s - self._zero_s) * self.pace
+        return self._clock.mission_s(now_s * self.pace)
 
     def keep_time(self, now_s: float, mission_s: float, pace: float) -> None:
         """Follow a mission whose time runs otherwise than the own clock.
@@ -267,8 +270,8 @@ class Observer:
             mission_s: mission time then [s].
             pace: mission seconds per second of the own clock; > 0.
         """
-        self.pace = pace
-        self._zero_s = now_s - mission_s / pace
+        self.pace, self._clock = pace, MissionClock()
+        self._clock.hear(mission_s, now_s * pace)
 
     def silent_s(self, uav: str, now_s: float) -> float | None:
         """How long one that is there has said nothing, once that is half of what gives it up [s].
@@ -368,12 +371,13 @@ class Observer:
         if isinstance(message.body, Choice):
             self._hear_choice(message.writer, message.stamp, message.body, now_s)
             return
-        if self._zero_s is not None and self.replica.is_premature(message):
+        if self._clock.is_set and self.replica.is_premature(message):
             return
         before = self.replica.claims.get(message.writer)
-        earlier = self.replica.known(message)
+        earlier, brief, epoch = self.replica.known(message), self.replica.brief, self.replica.epoch
         if not self.replica.join(message):
             return
+        self._clock.heed(message.body, brief, epoch)
         match message.body:
             case Epoch() as epoch:
                 self._hear_epoch(epoch, now_s)
@@ -398,7 +402,7 @@ class Observer:
 
     def _is_news(self, task: str) -> bool:
         """Whether the task is a pop-up, or one that the scenario does not know at all."""
-        started = self._zero_s is not None and not self._joining
+        started = self._clock.is_set and not self._joining
         return started and task not in self._known_at_start
 
     def _hear_status(self, uav: str, stamp: Stamp, status: Status, now_s: float) -> None:
@@ -485,10 +489,10 @@ class Observer:
     def _hear_epoch(self, epoch: Epoch, now_s: float) -> None:
         lists = tuple((uav, tasks) for uav, tasks in sorted(epoch.routes.items()))
         course = epoch.number, epoch.rule, epoch.sequence, lists
+        if epoch.phase is EpochPhase.RUNNING:
+            self._clock.hear(epoch.mission_s, now_s * self.pace)
         if epoch.phase is EpochPhase.RUNNING and course not in self._epochs:
             self._epochs.add(course)
-            if self._zero_s is None:
-                self._zero_s = now_s - epoch.mission_s / self.pace
             order = " > ".join(epoch.sequence)
             why = f" ({epoch.reason})" if epoch.number > 1 and epoch.reason else ""
             # With the first one mission time began.

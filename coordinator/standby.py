@@ -33,6 +33,7 @@ from swarm.model.ids import COORDINATOR
 from swarm.pulse import Pulse
 from swarm.state.board import TaskBoard
 from swarm.state.membership import Membership
+from swarm.state.mission_clock import MissionClock
 from swarm.state.registers import Replica, snapshot_without
 from swarm.wire.messages import Epoch, EpochPhase, Message, Snapshot
 
@@ -75,7 +76,7 @@ class StandbyCore:
         self._pulse = Pulse(timing.pause_s)
         self._actions: list[Action] = []
         self._linked = True
-        self._zero_s: float | None = None
+        self._clock = MissionClock()
         self._due_at_s: float | None = None
         """When it takes the place of the coordinator, which is missing; None while it is there."""
         self._last_question = False
@@ -143,7 +144,7 @@ class StandbyCore:
         return None if self.coordinator is None else self.coordinator.stood_down
 
     def _known(self, now_s: float, messages: tuple[Message, ...]) -> Snapshot:
-        mission_s = None if self._zero_s is None else now_s - self._zero_s
+        mission_s = self._clock.mission_s(now_s)
         return Snapshot(self._mission.name, COORDINATOR, 0, mission_s, messages)
 
     # -- watching -----------------------------------------------------------------------
@@ -156,10 +157,11 @@ class StandbyCore:
             case Learned(snapshots):
                 self._inquiry.answered()
                 for snapshot in snapshots:
+                    is_word = snapshot.writer == COORDINATOR or not self._clock.is_set
+                    if is_word and snapshot.mission_s is not None:
+                        self._clock.hear(snapshot.mission_s, now_s)
                     for message in snapshot.messages:
                         self._take_in(message, now_s)
-                    if self._zero_s is None and snapshot.mission_s is not None:
-                        self._zero_s = now_s - snapshot.mission_s
                 if any(snapshot.writer == COORDINATOR for snapshot in snapshots):
                     self._wait(now_s)
             case PeerSeen(writer):
@@ -184,9 +186,12 @@ class StandbyCore:
                 pass
 
     def _take_in(self, message: Message, now_s: float) -> None:
-        if self._replica.join(message) and isinstance(message.body, Epoch):
-            running = message.body.phase is EpochPhase.RUNNING
-            self._zero_s = now_s - message.body.mission_s if running else self._zero_s
+        brief, epoch, body = self._replica.brief, self._replica.epoch, message.body
+        if not self._replica.join(message):
+            return
+        self._clock.heed(body, brief, epoch)
+        if isinstance(body, Epoch) and body.phase is EpochPhase.RUNNING:
+            self._clock.hear(body.mission_s, now_s)
 
     def _wait(self, since_s: float) -> None:
         """Give the coordinator the time that it has from ``since_s`` on."""

@@ -492,6 +492,20 @@ def test_one_who_joins_late_learns_time_and_result_but_tells_no_tales_of_pop_ups
     assert not any("appeared" in sentence for sentence in onlooker.story)
 
 
+def test_who_heard_of_the_start_late_is_put_right_by_the_next_announcement() -> None:
+    onlooker = Onlooker()
+    onlooker.hear(COORDINATOR, epoch("u0", "u1"), 3.0)
+    onlooker.hear(COORDINATOR, epoch("u0", "u1", mission_s=4.0), 4.0)
+    assert onlooker.observer.mission_s(onlooker.now_s) == 4.0
+
+    other = message(COORDINATOR, epoch("u0", "u1", number=7), 1, incarnation=9)
+    onlooker.hear(COORDINATOR, brief_of(FLOWN))
+    onlooker.happen(Heard(other), 60.0)
+    another_flight = replace(brief_of(FLOWN), run=2)
+    onlooker.happen(Heard(message(COORDINATOR, another_flight, 2, incarnation=9)), 61.0)
+    assert onlooker.observer.mission_s(onlooker.now_s) == 1.0
+
+
 def test_one_who_joins_late_tells_what_was_before_at_its_own_time() -> None:
     onlooker = Onlooker(replace(FLOWN, tasks=()))
     said = [onlooker.statement(COORDINATOR, epoch("u0", "u1", mission_s=40.0))]

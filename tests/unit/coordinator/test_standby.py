@@ -285,6 +285,16 @@ def test_it_takes_over_with_all_that_it_has_heard() -> None:
     assert watcher.core.memory(104.0).mission_s == pytest.approx(6.0)
 
 
+def test_mission_time_is_by_the_word_that_was_least_under_way() -> None:
+    watcher = Watcher().watching()
+    for counter, (at_s, delay_s) in enumerate([(10.0, 3.0), (20.0, 0.1), (30.0, 0.9)], 100):
+        watcher.now_s = 98.0 + at_s + delay_s
+        said = epoch("u0", mission_s=at_s)
+        watcher.happen(Heard(message(COORDINATOR, said, counter, incarnation=9)))
+
+    assert watcher.core.memory(140.0).mission_s == 42.0
+
+
 def test_a_coordinator_that_blinks_or_comes_back_in_time_keeps_its_seat() -> None:
     watcher = Watcher().watching()
     watcher.happen(PeerGone(COORDINATOR))
