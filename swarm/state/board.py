@@ -71,7 +71,8 @@ class TaskBoard:
         """By id, with the entry each was made from."""
         self._states: dict[str, TaskState] = {}
         self._unfinished = False
-        self._states_version = -1
+        self._basis: tuple[int, int] | None = None
+        """Versions of brief and board, and of outcomes apart from further ones, of the states."""
         self._attempts = 0
         """How many outcomes the states take into account."""
         self._columns: list[Task] = []
@@ -129,27 +130,29 @@ class TaskBoard:
             self._entries_version = self.replica.board_version
 
     def _catch_up(self) -> None:
-        replica = self.replica
-        changes = replica.task_version - self._states_version
-        if not changes:
+        """Work the states out of brief, board and outcomes, or add what has come at their end.
+
+        An outcome makes of a task the same whatever others there are and whichever comes first.
+        """
+        replica, outcomes = self.replica, self.replica.outcomes
+        basis = replica.board_version, replica.reattempts
+        if basis == self._basis and len(outcomes) == self._attempts:
             return
-        attempts = len(replica.outcomes) - self._attempts
-        if changes != attempts:
-            # There is more than outcomes of first attempts, which stand at the end.
+        if basis != self._basis:
             self._sort()
-            self._states, attempts = self._untried.copy(), len(replica.outcomes)
-        reattempt = replica.brief is not None and replica.brief.reattempt_failed
-        for (_, task), outcome in islice(reversed(replica.outcomes.items()), attempts):
-            state = self._states.get(task)
-            if state is None:
+            self._states, self._attempts = self._untried.copy(), 0
+        final = replica.brief is None or not replica.brief.reattempt_failed
+        states, further = self._states, len(outcomes) - self._attempts
+        for (_, task), outcome in islice(reversed(outcomes.items()), further):
+            if task not in states:
                 continue
             if outcome.result is Result.DONE:
-                self._states[task] = TaskState.DONE
-            elif state is TaskState.OPEN and not reattempt:
-                self._states[task] = TaskState.FAILED
-        self._attempts = len(replica.outcomes)
+                states[task] = TaskState.DONE
+            elif final and states[task] is TaskState.OPEN:
+                states[task] = TaskState.FAILED
+        self._attempts = len(outcomes)
         self._unfinished = TaskState.OPEN in self._states.values()
-        self._states_version = replica.task_version
+        self._basis = basis
 
 
 def mission_of(replica: Replica, name: str, brief: Brief) -> Mission:

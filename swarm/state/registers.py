@@ -65,7 +65,8 @@ class Replica:
         self.claims: dict[str, Claim] = {}
         """By UAV id, of those in the brief; of all as long as there is none."""
         self.outcomes: dict[tuple[str, str], Outcome] = {}
-        """By UAV id and task id, of those in the brief likewise."""
+        """By UAV id and task id, of those in the brief likewise; as long as neither `board_version`
+        nor `reattempts` grows, further ones come at the end."""
         self._fleet: set[str] | None = None
         self.commands: dict[str, tuple[Stamp, Command]] = {}
         """By target, those for other flights of the mission among them; see swarm.state.commands.
@@ -81,6 +82,8 @@ class Replica:
         """Grows with every change of brief or board."""
         self.task_version = 0
         """Grows with every change of brief, board or outcomes."""
+        self.reattempts = 0
+        """Outcomes that have taken the place of others, of those that count."""
         self._ordered: dict[str, tuple[TaskOrder, Board]] = {}
         """By task id, the order that counts and the entry of the board made from it."""
 
@@ -181,6 +184,7 @@ class Replica:
             case Claim() as claim:
                 self.claims[message.writer] = claim
             case Outcome(task=task) as outcome:
+                self.reattempts += (message.writer, task) in self.outcomes
                 self.outcomes[message.writer, task] = outcome
             case _:
                 pass

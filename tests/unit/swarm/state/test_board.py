@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from random import Random
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -217,6 +221,68 @@ def test_however_often_one_looks_tasks_end_as_the_last_look_alone_finds(
     fresh = TaskBoard(registers.replica, MISSION)
     assert list(registers.board.states.items()) == list(fresh.states.items())
     assert registers.board.unfinished == fresh.unfinished
+
+
+def test_a_brief_that_adds_a_uav_whose_outcome_is_known_counts_all_of_its_outcomes() -> None:
+    registers = Registers((COORDINATOR, brief(FLEET[0])), (COORDINATOR, entry("t0")))
+    registers.post(entry("t1"))
+    registers.say("u1", done("t0"))
+    registers.say("u0", done("t1"))
+    assert registers.board.states == {"t0": TaskState.OPEN, "t1": TaskState.DONE}
+
+    registers.say(COORDINATOR, brief(*FLEET))
+    assert registers.board.states == {"t0": TaskState.DONE, "t1": TaskState.DONE}
+
+
+def any_statements(random: Random) -> list[Message]:
+    """Statements of all kinds that bear on what became of tasks, several of some registers."""
+
+    def body() -> tuple[str, Body]:
+        name = random.choice(["t0", "t1", "op"])
+        match random.choice(["brief", "entry", "order", "outcome", "outcome", "outcome"]):
+            case "brief":
+                fleet = random.sample([uav("u0"), uav("u1"), uav("u2")], random.randint(0, 3))
+                told = brief(*fleet, reattempt_failed=random.random() < 0.3)
+                return COORDINATOR, replace(told, run=random.choice([1, 1, 2]))
+            case "entry":
+                withdrawn, number = random.random() < 0.2, random.randint(0, 3)
+                return COORDINATOR, entry(name, 0.0, number, withdrawn=withdrawn)
+            case "order":
+                withdrawn, run = random.random() < 0.3, random.randint(1, 2)
+                return OPERATOR, order(name, run=run, withdrawn=withdrawn)
+            case _:
+                outcome = random.choice([done, failed])(name, attempt=random.randint(1, 2))
+                return random.choice(["u0", "u1", "u2", "stranger"]), outcome
+
+    said = [body() for _ in range(random.randint(1, 16))]
+    return [message(writer, body, counter) for counter, (writer, body) in enumerate(said, 1)]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_equal_registers_give_equal_boards_whatever_order_they_came_in(seed: int) -> None:
+    random = Random(seed)
+    for _ in range(60):
+        said = any_statements(random)
+        first = TaskBoard(Replica(), MISSION)
+        first.replica.join_all(said)
+
+        shuffled = said + random.sample(said, len(said) // 2)
+        random.shuffle(shuffled)
+        other = TaskBoard(Replica(), MISSION)
+        for statement in shuffled:
+            other.replica.join(statement)
+            if random.random() < 0.5:  # what was seen on the way must not matter
+                assert other.unfinished == (TaskState.OPEN in other.states.values())
+                _ = other.problem
+
+        assert list(other.replica.messages()) == list(first.replica.messages())
+        assert list(other.states.items()) == list(first.states.items())
+        assert other.unfinished == first.unfinished
+        assert (other.problem is None) == (first.problem is None)
+        if other.problem is not None and first.problem is not None:
+            assert other.problem.uav_ids == first.problem.uav_ids
+            assert other.problem.task_ids == first.problem.task_ids
+            np.testing.assert_array_equal(other.problem.success, first.problem.success)
 
 
 def test_doable_is_what_someone_who_takes_part_is_capable_of() -> None:
