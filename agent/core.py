@@ -12,6 +12,7 @@ counts of an earlier life's memory (agent.recall), which of the operator's comma
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from agent.ending import Ending
@@ -62,6 +63,7 @@ from swarm.state.commands import BEING_STOPPED, CANNOT_HOLD, words
 from swarm.state.registers import Replica
 from swarm.state.voice import Voice
 from swarm.wire.messages import (
+    MOST_REASONS,
     Claim,
     ClaimPhase,
     Command,
@@ -506,7 +508,7 @@ class AgentCore:
 
     def _status(self, now_s: float) -> Status:
         claim, telemetry = self.claim, self._picture.telemetry
-        stale = self.replica.stale
+        dropped = Counter({**self.dropped, "stale": self.replica.stale})
         return Status(
             phase=self.phase,
             task=None if claim is None else claim.task,
@@ -514,7 +516,7 @@ class AgentCore:
             velocity_enu_m_s=None if telemetry is None else telemetry.velocity_enu_m_s,
             battery_frac=None if telemetry is None else telemetry.battery_frac,
             mission_s=self._picture.known_mission_s(now_s),
-            dropped={**self.dropped, **({"stale": stale} if stale else {})},
+            dropped=dict((+dropped).most_common(MOST_REASONS)),
             note=self._speech.note[:200],
         )
 

@@ -115,7 +115,8 @@ class Hearing:
         self._learn_clock(snapshots, now_s)
         somebody_knows = any(isinstance(message.body, Brief) for message in told)
         self.learning.take(enough=somebody_knows and not self.at_work)
-        self._answered.update(snapshot.writer for snapshot in snapshots)
+        answered = {snapshot.writer for snapshot in snapshots}
+        self._answered |= answered & self._peers.membership.present
         if self._left_open:
             self._left_open = False
             self._tasking.tempt()

@@ -217,6 +217,7 @@ async def run_agent(
         execute=execute,
         snapshot=core.snapshot,
         known=core.replica.digest,
+        left_out=lambda: core.replica.overfull,
         save=keep,
         answer_s=answer_s,
     )

@@ -136,6 +136,7 @@ async def run_coordinator(
         execute=execute,
         snapshot=core.snapshot,
         known=known,
+        left_out=lambda: core.replica.overfull,
         save=None if save is None else lambda now_s: save(core.memory(now_s)),
         answer_s=answer_s,
         context=context,

@@ -6,7 +6,7 @@ Leaves out: what such a process does there (coordinator.status, coordinator.oper
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 
 from coordinator.status.onlooker import only_mission
 from swarm.bus.config import BusConfig
@@ -65,6 +65,7 @@ def onlooking(
     answer_s: float = PRESETS[Link.NORMAL].answer_s,
     *,
     every_status: bool = False,
+    left_out: Callable[[], int] = int,
 ) -> Shell[BusFact, Wish]:
     """A shell that tells ``core`` all that is said on the bus; it shows no token.
 
@@ -76,6 +77,7 @@ def onlooking(
         name: of this process, in logs and, where it speaks, as a writer.
         answer_s: how long a question waits for the slowest answer [wall s].
         every_status: see `take_seat`.
+        left_out: see `Shell`.
     """
     shell: Shell[BusFact, Wish] = Shell(
         core,
@@ -86,6 +88,7 @@ def onlooking(
         from_bus=lambda fact: fact,
         execute=lambda _: None,
         snapshot=None,
+        left_out=left_out,
         answer_s=answer_s,
     )
     take_seat(bus, mission, None, status=True, every_status=every_status)

@@ -10,7 +10,7 @@ is said (swarm.wire.codec).
 from __future__ import annotations
 
 from collections import Counter, OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Final
 
 from swarm.bus.port import BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
@@ -19,10 +19,14 @@ from swarm.wire.keys import Keys
 from swarm.wire.question import Question
 from swarm.wire.seal import NOT_SIGNED, NOT_THE_SIGNERS, SIGNER_UNKNOWN, Seal, open_envelope
 
-__all__ = ["TOO_MANY", "Asked", "Gate", "Limiter"]
+__all__ = ["MOST_STRANGERS", "TOO_MANY", "TOO_MANY_NAMES", "Asked", "Gate", "Limiter"]
 
 TOO_MANY: Final = "too many"
 """Reason under which is counted what came too fast."""
+TOO_MANY_NAMES: Final = "too many names"
+"""Reason under which is counted what names of UAVs say that are more than anybody has."""
+MOST_STRANGERS: Final = 4096
+"""Names of which a process takes anything in without a brief that tells of them."""
 ASKED_BEFORE: Final = "asked before"
 """Reason under which is counted a question that somebody else says again."""
 
@@ -41,32 +45,33 @@ a router passes on 50 a second of each neighbour."""
 QUESTION_HZ, QUESTION_BURST = 100.0, 1000
 """Questions of everybody together, where nobody knows who asks."""
 _NOBODY: Final = ""
+_NO_UAVS: Final = (AUTHORITY, COORDINATOR, OPERATOR, _NOBODY)
 _KEPT_QUESTIONS: Final = 4096
 
 
 class Limiter:
-    """One token bucket for each of many sources.
+    """One token bucket for each of many sources; how many there may be is for who calls to say.
 
     Args:
         rate_hz: how many each may send for good.
         burst: how many at once.
-        most_sources: of how many it keeps a record; further ones wait until some have been
-            quiet, so that made-up names cost no memory.
     """
 
-    def __init__(self, rate_hz: float, burst: int, *, most_sources: int = 4096) -> None:
+    def __init__(self, rate_hz: float, burst: int) -> None:
         self._rate_hz = rate_hz
         self._burst = burst
-        self._most_sources = most_sources
-        self._buckets: dict[str, tuple[float, float]] = {}
-        """What is left to each source, and when that was so [s]."""
+        self._buckets: OrderedDict[str, tuple[float, float]] = OrderedDict()
+        """What is left to each source, and when that was so [s]; who was quiet longest first."""
+
+    def __len__(self) -> int:
+        """Of how many sources it keeps a record."""
+        return len(self._buckets)
 
     def allows(self, source: str, now_s: float) -> bool:
         """Whether one more from ``source`` may come in now."""
-        known = self._buckets.get(source)
+        known = self._buckets.pop(source, None)
         if known is None:
-            if len(self._buckets) >= self._most_sources and not self._forget_quiet(now_s):
-                return False
+            self._forget_quiet(now_s)
             left = float(self._burst)
         else:
             left, at_s = known
@@ -75,13 +80,14 @@ class Limiter:
         self._buckets[source] = (left - allowed, now_s)
         return allowed
 
-    def _forget_quiet(self, now_s: float) -> bool:
-        """Forget whose bucket is full again; whether there was any."""
+    def _forget_quiet(self, now_s: float) -> None:
+        """Forget whose bucket is full again: never more in all than have ever come in."""
         full_s = self._burst / self._rate_hz
-        quiet = [source for source, (_, at_s) in self._buckets.items() if at_s + full_s <= now_s]
-        for source in quiet:
+        while self._buckets:
+            source = next(iter(self._buckets))
+            if self._buckets[source][1] + full_s > now_s:
+                return
             del self._buckets[source]
-        return bool(quiet)
 
 
 class Gate:
@@ -89,7 +95,8 @@ class Gate:
 
     Where there are keys, a source is who claims to have signed, if that one may write the key:
     nobody uses up what another may say but by its forged name, for which it needs the key of
-    that other one at the routers. Else it is whose key it is.
+    that other one at the routers. Else it is whose key it is, and anybody can make names up: of
+    those only so many count, but for the UAVs that the brief names, which no flood shuts out.
 
     Args:
         keys: of the mission.
@@ -100,6 +107,9 @@ class Gate:
     def __init__(self, keys: Keys, seal: Seal | None, now_s: Callable[[], float]) -> None:
         self.refused: Counter[str] = Counter()
         """What was not let in, by reason."""
+        self.fleet: Collection[str] = ()
+        """Ids of the UAVs that the brief names, as far as it is known; set as a whole."""
+        self._strangers: set[str] = set()
         self._keys = keys
         self._seal = seal
         self._now_s = now_s
@@ -132,7 +142,7 @@ class Gate:
     def _fault_of_sample(self, key: str, payload: bytes) -> str | None:
         writer = self._keys.writer_of(key) or _NOBODY
         if self._seal is None or writer == AUTHORITY:
-            return self._too_many(writer, writer)
+            return self._too_many_names(writer) or self._too_many(writer, writer)
         envelope = open_envelope(payload)
         if envelope is None:
             return NOT_SIGNED
@@ -146,6 +156,15 @@ class Gate:
         seat = writer in (AUTHORITY, COORDINATOR, OPERATOR)
         limiter = self._seats if seat else self._uavs
         return None if limiter.allows(source, self._now_s()) else TOO_MANY
+
+    def _too_many_names(self, writer: str) -> str | None:
+        """Why ``writer`` does not count as one more UAV; None if it does, or is none."""
+        if writer in _NO_UAVS or writer in self._strangers or writer in self.fleet:
+            return None
+        if len(self._strangers) >= MOST_STRANGERS:
+            return TOO_MANY_NAMES
+        self._strangers.add(writer)
+        return None
 
     def _fault_of_question(self, payload: bytes) -> str | None:
         source = _NOBODY
@@ -162,6 +181,8 @@ class Gate:
         writer = self._keys.writer_of_token(key) or _NOBODY
         if self._seal is not None and not self._seal.knows(writer):
             return SIGNER_UNKNOWN
+        if self._seal is None and (reason := self._too_many_names(writer)) is not None:
+            return reason
         return None if self._tokens.allows(writer, self._now_s()) else TOO_MANY
 
 

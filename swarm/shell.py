@@ -49,9 +49,10 @@ from swarm.limits import TOO_MANY, Gate
 from swarm.log import get_logger
 from swarm.model.ids import AUTHORITY
 from swarm.questions import Questions, draw_nonce
+from swarm.state.registers import NO_ROOM
 from swarm.wire.codec import Codec
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Choice, Message, SignedRoster, Snapshot, Stamp, Status
+from swarm.wire.messages import Brief, Choice, Message, SignedRoster, Snapshot, Stamp, Status
 from swarm.wire.seal import Seal
 
 __all__ = ["Core", "Shell", "take_seat"]
@@ -95,6 +96,7 @@ class Shell(Generic[E, A]):
         snapshot: answers a query; None for a process that answers none.
         known: digest of the registers the core knows; answers to it leave those out, and
             its own answers what the asker knows.
+        left_out: how many registers the core has had no room for so far.
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
         context: what every note of the core is logged with, besides its own fields.
@@ -113,6 +115,7 @@ class Shell(Generic[E, A]):
         execute: Callable[[A], None],
         snapshot: Callable[[float], Snapshot] | None,
         known: Callable[[], Mapping[str, int]] = dict,
+        left_out: Callable[[], int] = int,
         save: Callable[[float], None] | None = None,
         answer_s: float = PRESETS[Link.NORMAL].answer_s,
         context: Callable[[], Mapping[str, object]] = dict,
@@ -141,6 +144,7 @@ class Shell(Generic[E, A]):
         )
         self._from_bus = from_bus
         self._execute = execute
+        self._left_out = left_out
         self._save = save
         self._context = context
         self._loop = asyncio.get_running_loop()
@@ -150,8 +154,10 @@ class Shell(Generic[E, A]):
         self._events: deque[E] = deque()
         self._busy = False
         self._told_newer: set[str] = set()
+        self._briefed: Stamp | None = None
+        """Of the newest brief that was heard."""
         self._counted: Counter[str] = Counter()
-        """Of what never got as far as the codec, what is counted there."""
+        """Of what others than the codec have dropped, what is counted there."""
 
     @property
     def dropped(self) -> Mapping[str, int]:
@@ -313,12 +319,16 @@ class Shell(Generic[E, A]):
             self._log.info("a newer release says more than this one understands", kind=kind)
 
     def _count(self) -> None:
-        """Count what was dropped before anything was read of it."""
-        gone, refused = self._bus.inbox.dropped, self._gate.refused
-        if gone or refused:
+        """Count what was dropped before anything was read of it, or has no room in the core."""
+        gone, refused, left_out = self._bus.inbox.dropped, self._gate.refused, self._left_out()
+        if gone or refused or left_out:
             counts = Counter(dict(refused))  # copied at once: others may count on meanwhile
             counts[TOO_MANY] += gone
-            self._codec.dropped.update(counts - self._counted)
+            counts[NO_ROOM] = max(left_out, self._counted[NO_ROOM])
+            news = counts - self._counted
+            if news[NO_ROOM] and not self._counted[NO_ROOM]:
+                self._log.warning("others say more than there is room for", left_out=left_out)
+            self._codec.dropped.update(news)
             self._counted = counts
 
     def _fact(self, event: BusEvent) -> BusFact | None:
@@ -329,6 +339,7 @@ class Shell(Generic[E, A]):
                     return None
                 self._tell_newer()
                 self._heed([message])
+                self._expect([message])
                 return Heard(message)
             case TokenSeen(key):
                 writer = self._keys.writer_of_token(key)
@@ -344,9 +355,19 @@ class Shell(Generic[E, A]):
                 self._questions.answer(reply, payload)
                 return None
 
+    def _expect(self, messages: Iterable[Message]) -> None:
+        """Let no made-up names shut out whom a brief names."""
+        for message in messages:
+            body, stamp = message.body, message.stamp
+            if isinstance(body, Brief) and (self._briefed is None or stamp > self._briefed):
+                self._briefed = stamp
+                self._gate.fleet = frozenset(uav.id for uav in body.uavs)
+
     async def _ask(self) -> None:
         heed = partial(self._heed, answers=True)
-        self.step(self._from_bus(Learned(await self._questions.ask(heed))))
+        learned = await self._questions.ask(heed)
+        self._expect(message for snapshot in learned for message in snapshot.messages)
+        self.step(self._from_bus(Learned(learned)))
 
 
 def take_seat(

@@ -96,8 +96,15 @@ class LiveMission:
             stays=self._mission is not None,
             first=first,
         )
+        replica = self._desk.observer.replica
         self._shell = onlooking(
-            self._desk, bus, self._clock, mission, OPERATOR, self._network.answer_s
+            self._desk,
+            bus,
+            self._clock,
+            mission,
+            OPERATOR,
+            self._network.answer_s,
+            left_out=lambda: replica.overfull,
         )
         self._log.info("looking on", mission=mission)
         await self._shell.run()

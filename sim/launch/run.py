@@ -316,6 +316,7 @@ async def _watching(run: Run) -> AsyncIterator[None]:
         from_bus=lambda fact: fact,
         execute=lambda _: None,
         snapshot=None,
+        left_out=lambda: run.observer.replica.overfull,
     )
     run.dropped = shell.dropped
     take_seat(bus, mission, None, status=True, every_status=recorder is not None)

@@ -13,7 +13,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
+from typing import Final
 
+from swarm.model.ids import FLEET
 from swarm.wire.codec import encode
 from swarm.wire.digest import fingerprint
 from swarm.wire.messages import (
@@ -34,10 +36,28 @@ from swarm.wire.messages import (
 )
 from swarm.wire.seal import open_envelope
 
-__all__ = ["MOST_UNPOSTED", "Replica", "snapshot_without", "without_signers"]
+__all__ = [
+    "MOST_STRANGE",
+    "MOST_TASKS",
+    "MOST_UNBRIEFED",
+    "MOST_UNPOSTED",
+    "NO_ROOM",
+    "Replica",
+    "snapshot_without",
+    "without_signers",
+]
 
-MOST_UNPOSTED = 1000
+# A bus without keys lets anybody make names up: they must not cost memory without end.
+MOST_UNPOSTED: Final = 1000
 """Tasks that nobody has posted of which one writer may tell the outcome."""
+MOST_STRANGE: Final = 1000
+"""Claims, outcomes and commands of all UAVs together that the brief does not name."""
+MOST_UNBRIEFED: Final = 20_000
+"""The same as long as there is no brief, which may name any of them."""
+MOST_TASKS: Final = 20_000
+"""Tasks of the coordinator and of the operator."""
+NO_ROOM: Final = "no room"
+"""Reason under which is counted what these leave out."""
 
 
 class Replica:
@@ -75,9 +95,11 @@ class Replica:
         self.stale = 0
         """Statements that were older than what was known."""
         self.overfull = 0
-        """Outcomes of tasks that nobody has posted, of writers that told of too many such."""
+        """Statements left out because there were too many of their kind, see `MOST_STRANGE`."""
         self._unposted: Counter[str] = Counter()
         """By writer, outcomes that were taken in when their task was not on the board."""
+        self._strange = 0
+        """Registers about UAVs that the brief does not name."""
         self.board_version = 0
         """Grows with every change of brief or board."""
         self.task_version = 0
@@ -99,7 +121,7 @@ class Replica:
                 self._registers[key] = message
                 self._changed.add(key)
             return False
-        if known is None and self._is_overfull(message):
+        if known is None and not self._has_room(message):
             self.overfull += 1
             return False
         self._registers[key] = message
@@ -125,19 +147,62 @@ class Replica:
                 self.commands[target] = message.stamp, command
         return True
 
-    def _is_overfull(self, message: Message) -> bool:
-        """Whether its writer has told of too many tasks that there are not.
+    def _has_room(self, message: Message) -> bool:
+        """Whether one more register may be kept; takes its room then.
 
-        An honest one may tell of some before the board is known here; what of that is left out
-        comes again, as everything that is not known. Others must not cost memory without end.
+        Of the fleet everything has, but outcomes of ever more tasks that there are not: an honest
+        UAV may tell of some before the board is known here. What is left out comes again, as
+        everything that is not known.
         """
         body, writer = message.body, message.writer
-        if not isinstance(body, Outcome) or body.task in self.board:
+        if isinstance(body, Board | TaskOrder):
+            return len(self.posted) + len(self.task_orders) < MOST_TASKS
+        strange = self._is_strange(message)
+        if strange and self._strange >= (MOST_UNBRIEFED if self._fleet is None else MOST_STRANGE):
             return False
-        if self._unposted[writer] >= MOST_UNPOSTED:
-            return True
-        self._unposted[writer] += 1
-        return False
+        if isinstance(body, Outcome) and body.task not in self.board:
+            if self._unposted[writer] >= MOST_UNPOSTED:
+                return False
+            self._unposted[writer] += 1
+        self._strange += strange
+        return True
+
+    def _is_strange(self, message: Message) -> bool:
+        """Whether it is about a UAV that is not known to take part."""
+        match message.body:
+            case Claim() | Outcome():
+                name = message.writer
+            case Command(target=target) if target != FLEET:
+                name = target
+            case _:
+                return False
+        return self._fleet is None or name not in self._fleet
+
+    def _forget_strangers(self) -> None:
+        """The brief has told who takes part: of all others no more is kept than there is room."""
+        strange = sorted(key for key, said in self._registers.items() if self._is_strange(said))
+        fleet = self._fleet or ()
+        self._unposted = Counter({uav: n for uav, n in self._unposted.items() if uav in fleet})
+        self._strange = min(len(strange), MOST_STRANGE)
+        self.overfull += len(strange) - self._strange
+        writers = set[str]()
+        for key in strange[MOST_STRANGE:]:
+            message = self._registers.pop(key)
+            writers.add(message.writer)
+            self._changed.discard(key)
+            number = self._in_digest.pop(key, 0)
+            self._digest[message.writer] = self._digest.get(message.writer, 0) ^ number
+            if isinstance(message.body, Command):
+                del self.commands[message.body.target]
+        kept = {writer: list[Stamp]() for writer in writers}
+        for message in self._registers.values() if writers else ():
+            if message.writer in writers:
+                kept[message.writer].append(message.stamp)
+        for writer, stamps in kept.items():
+            if stamps:
+                self.heads[writer] = max(stamps)
+            else:
+                del self.heads[writer], self._digest[writer]
 
     def is_premature(self, message: Message) -> bool:
         """Whether it briefs for another flight, by a coordinator that has not taken charge.
@@ -166,6 +231,7 @@ class Replica:
                 self._settle(task)
         if before is None or before.uavs != brief.uavs:
             self._fleet = {uav.id for uav in brief.uavs}
+            self._forget_strangers()
             self.claims.clear()
             self.outcomes.clear()
             for message in self._registers.values():

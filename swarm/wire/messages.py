@@ -41,6 +41,7 @@ from swarm.wire.keys import Keys
 __all__ = [
     "LATEST_S",
     "MAX_COUNT",
+    "MOST_REASONS",
     "NOBODYS",
     "SCHEMA_VERSION",
     "Board",
@@ -69,6 +70,8 @@ __all__ = [
 
 SCHEMA_VERSION = 1
 """Grows only with what releases before cannot be mixed with; see swarm.wire.codec."""
+MOST_REASONS = 20
+"""Reasons of which one status tells."""
 LONGEST_ROSTER = 1 << 20
 """Characters of a signed roster."""
 
@@ -257,9 +260,10 @@ class Status:
     velocity_enu_m_s: Point | None
     battery_frac: Probability | None
     mission_s: Instant | None
-    dropped: Annotated[Mapping[Reason, Count], Len(0, 20)]
+    dropped: Annotated[Mapping[Reason, Count], Len(0, MOST_REASONS)]
     """Messages this process has dropped, by reason: those of `swarm.wire.codec`, "too many"
-    where the inbox was full, "stale" for registers older than known."""
+    where the inbox was full, "stale" for registers older than known, "no room" for those of which
+    there were too many."""
     note: Words
     """What it waits for, in words."""
 

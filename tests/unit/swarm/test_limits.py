@@ -8,6 +8,7 @@ from swarm.bus.port import BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone,
 from swarm.limits import (
     ASKER_BURST,
     CLAIMED_BURST,
+    MOST_STRANGERS,
     TOKEN_BURST,
     UAV_BURST,
     UAV_HZ,
@@ -15,11 +16,12 @@ from swarm.limits import (
     Gate,
     Limiter,
 )
+from swarm.model.ids import COORDINATOR
 from swarm.wire.codec import Codec, encode
 from swarm.wire.keys import Keys
 from swarm.wire.question import NONCE_BYTES, Question, encode_question
 from swarm.wire.seal import Seal
-from tests.builders import MISSION, held, message
+from tests.builders import MISSION, brief, held, message, uav
 from tests.keyring import Keyring
 from tests.shell_play import HandClock
 
@@ -56,11 +58,59 @@ def test_a_clock_that_goes_back_gives_nothing() -> None:
     assert not limiter.allows("u0", 0.0)
 
 
-def test_made_up_sources_cost_no_memory_without_end() -> None:
-    limiter = Limiter(1.0, 2, most_sources=3)
+def test_sources_that_have_been_quiet_are_forgotten() -> None:
+    limiter = Limiter(1.0, 10)
+    for number in range(20_000):
+        assert limiter.allows(f"u{number}", number / 100.0)
 
-    assert [limiter.allows(name, 0.0) for name in "abcd"] == [True, True, True, False]
-    assert limiter.allows("d", 2.5), "the others have been quiet by then"
+    assert len(limiter) == 1000, "those of the last 10 s"
+    assert limiter.allows("u0", 200.0)
+
+
+def test_who_was_refused_is_not_forgotten_for_it() -> None:
+    limiter = Limiter(1.0, 2)
+    assert [limiter.allows("u0", at_s) for at_s in (0.0, 0.0, 0.0, 0.5, 0.9)] == [True] * 2 + [
+        False
+    ] * 3
+    assert limiter.allows("u1", 1.6)
+    assert [limiter.allows("u0", 1.6) for _ in range(2)] == [True, False]
+
+
+def plain(uav: str) -> Sample:
+    said = message(uav, held("t0", 1.0))
+    return Sample(said.key, encode(said))
+
+
+def test_of_made_up_names_only_so_many_count_however_slowly_they_come() -> None:
+    clock = HandClock()
+    gate = Gate(KEYS, None, clock.now_s)
+    passed = 0
+    for number in range(2 * MOST_STRANGERS):
+        clock.time_s += 1.0
+        event = plain(f"ghost{number}") if number % 2 else TokenSeen(KEYS.alive(f"ghost{number}"))
+        passed += gate.admits(event)
+
+    assert passed == MOST_STRANGERS
+    assert gate.refused == {"too many names": MOST_STRANGERS}
+    assert gate.admits(plain("ghost1")), "who is known may go on"
+
+
+def test_made_up_names_shut_out_neither_fleet_nor_coordinator() -> None:
+    gate = Gate(KEYS, None, HandClock().now_s)
+    gate.fleet = {"u1", "u2"}
+    for number in range(3 * MOST_STRANGERS):
+        gate.admits(plain(f"ghost{number}"))
+        gate.admits(TokenSeen(KEYS.alive(f"phantom{number}")))
+
+    for name in ("u1", "u2", COORDINATOR):
+        assert gate.admits(TokenSeen(KEYS.alive(name)))
+    assert gate.admits(plain("u1"))
+    said = message(COORDINATOR, brief(uav("u3")))
+    assert gate.admits(Sample(said.key, encode(said)))
+
+    assert not gate.admits(plain("u3"))
+    gate.fleet = {"u3"}
+    assert gate.admits(plain("u3"))
 
 
 @pytest.mark.parametrize("seal", [None, RING.seal("u0")], ids=["plain", "keys"])

@@ -29,6 +29,7 @@ from swarm.events import (
     Tick,
     Wish,
 )
+from swarm.limits import MOST_STRANGERS, TOO_MANY_NAMES
 from swarm.model.ids import COORDINATOR
 from swarm.shell import Shell, take_seat
 from swarm.wire.codec import Codec, encode
@@ -118,6 +119,7 @@ async def at_work(
     answers: bool = True,
     snapshot: Snapshot = SNAPSHOT,
     known: Mapping[str, int] | None = None,
+    left_out: Callable[[], int] = int,
     save: Callable[[float], None] | None = None,
     capacity: int = 4096,
 ) -> AsyncIterator[Played]:
@@ -143,6 +145,7 @@ async def at_work(
         execute=execute or remember,
         snapshot=(lambda _: snapshot) if answers else None,
         known=lambda: known or {},
+        left_out=left_out,
         save=save,
     )
     running = asyncio.create_task(shell.run())
@@ -186,6 +189,56 @@ def test_what_is_said_last_is_put_together_after_all_else_and_heard_by_onlookers
             await take_until(played.other, lambda events: heard in events)
 
             assert made == [["first"]]
+
+    play(scenario)
+
+
+def test_what_the_core_has_no_room_for_is_counted_and_told_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    async def scenario() -> None:
+        left_out = [0]
+        core = ScriptedCore()
+        async with at_work(core, left_out=lambda: left_out[0]) as played:
+            assert played.shell.dropped == {}
+            for count in (3, 7):
+                left_out[0] = count
+                assert played.shell.dropped == {"no room": count}
+            left_out[0] = 2  # another core has taken over
+            assert played.shell.dropped == {"no room": 7}
+        assert capsys.readouterr().err.count("room") == 1
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("how", ["said", "answered"])
+def test_whom_the_brief_names_is_heard_however_many_names_others_make_up(how: str) -> None:
+    said = message(COORDINATOR, brief(uav("u0"), uav("u9")))
+
+    def reply(bus: MemoryBus) -> bool:
+        queries = [event for event in bus.inbox.take() if isinstance(event, Query)]
+        for query in queries:
+            query.reply(encode(Snapshot(MISSION, "u1", 1, None, (said,))))
+        return bool(queries)
+
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Ask()] if how == "answered" else ())
+        async with at_work(core, capacity=2 * MOST_STRANGERS) as played:
+            if how == "said":
+                played.other.publish(said.key, encode(said))
+                await until(lambda: Heard(said) in core.heard, "hearing of the fleet")
+            else:
+                await until(lambda: reply(played.other), "being asked")
+                await until(lambda: isinstance(core.heard[-1], Learned), "learning of the fleet")
+            for number in range(MOST_STRANGERS + 50):
+                played.other.publish(KEYS.claim(f"ghost{number}"), b"")
+            late, member = message("u8", held("t0", 1.0)), message("u9", held("t0", 1.0))
+            played.other.publish(late.key, encode(late))
+            played.other.publish(member.key, encode(member))
+
+            await until(lambda: Heard(member) in core.heard, "hearing one of the fleet")
+            assert Heard(late) not in core.heard
+            assert played.shell.dropped[TOO_MANY_NAMES] == 51
 
     play(scenario)
 

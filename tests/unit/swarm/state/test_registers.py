@@ -12,7 +12,13 @@ from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.state.board import TaskBoard
 from swarm.state.claims import holders
 from swarm.state.commands import newest
-from swarm.state.registers import MOST_UNPOSTED, Replica
+from swarm.state.registers import (
+    MOST_STRANGE,
+    MOST_TASKS,
+    MOST_UNBRIEFED,
+    MOST_UNPOSTED,
+    Replica,
+)
 from swarm.state.voice import Voice
 from swarm.wire.codec import encode
 from swarm.wire.messages import (
@@ -520,3 +526,97 @@ def test_a_writer_may_tell_of_many_tasks_that_nobody_knows_but_not_of_any_number
     assert replica.join(message("u1", done("t9"))), "others have room of their own"
     replica.join(message(COORDINATOR, entry(tasks[-1])))
     assert replica.join(told[-1]), "what is on the board always has"
+
+
+# -- made-up names -----------------------------------------------------------------------
+
+
+def made_up(count: int, first: int = 0) -> list[Message]:
+    """Claims, outcomes and commands under names of which nobody knows."""
+    kinds = [
+        lambda name: message(name, held("t0", 1.0)),
+        lambda name: message(name, done("t0")),
+        lambda name: message(OPERATOR, Command(name, CommandKind.HOLD, 1, "")),
+    ]
+    return [kinds[n % 3](f"ghost{n}") for n in range(first, first + count)]
+
+
+def size(replica: Replica) -> int:
+    return sum(1 for _ in replica.messages())
+
+
+def test_made_up_names_take_a_bounded_room_and_what_has_none_is_counted() -> None:
+    replica = joined([message(COORDINATOR, brief(uav("u0"), uav("u1"))), *made_up(48_000)])
+
+    assert size(replica) == 1 + MOST_STRANGE
+    assert replica.overfull == 48_000 - MOST_STRANGE
+    assert len(replica.heads) <= 2 + MOST_STRANGE
+    assert len(replica.digest()) <= 2 + MOST_STRANGE
+    assert len(replica.commands) <= MOST_STRANGE
+
+
+def test_a_flood_of_made_up_names_shuts_out_nobody_of_the_fleet() -> None:
+    replica = joined(
+        [
+            message(COORDINATOR, brief(uav("u0"))),
+            message(COORDINATOR, entry("t0"), 2),
+            *made_up(3 * MOST_STRANGE),
+        ]
+    )
+    hold = Command("u0", CommandKind.HOLD, 1, "")
+    abort = Command(FLEET, CommandKind.ABORT, 1, "")
+    honest = [message("u0", held("t0", 1.0)), message("u0", done("t0"), 2)]
+    honest += [message(OPERATOR, hold), message(OPERATOR, abort, 2)]
+    honest += [message(COORDINATOR, entry("t1"), 3), message(OPERATOR, order("op"), 3)]
+
+    assert all(replica.join(said) for said in honest)
+    assert replica.claims.keys() == {"u0"}
+
+
+def test_words_of_strangers_already_known_are_kept_up_to_date() -> None:
+    replica = joined([message(COORDINATOR, brief(uav("u0"))), *made_up(2 * MOST_STRANGE)])
+
+    assert replica.join(message("ghost0", held("t0", 2.0), counter=2))
+    assert not replica.join(message("ghost0", done("t9"))), "but there is no room for further ones"
+
+
+def test_before_the_brief_there_is_room_for_any_fleet_and_with_it_the_strangers_go() -> None:
+    fleet = [uav(f"ghost{n}") for n in range(0, 2 * MOST_STRANGE, 2)]
+    replica = joined(made_up(MOST_UNBRIEFED + 10))
+    assert size(replica) == MOST_UNBRIEFED
+    assert replica.overfull == 10
+    replica.digest()
+
+    replica.join(message(COORDINATOR, brief(*fleet)))
+
+    names = {each.id for each in fleet}
+    assert {uav for uav, _ in replica.outcomes} | replica.claims.keys() <= names
+    assert set(replica.commands) >= {name for name in names if int(name[5:]) % 3 == 2}
+    strange = [said for said in made_up(MOST_UNBRIEFED) if replica.known(said) is not None]
+    briefed = len(fleet)
+    assert len(strange) == briefed + MOST_STRANGE
+    assert size(replica) == 1 + briefed + MOST_STRANGE
+    fresh = joined(list(replica.messages()))
+    assert (fresh.digest(), fresh.heads) == (replica.digest(), replica.heads)
+    assert (fresh.claims, fresh.outcomes, fresh.commands) == (
+        replica.claims,
+        replica.outcomes,
+        replica.commands,
+    )
+
+
+def test_briefs_that_name_ever_other_uavs_leave_no_more_behind() -> None:
+    replica = Replica()
+    for flight in range(6):
+        names = [f"f{flight}-{n}" for n in range(MOST_STRANGE)]
+        replica.join(message(COORDINATOR, brief(*map(uav, names)), counter=flight + 1))
+        assert all(replica.join(message(name, IDLE)) for name in names)
+    assert size(replica) == 1 + 2 * MOST_STRANGE
+
+
+def test_made_up_tasks_take_a_bounded_room() -> None:
+    replica = joined([message(COORDINATOR, entry(f"t{n}"), 1 + n) for n in range(MOST_TASKS + 7)])
+
+    assert (len(replica.board), replica.overfull) == (MOST_TASKS, 7)
+    assert not replica.join(message(OPERATOR, order("op")))
+    assert replica.join(message(COORDINATOR, entry("t0", withdrawn=True), MOST_TASKS + 9))
