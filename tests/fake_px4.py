@@ -21,6 +21,8 @@ AUTO_TAKEOFF, AUTO_LOITER, AUTO_MISSION, AUTO_RTL, AUTO_LAND = (
 POSCTL = 3 << 16
 
 _PREARM = 0x10000000
+_CONST_POS_MODE = 128
+"""Set while it stands still, position or not; on the ground with a position it says 1023."""
 _SPOOL_UP_S = 1.5
 _CHANGE_TOLD_S = 0.4
 """How long after a change of mode a heartbeat tells it."""
@@ -51,6 +53,7 @@ class FakePx4(FakeCopter):
         self._texts = 0
         super().__init__(*args, **kwargs)
         self.parameters = {"MPC_XY_CRUISE": self.default_speed_m_s}
+        self.ekf_flags = 895
 
     def power_on(self, now_s: float) -> None:
         self._heartbeat_due_s = now_s
@@ -86,6 +89,8 @@ class FakePx4(FakeCopter):
     def _stream(self, message_id: int) -> None:
         if message_id == 230:
             flags = self.ekf_flags if self.ready else 167
+            if not self.airborne:
+                flags |= _CONST_POS_MODE
             self.say(mavlink.MAVLink_estimator_status_message(0, flags, *[0.0] * 8))
             return
         if message_id != 1:

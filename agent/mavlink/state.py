@@ -30,7 +30,6 @@ _BOOT_WRAP_S = 2**32 / 1e3
 _HEARTLESS = 3.0
 """Without a heartbeat for that many silence timeouts it is silent, whatever else it says."""
 _EKF_POS_HORIZ_ABS = 16
-_EKF_CONST_POS_MODE = 128
 _WARNING = 4
 """MAV_SEVERITY_WARNING; smaller is worse."""
 
@@ -96,11 +95,12 @@ class VehicleState:
 
     @property
     def estimate_lost(self) -> bool:
-        """Whether its estimator knows no absolute position; False while it says nothing."""
-        flags = self.ekf_flags
-        return flags is not None and (
-            not flags & _EKF_POS_HORIZ_ABS or bool(flags & _EKF_CONST_POS_MODE)
-        )
+        """Whether its estimator knows no absolute position; False while it says nothing.
+
+        EKF_CONST_POS_MODE tells nothing: PX4 sets it wherever it stands still, and no firmware
+        has an absolute position in the mode that it is named after.
+        """
+        return self.ekf_flags is not None and not self.ekf_flags & _EKF_POS_HORIZ_ABS
 
     @property
     def armed(self) -> bool:

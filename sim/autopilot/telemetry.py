@@ -310,7 +310,10 @@ class Telemetry:
         readiness = self._pilot.readiness
         if not readiness.booted:
             return int(mavlink.EKF_UNINITIALIZED)
-        return int(_EKF_WITH_POSITION if readiness.has_position else _EKF_WITHOUT_POSITION)
+        flags = _EKF_WITH_POSITION if readiness.has_position else _EKF_WITHOUT_POSITION
+        if self._pilot.flavour.constant_position_at_rest and self._pilot.flight.on_ground:
+            flags |= mavlink.EKF_CONST_POS_MODE
+        return int(flags)
 
     def _extended_state(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s

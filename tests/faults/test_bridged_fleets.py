@@ -12,7 +12,7 @@ from dataclasses import replace
 import pytest
 
 from agent.mavlink.config import CommandStyle
-from agent.vehicle import HandedOver, NotReady, Refused, ReturnAdvised
+from agent.vehicle import HandedOver, NotReady, Refused, ReturnAdvised, VehicleReady
 from sim.autopilot.flavours import FlavourName
 from sim.bridged_vehicle import Equipment
 from swarm.wire.messages import StatusPhase
@@ -88,6 +88,19 @@ def test_who_is_silent_or_blind_is_commanded_no_more(
     comes_home = style is CommandStyle.MISSION
     assert fleet.vehicles["u0"].pilot(LONG_S).armed is not comes_home
     assert_let_go(fleet, "u2", "no valid position for 5 s")
+
+
+def test_a_fix_that_comes_late_delays_the_takeoff_and_nothing_else(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    fleet = BridgedFleet(flavour, style, faults={"u0": "gps-lost@0+15", "u2": "gps-lost@0+60"})
+    fleet.fly()
+
+    fleet.assert_all_done()
+    assert fleet.books["u0"].first_s(VehicleReady) < 15.0 + 40.0
+    for uav in ("u0", "u2"):
+        assert (fleet.books[uav].reasons(Refused), fleet.phase(uav)) == ([], StatusPhase.HOME)
+        assert fleet.books[uav].first_s(VehicleReady) > 15.0
 
 
 def test_who_cannot_arm_stays_and_who_does_not_move_gives_its_tasks_away(

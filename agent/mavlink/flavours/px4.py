@@ -161,12 +161,14 @@ class Px4Copter(Copter):
     def unready(self, vehicle: VehicleState) -> str | None:
         """Pre-arm checks, whose bit PX4 sets in the health of SYS_STATUS alone, then a position.
 
-        The checks include the position estimate.
+        The checks include the position estimate only as far as the mode needs one.
         """
         if not vehicle.prearm_heard:
             return "waiting for the pre-arm checks (SYS_STATUS)"
         if not vehicle.prearm_healthy:
             return "pre-arm checks do not pass"
+        if vehicle.estimate_lost:
+            return "no position estimate yet"
         if vehicle.position is None:
             return "waiting for a position"
         return None

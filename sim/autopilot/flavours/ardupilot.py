@@ -127,6 +127,7 @@ class ArduCopter:
     obeys_leg_speed: bool = False
     pauses_anywhere: bool = False
     tells_origin_when_armed: bool = True
+    constant_position_at_rest: bool = False
 
     unasked_streams: Mapping[int, float] = MappingProxyType({})
     fixed_streams: frozenset[int] = frozenset()

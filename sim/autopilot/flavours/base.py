@@ -141,6 +141,9 @@ class Flavour(Protocol):
     pauses_anywhere: bool
     """Whether DO_REPOSITION without a place, height and heading stops the vehicle."""
     tells_origin_when_armed: bool
+    constant_position_at_rest: bool
+    """Whether the estimator says EKF_CONST_POS_MODE wherever the vehicle stands still, rather
+    than only where it has no position."""
 
     unasked_streams: Mapping[int, float]
     """Messages and intervals [s] streamed on a new channel; heartbeats go without saying."""

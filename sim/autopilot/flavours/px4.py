@@ -130,6 +130,7 @@ class Px4:
     obeys_leg_speed: bool = True
     pauses_anywhere: bool = True
     tells_origin_when_armed: bool = False
+    constant_position_at_rest: bool = True
 
     unasked_streams: Mapping[int, float] = MappingProxyType(
         {

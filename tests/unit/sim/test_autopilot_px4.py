@@ -501,3 +501,21 @@ def test_parameters_asked_by_name_tell_their_index() -> None:
     assert named.param_value == 5.0
     assert indexed.param_id == "MPC_XY_CRUISE"
     assert ground.send(request(1, 1, b"WP_SPD", -1)) == []
+
+
+def test_estimator_says_at_rest_that_the_position_is_constant_though_it_has_one() -> None:
+    ground = ground_station()
+    ground.wait(5.0)
+
+    def flags() -> int:
+        request, status = mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
+        assert ground.command(request, status) == ACCEPTED
+        return int(only(ground.heard, "ESTIMATOR_STATUS")[-1].flags)
+
+    assert flags() & mavlink.EKF_CONST_POS_MODE
+    assert flags() & mavlink.EKF_POS_HORIZ_ABS
+    assert ground.arm() == ACCEPTED
+    assert take_off(ground, home_alt_m(ground) + 10.0) == ACCEPTED
+    ground.wait(10.0)
+    assert not flags() & mavlink.EKF_CONST_POS_MODE
+    assert flags() & mavlink.EKF_POS_HORIZ_ABS

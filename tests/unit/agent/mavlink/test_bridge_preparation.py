@@ -65,6 +65,34 @@ def test_reasons_for_waiting_change_as_the_vehicle_gets_ready(fake: type[FakeCop
     assert all(a != b for a, b in itertools.pairwise(reasons))
 
 
+@pytest.mark.parametrize("ready_s", [15.0, 60.0])
+def test_vehicle_whose_position_comes_late_takes_off_as_any_other(
+    fake: type[FakeCopter], ready_s: float
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN, ready_s=ready_s))
+    flight.order(START)
+    flight.run(ready_s - 1.0)
+    assert not flight.copter.commands(ARM)
+    flight.run_until(VehicleReady())
+    assert math.dist(flight.copter.position_m, START.position_enu_m) < 1.0
+    assert {type(report) for report in flight.reports} == {NotReady, VehicleReady}
+
+
+@pytest.mark.parametrize("met_s", [1.0, 30.0])
+def test_position_that_is_lost_on_the_ground_and_comes_back_is_forgiven(
+    fake: type[FakeCopter], met_s: float
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN))
+    flight.run(met_s)
+    flags, flight.copter.ekf_flags = flight.copter.ekf_flags, 167
+    flight.run(1.0)
+    flight.order(START)
+    flight.run(20.0)
+    assert not flight.copter.commands(ARM)
+    flight.copter.ekf_flags = flags
+    flight.run_until(VehicleReady())
+
+
 def test_mode_is_not_set_before_boot_has_ended(fake: type[FakeCopter]) -> None:
     flight = BridgeFlight(fake(ORIGIN, boot_s=5.0, ready_s=6.0))
     flight.order(START)
