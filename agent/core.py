@@ -30,6 +30,8 @@ from agent.vehicle import (
     AttemptFailed,
     GoTo,
     HandedOver,
+    HandOverExplained,
+    HeardAgain,
     Held,
     Hold,
     Home,
@@ -259,8 +261,12 @@ class AgentCore:
                 self._picture.move(telemetry)
             case Refused(order, reason):
                 self._give_up_order(order, reason, now_s)
-            case HandedOver(reason):
-                self._leave_vehicle(reason, now_s, handed_over=True)
+            case HandedOver(reason, silent):
+                self._leave_vehicle(reason, now_s, handed_over=not silent)
+            case HandOverExplained(reason) if self.phase is StatusPhase.OUT:
+                self._explain(reason, now_s)
+            case HeardAgain(reason) if self.phase is StatusPhase.OUT:
+                self._turn_home(reason, now_s, hurry=True)
             case ReturnAdvised(reason):
                 if self.phase is not StatusPhase.OUT:
                     self._go_home(reason, now_s, hurry=True)
@@ -311,6 +317,14 @@ class AgentCore:
         if returning:
             # It was told to come home; nobody here can see whether it does.
             self._finish(1, now_s)
+
+    def _explain(self, reason: str, now_s: float) -> None:
+        """More is known of the vehicle given up; one that was only silent is another's now."""
+        self._actions.append(Note("of the vehicle given up", {"reason": reason}))
+        claim = self.replica.claims.get(self.uav)
+        if claim is not None and not claim.handed_over:
+            self._actions += self._tasking.end(now_s, handed_over=True)
+        self._enter(StatusPhase.OUT, reason)
 
     def _come_home(self, now_s: float) -> None:
         held = self._stage is StatusPhase.HOLDING and self._homebound
@@ -487,14 +501,18 @@ class AgentCore:
             # The vehicle is not ours to command any more.
             self._finish(0, now_s)
         elif self.phase is not StatusPhase.RETURNING or (hurry and self._on_detour):
-            self._take_no_further_part(now_s)
             self._exit_status = max(self._exit_status, status)
-            self._enter(StatusPhase.RETURNING, reason)
-            me = None if hurry else self._picture.me
-            via_enu_m = None if me is None else self._picture.in_layer(me.position_enu_m)
-            self._on_detour = via_enu_m is not None
-            order = Return(reason, self._flew_before, via_enu_m)
-            self._actions += [Note("returning", {"reason": reason}), Order(order)]
+            self._turn_home(reason, now_s, hurry=hurry)
+
+    def _turn_home(self, reason: str, now_s: float, *, hurry: bool) -> None:
+        """Order the return, from whatever the vehicle does now."""
+        self._take_no_further_part(now_s)
+        self._enter(StatusPhase.RETURNING, reason)
+        me = None if hurry else self._picture.me
+        via_enu_m = None if me is None else self._picture.in_layer(me.position_enu_m)
+        self._on_detour = via_enu_m is not None
+        order = Return(reason, self._flew_before, via_enu_m)
+        self._actions += [Note("returning", {"reason": reason}), Order(order)]
 
     def _take_no_further_part(self, now_s: float) -> None:
         if not self._homebound:

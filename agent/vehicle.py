@@ -13,7 +13,9 @@ __all__ = [
     "Arrived",
     "AttemptFailed",
     "GoTo",
+    "HandOverExplained",
     "HandedOver",
+    "HeardAgain",
     "Held",
     "Hold",
     "Home",
@@ -149,6 +151,25 @@ class HandedOver:
     """The vehicle is no longer ours to command (pilot took over, rebooted, link lost)."""
 
     reason: str
+    silent: bool = field(default=False, compare=False)
+    """Nobody is known to have taken it: it is not heard, and looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandOverExplained:
+    """More is known of a vehicle that was handed over: why, or what it has done since."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class HeardAgain:
+    """A vehicle handed over for its silence flies as it was left, and should go home now.
+
+    It obeys again; nobody else would bring it down.
+    """
+
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +206,8 @@ Report = (
     | Telemetry
     | Refused
     | HandedOver
+    | HandOverExplained
+    | HeardAgain
     | ReturnAdvised
     | ReturnBegun
     | Held

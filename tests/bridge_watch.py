@@ -39,6 +39,8 @@ from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    HandOverExplained,
+    HeardAgain,
     Hold,
     Prepare,
     Refused,
@@ -151,6 +153,8 @@ class BridgeWatch:
         """Whether `Prepare` has been ordered and not been answered."""
         self._silent = False
         """Handed over, and nothing ordered since."""
+        self._heard_again = False
+        """Since it was handed over."""
         self._mode_wanted: set[tuple[float, float]] = set()
 
     def step(self, event: Event, now_s: float) -> list[Action]:
@@ -318,10 +322,15 @@ class BridgeWatch:
     def _take(self, report: Report) -> None:
         match report:
             case HandedOver():
-                hold(not self._silent, "handed over twice")
-                self._silent = True
+                hold(self._heard_again or not self._silent, "handed over twice")
+                self._silent, self._heard_again = True, False
                 self._prepared = False
                 self._task = _Task(self._task.places_m)
+            case HeardAgain():
+                hold(self._silent and not self._heard_again, "heard again, though it was not lost")
+                self._heard_again = True
+            case HandOverExplained():
+                hold(self._silent and not self._heard_again, "explained, though it is ours")
             case VehicleReady():
                 hold(self._prepared, "ready, though nobody asked")
                 self._prepared = False

@@ -8,7 +8,8 @@ sees over what was acknowledged. Leaves out: transports (agent.mavlink.link), wa
 The vehicle is *handed over* when a pilot or a failsafe changes its mode, when it
 disarms, reboots, ends its flight or loses its position, or when it falls silent. From
 then on nothing is commanded until a new `Prepare`, or a `Return` that finds it still in
-the mode that takes our targets. One that obeys and is in trouble is *advised to return*.
+the mode that takes our targets. One that only fell silent is looked for, and taken back if
+it is heard again as it was left. One that obeys and is in trouble is *advised to return*.
 """
 
 from __future__ import annotations
@@ -36,7 +37,16 @@ from agent.mavlink.signing import Signing
 from agent.mavlink.state import PositionNews
 from agent.mavlink.streams import Streams
 from agent.mavlink.work import Phase, Work
-from agent.vehicle import GoTo, Hold, Prepare, Return, ReturnAdvised, Telemetry
+from agent.vehicle import (
+    GoTo,
+    HandOverExplained,
+    HeardAgain,
+    Hold,
+    Prepare,
+    Return,
+    ReturnAdvised,
+    Telemetry,
+)
 from swarm.model.frames import enu_from_wgs84
 from swarm.pulse import Pulse
 
@@ -125,6 +135,8 @@ class Bridge:
             return
         seat.vehicle.heard_at_s = seat.now_s
         seat.guards.on_message(message, seat.now_s)
+        if self._work.loss is not None:
+            self._work.loss.on_message(message)
         if self._streams is not None:
             self._streams.on_message(message, seat.now_s)
         match message:
@@ -225,6 +237,9 @@ class Bridge:
 
     def _on_reboot(self) -> None:
         """Forget what is no longer true of an autopilot that began anew."""
+        if self._work.loss is not None:
+            self._work.loss = None
+            self._seat.report(HandOverExplained("heard again: the autopilot rebooted"))
         self._duty.on_reboot()
         self._seat.forget_vehicle()
         self._streams = None
@@ -234,6 +249,17 @@ class Bridge:
             for one in ended:
                 self._streams.on_ended(one, self._seat.now_s)
         self._duty.on_ended(ended)
+
+    def _look_for_lost(self) -> None:
+        """Take a vehicle back that is heard again as it was left, or say what became of it."""
+        loss = self._work.loss
+        news = None if loss is None else loss.news()
+        if isinstance(news, HeardAgain):
+            self._work.take_back()
+        elif news is not None:
+            self._work.loss = None
+        if news is not None:
+            self._seat.report(news)
 
     # What time brings.
 
@@ -246,7 +272,8 @@ class Bridge:
         seat.say(*out)
         self._on_ended(ended)
         if seat.silent and self._work.in_our_hands():
-            self._work.hand_over(seat.vehicle.silence(now_s))
+            self._work.lose()
+        self._look_for_lost()
         if self._streams is not None and not seat.silent:
             seat.say(*self._streams.advance(seat.commands, now_s))
         self._duty.advance()

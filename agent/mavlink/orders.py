@@ -64,6 +64,7 @@ class OrderTaker:
         work.phase = Phase.PREPARING
         work.prepare, work.prepares_ours = order, ours
         work.speed_m_s = order.speed_m_s
+        work.sent_to_enu_m.append(order.position_enu_m)
         work.tell_anew()
 
     def _must_stop_first(self) -> bool:
@@ -94,6 +95,7 @@ class OrderTaker:
             work.drop()
         work.target = Target(order, self._seat, self._seat.flavour, work.speed_m_s)
         work.phase = Phase.FLYING
+        work.sent_to_enu_m.append(order.position_enu_m)
         work.target.start()
 
     def _hold(self, order: Hold) -> None:

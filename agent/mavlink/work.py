@@ -5,9 +5,11 @@ Leaves out: what begins it (agent.mavlink.orders), and how it goes on (agent.mav
 
 from __future__ import annotations
 
+from collections import deque
 from enum import Enum
 
 from agent.mavlink.holding import Holding
+from agent.mavlink.link_loss import LinkLoss
 from agent.mavlink.messages import Heartbeat
 from agent.mavlink.preparation import Preparation
 from agent.mavlink.returning import Returning
@@ -17,6 +19,10 @@ from agent.mavlink.target import Target
 from agent.vehicle import HandedOver, NotReady, Prepare
 
 __all__ = ["Phase", "Work"]
+
+Point = tuple[float, float, float]
+
+_PLACES = 2
 
 
 class Phase(Enum):
@@ -54,6 +60,10 @@ class Work:
         """Ordered of a vehicle that has to be stopped first."""
         self.speed_m_s = 0.0
         """Cruise speed of the last preparation [m/s]."""
+        self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
+        """Where the vehicle was last told to fly: of the newest it may not have heard."""
+        self.loss: LinkLoss | None = None
+        """Of a vehicle that was handed over for its silence, as long as it may be ours."""
         self._told_not_ready: str | None = None
 
     def in_our_hands(self) -> bool:
@@ -92,7 +102,7 @@ class Work:
 
     def drop(self) -> None:
         """Give up whatever is under way; nothing is sent about it any more."""
-        self.target = self.search = None
+        self.target = self.search = self.loss = None
         self.prepare = self.preparation = self.prepare_next = None
         self.returning = self.holding = None
         self._seat.commands.cancel_all()
@@ -102,13 +112,24 @@ class Work:
         self.preparation = None
         self._seat.commands.cancel_all()
 
-    def hand_over(self, reason: str) -> None:
+    def lose(self) -> None:
+        """Command nothing any more to a vehicle that is not heard, and look for it."""
+        loss = LinkLoss(self._seat, tuple(self.sent_to_enu_m))
+        self.hand_over(self._seat.vehicle.silence(self._seat.now_s), silent=True)
+        self.loss = loss
+
+    def take_back(self) -> None:
+        """The vehicle obeys as it did before it was lost."""
+        self.loss = None
+        self.phase = Phase.HOVERING
+
+    def hand_over(self, reason: str, *, silent: bool = False) -> None:
         """Command nothing any more."""
         self.drop()
         if self._seat.mission is not None:
             self._seat.mission.abort(reason)
         self.phase = Phase.HANDED_OVER
-        self._seat.report(HandedOver(reason))
+        self._seat.report(HandedOver(reason, silent))
 
     def tell_not_ready(self, reason: str) -> None:
         """What the vehicle is waited for, once."""

@@ -7,6 +7,7 @@ the arming of their vehicle: 11 s later it is on its way to its first task.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -76,7 +77,24 @@ def test_low_batteries_go_home_and_failsafes_are_left_to_themselves(
     assert not fleet.vehicles["u2"].pilot(LONG_S).armed, "the failsafe has brought it home"
 
 
-def test_who_is_silent_or_blind_is_commanded_no_more(
+def assert_home_after_silence(fleet: BridgedFleet, uav: str) -> None:
+    """It was handed over for its silence, and came home when it was heard again.
+
+    Its mission brings it, if it flies one, and its agent otherwise.
+    """
+    book = fleet.books[uav]
+    assert book.reasons(HandedOver) == ["nothing heard for 5 s"]
+    by_mission = fleet.style is CommandStyle.MISSION
+    assert fleet.phase(uav) is (StatusPhase.OUT if by_mission else StatusPhase.HOME)
+    why = ": it flies its mission, which ends at home" if by_mission else ", as it was left"
+    assert re.fullmatch(rf"heard again after \d+ s{why}", fleet.note(uav))
+    if by_mission:
+        fleet.assert_left_alone_after(uav, HandedOver)
+    assert fleet.world.observer.replica.claims[uav].handed_over is by_mission
+    assert not fleet.vehicles[uav].pilot(LONG_S).armed
+
+
+def test_who_is_silent_comes_home_once_it_is_heard_and_who_is_blind_is_left_alone(
     flavour: FlavourName, style: CommandStyle
 ) -> None:
     """The silent one is heard again after 10 s, still flying to where it was sent."""
@@ -84,9 +102,7 @@ def test_who_is_silent_or_blind_is_commanded_no_more(
     fleet = BridgedFleet(flavour, style, faults=faults).fly()
 
     fleet.assert_all_done(without=("u0", "u2"))
-    assert_let_go(fleet, "u0", "nothing heard for 5 s")
-    comes_home = style is CommandStyle.MISSION
-    assert fleet.vehicles["u0"].pilot(LONG_S).armed is not comes_home
+    assert_home_after_silence(fleet, "u0")
     assert_let_go(fleet, "u2", "no valid position for 5 s")
 
 
@@ -134,7 +150,7 @@ def test_another_vehicle_than_the_configured_one_is_never_commanded(
     book = fleet.books["u0"]
     assert {sent.name for sent in book.sent} == {"HEARTBEAT"}
     assert "heartbeat of system id 1" in str(book.reported)
-    assert_let_go(fleet, "u2", "nothing heard for 5 s")
+    assert_home_after_silence(fleet, "u2")
 
 
 def test_a_fence_keeps_targets_from_one_uav_and_brings_a_strayed_one_home(

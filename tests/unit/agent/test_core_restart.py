@@ -446,6 +446,21 @@ def test_a_vehicle_that_was_handed_over_stays_so(returning: bool, from_peers: bo
     assert finishes(agent.end_mission(31.0)) == [0]
 
 
+@pytest.mark.parametrize("returning", [True, False])
+def test_a_vehicle_that_was_only_silent_is_looked_for_and_brought_home(returning: bool) -> None:
+    """Nobody is known to have it; its new agent's heartbeats keep its own failsafe off."""
+    earlier = crashed()
+    if returning:
+        earlier.happen(Stop("told"))
+    earlier.happen(HandedOver("nothing heard for 5 s", silent=True))
+    agent = earlier.reborn()
+    actions = agent.learn_what_was_known_to(earlier)
+
+    assert orders(actions) == [
+        Return("left the mission in an earlier life", resume=True, via_enu_m=ABOVE_START)
+    ]
+
+
 def test_a_vehicle_handed_over_before_an_end_unheard_of_is_left_alone_then() -> None:
     earlier = crashed()
     earlier.happen(HandedOver("its pilot switched it to LOITER"))

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 
+from agent.events import Action
 from agent.vehicle import (
     HandedOver,
+    HandOverExplained,
+    HeardAgain,
     Home,
     NotReady,
     Prepare,
@@ -15,6 +20,7 @@ from agent.vehicle import (
     ReturnAdvised,
     VehicleReady,
 )
+from swarm.events import Note
 from swarm.wire.messages import ClaimPhase, StatusPhase
 from tests.builders import entry, uav
 from tests.lone_agent import LoneAgent, claims, finishes, orders, statuses
@@ -24,6 +30,8 @@ FENCE = ReturnAdvised("75 m from the origin, outside the fence of 60 m")
 PILOT = HandedOver("its pilot switched it to LOITER")
 FAILSAFE = HandedOver("a failsafe switched it to RTL (Radio Failsafe)")
 LOST = HandedOver("no valid position for 5 s")
+SILENT = HandedOver("nothing heard for 5 s", silent=True)
+AGAIN = HeardAgain("heard again after 20 s, as it was left")
 
 
 def flying() -> LoneAgent:
@@ -32,6 +40,11 @@ def flying() -> LoneAgent:
     agent.start_mission()
     assert agent.task == "near"
     return agent
+
+
+def reasons(actions: Sequence[Action]) -> list[object]:
+    """What the log says of them."""
+    return [action.fields["reason"] for action in actions if isinstance(action, Note)]
 
 
 def status_phase_and_note(agent: LoneAgent) -> tuple[StatusPhase, str]:
@@ -89,6 +102,48 @@ def test_a_vehicle_handed_over_is_not_called_home_by_advice() -> None:
     actions = agent.happen(BATTERY, 3.0)
     assert orders(actions) == []
     assert finishes(actions) == []
+
+
+def test_a_vehicle_that_was_silent_and_is_heard_again_is_brought_home() -> None:
+    agent = flying()
+    [claim] = claims(agent.happen(SILENT, 2.0))
+    assert (claim.phase, claim.handed_over) == (ClaimPhase.OUT, False)
+    assert status_phase_and_note(agent) == (StatusPhase.OUT, SILENT.reason)
+
+    actions = agent.happen(AGAIN, 20.0)
+    assert orders(actions) == [Return(AGAIN.reason)]
+    assert agent.core.phase is StatusPhase.RETURNING
+    later = agent.post(entry("new", east_m=1.0, number=2)) + agent.run_until(30.0)
+    assert orders(later) == []
+    assert statuses(later)[-1].note == AGAIN.reason
+    assert finishes(agent.happen(Home(), 31.0)) == [0]
+
+
+def test_what_became_of_a_silent_vehicle_is_told_and_it_is_left_to_who_has_it() -> None:
+    agent = flying()
+    agent.happen(SILENT, 2.0)
+    told = HandOverExplained("heard again after 20 s: its pilot switched it to LOITER")
+    actions = agent.happen(told, 3.0)
+    assert orders(actions) == []
+    assert [claim.handed_over for claim in claims(actions)] == [True]
+    assert reasons(actions) == [told.reason]
+    assert status_phase_and_note(agent) == (StatusPhase.OUT, told.reason)
+
+
+def test_why_a_vehicle_was_handed_over_is_told_in_full_once_it_is_known() -> None:
+    agent = flying()
+    agent.happen(HandedOver("its pilot or a failsafe switched it to RTL"), 2.0)
+    actions = agent.happen(HandOverExplained(FAILSAFE.reason), 2.5)
+    assert (orders(actions), claims(actions)) == ([], [])
+    assert reasons(actions) == [FAILSAFE.reason]
+    assert status_phase_and_note(agent) == (StatusPhase.OUT, FAILSAFE.reason)
+
+
+@pytest.mark.parametrize("report", [AGAIN, HandOverExplained("late news")])
+def test_news_of_a_vehicle_that_is_not_given_up_means_nothing(report: Report) -> None:
+    agent = flying()
+    assert orders(agent.happen(report, 2.0)) == []
+    assert agent.task == "near"
 
 
 def test_a_target_refused_frees_the_task_and_the_uav_takes_another() -> None:
