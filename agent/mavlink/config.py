@@ -57,7 +57,8 @@ class BridgeConfig:
     heartbeat_interval_s: float = 1.0
     """Interval of our own heartbeat."""
     silence_timeout_s: float = 5.0
-    """Without a heartbeat for that long the vehicle is no longer ours."""
+    """Without any message for that long, or a heartbeat for three times as long, the vehicle is
+    no longer ours."""
     stream_timeout_s: float = 3.0
     """A stream that does not come for that long, or three intervals, is asked for again."""
     commands: CommandPolicy = field(default_factory=CommandPolicy)
