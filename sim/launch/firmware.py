@@ -24,6 +24,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
+from sim.launch.workplace import firmware_workplace
 from swarm.errors import Fault, InputError
 from swarm.model import Mission
 from swarm.model.frames import DEFAULT_ORIGIN, wgs84_from_enu
@@ -114,6 +115,8 @@ class FirmwareProcess:
 
     command: tuple[str, ...]
     """Program and arguments; to be run in a folder of its own."""
+    folder: str
+    """Name of that folder: nothing in it that a shell would not take as it is."""
     environment: Mapping[str, str]
     """Variables beside those of this process."""
     files: Mapping[str, str]
@@ -129,6 +132,8 @@ class Firmware:
     kind: FirmwareKind
     program: Path
     """Absolute path of the binary."""
+    workplace: Path
+    """Where its instances get folders of their own."""
 
     def processes(self, mission: Mission, speedup: float) -> dict[str, FirmwareProcess]:
         """Processes by UAV, each vehicle standing at its UAV's start."""
@@ -153,9 +158,9 @@ class Firmware:
             *("--sysid", str(number + 1)),
         )
         parameters = "".join(f"{name} {value}\n" for name, value in ARDUCOPTER_PARAMETERS.items())
-        return FirmwareProcess(
-            command, {}, {_ARDUCOPTER_FILE: parameters}, f"tcp:127.0.0.1:{port}", number + 1
-        )
+        url = f"tcp:127.0.0.1:{port}"
+        files = {_ARDUCOPTER_FILE: parameters}
+        return FirmwareProcess(command, self._folder(number), {}, files, url, number + 1)
 
     def _px4(
         self, number: int, home: tuple[float, float, float], speedup: float
@@ -173,7 +178,10 @@ class Firmware:
         }
         command = (str(self.program), "-i", str(number), "-d", "-s", startup, str(etc))
         url = f"udpin:127.0.0.1:{_PX4_PORT + number}"
-        return FirmwareProcess(command, environment, {}, url, number + 1)
+        return FirmwareProcess(command, self._folder(number), environment, {}, url, number + 1)
+
+    def _folder(self, number: int) -> str:
+        return f"{self.kind}-{number + 1}"
 
 
 def find_firmware(
@@ -188,7 +196,7 @@ def find_firmware(
         environment: environment variables.
 
     Raises:
-        InputError: it is not there, or cannot serve so many.
+        InputError: it is not there, cannot serve so many, or has no place to work in.
     """
     source = "--firmware" if path is not None else kind.variable
     what, example = (
@@ -210,7 +218,10 @@ def find_firmware(
     if kind is FirmwareKind.PX4 and not (place / "etc" / "init.d-posix" / "rcS").is_file():
         problem = f"there is no startup script {place}/etc/init.d-posix/rcS"
         raise InputError(Fault(source, text, problem, remedy))
+    if kind is FirmwareKind.PX4 and os.pathsep in str(place):
+        problem = f"PX4 finds its programs along PATH, so not below a folder with {os.pathsep!r}"
+        raise InputError(Fault(source, text, problem, "give the build folder another name"))
     if n_uav > kind.most:
         problem = f"{n_uav} UAVs, but at most {kind.most} such vehicles run on one machine"
         raise InputError(Fault("--autopilot", kind, problem, "fly a smaller scenario"))
-    return Firmware(kind, program)
+    return Firmware(kind, program, firmware_workplace())

@@ -91,7 +91,9 @@ class Launch:
         """
         layout = self.layout
         # A process's memory is for its next life in this run, and for nobody after that.
-        self._folder = tempfile.TemporaryDirectory(prefix="peckorder-", ignore_cleanup_errors=True)
+        self._folder = tempfile.TemporaryDirectory(
+            prefix="peckorder-", dir=self._place(), ignore_cleanup_errors=True
+        )
         layout.state = Path(self._folder.name)
         if self._through is not None:
             for link in layout.links:
@@ -115,6 +117,11 @@ class Launch:
             arguments = layout.agent(place.uav, place.url, place.system_id)
             await self._start(place.uav, arguments)
 
+    def _place(self) -> Path | None:
+        """Where the run has its folder; None: where temporary files go."""
+        autopilots = self.options.autopilots
+        return autopilots.workplace if isinstance(autopilots, Firmware) else None
+
     async def _start_simulated(self) -> AsyncIterator[VehiclePlace]:
         """Start simulated autopilots; the vehicles come as they are ready."""
         groups = autopilot_groups([uav.id for uav in self.mission.uavs])
@@ -137,7 +144,7 @@ class Launch:
         processes = firmware.processes(self.mission, self.options.speedup)
         children = {}
         for uav, process in processes.items():
-            own = folder / f"{firmware.kind} of {uav}"
+            own = folder / process.folder
             own.mkdir()
             for name, text in process.files.items():
                 (own / name).write_text(text, encoding="utf-8")

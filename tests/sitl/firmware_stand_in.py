@@ -1,7 +1,9 @@
 """Programs that take real firmware's place on the command line, and fly simulated vehicles.
 
-They accept exactly what the firmware would be started with, and open the same ports. So all
-but the firmware itself is tried where there is none. Leaves out: any behaviour of its own.
+They accept exactly what the firmware would be started with, and open the same ports. PX4's
+also runs a startup script that names files below its working folder as PX4's does: without
+quotes, and by PATH. So all but the firmware itself is tried where there is none. Leaves out:
+any behaviour of its own.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ os.execv(sys.executable, [
 ])
 """
 _PX4 = """
-import argparse, os, sys
+import argparse, os, subprocess, sys
 parser = argparse.ArgumentParser(allow_abbrev=False)
 parser.add_argument("-i", dest="instance", required=True)
 parser.add_argument("-s", dest="startup", required=True)
@@ -38,13 +40,28 @@ told = parser.parse_args()
 assert os.environ["PX4_SIM_MODEL"] == "sihsim_quadx"
 assert all(float(os.environ[f"PX4_HOME_{part}"]) for part in ("LAT", "LON", "ALT"))
 os.symlink(told.data, "etc")
-assert os.path.exists(told.startup)
+programs = os.path.dirname(os.path.abspath(sys.argv[0]))
+os.environ["PATH"] = programs + ":" + os.environ["PATH"]
+if subprocess.run(f"/bin/sh {told.startup} {told.instance}", shell=True).returncode:
+    sys.exit("ERROR [px4] Startup script returned with an error")
 port = 14540 + int(told.instance)
 os.execv(sys.executable, [
     *(sys.executable, "-m", "swarm", "autopilot", SCENARIO, "--json", "--flavour", "px4"),
     *("--uav", UAVS[int(told.instance)], "--system-id", str(int(told.instance) + 1)),
     *("--listen", f"udpout:127.0.0.1:{port}", "--speedup", os.environ["PX4_SIM_SPEED_FACTOR"]),
 ])
+"""
+_PX4_STARTUP = """
+here=$(pwd)/
+. stand-in-alias.sh
+PATH=$PATH:${here}etc/init.d-posix
+airframe=
+for file in ${here}etc/init.d-posix/airframes/*_sihsim_quadx; do
+    [ -e "$file" ] && airframe=$file
+done
+if [ -z "$airframe" ]; then echo "Error: no autostart file found" >&2; exit 1; fi
+. ${here}etc/init.d/rc.stand_in
+. stand-in.rc
 """
 
 
@@ -55,10 +72,13 @@ def arducopter_stand_in(folder: Path, scenario: str, uavs: list[str]) -> Path:
 
 def px4_stand_in(folder: Path, scenario: str, uavs: list[str]) -> Path:
     """A folder for SWARM_SITL_PX4."""
-    startup = folder / "etc" / "init.d-posix" / "rcS"
-    startup.parent.mkdir(parents=True)
-    startup.touch()
-    (folder / "bin").mkdir()
+    posix, common, programs = (folder / name for name in ("etc/init.d-posix", "etc/init.d", "bin"))
+    for each in (posix / "airframes", common, programs):
+        each.mkdir(parents=True)
+    (posix / "rcS").write_text(_PX4_STARTUP, encoding="utf-8")
+    found = (programs / "stand-in-alias.sh", posix / "stand-in.rc", common / "rc.stand_in")
+    for file in (*found, posix / "airframes" / "10040_sihsim_quadx"):
+        file.touch()
     _program(folder / "bin" / "px4", _PX4, scenario, uavs)
     return folder
 

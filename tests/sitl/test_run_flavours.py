@@ -53,8 +53,9 @@ def test_the_plan_is_flown(
 def test_firmware_is_started_on_the_ports_where_agents_look_for_it(
     tmp_path: Path, kind: FirmwareKind
 ) -> None:
+    """Whatever its own folder, and that of temporary files, are called."""
     make = arducopter_stand_in if kind is FirmwareKind.ARDUPILOT else px4_stand_in
-    programs, work = tmp_path / "programs", tmp_path / "work"
+    programs, work = tmp_path / "my programs & more", tmp_path / "work (of $HOME)"
     programs.mkdir()
     work.mkdir()
     scenario = programs / "meadow.toml"  # a name that only this test's vehicles carry

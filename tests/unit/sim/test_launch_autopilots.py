@@ -12,6 +12,7 @@ from sim.launch.autopilots import Running, Simulated, VehiclePlace, parse_autopi
 from sim.launch.firmware import Firmware, FirmwareKind
 from sim.launch.fleet import defaults_for
 from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
+from sim.launch.workplace import firmware_workplace
 from swarm.errors import InputError
 
 UAVS = ("uav1", "uav2", "uav3")
@@ -35,7 +36,7 @@ def test_firmware_is_looked_for(tmp_path: Path) -> None:
 
     made = parse_autopilots("ardupilot", UAVS, copter, {})
 
-    assert made == Firmware(FirmwareKind.ARDUPILOT, copter)
+    assert made == Firmware(FirmwareKind.ARDUPILOT, copter, firmware_workplace())
 
 
 def test_urls_belong_to_the_uavs_in_order() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -22,7 +23,8 @@ FLEET = replace(
 
 
 def processes(kind: FirmwareKind, program: str, speedup: float = 4.0) -> list[FirmwareProcess]:
-    return list(Firmware(kind, Path(program)).processes(FLEET, speedup).values())
+    firmware = Firmware(kind, Path(program), Path("/tmp"))
+    return list(firmware.processes(FLEET, speedup).values())
 
 
 def value(process: FirmwareProcess, option: str) -> str:
@@ -96,6 +98,14 @@ def test_px4_learns_everything_else_from_its_environment() -> None:
     }
 
 
+@pytest.mark.parametrize("kind", FirmwareKind)
+def test_every_instance_has_a_folder_that_a_shell_takes_as_it_is(kind: FirmwareKind) -> None:
+    folders = [each.folder for each in processes(kind, "/opt/firmware")]
+
+    assert len(set(folders)) == len(folders)
+    assert all(re.fullmatch(r"[a-z0-9-]+", folder) for folder in folders)
+
+
 def build_of_px4(folder: Path) -> Path:
     (folder / "etc" / "init.d-posix").mkdir(parents=True)
     (folder / "etc" / "init.d-posix" / "rcS").touch()
@@ -151,6 +161,11 @@ def test_px4_without_its_startup_script_is_one_clear_line(tmp_path: Path) -> Non
     (build / "etc" / "init.d-posix" / "rcS").unlink()
     with pytest.raises(InputError, match="no startup script"):
         find_firmware(FirmwareKind.PX4, 3, build, {})
+
+
+def test_a_build_folder_that_no_path_can_name_is_one_clear_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"^--firmware: .*: PX4 finds its programs along PATH"):
+        find_firmware(FirmwareKind.PX4, 3, build_of_px4(tmp_path / "a:b"), {})
 
 
 def test_more_px4s_than_have_ports_are_refused(tmp_path: Path) -> None:

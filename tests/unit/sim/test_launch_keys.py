@@ -113,7 +113,7 @@ def test_a_secure_run_signs_mavlink_with_a_key_for_each_simulated_vehicle() -> N
 
 
 def test_firmware_has_been_given_no_keys_and_the_report_says_so() -> None:
-    firmware = Firmware(FirmwareKind.PX4, Path("px4"))
+    firmware = Firmware(FirmwareKind.PX4, Path("px4"), Path("/tmp"))
     flown = replace(OPTIONS, bus=BusKind.MESH, autopilots=firmware)
     with protected(FLEET, flown, secure=True, keys=None) as options:
         assert options.handed_on.signing_key is None
