@@ -103,6 +103,14 @@ def agent(
             "return home, so that the vehicle comes back if its companion dies.",
         ),
     ] = CommandStyle.REPOSITION,
+    accept_no_failsafe: Annotated[
+        bool,
+        typer.Option(
+            "--accept-no-failsafe",
+            help="Fly the vehicle although its own failsafes would not bring it home if this "
+            "agent dies; without this it is not armed then. Missions bring it home anyway.",
+        ),
+    ] = False,
     battery_reserve: Annotated[
         float,
         typer.Option(
@@ -227,6 +235,7 @@ def agent(
                 ground_system_id=own_system_id,
                 ground_component_id=own_component_id,
                 command=command,
+                accept_no_failsafe=accept_no_failsafe,
                 acceptance_radius_m=acceptance_radius_m,
                 position_rate_hz=position_rate_hz,
                 battery_reserve_frac=battery_reserve or None,

@@ -28,6 +28,7 @@ from agent.tasking import Tasking
 from agent.vehicle import (
     Arrived,
     AttemptFailed,
+    Caution,
     GoTo,
     HandedOver,
     HandOverExplained,
@@ -141,6 +142,8 @@ class AgentCore:
         self._on_detour = False
         """Whether the vehicle was told to fly to its start before it returns."""
         self._exit_status = 0
+        self._caution = ""
+        """What people should know of the vehicle in flight."""
         self._finished = False
         self._deadline_s: float | None = None
         self._kept: object = None
@@ -253,6 +256,9 @@ class AgentCore:
                 if self._stage is not StatusPhase.HOLDING:  # why it holds is worth more
                     self._speech.note = reason
                 self._actions.append(Note("vehicle not ready", {"reason": reason}))
+            case Caution(reason):
+                self._caution = reason
+                self._actions.append(Note("caution", {"reason": reason}))
             case Arrived(leg):
                 self._tasking.arrive(leg, now_s)
             case AttemptFailed(leg):
@@ -286,7 +292,7 @@ class AgentCore:
     def _become_airborne(self, now_s: float) -> None:
         if self._stage is not StatusPhase.PREPARING or self._tasking.airborne:
             return
-        self._speech.note = ""
+        self._speech.note = self._caution[:200]
         me = self._picture.me
         if self._picture.place_enu_m is None and me is not None:
             self._picture.place_enu_m = me.position_enu_m

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 __all__ = [
     "Arrived",
     "AttemptFailed",
+    "Caution",
     "GoTo",
     "HandOverExplained",
     "HandedOver",
@@ -110,6 +111,13 @@ class NotReady:
 
 
 @dataclass(frozen=True, slots=True)
+class Caution:
+    """What a person should know of the vehicle before it flies; nothing else follows from it."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Arrived:
     """The vehicle is at the target of that leg and has stopped there."""
 
@@ -201,6 +209,7 @@ class Home:
 Report = (
     VehicleReady
     | NotReady
+    | Caution
     | Arrived
     | AttemptFailed
     | Telemetry

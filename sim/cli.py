@@ -137,6 +137,14 @@ def run(
             show_default=False,
         ),
     ] = None,
+    accept_no_failsafe: Annotated[
+        bool,
+        typer.Option(
+            "--accept-no-failsafe",
+            help="Fly vehicles that run already although their own failsafes would not bring "
+            "them home; see swarm agent. What a run starts itself is flown anyway.",
+        ),
+    ] = False,
     without_bus_s: Annotated[
         float | None,
         typer.Option(
@@ -271,6 +279,7 @@ def run(
     from coordinator.view.report import MissionReport, check_report_path
     from sim.launch.autopilots import check_speedup, parse_autopilots
     from sim.launch.fence import fence_around
+    from sim.launch.firmware import Firmware
     from sim.launch.fleet import LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, check_handed_on, parse_command_styles
     from sim.launch.kept_logs import KeptLogs
@@ -297,6 +306,8 @@ def run(
         battery_reserve=battery_reserve,
         fence=fence_around(mission, fence_radius_m, fence_height_m),
         without_bus_s=without_bus_s,
+        # Firmware that is started here flies in a simulator, with parameters of its own.
+        accept_no_failsafe=accept_no_failsafe or isinstance(autopilots, Firmware),
         faults=tuple(fault or ()),
     )
     check_handed_on(handed_on, autopilots, uavs)

@@ -220,7 +220,9 @@ class BridgeWatch:
         hold(not self._silent, f"{name} after a hand-over: {message}")
         if name in ("PARAM_REQUEST_READ", "PARAM_SET"):
             hold(Phase.PREPARING in phases, f"{name} while {before}, {after}")
-            hold(message.param_id in self.fake.speed_names, f"{name} of {message.param_id}")
+            read = self.fake.failsafe_names if name == "PARAM_REQUEST_READ" else frozenset()
+            known = message.param_id in read or message.param_id in self.fake.speed_names
+            hold(known, f"{name} of {message.param_id}")
         elif name in _MISSION_MESSAGES:
             hold(missions, f"{name}, though commanded by targets")
             if name not in _MISSION_READING:

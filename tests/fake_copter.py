@@ -43,6 +43,18 @@ class FakeCopter:
     """Message ids that have to be asked for."""
     speed_names: tuple[str, ...] = ("WP_SPD", "WPNAV_SPEED")
     """Names that the parameter of the cruise speed may have."""
+    failsafe_names = frozenset(
+        {
+            "FS_GCS_ENABLE",
+            "FS_GCS_TIMEOUT",
+            "MAV_GCS_SYSID",
+            "SYSID_MYGCS",
+            "MAV_GCS_SYSID_HI",
+            "BATT_FS_LOW_ACT",
+            "SWARM_SIMULATED",
+        }
+    )
+    """What may be read of it besides."""
 
     def __init__(
         self,
@@ -74,7 +86,14 @@ class FakeCopter:
         self.ekf_flags = 831
         self.system_status: int | None = None
         """MAV_STATE to say instead of the true one."""
-        self.parameters: dict[str, float] = {"WP_SPD": default_speed_m_s}
+        self.parameters: dict[str, float] = {
+            "WP_SPD": default_speed_m_s,
+            "FS_GCS_ENABLE": 1.0,
+            "FS_GCS_TIMEOUT": 5.0,
+            "MAV_GCS_SYSID": 255.0,
+            "MAV_GCS_SYSID_HI": 0.0,
+            "BATT_FS_LOW_ACT": 2.0,
+        }
         self.ground_m = ground_m
         self.home_m: Point = (0.0, 0.0, ground_m)
         self.position_m: Point = self.home_m

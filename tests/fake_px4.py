@@ -7,6 +7,7 @@ knobs are those of the scripted ArduCopter; what is here is what PX4 does otherw
 from __future__ import annotations
 
 import math
+import struct
 from typing import Any, ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -20,6 +21,7 @@ AUTO_TAKEOFF, AUTO_LOITER, AUTO_MISSION, AUTO_RTL, AUTO_LAND = (
 )
 POSCTL = 3 << 16
 
+_INT32, _REAL32 = 6, 9
 _PREARM = 0x10000000
 _CONST_POS_MODE = 128
 """Set while it stands still, position or not; on the ground with a position it says 1023."""
@@ -48,12 +50,21 @@ class FakePx4(FakeCopter):
     takeoff_mode = AUTO_TAKEOFF
     streams_asked = frozenset({33, 1, 230, 245})
     speed_names = ("MPC_XY_CRUISE",)
+    failsafe_names = frozenset(
+        {"NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_DL_LOSS_T", "COM_LOW_BAT_ACT", "SWARM_SIMULATED"}
+    )
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._texts = 0
         super().__init__(*args, **kwargs)
-        self.parameters = {"MPC_XY_CRUISE": self.default_speed_m_s}
         self.ekf_flags = 895
+        self.parameters = {
+            "MPC_XY_CRUISE": self.default_speed_m_s,
+            "NAV_DLL_ACT": 2.0,
+            "COM_DLL_EXCEPT": 0.0,
+            "COM_DL_LOSS_T": 30.0,
+            "COM_LOW_BAT_ACT": 3.0,
+        }
 
     def power_on(self, now_s: float) -> None:
         self._heartbeat_due_s = now_s
@@ -100,6 +111,13 @@ class FakePx4(FakeCopter):
         sensors = (0x300402F, 0x301402F, 0x320C83F | healthy)
         fields = (*sensors, 160, 16200, -100, self.battery_percent, 0, 0, 0, 0, 0, 0)
         self.say(mavlink.MAVLink_sys_status_message(*fields))
+
+    def _say_parameter(self, name: str) -> None:
+        value, kind = self.parameters[name], _REAL32
+        if name != "MPC_XY_CRUISE":
+            kind = _INT32
+            (value,) = struct.unpack("<f", struct.pack("<i", round(value)))
+        self.say(mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 65535))
 
     # What it hears.
 

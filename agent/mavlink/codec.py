@@ -9,6 +9,7 @@ Wire units: https://mavlink.io/en/messages/common.html
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -293,7 +294,12 @@ def _command_ack(raw: Any) -> Inbound | None:
 
 
 def _parameter(raw: Any) -> Inbound | None:
-    return Parameter(raw.param_id, raw.param_value) if math.isfinite(raw.param_value) else None
+    if not math.isfinite(raw.param_value):
+        return None
+    integer = None
+    if raw.param_type == mavlink.MAV_PARAM_TYPE_INT32:
+        (integer,) = struct.unpack("<i", struct.pack("<f", raw.param_value))
+    return Parameter(raw.param_id, raw.param_value, integer)
 
 
 def _parameter_missing(raw: Any) -> Inbound | None:

@@ -92,6 +92,8 @@ class BridgeConfig:
     reached_radius_m: float = 5.0
     """Where the vehicle says itself that it reached its target, it must be at least that near,
     or within the acceptance radius if that is wider."""
+    accept_no_failsafe: bool = False
+    """Whether a vehicle is flown that would not come home by itself if its agent dies."""
     battery_reserve_frac: float | None = 0.2
     """Charge below which the vehicle should go home, 0..1; None leaves that to the autopilot."""
     position_timeout_s: float = 5.0

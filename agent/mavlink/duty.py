@@ -146,6 +146,8 @@ class Duty:
             )
         preparation = self._work.preparation
         self._seat.say(*preparation.advance(self._seat.vehicle, heartbeat, self._seat.now_s))
+        if preparation.caution is not None:
+            self._work.tell_caution(preparation.caution)
         if preparation.failure is not None:
             aloft = heartbeat.armed and self._seat.flavour.airborne(self._seat.vehicle)
             obeys = self._work.obeys(heartbeat.custom_mode)

@@ -149,6 +149,8 @@ class Parameter:
 
     name: str
     value: float
+    integer: int | None = None
+    """Its bytes read as a whole number, if it is one: so some firmwares mean them."""
 
 
 @dataclass(frozen=True, slots=True)

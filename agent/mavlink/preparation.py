@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from agent.mavlink.commands import Command, CommandEnded, Commands, Ending, result_text
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.consent import Consent
+from agent.mavlink.failsafe_check import FailsafeCheck
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.guards import Guards
 from agent.mavlink.leg import RepositionLeg
@@ -112,6 +113,9 @@ class Preparation:
         self._consent = Consent(flavour, ours=ours or order.resume)
         self._leg: RepositionLeg | None = None
         self._speed = SpeedSetting(order.speed_m_s, flavour, config)
+        self._failsafes = FailsafeCheck(flavour, config)
+        self.caution: str | None = None
+        """What people should know of a vehicle that is armed all the same."""
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
         self.done = False
@@ -143,6 +147,7 @@ class Preparation:
 
     def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
         """Take what matters of a message beside the vehicle's state."""
+        self._failsafes.on_message(message)
         return self._speed.on_message(message, now_s)
 
     def on_position(self, position: Position, now_s: float) -> list[Outbound]:
@@ -185,7 +190,8 @@ class Preparation:
         if not heartbeat.armed:
             if reason := self._left_by_others():
                 return self._fail(reason)
-            return self._start_motors(vehicle, now_s)
+            started = self._start_motors(vehicle, now_s)
+            return started if self.failure else [*self._failsafes.ask(now_s), *started]
         position = vehicle.position
         if position is None:
             return self._wait("waiting for a position")
@@ -225,6 +231,9 @@ class Preparation:
             return self._wait(f"{unready} ({text})" if text else unready)
         if vehicle.position is not None and (fault := self._misplaced(vehicle.position)):
             return self._fail(fault)
+        if objection := self._failsafes.objection:
+            return self._wait(objection)
+        self.caution = self._failsafes.caution
         if self._mission is not None and not self._mission.is_laid:
             return self._lay(self._mission, now_s)
         self._consent.arm()

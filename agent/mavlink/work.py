@@ -16,7 +16,7 @@ from agent.mavlink.returning import Returning
 from agent.mavlink.search import Search
 from agent.mavlink.seat import Seat
 from agent.mavlink.target import Target
-from agent.vehicle import HandedOver, NotReady, Prepare
+from agent.vehicle import Caution, HandedOver, NotReady, Prepare
 
 __all__ = ["Phase", "Work"]
 
@@ -65,6 +65,7 @@ class Work:
         self.loss: LinkLoss | None = None
         """Of a vehicle that was handed over for its silence, as long as it may be ours."""
         self._told_not_ready: str | None = None
+        self._told_caution: str | None = None
 
     def in_our_hands(self) -> bool:
         """Whether the vehicle is, or may be, in the air on our orders."""
@@ -137,6 +138,12 @@ class Work:
             self._told_not_ready = reason
             self._seat.report(NotReady(reason))
 
+    def tell_caution(self, reason: str) -> None:
+        """What people should know of the vehicle, once."""
+        if reason != self._told_caution:
+            self._told_caution = reason
+            self._seat.report(Caution(reason))
+
     def tell_anew(self) -> None:
         """Another wait begins."""
-        self._told_not_ready = None
+        self._told_not_ready = self._told_caution = None

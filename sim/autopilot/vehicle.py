@@ -34,7 +34,7 @@ from sim.autopilot.geo import place_enu_m
 from sim.autopilot.mission_items import MissionStore
 from sim.autopilot.mission_transfer import MissionTransfer
 from sim.autopilot.modes import Mode
-from sim.autopilot.params import ParameterTable
+from sim.autopilot.params import Parameter, ParameterTable
 from sim.autopilot.pilot import Pilot
 from sim.autopilot.streams import Streams
 from sim.autopilot.telemetry import DATA_STREAMS, Telemetry
@@ -43,6 +43,9 @@ __all__ = ["COMPONENT_ID", "Vehicle"]
 
 COMPONENT_ID = 1
 _HEARTBEAT_S = 1.0
+_SIMULATED = Parameter("SWARM_SIMULATED", 1.0, mavlink.MAV_PARAM_TYPE_REAL32, read_only=True)
+"""By which an agent knows that nothing falls from the sky if this vehicle does: it flies it
+whatever its failsafes are. No firmware has such a parameter."""
 _POSITION_IGNORED = 0b111
 """Bits of a position target's type mask that say that no position is meant."""
 _NANO = 1e9
@@ -68,7 +71,7 @@ class Vehicle:
         self._flavour = flavour
         self._outbox = Outbox(numbers_texts=flavour.numbers_texts)
         self._streams = Streams()
-        self._parameters = ParameterTable(flavour.parameters(config))
+        self._parameters = ParameterTable((*flavour.parameters(config), _SIMULATED))
         self._store = MissionStore()
         self._battery = Battery(config.endurance_s, config.battery_failsafe)
         self._now_s = start_s

@@ -90,6 +90,7 @@ def turnaround(
         turnarounds_as_rich,
     )
     from sim.launch.autopilots import parse_autopilots
+    from sim.launch.firmware import Firmware
     from sim.launch.fleet import BusKind, LaunchOptions, defaults_for
     from sim.launch.handed_on import HandedOn, parse_command_styles
     from swarm.log import LogFormat
@@ -110,7 +111,10 @@ def turnaround(
         acceptance_radius_m=defaults.acceptance_radius_m,
         start_timeout_s=defaults.start_timeout_s,
         autopilots=autopilots,
-        handed_on=HandedOn(command=parse_command_styles(command, uavs)),
+        handed_on=HandedOn(
+            command=parse_command_styles(command, uavs),
+            accept_no_failsafe=isinstance(autopilots, Firmware),
+        ),
         log_format=LogFormat.JSON,
     )
     machine = this_machine()

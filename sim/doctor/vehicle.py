@@ -12,9 +12,17 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.mavlink.codec import MavlinkCodec
+from agent.mavlink.failsafe_check import FailsafeReading
 from agent.mavlink.flavours import Flavour, flavour_of
 from agent.mavlink.framing import Framer
-from agent.mavlink.messages import CommandLong, Heartbeat, Position
+from agent.mavlink.messages import (
+    CommandLong,
+    Heartbeat,
+    Inbound,
+    Outbound,
+    ParameterRead,
+    Position,
+)
 from agent.mavlink.signing import Signing
 from agent.mavlink.state import VehicleState
 from sim.doctor.finding import Finding, fails, fine, warns
@@ -26,6 +34,8 @@ OWN_SYSTEM_ID = 254
 ASK_AGAIN_S = 1.0
 _AUTOPILOT_COMPONENT = 1
 _CMD_REQUEST_MESSAGE = 512
+_AGENT_SYSTEM_ID = 255
+"""An agent's, unless it is told another one: whose silence the vehicle should notice."""
 _ASKED_FOR = (
     mavlink.MAVLINK_MSG_ID_SYS_STATUS,
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
@@ -79,6 +89,7 @@ class Listening:
         self._time_heard = False
         self._others: dict[int, int] = {}
         self._bytes = 0
+        self._failsafes: FailsafeReading | None = None
 
     @property
     def heard(self) -> bool:
@@ -86,13 +97,14 @@ class Listening:
         return self._state.heartbeat is not None
 
     def requests(self) -> list[bytes]:
-        """Frames that ask the vehicle for messages, once each."""
-        return [
-            self._codec.encode(
-                CommandLong(_CMD_REQUEST_MESSAGE, (float(each), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-            )
+        """Frames that ask the vehicle for messages, and for parameters, once each."""
+        asked: list[Outbound] = [
+            CommandLong(_CMD_REQUEST_MESSAGE, (float(each), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
             for each in _ASKED_FOR
         ]
+        unread = () if self._failsafes is None else self._failsafes.unread
+        asked += [ParameterRead(name) for name in unread]
+        return [self._codec.encode(each) for each in asked]
 
     def receive(self, data: bytes, now_s: float, unix_s: float) -> None:
         """Take in what came.
@@ -114,10 +126,17 @@ class Listening:
                 self._state.on_position(heard.message)
             else:
                 self._state.on_message(heard.message, now_s)
+                self._read_failsafes(heard.message)
         for frame in self._codec.take_frames():
             for each in self._framer.feed(frame):
                 self._count(each.data)
                 self._take_time(each.message, unix_s)
+
+    def _read_failsafes(self, message: Inbound) -> None:
+        if self._failsafes is not None:
+            self._failsafes.on_message(message)
+        elif isinstance(message, Heartbeat) and (flavour := flavour_of(message)) is not None:
+            self._failsafes = FailsafeReading(flavour, _AGENT_SYSTEM_ID)
 
     def _count(self, frame: bytes) -> None:
         number, component = (
@@ -155,6 +174,7 @@ class Listening:
         return [
             self._vehicle(name, heartbeat, flavour),
             self._readiness(name, flavour),
+            *([] if self._failsafes is None else [_failsafes(name, self._failsafes)]),
             self._time(name),
             self._loss(name),
             self._signature(name),
@@ -241,6 +261,21 @@ class Listening:
             text = "it signs what it says, and may obey nobody who does not"
             return warns(what, text, "give --signing-key FILE, here and to swarm agent")
         return fine(what, "nothing is signed; whoever reaches the link can command the vehicle")
+
+
+def _failsafes(name: str, reading: FailsafeReading) -> Finding:
+    """What it does when nobody is there to command it."""
+    what = f"{name} failsafes"
+    told = reading.failsafes
+    text = f"if its agent dies it {told.agent_lost}"
+    if reading.simulated:
+        return fine(what, f"{text}; it is simulated, and flown all the same")
+    if not told.comes_home:
+        remedy = f"{told.remedy}, or fly it with --command mission: it is not armed otherwise"
+        return warns(what, text if told.battery is None else f"{text}; {told.battery}", remedy)
+    if told.battery is not None:
+        return warns(what, f"{text}; {told.battery}", "set what it does of its own: return or land")
+    return fine(what, text)
 
 
 def _advice(problem: str) -> str:

@@ -36,6 +36,7 @@ class HandedOn:
     battery_reserve: float | None = None
     fence: Fence | None = None
     without_bus_s: float | None = None
+    accept_no_failsafe: bool = False
     faults: tuple[str, ...] = ()
     """Each ``UAV:KIND@T+DURATION``."""
 
@@ -48,6 +49,7 @@ class HandedOn:
             *_given("--battery-reserve", self.battery_reserve),
             *([] if self.fence is None else self.fence.to_agent()),
             *_given("--without-bus-s", self.without_bus_s),
+            *(["--accept-no-failsafe"] if self.accept_no_failsafe else []),
             *([] if key is None else ["--signing-key", str(signing_key_of(uav, key))]),
         ]
 

@@ -10,9 +10,11 @@ https://ardupilot.org/dev/docs/copter-commands-in-guided-mode.html
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from agent.mavlink.flavours.base import SpeedParameter
 from agent.mavlink.flavours.copter import COPTER_TYPES, UNCHANGED, Copter, set_mode
+from agent.mavlink.flavours.failsafes import ARDUCOPTER_NAMES, Failsafes, arducopter_failsafes
 from agent.mavlink.messages import (
     AltitudeFrame,
     Battery,
@@ -81,6 +83,15 @@ class ArduCopter(Copter):
     def speed_parameters(self) -> tuple[SpeedParameter, ...]:
         """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""
         return (SpeedParameter("WP_SPD", 1.0), SpeedParameter("WPNAV_SPEED", 100.0))
+
+    @property
+    def failsafe_names(self) -> tuple[tuple[str, ...], ...]:
+        """Ground station and battery failsafes."""
+        return ARDUCOPTER_NAMES
+
+    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
+        """It listens to the heartbeats of certain system ids only."""
+        return arducopter_failsafes(values, own_system_id)
 
     @property
     def streams(self) -> tuple[tuple[int, type[Inbound]], ...]:

@@ -5,10 +5,12 @@ Leaves out: when to do what, which is the same for every firmware (agent.mavlink
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from agent.mavlink.messages import CommandInt, CommandLong, Heartbeat, Inbound
+from agent.mavlink.flavours.failsafes import Failsafes
+from agent.mavlink.messages import CommandInt, CommandLong, Heartbeat, Inbound, Parameter
 from agent.mavlink.state import VehicleState
 
 __all__ = ["Flavour", "SpeedParameter"]
@@ -29,6 +31,19 @@ class Flavour(Protocol):
     @property
     def speed_parameters(self) -> tuple[SpeedParameter, ...]:
         """Every name that the cruise speed has had."""
+        ...
+
+    @property
+    def failsafe_names(self) -> tuple[tuple[str, ...], ...]:
+        """Parameters that say what it does without us, each by all its names."""
+        ...
+
+    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
+        """What the vehicle does without us, as far as these parameters say."""
+        ...
+
+    def value_of(self, parameter: Parameter) -> float:
+        """What the firmware means by a parameter's value on the wire."""
         ...
 
     @property

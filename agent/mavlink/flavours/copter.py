@@ -7,7 +7,7 @@ Commands: https://mavlink.io/en/messages/common.html
 
 from __future__ import annotations
 
-from agent.mavlink.messages import CommandLong
+from agent.mavlink.messages import CommandLong, Parameter
 
 __all__ = ["COPTER_TYPES", "UNCHANGED", "Copter", "set_mode"]
 
@@ -33,6 +33,10 @@ class Copter:
     def disarm(self) -> CommandLong:
         """Stop the motors; refused in the air."""
         return CommandLong(_CMD_COMPONENT_ARM_DISARM, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+    def value_of(self, parameter: Parameter) -> float:
+        """Whole numbers are told as such, in the float."""
+        return parameter.value
 
     def change_speed(self, speed_m_s: float) -> CommandLong:
         """Ground speed from now on.

@@ -10,9 +10,11 @@ is not written anywhere, but recorded.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from agent.mavlink.flavours.base import SpeedParameter
 from agent.mavlink.flavours.copter import COPTER_TYPES, UNCHANGED, Copter, set_mode
+from agent.mavlink.flavours.failsafes import PX4_NAMES, Failsafes, px4_failsafes
 from agent.mavlink.messages import (
     AltitudeFrame,
     CommandInt,
@@ -22,6 +24,7 @@ from agent.mavlink.messages import (
     Heartbeat,
     Inbound,
     Landed,
+    Parameter,
     SystemStatus,
 )
 from agent.mavlink.state import VehicleState
@@ -75,6 +78,20 @@ class Px4Copter(Copter):
     def speed_parameters(self) -> tuple[SpeedParameter, ...]:
         """MPC_XY_CRUISE [m/s], which also survives a restart of the vehicle."""
         return (SpeedParameter("MPC_XY_CRUISE", 1.0),)
+
+    @property
+    def failsafe_names(self) -> tuple[tuple[str, ...], ...]:
+        """Data link and battery failsafes."""
+        return PX4_NAMES
+
+    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
+        """It listens to the heartbeats of every ground station, so ours are enough."""
+        del own_system_id
+        return px4_failsafes(values)
+
+    def value_of(self, parameter: Parameter) -> float:
+        """The bytes of whole numbers travel in the float."""
+        return parameter.value if parameter.integer is None else float(parameter.integer)
 
     @property
     def streams(self) -> tuple[tuple[int, type[Inbound]], ...]:

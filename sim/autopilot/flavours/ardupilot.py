@@ -184,6 +184,8 @@ class ArduCopter:
             Parameter("RTL_LOIT_TIME", 5000.0, _INT32, Setting.RETURN_WAIT_S, 1e-3, least=0.0),
             Parameter("GUID_TIMEOUT", 3.0, _REAL, least=0.1),
             Parameter("FS_GCS_ENABLE", 0.0, _INT8),
+            Parameter("FS_GCS_TIMEOUT", 5.0, _REAL, least=2.0),
+            Parameter("BATT_FS_LOW_ACT", 0.0, _INT8),
             Parameter("AUTO_OPTIONS", 0.0, _INT32),
             Parameter("MIS_TOTAL", 0.0, _INT16, read_only=True),
             Parameter("MIS_RESTART", 0.0, _INT8),
@@ -192,6 +194,8 @@ class ArduCopter:
     def _new(self, config: VehicleConfig) -> tuple[Parameter, ...]:
         return (
             Parameter("MAV_SYSID", float(config.system_id), _INT16, read_only=True),
+            Parameter("MAV_GCS_SYSID", 255.0, _INT16, least=1.0),
+            Parameter("MAV_GCS_SYSID_HI", 0.0, _INT16, least=0.0),
             Parameter("ARMING_SKIPCHK", 0.0, _INT32),
             Parameter("WP_SPD", config.cruise_m_s, _REAL, Setting.CRUISE_M_S, least=0.1),
             Parameter("WP_SPD_UP", config.climb_m_s, _REAL, Setting.CLIMB_M_S, least=0.1),
@@ -205,6 +209,7 @@ class ArduCopter:
         cm = 0.01
         return (
             Parameter("SYSID_THISMAV", float(config.system_id), _INT16, read_only=True),
+            Parameter("SYSID_MYGCS", 255.0, _INT16, least=1.0),
             Parameter("ARMING_CHECK", 1.0, _INT32),
             Parameter(
                 "WPNAV_SPEED", config.cruise_m_s / cm, _REAL, Setting.CRUISE_M_S, cm, least=10.0

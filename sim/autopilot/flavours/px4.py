@@ -206,7 +206,9 @@ class Px4:
         return (
             Parameter("COM_DISARM_LAND", 2.0, _REAL, Setting.DISARM_LANDED_S),
             Parameter("COM_DISARM_PRFLT", 10.0, _REAL, Setting.DISARM_DELAY_S),
+            Parameter("COM_DLL_EXCEPT", 0.0, _INT32, least=0.0),
             Parameter("COM_DL_LOSS_T", 30.0, _INT32, least=5.0),
+            Parameter("COM_LOW_BAT_ACT", 0.0, _INT32, least=0.0),
             Parameter("COM_OBC_LOSS_T", 15.0, _REAL, least=0.0),
             Parameter("COM_OF_LOSS_T", 3.0, _REAL, least=0.0),
             Parameter("COM_RC_IN_MODE", 1.0, _INT32, least=0.0),

@@ -8,6 +8,7 @@ import pytest
 
 from agent.events import Action
 from agent.vehicle import (
+    Caution,
     HandedOver,
     HandOverExplained,
     HeardAgain,
@@ -179,3 +180,15 @@ def test_what_a_vehicle_waits_for_shows_until_it_is_airborne() -> None:
 
     agent.happen(VehicleReady(), 9.0)
     assert statuses(agent.run_until(12.0))[-1].note == ""
+
+
+def test_what_people_should_know_of_a_vehicle_is_logged_and_shows_in_flight() -> None:
+    agent = LoneAgent(uav("u0"), uav("u1"))
+    agent.see("coordinator", "u1")
+    agent.learn(agent.statement("coordinator", agent.brief))
+    reason = "if its agent dies it hovers (FS_GCS_ENABLE is 0)"
+    said = agent.happen(Caution(reason), 0.0)
+    assert Note("caution", {"reason": reason}) in said
+
+    agent.happen(VehicleReady(), 9.0)
+    assert statuses(agent.run_until(12.0))[-1].note == reason

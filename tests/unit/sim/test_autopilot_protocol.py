@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import struct
+
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import Disconnected, Tick
 from sim.autopilot.flavours.ardupilot import ArduCopter
+from sim.autopilot.flavours.base import Flavour
+from sim.autopilot.flavours.px4 import Px4
 from sim.autopilot.params import Setting
 from sim.autopilot.vehicle import Vehicle
 from tests.ground_station import (
@@ -189,6 +193,54 @@ def test_older_firmware_has_older_names_and_keeps_silent_about_unknown_ones() ->
     assert vehicle.pilot.parameters.value_si(Setting.CRUISE_M_S) == 5.0
     [system_id] = ground.send(read(3, 1, b"SYSID_THISMAV", -1))
     assert system_id.param_value == 3.0
+
+
+@pytest.mark.parametrize(
+    ("flavour", "told"),
+    [
+        (
+            ArduCopter(),
+            {
+                "FS_GCS_ENABLE": 0,
+                "FS_GCS_TIMEOUT": 5,
+                "MAV_GCS_SYSID": 255,
+                "MAV_GCS_SYSID_HI": 0,
+                "BATT_FS_LOW_ACT": 0,
+            },
+        ),
+        (
+            ArduCopter(old_names=True),
+            {"FS_GCS_ENABLE": 0, "FS_GCS_TIMEOUT": 5, "SYSID_MYGCS": 255, "BATT_FS_LOW_ACT": 0},
+        ),
+        (
+            Px4(),
+            {"NAV_DLL_ACT": 0, "COM_DLL_EXCEPT": 0, "COM_DL_LOSS_T": 30, "COM_LOW_BAT_ACT": 0},
+        ),
+    ],
+)
+def test_failsafes_are_told_with_the_defaults_of_the_firmware(
+    flavour: Flavour, told: dict[str, int]
+) -> None:
+    ground = ground_station(flavour)
+
+    def value(name: str) -> float:
+        read = mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), -1)
+        [answer] = ground.send(read)
+        if flavour.parameter_habits.integers_bytewise:
+            [whole] = struct.unpack("<i", struct.pack("<f", answer.param_value))
+            return float(whole)
+        return float(answer.param_value)
+
+    assert {name: value(name) for name in told} == told
+
+
+@pytest.mark.parametrize("flavour", [ArduCopter(), Px4()])
+def test_a_simulated_vehicle_says_that_it_is(flavour: Flavour) -> None:
+    ground = ground_station(flavour)
+    read = mavlink.MAVLink_param_request_read_message(1, 1, b"SWARM_SIMULATED", -1)
+
+    [answer] = ground.send(read)
+    assert answer.param_value == 1.0
 
 
 def test_messages_for_somebody_else_are_counted_and_dropped() -> None:

@@ -60,9 +60,9 @@ class Flight:
     def kinds(self) -> set[type]:
         return {type(report) for _, report in self.heard}
 
-    def prepared(self) -> Flight:
+    def prepared(self, by_s: float = 20.0) -> Flight:
         self.vehicle.order(PREPARE, VehicleReady())
-        self.queue.run(20.0)
+        self.queue.run(by_s)
         assert VehicleReady in self.kinds()
         return self
 
@@ -118,7 +118,7 @@ def test_a_cut_link_lets_nothing_through_until_it_is_over(silent_s: float, *, lo
 
 def test_what_is_lost_follows_from_the_seed() -> None:
     poor = LinkQuality(0.05, 0.3)
-    one, same, other = (Flight(poor, seed).prepared() for seed in (1, 1, 2))
+    one, same, other = (Flight(poor, seed).prepared(by_s=30.0) for seed in (1, 1, 2))
 
     assert (one.sent, one.heard) == (same.sent, same.heard)
     assert one.heard != other.heard

@@ -112,6 +112,10 @@ def test_styles_of_command_may_differ() -> None:
     assert told.to_agent("uav2") == []
 
 
+def test_what_is_accepted_of_vehicles_is_told_to_every_agent() -> None:
+    assert HandedOn(accept_no_failsafe=True).to_agent("uav2") == ["--accept-no-failsafe"]
+
+
 @pytest.mark.parametrize(
     ("text", "problem"),
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import pytest
@@ -60,6 +61,26 @@ def ekf() -> Any:
     return mavlink.MAVLink_ekf_status_report_message(EKF_READY, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+def parameters(*, bytewise: bool = False, **values: int) -> list[Any]:
+    return [
+        mavlink.MAVLink_param_value_message(
+            name.encode(),
+            struct.unpack("<f", struct.pack("<i", value))[0] if bytewise else float(value),
+            mavlink.MAV_PARAM_TYPE_INT32,
+            len(values),
+            65535,
+        )
+        for name, value in values.items()
+    ]
+
+
+def asked_for(listening: Listening) -> set[str]:
+    """Names of the parameters that it asks for now."""
+    parser = mavlink.MAVLink(None)
+    said = parser.parse_buffer(b"".join(listening.requests())) or ()
+    return {each.param_id for each in said if each.get_type() == "PARAM_REQUEST_READ"}
+
+
 def system_time(ahead_s: float) -> Any:
     return mavlink.MAVLink_system_time_message(round((UNIX_S + ahead_s) * 1e6), 5000)
 
@@ -72,6 +93,7 @@ def found(speaker: Speaker, listening: Listening | None = None) -> dict[str, Fin
 
 def test_a_ready_vehicle_is_told_with_all_it_says() -> None:
     speaker = Speaker().say(heartbeat(), sys_status(), position(), ekf(), system_time(0.25))
+    speaker.say(*parameters(FS_GCS_ENABLE=1, MAV_GCS_SYSID=255, BATT_FS_LOW_ACT=2))
 
     told = found(speaker)
 
@@ -79,7 +101,43 @@ def test_a_ready_vehicle_is_told_with_all_it_says() -> None:
     assert told[NAME].text == "system id 1, ArduPilot, mode STABILIZE, not armed"
     assert told[f"{NAME} ready"].text == "pre-arm checks pass, position known, battery 87%"
     assert told[f"{NAME} time"].text == "its clock and this one differ by 0.25 s"
-    assert told[f"{NAME} link"].text == "5 frames, 0 lost (0.0%)"
+    assert told[f"{NAME} link"].text == "8 frames, 0 lost (0.0%)"
+    assert told[f"{NAME} failsafes"].text == "if its agent dies it returns"
+
+
+def test_what_it_does_without_its_agent_is_told_with_what_would_bring_it_home() -> None:
+    stays = found(Speaker().say(heartbeat(), *parameters(FS_GCS_ENABLE=0, BATT_FS_LOW_ACT=2)))
+    unknown = found(Speaker().say(heartbeat()))
+    lands = parameters(FS_GCS_ENABLE=5, MAV_GCS_SYSID=255, FS_GCS_TIMEOUT=7)
+    warns = found(Speaker().say(heartbeat(), *lands))
+    holds = found(Speaker().say(heartbeat(autopilot=12), *parameters(bytewise=True, NAV_DLL_ACT=1)))
+    simulated = found(Speaker().say(heartbeat(), *parameters(FS_GCS_ENABLE=0, SWARM_SIMULATED=1)))
+
+    low = "what it does on a low battery is not known"
+    findings = [told[f"{NAME} failsafes"] for told in (stays, unknown, warns, holds, simulated)]
+    assert [each.state for each in findings] == [State.WARNING] * 4 + [State.OK]
+    assert [each.text for each in findings] == [
+        "if its agent dies it hovers (FS_GCS_ENABLE is 0)",
+        f"if its agent dies it may hover (FS_GCS_ENABLE is not known); {low} (BATT_FS_LOW_ACT)",
+        f"if its agent dies it lands after 7 s; {low} (BATT_FS_LOW_ACT)",
+        f"if its agent dies it hovers (NAV_DLL_ACT is 1); {low} (COM_LOW_BAT_ACT)",
+        "if its agent dies it hovers (FS_GCS_ENABLE is 0); it is simulated, and flown all the same",
+    ]
+    assert "set FS_GCS_ENABLE 1" in findings[0].remedy
+    assert "--command mission" in findings[0].remedy
+
+
+def test_parameters_are_asked_for_until_they_are_told() -> None:
+    listening = Listening(1)
+    before = asked_for(listening)
+    listening.receive(bytes(Speaker().say(heartbeat()).said), 1.0, UNIX_S)
+    first = asked_for(listening)
+    said = Speaker().say(*parameters(FS_GCS_ENABLE=1, SYSID_MYGCS=255, BATT_FS_LOW_ACT=2)).said
+    listening.receive(bytes(said), 2.0, UNIX_S)
+
+    assert before == set()
+    assert {"FS_GCS_ENABLE", "SYSID_MYGCS", "MAV_GCS_SYSID", "BATT_FS_LOW_ACT"} <= first
+    assert asked_for(listening) == {"MAV_GCS_SYSID_HI", "FS_GCS_TIMEOUT"}
 
 
 def test_what_keeps_it_from_flying_is_told_in_the_bridges_words() -> None:
