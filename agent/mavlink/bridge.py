@@ -97,9 +97,10 @@ class Bridge:
         if self._pulse.late(now_s):
             seat.vehicle.excuse_silence(now_s)
             seat.guards.excuse_silence(now_s)
+            seat.codec.excuse_silence(now_s)
         match event:
-            case Received(data):
-                for heard in seat.codec.decode(data):
+            case Received(data, source):
+                for heard in seat.codec.decode(data, source, now_s):
                     self._hear(heard)
             case Prepare() | GoTo() | Hold() | Return():
                 self._orders.obey(event)

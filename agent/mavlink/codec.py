@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from agent.mavlink.framing import Framer
+from agent.mavlink.framing import Frame, Framer
+from agent.mavlink.latch import PeerLatch
 from agent.mavlink.messages import (
     AltitudeFrame,
     Battery,
@@ -52,6 +53,7 @@ from agent.mavlink.texts import TextJoiner
 __all__ = ["MavlinkCodec"]
 
 _AUTOPILOT_COMPONENT = 1
+_PEER_SILENCE_S = 3.0
 _INT_FRAME = {AltitudeFrame.MEAN_SEA_LEVEL: 5, AltitudeFrame.HOME: 6, AltitudeFrame.NONE: 2}
 _FRAME_BY_WIRE = {
     0: AltitudeFrame.MEAN_SEA_LEVEL,
@@ -72,6 +74,7 @@ class MavlinkCodec:
         source_component_id: our own component id; 1..255.
         signing: signs what is sent, and lets nothing be heard that is not signed. Without
             it signatures are not looked at: signed frames are heard like others.
+        peer_silence_s: see `agent.mavlink.latch`.
     """
 
     def __init__(
@@ -81,12 +84,14 @@ class MavlinkCodec:
         source_system_id: int = 255,
         source_component_id: int = 191,
         signing: Signing | None = None,
+        peer_silence_s: float = _PEER_SILENCE_S,
     ) -> None:
         self._target = target_system_id
         self._own_system = source_system_id
         self._own_component = source_component_id
         self._signing = signing
         self._framer = Framer(signing)
+        self._latch = PeerLatch(peer_silence_s, signed=signing is not None)
         self._texts = TextJoiner()
         self._sender = mavlink.MAVLink(
             None, srcSystem=source_system_id, srcComponent=source_component_id
@@ -98,6 +103,16 @@ class MavlinkCodec:
         self.keep_frames = False
         """Whether to keep the vehicle's frames for `take_frames`."""
         self._kept_frames: list[bytes] = []
+
+    @property
+    def peer(self) -> Hashable | None:
+        """Whom to answer on a link to which anybody can send; None while that is not known."""
+        return self._latch.peer
+
+    @property
+    def strangers(self) -> int:
+        """Pieces dropped because somebody else than the vehicle's peer sent them."""
+        return self._latch.strangers
 
     @property
     def distrusted(self) -> Mapping[str, int]:
@@ -119,10 +134,24 @@ class MavlinkCodec:
         """Frames received whose message the dialect does not have."""
         return self._framer.unknown_frames
 
-    def decode(self, data: bytes) -> list[Heard]:
-        """Messages completed by ``data`` that the bridge knows; anything else is counted."""
+    def decode(
+        self, data: bytes, source: Hashable | None = None, now_s: float = 0.0
+    ) -> list[Heard]:
+        """Messages completed by ``data`` that the bridge knows; anything else is counted.
+
+        Args:
+            data: what came.
+            source: from whom, on a link to which anybody can send; only its peer is listened to.
+            now_s: when [s].
+        """
         heard: list[Heard] = []
-        for frame in self._framer.feed(data):
+        frames = list(self._framer.feed(data, source))
+        if source is not None:
+            proof = any(map(self._proves, frames))
+            if not self._latch.admits(source, now_s, proof=proof):
+                return []
+            self._framer.kept = self._latch.peer
+        for frame in frames:
             if self.keep_frames and frame.system_id == self._target:
                 self._kept_frames.append(frame.data)
             raw = frame.message
@@ -157,9 +186,24 @@ class MavlinkCodec:
         return frames
 
     def reset_link(self) -> None:
-        """Forget a half-received frame or text, because the link is a new one."""
+        """Forget the peer, and half-received frames and texts, because the link is a new one."""
         self._framer.reset()
+        self._latch.forget()
         self._texts.forget()
+
+    def excuse_silence(self, now_s: float) -> None:
+        """Nobody was listened to for a while, so nobody was silent."""
+        self._latch.excuse_silence(now_s)
+
+    def _proves(self, frame: Frame) -> bool:
+        """Whether only the autopilot that is spoken to can have said it, as far as can be told."""
+        raw = frame.message
+        return (
+            raw is not None
+            and frame.system_id == self._target
+            and raw.get_srcComponent() == _AUTOPILOT_COMPONENT
+            and (self._signing is None or frame.signed)
+        )
 
     def _texts_of(self, raw: Any) -> list[Heard]:
         """Texts of the autopilot that are complete by this chunk; nobody else's are joined."""

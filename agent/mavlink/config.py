@@ -59,6 +59,9 @@ class BridgeConfig:
     silence_timeout_s: float = 5.0
     """Without any message for that long, or a heartbeat for three times as long, the vehicle is
     no longer ours."""
+    peer_silence_s: float = 3.0
+    """On a link to which anybody can send: after so long without a frame of the vehicle from
+    where it was heard last it may be heard from elsewhere."""
     stream_timeout_s: float = 3.0
     """A stream that does not come for that long, or three intervals, is asked for again."""
     commands: CommandPolicy = field(default_factory=CommandPolicy)
@@ -115,6 +118,7 @@ class BridgeConfig:
             "status_rate_hz",
             "heartbeat_interval_s",
             "silence_timeout_s",
+            "peer_silence_s",
             "stream_timeout_s",
             "mode_tries",
             "arm_tries",
@@ -180,6 +184,7 @@ class BridgeConfig:
         return replace(
             self,
             silence_timeout_s=max(self.silence_timeout_s, 3.0 * speedup),
+            peer_silence_s=max(self.peer_silence_s, 3.0 * speedup),
             stream_timeout_s=max(self.stream_timeout_s, answer_s),
             effect_timeout_s=max(self.effect_timeout_s, answer_s),
             climb_timeout_s=max(self.climb_timeout_s, 2.0 * answer_s),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 from agent.vehicle import Orders, Report
@@ -14,6 +15,8 @@ class Received:
     """Bytes came from the link."""
 
     data: bytes
+    source: Hashable | None = None
+    """Who sent them, on a link to which anybody can send; None where there is one other end."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ Leaves out: sockets (agent.mavlink.link) and choosing among the frames.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 
 from agent.mavlink.link import open_link
 from agent.mavlink.link_address import UdpOutAddress
@@ -65,5 +65,5 @@ class _Deaf:
     def link_down(self) -> None:
         pass
 
-    def received(self, data: bytes) -> None:
+    def received(self, data: bytes, source: Hashable | None = None) -> None:
         pass

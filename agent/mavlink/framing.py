@@ -11,8 +11,8 @@ Frame layout: https://mavlink.io/en/guide/serialization.html
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, OrderedDict
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +27,8 @@ _START_V2 = 0xFD
 _OVERHEAD_V1 = 8
 """Start byte, five header bytes and the checksum."""
 _OVERHEAD_V2 = 12
+_MOST_SOURCES = 16
+"""Half-received frames remembered, of one source each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,11 @@ class Frame:
     system_id: int
     message: Any
     """Of the dialect; None if it does not have that message."""
+
+    @property
+    def signed(self) -> bool:
+        """Whether it carries a signature."""
+        return self.data[0] == _START_V2 and bool(self.data[2] & SIGNED)
 
 
 class Framer:
@@ -49,6 +56,10 @@ class Framer:
     def __init__(self, signing: Signing | None = None) -> None:
         self._signing = signing
         self._buffer = bytearray()
+        self._halves: OrderedDict[Hashable, bytearray] = OrderedDict()
+        """What came of frames that are not complete, by source; the last one heard last."""
+        self.kept: Hashable | None = None
+        """The source whose half frame is remembered, however many others send."""
         self._parser = mavlink.MAVLink(None)
         self.distrusted: Counter[str] = Counter()
         """Whole frames dropped because of their signature or its absence."""
@@ -59,9 +70,14 @@ class Framer:
         self.unchecked_frames = 0
         """Signed frames taken without a key to check them with."""
 
-    def feed(self, data: bytes) -> Iterator[Frame]:
-        """Take in ``data`` and yield every frame that is complete by now."""
-        buffer = self._buffer
+    def feed(self, data: bytes, source: Hashable | None = None) -> Iterator[Frame]:
+        """Take in ``data`` and yield every frame that is complete by now.
+
+        Args:
+            data: what came.
+            source: from whom; what several send at a time is put together apart.
+        """
+        buffer = self._buffer = self._halves.pop(source, bytearray())
         buffer += data
         start = 0
         try:
@@ -84,11 +100,19 @@ class Framer:
                             yield self._frame(frame, message)
         finally:
             del buffer[:start]
+            if buffer:
+                self._remember(source, buffer)
 
     def reset(self) -> None:
-        """Forget a half-received frame, because the link is a new one."""
-        self.bad_bytes += len(self._buffer)
-        self._buffer.clear()
+        """Forget half-received frames, because the link is a new one."""
+        self.bad_bytes += sum(map(len, self._halves.values()))
+        self._halves.clear()
+
+    def _remember(self, source: Hashable | None, half: bytearray) -> None:
+        if len(self._halves) >= _MOST_SOURCES:
+            oldest = next(each for each in self._halves if each != self.kept)
+            self.bad_bytes += len(self._halves.pop(oldest))
+        self._halves[source] = half
 
     def _frame_size(self, start: int) -> int | None:
         """Bytes of the frame at ``start``; 0 if still unknown, None if there is none."""

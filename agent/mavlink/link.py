@@ -2,7 +2,7 @@
 
     tcp:HOST:PORT       connects, and again whenever the connection is lost or says nothing
     udpout:HOST:PORT    sends there, receives from there
-    udpin:HOST:PORT     waits there and answers who speaks
+    udpin:HOST:PORT     waits there, and answers whom its listener takes for the vehicle
     serial:DEVICE:BAUD  a serial port, opened again whenever it disappears
 
 A link reports what happens to three callbacks, in the loop's thread, and never raises
@@ -18,9 +18,9 @@ import asyncio
 import contextlib
 import socket
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, cast
 
 from agent.mavlink.link_address import (
     LinkAddress,
@@ -56,8 +56,6 @@ nothing (tcp(7), TCP_USER_TIMEOUT), and discards what it holds."""
 _DISCARD_AT_CLOSE = struct.pack("ii", 1, 0)
 """SO_LINGER, on, 0 s: closing resets the connection, and the system's queue is discarded
 instead of being delivered once the peer reads again (socket(7))."""
-_PEER_SILENCE_S = 3.0
-"""After that much silence of its peer a listening link turns to whoever speaks next."""
 
 
 _Peer = tuple[str, int] | tuple[str, int, int, int]
@@ -75,8 +73,8 @@ class LinkListener(Protocol):
         """The link is closed; it will open again unless it was closed on purpose."""
         ...
 
-    def received(self, data: bytes) -> None:
-        """Bytes came."""
+    def received(self, data: bytes, source: Hashable | None = None) -> None:
+        """Bytes came; from whom is told where anybody can send, and `Link.answer` takes it."""
         ...
 
 
@@ -87,8 +85,6 @@ class LinkCounts:
     unsent: int = 0
     """Pieces that were lost: the link was closed, full, or the network refused them."""
     unsent_bytes: int = 0
-    foreign_datagrams: int = 0
-    """Datagrams of others than the peer."""
 
 
 class Link:
@@ -117,6 +113,9 @@ class Link:
         if not self._write(data):
             self.counts.unsent += 1
             self.counts.unsent_bytes += len(data)
+
+    def answer(self, source: Hashable | None) -> None:
+        """Send to that one of those heard from now on; nothing but where anybody can send."""
 
     def give_up(self) -> None:
         """Open the link anew; what was sent and is still in this machine is never delivered."""
@@ -294,8 +293,7 @@ class _UdpLink(Link):
         self._address = address
         self._transport: asyncio.DatagramTransport | None = None
         self._full = False
-        self._peer: _Peer | None = None
-        self._heard_s = 0.0
+        self._peer: Hashable | None = None
 
     async def _open(self) -> None:
         loop = asyncio.get_running_loop()
@@ -314,16 +312,15 @@ class _UdpLink(Link):
         # what all transports of asyncio have in those of streams alone.
         self._transport.set_write_buffer_limits(high=0)  # type: ignore[attr-defined]
 
+    def answer(self, source: Hashable | None) -> None:
+        """Send there from now on; nowhere if None."""
+        self._peer = source
+
     def on_datagram(self, data: bytes, sender: _Peer) -> None:
         if isinstance(self._address, UdpInAddress):
-            now_s = asyncio.get_running_loop().time()
-            if self._peer is None or now_s - self._heard_s > _PEER_SILENCE_S:
-                self._peer = sender
-            if sender != self._peer:
-                self.counts.foreign_datagrams += 1
-                return
-            self._heard_s = now_s
-        self._listener.received(data)
+            self._listener.received(data, sender)
+        else:
+            self._listener.received(data)
 
     def on_refused(self, error: Exception) -> None:
         """The network did not take an earlier datagram; the peer may start later."""
@@ -345,7 +342,7 @@ class _UdpLink(Link):
         if isinstance(self._address, UdpInAddress):
             if self._peer is None:
                 return False
-            transport.sendto(data, self._peer)
+            transport.sendto(data, cast("_Peer", self._peer))
         else:
             transport.sendto(data)
         return True

@@ -37,6 +37,7 @@ class Seat:
             source_system_id=config.ground_system_id,
             source_component_id=config.ground_component_id,
             signing=signing,
+            peer_silence_s=config.peer_silence_s,
         )
         self.commands = Commands(config.commands)
         self.vehicle = VehicleState()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 
 from agent.mavlink.bridge import Bridge
 from agent.mavlink.config import BridgeConfig
@@ -86,8 +86,14 @@ class MavlinkVehicle:
     @property
     def dropped(self) -> Mapping[str, int]:
         """Frames dropped so far, by reason."""
-        dropped = Counter(self.bridge.codec.distrusted)
+        dropped = self._disbelieved()
         dropped["not forwarded"] = self._forwarding.dropped
+        return +dropped
+
+    def _disbelieved(self) -> Counter[str]:
+        """What was not listened to, by reason."""
+        dropped = Counter(self.bridge.codec.distrusted)
+        dropped["from strangers"] = self.bridge.codec.strangers
         return +dropped
 
     def order(self, order: Orders) -> None:
@@ -112,16 +118,16 @@ class MavlinkVehicle:
         """Called by the link."""
         self._happen(LinkDown())
 
-    def received(self, data: bytes) -> None:
+    def received(self, data: bytes, source: Hashable | None = None) -> None:
         """Called by the link."""
         self._meter.received(self._clock.now_s())
-        self._happen(Received(data))
+        self._happen(Received(data, source))
         self._forwarding.show(self.bridge.codec.take_frames())
-        self._tell_of_signatures()
+        self._tell_of_dropped()
 
-    def _tell_of_signatures(self) -> None:
+    def _tell_of_dropped(self) -> None:
         """Tell people of every reason once: a hostile peer must not fill the log."""
-        for reason, count in self.bridge.codec.distrusted.items():
+        for reason, count in self._disbelieved().items():
             if reason not in self._told_dropped:
                 self._told_dropped.add(reason)
                 self._log.warning("frames are dropped", reason=reason, count=count)
@@ -153,7 +159,9 @@ class MavlinkVehicle:
             return
         if isinstance(event, Orders):
             self._meter.ordered(event)
-        for action in self.bridge.step(event, self._clock.now_s()):
+        actions = self.bridge.step(event, self._clock.now_s())
+        self.link.answer(self.bridge.codec.peer)
+        for action in actions:
             if isinstance(action, Send):
                 self.link.send(action.data)
                 self._meter.sent(action.data, self._clock.now_s())

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+from collections.abc import Hashable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,9 +82,10 @@ async def check_vehicle(vehicle: Vehicle, key: SigningKey | None, wait_s: float)
         def link_down(self) -> None:
             """It opens again by itself."""
 
-        def received(self, data: bytes) -> None:
+        def received(self, data: bytes, source: Hashable | None = None) -> None:
             """Bytes came."""
-            listening.receive(data, clock.now_s(), unix_s())
+            listening.receive(data, clock.now_s(), unix_s(), source)
+            link.answer(listening.peer)
 
     link = open_link(vehicle.address, Ears())
     link.start()

@@ -6,6 +6,7 @@ read as the bridge reads it. Leaves out: sockets (sim.doctor.link).
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,17 +107,25 @@ class Listening:
         asked += [ParameterRead(name) for name in unread]
         return [self._codec.encode(each) for each in asked]
 
-    def receive(self, data: bytes, now_s: float, unix_s: float) -> None:
+    @property
+    def peer(self) -> Hashable | None:
+        """Whom to ask on a link to which anybody can send."""
+        return self._codec.peer
+
+    def receive(
+        self, data: bytes, now_s: float, unix_s: float, source: Hashable | None = None
+    ) -> None:
         """Take in what came.
 
         Args:
             data: from the link.
             now_s: time of any clock [s].
             unix_s: wall time here.
+            source: who sent it, on a link to which anybody can send.
         """
         self._bytes += len(data)
         self._now_s = now_s
-        for heard in self._codec.decode(data):
+        for heard in self._codec.decode(data, source, now_s):
             if heard.system_id != self._system_id:
                 if isinstance(heard.message, Heartbeat):
                     self._others[heard.system_id] = self._others.get(heard.system_id, 0) + 1

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import functools
 import os
 import pty
 import socket
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine, Hashable
 from contextlib import asynccontextmanager
 from typing import ParamSpec
 
@@ -31,7 +32,7 @@ from agent.vehicle import (
 from swarm.clock import ScaledClock
 from swarm.errors import InputError
 from tests.bridge_flight import ORIGIN, START
-from tests.fake_copter import FakeCopter
+from tests.fake_copter import INTERVAL, FakeCopter
 
 pytestmark = pytest.mark.sitl
 
@@ -46,6 +47,7 @@ class Listener:
         self.ups = 0
         self.downs = 0
         self.data = b""
+        self.sources: list[Hashable] = []
 
     def link_up(self) -> None:
         self.ups += 1
@@ -53,8 +55,10 @@ class Listener:
     def link_down(self) -> None:
         self.downs += 1
 
-    def received(self, data: bytes) -> None:
+    def received(self, data: bytes, source: Hashable | None = None) -> None:
         self.data += data
+        if source is not None:
+            self.sources.append(source)
 
 
 def in_loop(test: Callable[P, Coroutine[None, None, None]]) -> Callable[P, None]:
@@ -203,12 +207,13 @@ async def test_udp_links_speak_to_each_other() -> None:
             await until(lambda: there.ups == 1)
             calling.send(b"ping")
             await until(lambda: here.data == b"ping")
+            waiting.answer(here.sources[0])
             waiting.send(b"pong")
             await until(lambda: there.data == b"pong")
 
 
 @in_loop
-async def test_listening_link_keeps_to_its_first_peer() -> None:
+async def test_listening_link_answers_whom_it_is_told_to() -> None:
     port = free_port(socket.SOCK_DGRAM)
     listener = Listener()
     async with opened(f"udpin:127.0.0.1:{port}", listener) as waiting:
@@ -220,12 +225,54 @@ async def test_listening_link_keeps_to_its_first_peer() -> None:
                 peer.connect(("127.0.0.1", port))
             first.send(b"mine")
             await until(lambda: listener.data == b"mine")
+            waiting.send(b"nobody has been named yet")
+            waiting.answer(first.getsockname())
             second.send(b"stranger")
-            await until(lambda: waiting.counts.foreign_datagrams == 1)
+            await until(lambda: listener.data == b"minestranger")
             waiting.send(b"answer")
             loop = asyncio.get_running_loop()
             assert await asyncio.wait_for(loop.sock_recv(first, 100), PATIENCE_S) == b"answer"
-            assert listener.data == b"mine"
+            assert listener.sources == [first.getsockname(), second.getsockname()]
+            assert waiting.counts.unsent_bytes == 25
+
+
+@in_loop
+async def test_a_stranger_at_the_port_keeps_no_vehicle_from_its_agent() -> None:
+    port, reports = free_port(socket.SOCK_DGRAM), list[Report]()
+    config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0)
+    vehicle = MavlinkVehicle(config, f"udpin:127.0.0.1:{port}", ScaledClock(1.0), reports.append)
+    await vehicle.start()
+    copter = FakeCopter(ORIGIN)
+    loop = asyncio.get_running_loop()
+    stranger, own = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+    with stranger, own:
+        for each in (stranger, own):
+            each.setblocking(False)
+            each.connect(("127.0.0.1", port))
+        await until(lambda: vehicle.bridge.contact.link_up)
+        stranger.send(b"the first")
+
+        async def fly() -> None:
+            while True:
+                stranger.send(b"x")
+                for data in copter.advance(loop.time()):
+                    own.send(data)
+                with contextlib.suppress(BlockingIOError):
+                    for data in copter.receive(own.recv(4096), loop.time()):
+                        own.send(data)
+                await asyncio.sleep(0.01)
+
+        flight = loop.create_task(fly())
+        try:
+            vehicle.order(START)
+            await until(lambda: bool(copter.commands(INTERVAL)))
+            await until(lambda: any(isinstance(each, Telemetry) for each in reports))
+        finally:
+            flight.cancel()
+            await vehicle.close()
+        with pytest.raises(BlockingIOError):
+            stranger.recv(4096)
+        assert vehicle.dropped["from strangers"] > 0
 
 
 @in_loop
