@@ -93,7 +93,8 @@ def doctor(
             min=0.1,
             max=600.0,
             metavar="S",
-            help="How long to wait for each autopilot's heartbeat.",
+            help="How long to wait for each autopilot's heartbeat, and once it is heard for it to "
+            "have booted and be ready.",
         ),
     ] = 5.0,
     json: JsonOption = False,

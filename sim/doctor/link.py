@@ -31,7 +31,7 @@ from swarm.errors import Fault, InputError
 __all__ = ["Vehicle", "check_vehicle", "parse_vehicle"]
 
 LISTEN_S = 2.0
-"""How long a vehicle that was heard is listened to [wall s]."""
+"""How long a vehicle that was heard is listened to at least [wall s]."""
 _CONDITION_S = 0.05
 
 
@@ -64,7 +64,8 @@ async def check_vehicle(vehicle: Vehicle, key: SigningKey | None, wait_s: float)
     Args:
         vehicle: which.
         key: that its frames are signed with; None if they are not.
-        wait_s: how long to wait for its heartbeat [wall s].
+        wait_s: how long to wait for its heartbeat, and again for it to be ready: who asks has
+            often just switched it on [wall s].
     """
     name = str(vehicle.address)
     obstacle = await _obstacle(vehicle.address)
@@ -90,15 +91,18 @@ async def check_vehicle(vehicle: Vehicle, key: SigningKey | None, wait_s: float)
     link = open_link(vehicle.address, Ears())
     link.start()
     try:
-        give_up_at_s = clock.now_s() + wait_s
-        ask_at_s, until_s = clock.now_s(), give_up_at_s
-        while clock.now_s() < until_s:
-            if clock.now_s() >= ask_at_s:
-                ask_at_s = clock.now_s() + ASK_AGAIN_S
+        ask_at_s = clock.now_s()
+        heard_at_s: float | None = None
+        give_up_at_s = ask_at_s + wait_s
+        while (now_s := clock.now_s()) < give_up_at_s:
+            if now_s >= ask_at_s:
+                ask_at_s = now_s + ASK_AGAIN_S
                 for frame in listening.requests():
                     link.send(frame)
-            if listening.heard and until_s == give_up_at_s:
-                until_s = clock.now_s() + LISTEN_S
+            if heard_at_s is None and listening.heard:
+                heard_at_s, give_up_at_s = now_s, now_s + max(wait_s, LISTEN_S)
+            elif heard_at_s is not None and now_s >= heard_at_s + LISTEN_S and listening.settled:
+                break
             await asyncio.sleep(_CONDITION_S)
     finally:
         await link.close()

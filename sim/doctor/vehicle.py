@@ -47,6 +47,7 @@ _ASKED_FOR = (
 )
 """What a vehicle may not say unasked."""
 _SKEW_S = 1.0
+_BOOTING = "still booting or calibrating"
 _LOSSY, _DEAF = 0.02, 0.2
 """Shares of frames lost from which on a link is doubtful, and of no use."""
 
@@ -96,6 +97,15 @@ class Listening:
     def heard(self) -> bool:
         """Whether the vehicle's own heartbeat has come."""
         return self._state.heartbeat is not None
+
+    @property
+    def settled(self) -> bool:
+        """Whether it is ready, or waiting changes nothing: it flies, or never will for us."""
+        heartbeat = self._state.heartbeat
+        if heartbeat is None:
+            return False
+        flavour = flavour_of(heartbeat)
+        return flavour is None or heartbeat.armed or self._unready(flavour) is None
 
     def requests(self) -> list[bytes]:
         """Frames that ask the vehicle for messages, and for parameters, once each."""
@@ -225,10 +235,9 @@ class Listening:
         what = f"{name} ready"
         charge = state.battery_frac
         battery = "" if charge is None else f", battery {charge:.0%}"
-        heartbeat = state.heartbeat
-        if heartbeat is not None and not flavour.has_booted(heartbeat):
-            return warns(what, "still booting or calibrating", "wait, and keep it still")
-        problem = flavour.unready(state) or flavour.position_fault(state)
+        problem = self._unready(flavour)
+        if problem == _BOOTING:
+            return warns(what, problem, "wait, and keep it still")
         if problem is not None:
             said = f"; it says: {state.warning}" if state.warning else ""
             return warns(what, f"not yet: {problem}{said}{battery}", _advice(problem))
@@ -236,6 +245,13 @@ class Listening:
             return warns(what, f"battery {charge:.0%}", "charge it: below 20 % nothing is armed")
         place = "" if state.position is None else ", position known"
         return fine(what, f"pre-arm checks pass{place}{battery}")
+
+    def _unready(self, flavour: Flavour) -> str | None:
+        """What keeps it from being armed; None if nothing does."""
+        heartbeat = self._state.heartbeat
+        if heartbeat is not None and not flavour.has_booted(heartbeat):
+            return _BOOTING
+        return flavour.unready(self._state) or flavour.position_fault(self._state)
 
     def _time(self, name: str) -> Finding:
         what = f"{name} time"

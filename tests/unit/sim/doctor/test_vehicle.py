@@ -153,6 +153,23 @@ def test_what_keeps_it_from_flying_is_told_in_the_bridges_words() -> None:
     assert all(told[f"{NAME} ready"].state is State.WARNING for told in (refused, lost, booting))
 
 
+def test_who_gets_ready_is_worth_waiting_for_and_who_is_or_never_will_be_is_not() -> None:
+    nobody, listening = Listening(1), Listening(1)
+    steps = [heartbeat(state=1)], [heartbeat(), sys_status(), position()], [ekf()]
+    settled = []
+    for messages in steps:
+        listening.receive(bytes(Speaker().say(*messages).said), 1.0, UNIX_S)
+        settled.append(listening.settled)
+    plane, flown = Listening(1), Listening(1)
+    plane.receive(bytes(Speaker().say(heartbeat(autopilot=4)).said), 1.0, UNIX_S)
+    flown.receive(bytes(Speaker().say(heartbeat(armed=True)).said), 1.0, UNIX_S)
+
+    assert settled == [False, False, True]
+    assert not nobody.settled
+    assert plane.settled
+    assert flown.settled
+
+
 def test_an_armed_vehicle_is_to_be_left_alone() -> None:
     told = found(Speaker().say(heartbeat(armed=True)))[NAME]
 
