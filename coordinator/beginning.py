@@ -1,14 +1,20 @@
 """How a mission begins: planned while the vehicles get ready, started when they are.
 
-Leaves out: saying so (coordinator.core).
+Waiting costs nothing on the ground, and energy in the air. As soon as somebody is airborne,
+whoever was lost is waited for only as long as a restart of its agent takes, and whoever else
+is not ready (preparing, or never seen) only as long as the first in the air may hover. Who
+gets ready later joins the mission that runs. Leaves out: saying so (coordinator.core).
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from enum import Enum
 
 from coordinator.events import Action, MakePlan
+from swarm.config import Timing
+from swarm.deadline import earliest
 from swarm.events import Note
 from swarm.model import Mission, Plan, UavId
 from swarm.state.board import mission_of
@@ -17,6 +23,8 @@ from swarm.state.registers import Replica
 from swarm.wire.messages import ClaimPhase, Epoch, EpochPhase
 
 __all__ = ["Beginning", "Verdict"]
+
+EVERYBODY = "every UAV is airborne"
 
 
 class Verdict(Enum):
@@ -36,7 +44,9 @@ class Beginning:
         seed: of the planner.
         replica: brief, board and claims.
         membership: who is there.
-        start_timeout_s: UAVs that are not airborne by then are given up [s].
+        start_timeout_s: UAVs that are not airborne by then are given up, whatever the others
+            do [s].
+        timing: how long to wait for whom while others hover.
     """
 
     def __init__(
@@ -47,7 +57,10 @@ class Beginning:
         replica: Replica,
         membership: Membership,
         start_timeout_s: float,
+        timing: Timing,
     ) -> None:
+        self.reason = EVERYBODY
+        """Why the mission starts, in words."""
         self.plan: Plan | None = None
         """The plan that the mission starts with; None while there is none for those who fly."""
         self._mission = mission
@@ -56,7 +69,14 @@ class Beginning:
         self._replica = replica
         self._membership = membership
         self._start_timeout_s = start_timeout_s
+        self._timing = timing
         self._start_by_s: float | None = None
+        self._wake_at_s: float | None = None
+        self._hovers_since_s: dict[UavId, float] = {}
+        """UAVs that are ready, and since when."""
+        self._lost_since_s: dict[UavId, float] = {}
+        """UAVs that have been there and are not, and since when."""
+        self._seen: set[UavId] = set()
         self._planned_for: tuple[UavId, ...] = ()
         self._planned_tasks: set[str] = set()
         self._request = 0
@@ -64,11 +84,12 @@ class Beginning:
     def begin(self, now_s: float) -> list[Action]:
         """The fleet is briefed: wait for it, and plan for all of it."""
         self._start_by_s = now_s + self._start_timeout_s
+        self.reason = EVERYBODY
         return self._make_plan(self._fleet)
 
     def leave(self) -> None:
         """There is nothing to begin any more; a plan under way is for nothing."""
-        self._start_by_s = None
+        self._start_by_s = self._wake_at_s = None
         self._request += 1
 
     def expects(self, request: int) -> bool:
@@ -83,6 +104,7 @@ class Beginning:
 
     def advance(self, now_s: float) -> tuple[Verdict, list[Action]]:
         """Whether to start by now, and what is to do before."""
+        self._wake_at_s = None
         if self.is_forestalled:
             self._start_by_s = None
             return Verdict.WAIT, []
@@ -91,17 +113,23 @@ class Beginning:
         uavs = self._fleet
         phases = {uav: self._phase_of(uav) for uav in uavs}
         ready = tuple(uav for uav in uavs if phases[uav] is ClaimPhase.IDLE)
-        out = [uav for uav in uavs if phases[uav] is ClaimPhase.OUT]
         paused = [uav for uav in uavs if phases[uav] is ClaimPhase.PAUSED]
-        settled = len(ready) + len(out) + len(paused)
-        if settled < len(uavs) and self._start_by_s is not None:
-            return Verdict.WAIT, []
+        settled = (ClaimPhase.IDLE, ClaimPhase.OUT, ClaimPhase.PAUSED)
+        missing = [uav for uav in uavs if phases[uav] not in settled]
+        self._look(uavs, ready, now_s)
+        if missing and self._start_by_s is not None:
+            until_s = self._waits_until_s(missing, now_s) if ready else self._start_by_s
+            if now_s < until_s:
+                self._wake_at_s = until_s
+                return Verdict.WAIT, []
         if not ready:  # whom the operator has stopped may yet be told to go on
             return Verdict.WAIT if paused else Verdict.NOBODY, []
         if self._planned_for != ready:
             # Somebody is missing: the sequence must be one of those who fly.
-            missing = sorted(set(uavs) - set(ready))
-            note = Note("starting without", {"uavs": ", ".join(missing)})
+            without = [uav for uav in sorted(uavs) if uav not in ready]
+            why = "; ".join(f"{uav}: {self._why_not(uav, phases[uav])}" for uav in without)
+            self.reason = f"without {why}" if without else EVERYBODY
+            note = Note("starting without", {"uavs": ", ".join(without), "because": why})
             return Verdict.WAIT, [note, *self._make_plan(ready)]
         if self._planned_tasks != self._open_tasks:
             note = Note("plans anew", {"because": "the operator has added or withdrawn tasks"})
@@ -110,6 +138,36 @@ class Beginning:
             return Verdict.WAIT, []
         self._start_by_s = None
         return Verdict.START, []
+
+    def _look(self, uavs: Iterable[UavId], ready: Collection[UavId], now_s: float) -> None:
+        """Take note of who hovers, and who is lost."""
+        hovers, lost, claims = self._hovers_since_s, self._lost_since_s, self._replica.claims
+        present = self._membership.present
+        self._seen.update(uav for uav in uavs if uav in present or uav in claims)
+        self._hovers_since_s = {uav: hovers.get(uav, now_s) for uav in ready}
+        gone = self._seen - present
+        self._lost_since_s = {uav: lost.get(uav, now_s) for uav in gone}
+
+    def _waits_until_s(self, missing: Iterable[UavId], now_s: float) -> float:
+        """Until when those in the air wait for ``missing``; not after now if no longer."""
+        timing, lost_s = self._timing, self._lost_since_s
+        hovered_s = min(self._hovers_since_s.values()) + timing.hover_s
+        latest_s = earliest(hovered_s, self._start_by_s) or now_s
+        ends_s = (lost_s[uav] + timing.restart_s if uav in lost_s else latest_s for uav in missing)
+        return min(latest_s, max(ends_s, default=now_s))
+
+    def _why_not(self, uav: UavId, phase: ClaimPhase | None) -> str:
+        """Why the mission starts without ``uav``, in words."""
+        if phase is ClaimPhase.OUT:
+            return "takes no part"
+        if phase is ClaimPhase.PAUSED:
+            return "held by the operator"
+        if uav in self._lost_since_s:
+            return "its agent is lost"
+        what = "not airborne" if uav in self._seen else "its agent was never seen"
+        if self._start_by_s is None:
+            return f"{what} within {self._start_timeout_s:g} s"
+        return f"{what}, and others have waited {self._timing.hover_s:g} s in the air"
 
     def epoch(self, phase: EpochPhase, reason: str) -> Epoch:
         """The first epoch, by the plan."""
@@ -124,8 +182,8 @@ class Beginning:
         return {} if self.plan is None else {str(t): s for t, s in self.plan.completion_s.items()}
 
     def next_deadline_s(self) -> float | None:
-        """When `advance` gives up on who is not airborne."""
-        return self._start_by_s
+        """When `advance` waits no longer for somebody who is not airborne."""
+        return self._wake_at_s
 
     @property
     def _fleet(self) -> tuple[UavId, ...]:
@@ -137,9 +195,12 @@ class Beginning:
         return {task for task, entry in self._replica.board.items() if not entry.withdrawn}
 
     def _phase_of(self, uav: str) -> ClaimPhase | None:
-        """Phase of its claim; None while it is absent or has none."""
+        """Phase of its claim; None while it has none, or is absent without having left."""
         claim = self._replica.claims.get(uav)
-        return None if claim is None or uav not in self._membership.present else claim.phase
+        if claim is None:
+            return None
+        left = claim.phase is ClaimPhase.OUT
+        return claim.phase if left or uav in self._membership.present else None
 
     def _make_plan(self, uavs: tuple[UavId, ...]) -> list[Action]:
         self._request += 1

@@ -9,6 +9,7 @@ import contextlib
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated
@@ -18,6 +19,7 @@ import typer
 from coordinator.planner.methods import METHODS, ONLINE_METHODS
 from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
 from swarm.complete import among
+from swarm.config import Timing
 from swarm.errors import Fault, InputError
 from swarm.log import LogFormat, LogLevel
 from swarm.options import (
@@ -225,6 +227,16 @@ def coordinator(
             "seconds where the mission runs faster.",
         ),
     ] = 120.0,
+    hover_s: Annotated[
+        float,
+        typer.Option(
+            "--hover-s",
+            min=1.0,
+            metavar="S",
+            help="How long vehicles in the air wait before the start for one that does not get "
+            "ready; mission seconds, or wall seconds where the mission runs faster.",
+        ),
+    ] = Timing().hover_s,
     lowest_layer_m: Annotated[
         float,
         typer.Option(
@@ -309,6 +321,7 @@ def coordinator(
     mission = load_scenario(scenario)
     config = seat.config(mission=mission.name, roles=(Role.COORDINATOR,))
     timing = network.timing.scaled(speedup)
+    timing = replace(timing, hover_s=hover_s * max(1.0, speedup))
 
     def planner(what: Mission, how: str, planner_seed: int) -> Plan:
         made = make_plan(what, how, clock=SystemClock(), seed=planner_seed)

@@ -106,7 +106,7 @@ class CoordinatorCore:
         voice = Voice(mission.name, COORDINATOR, incarnation)
         self._speech = Speech(voice, self.replica, timing)
         self._beginning = Beginning(
-            mission, method, seed, self.replica, self._membership, start_timeout_s
+            mission, method, seed, self.replica, self._membership, start_timeout_s, timing
         )
         self._ending = Ending(self._board, self._membership, timing)
         self._replanning = Replanning(method, seed, timing.replan_interval_s)
@@ -429,8 +429,7 @@ class CoordinatorCore:
         self._actions += actions
         if verdict is Verdict.START:
             self._zero_s = now_s
-            why = "every UAV is airborne or given up"
-            self._say(self._beginning.epoch(EpochPhase.RUNNING, why))
+            self._say(self._beginning.epoch(EpochPhase.RUNNING, self._beginning.reason))
             self._replanning.begin(self._situation(now_s), self._beginning.completion_s, now_s)
         elif verdict is Verdict.NOBODY:
             self._end("no UAV is airborne", now_s)

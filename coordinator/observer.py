@@ -494,7 +494,10 @@ class Observer:
         if epoch.phase is EpochPhase.RUNNING and course not in self._epochs:
             self._epochs.add(course)
             order = " > ".join(epoch.sequence)
-            why = f" ({epoch.reason})" if epoch.number > 1 and epoch.reason else ""
+            brief = self.replica.brief
+            fleet = set() if brief is None else {uav.id for uav in brief.uavs}
+            notable = epoch.number > 1 or not fleet.issubset(epoch.sequence)
+            why = f" ({epoch.reason})" if notable and epoch.reason else ""
             # With the first one mission time began.
             at_s = 0.0 if self._joining and epoch.number == 1 else None
             self._tell(f"epoch {epoch.number}: {epoch.rule}, {order}{why}", now_s, at_s)

@@ -57,6 +57,12 @@ class Timing:
     the UAVs that could go on: how long a coordinator waits for them to come back."""
     ask_gap_s: float = 0.2
     """Shortest interval between two questions to everyone."""
+    restart_s: float = 10.0
+    """Before the start: an agent that was lost gets this long to be started anew, while other
+    vehicles wait in the air."""
+    hover_s: float = 60.0
+    """Before the start: how long a vehicle waits in the air for others that do not get ready;
+    5 % of a battery that lasts 20 minutes."""
     takeover_s: float = 1.0
     """How long a coordinator that stands by waits before it takes a lost one's place."""
     replan_interval_s: float = 5.0

@@ -108,7 +108,8 @@ def test_after_the_timeout_it_replans_for_those_who_are_airborne_and_starts() ->
     actions = coordinator.run_until(100.0 + START_TIMEOUT_S)
     (wanted,) = plans_wanted(actions)
     assert [u.id for u in wanted.mission.uavs] == ["u0", "u2"]
-    assert [n.fields for n in notes(actions)] == [{"uavs": "u1"}]
+    why = f"u1: its agent was never seen within {START_TIMEOUT_S:g} s"
+    assert [n.fields for n in notes(actions)] == [{"uavs": "u1", "because": why}]
     assert coordinator.epoch is None
 
     coordinator.answer_plan("u2", "u0")

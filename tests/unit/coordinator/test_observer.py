@@ -411,6 +411,15 @@ def test_a_new_plan_is_told_with_its_reason() -> None:
     assert onlooker.story[-1] == "epoch 2: greedy, u1 > u0 (u2 lost: worth 9 instead of 8)"
 
 
+def test_a_start_without_somebody_is_told_with_its_reason() -> None:
+    onlooker = Onlooker()
+    for body in onlooker.posted():
+        onlooker.hear(COORDINATOR, body)
+    onlooker.hear(COORDINATOR, epoch("u0", reason="without u1: its agent is lost"), 0.0)
+
+    assert onlooker.story == ["epoch 1: greedy, u0 (without u1: its agent is lost)"]
+
+
 def test_late_words_of_the_old_coordinator_are_no_news() -> None:
     onlooker = Onlooker().running()
     onlooker.happen(Heard(message(COORDINATOR, epoch("u0", "u1"), 1, incarnation=5)))
