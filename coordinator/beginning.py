@@ -1,9 +1,10 @@
 """How a mission begins: planned while the vehicles get ready, started when they are.
 
 Waiting costs nothing on the ground, and energy in the air. As soon as somebody is airborne,
-whoever was lost is waited for only as long as a restart of its agent takes, and whoever else
-is not ready (preparing, or never seen) only as long as the first in the air may hover. Who
-gets ready later joins the mission that runs. Leaves out: saying so (coordinator.core).
+whoever was lost is waited for only as long as a restart of its agent takes, whoever else is
+not ready (preparing, or never seen) only as long as the first in the air may hover, and whom
+the operator does not want waited for not at all. Who gets ready later joins the mission that
+runs. Leaves out: saying so (coordinator.core).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from swarm.deadline import earliest
 from swarm.events import Note
 from swarm.model import Mission, Plan, UavId
 from swarm.state.board import mission_of
+from swarm.state.commands import dispensable
 from swarm.state.membership import Membership
 from swarm.state.registers import Replica
 from swarm.wire.messages import ClaimPhase, Epoch, EpochPhase
@@ -118,7 +120,9 @@ class Beginning:
         missing = [uav for uav in uavs if phases[uav] not in settled]
         self._look(uavs, ready, now_s)
         if missing and self._start_by_s is not None:
-            until_s = self._waits_until_s(missing, now_s) if ready else self._start_by_s
+            given_up = dispensable(self._replica)
+            needed = [uav for uav in missing if uav not in given_up]
+            until_s = self._waits_until_s(needed, now_s) if ready else self._start_by_s
             if now_s < until_s:
                 self._wake_at_s = until_s
                 return Verdict.WAIT, []
@@ -162,6 +166,8 @@ class Beginning:
             return "takes no part"
         if phase is ClaimPhase.PAUSED:
             return "held by the operator"
+        if (start := dispensable(self._replica).get(uav)) is not None:
+            return "the operator does not wait for it" + (f" ({start.reason})" * bool(start.reason))
         if uav in self._lost_since_s:
             return "its agent is lost"
         what = "not airborne" if uav in self._seen else "its agent was never seen"

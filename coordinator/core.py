@@ -58,6 +58,7 @@ from swarm.wire.messages import (
     EpochPhase,
     Message,
     Snapshot,
+    StartWithout,
     TaskOrder,
 )
 
@@ -204,6 +205,10 @@ class CoordinatorCore:
                         self._inquiry.want(now_s)
                 elif news and isinstance(message.body, TaskOrder):
                     self._note_order(message.body)
+                elif news and isinstance(message.body, StartWithout):
+                    told: dict[str, object] = {"uav": message.body.uav}
+                    told["reason"] = message.body.reason
+                    self._actions.append(Note("the operator starts without it", told))
                 if self._standing is Standing.BRIEFED and self._beginning.is_forestalled:
                     self._inquiry.want(now_s, before_deciding=True)
             case Learned(snapshots):
@@ -508,7 +513,7 @@ class CoordinatorCore:
         if not self._finished and self._inquiry.due(now_s):
             self._actions.append(Ask())
         epoch = self.replica.epoch
-        commands = tuple(self.replica.commands.values())
+        commands = *self.replica.commands.values(), *self.replica.starts.values()
         state = self.replica.task_version, epoch and (epoch.number, epoch.phase), commands
         if self._in_charge and state != self._saved:
             self._saved = state

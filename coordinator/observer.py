@@ -33,7 +33,7 @@ from swarm.model.ids import COORDINATOR
 from swarm.pulse import Pulse
 from swarm.state.board import TaskBoard, TaskState
 from swarm.state.claims import holders
-from swarm.state.commands import in_force
+from swarm.state.commands import dispensable, in_force
 from swarm.state.membership import Membership
 from swarm.state.mission_clock import MissionClock
 from swarm.state.registers import Replica
@@ -52,6 +52,7 @@ from swarm.wire.messages import (
     Outcome,
     Result,
     Stamp,
+    StartWithout,
     Status,
     StatusPhase,
     TaskOrder,
@@ -395,6 +396,9 @@ class Observer:
                 self._hear_command(command, now_s)
             case TaskOrder() as order:
                 self._hear_task_order(order, now_s)
+            case StartWithout(uav=uav, reason=reason) if uav in dispensable(self.replica):
+                why = f": {reason}" if reason else ""
+                self._tell(f"operator does not wait for {uav} to start{why}", now_s)
             case Brief() if self.replica.task_orders:
                 self._complete_mission()
             case _:

@@ -20,7 +20,16 @@ __all__ = ["PANELS", "Panels", "explain_family", "help_text"]
 PANELS: Mapping[str, tuple[str, ...]] = {
     "Plan": ("new", "import", "plan"),
     "Fly": ("run", "simulate", "coordinator", "agent", "autopilot", "router"),
-    "Watch and command": ("status", "dashboard", "task", "hold", "resume", "return", "abort"),
+    "Watch and command": (
+        "status",
+        "dashboard",
+        "start",
+        "task",
+        "hold",
+        "resume",
+        "return",
+        "abort",
+    ),
     "Record and replay": ("record", "replay", "explain"),
     "Study and test": ("reproduce", "study", "bench", "soak"),
     "Fit for the field": ("keys", "install"),

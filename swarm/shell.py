@@ -376,7 +376,8 @@ def take_seat(
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
     Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
-    ``operator/*`` and ``operator/task/*``, where there are keys ``roster``, watches ``alive/*``.
+    ``operator/*``, ``operator/task/*`` and ``operator/start/*``, where there are keys ``roster``,
+    watches ``alive/*``.
 
     Args:
         bus: an open bus.
@@ -395,6 +396,7 @@ def take_seat(
         keys.outcome("*", "*"),
         keys.operator("*"),
         keys.operator_task("*"),
+        keys.operator_start("*"),
     ):
         bus.subscribe(key_expr)
     if status:

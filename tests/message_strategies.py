@@ -22,6 +22,7 @@ from swarm.wire.messages import (
     Outcome,
     Result,
     Stamp,
+    StartWithout,
     Status,
     StatusPhase,
     TaskOrder,
@@ -154,8 +155,10 @@ task_orders = st.builds(
     counts,
     notes,
 )
+starts = st.builds(StartWithout, uav_ids, counts, notes)
 by_coordinator = briefs | epochs | boards
 by_uav = claims | outcomes | statuses | choices
+by_operator = commands | task_orders | starts
 
 
 def messages(
@@ -171,5 +174,5 @@ def messages(
     return st.one_of(
         st.builds(Message, st.just(MISSION), st.just(COORDINATOR), stamped, by_coordinator),
         st.builds(Message, st.just(MISSION), uav_ids, stamped, said),
-        st.builds(Message, st.just(MISSION), st.just(OPERATOR), stamped, commands | task_orders),
+        st.builds(Message, st.just(MISSION), st.just(OPERATOR), stamped, by_operator),
     )

@@ -6,12 +6,14 @@ Leaves out: how it arrives (coordinator.dashboard.app).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Annotated, ClassVar, Final
 
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import Strict, ValidationError
 
 from coordinator.operator.commanding import CommandWish
+from coordinator.operator.starting import StartWish
 from coordinator.operator.task_orders import NewTask, Withdrawal
 from swarm.model.ids import FLEET
 from swarm.wire.bounds import Duration, Flag, Id, Point, Value
@@ -29,26 +31,38 @@ _CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
 """A page is served by the process it speaks to, so it has no fields of a newer release."""
 
 
+class CommandName(StrEnum):
+    """What may be commanded: the kinds of commands, and to start without a UAV."""
+
+    HOLD = "hold"
+    RESUME = "resume"
+    RETURN = "return"
+    START = "start"
+    ABORT = "abort"
+
+
 @dataclass(frozen=True, slots=True)
 class CommandSaid:
     """Body of ``/api/command``."""
 
     __pydantic_config__: ClassVar = _CHECKED
 
-    command: CommandKind
+    command: CommandName
     uav: Id | None = None
     """None for abort alone."""
     reason: Reason = ""
 
     def __post_init__(self) -> None:
-        if (self.command is CommandKind.ABORT) != (self.uav is None):
-            one = self.command is not CommandKind.ABORT
+        if (self.command is CommandName.ABORT) != (self.uav is None):
+            one = self.command is not CommandName.ABORT
             raise ValueError(f"{self.command} concerns {'one UAV: name it' if one else 'all UAVs'}")
 
     @property
-    def wish(self) -> CommandWish:
+    def wish(self) -> CommandWish | StartWish:
         """What the operator wants."""
-        return CommandWish(self.command, self.uav or FLEET, self.reason)
+        if self.command is CommandName.START:
+            return StartWish(self.uav or "", self.reason)
+        return CommandWish(CommandKind(self.command.value), self.uav or FLEET, self.reason)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The commands `swarm hold`, `resume`, `return` and `abort`, and `swarm task add|withdraw`.
+"""The commands `swarm start`, `hold`, `resume`, `return`, `abort` and `task add|withdraw`.
 
 Leaves out: saying so on the bus and seeing what comes of it (coordinator.operator.session).
 """
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from coordinator.operator.verdict import Verdict
     from swarm.wire.bounds import Point
 
-__all__ = ["abort", "hold", "resume", "return_home", "task"]
+__all__ = ["abort", "hold", "resume", "return_home", "start", "task"]
 
 UavArgument = Annotated[
     str, typer.Argument(metavar="UAV", help="Id of the UAV.", autocompletion=complete_uav)
@@ -112,6 +112,52 @@ return_home = _of_one_uav(
         swarm return uav2 --reason "camera failed"
     """,
 )
+
+
+@seated
+def start(
+    without: Annotated[
+        str,
+        typer.Option(
+            "--without",
+            metavar="UAV",
+            help="Id of the UAV that is not to be waited for.",
+            autocompletion=complete_uav,
+        ),
+    ],
+    reason: ReasonOption = "",
+    mission: SomeMissionOption = None,
+    timeout_s: TimeoutOption = 10.0,
+    seat: Seat = DEFAULT_SEAT,
+    speedup: SpeedupOption = 1.0,
+    json: JsonOption = False,
+) -> int:
+    """Let a mission start without a UAV that does not get ready.
+
+    The others begin as soon as all of them are airborne, at once if they are. The UAV itself is
+    told nothing: when it is ready after all, it joins in. Exit status 1: the coordinator was not
+    seen to know of it, or the mission has started already.
+
+    Examples:
+        swarm start --without uav2
+        swarm start --without uav2 --reason "no GPS" --keys keys/operator
+    """
+    from json import dumps
+
+    from coordinator.operator.session import Reach, check_words, fulfil
+    from coordinator.operator.starting import StartWish
+
+    check_words(reason, ("--mission", mission), ("--without", without))
+
+    def tell(name: str, core: OperatorSeat, verdict: Verdict) -> None:
+        if json:
+            told = {"mission": name, "command": "start", "without": without, "reason": reason}
+            print(dumps(told | {"obeyed": core.obeyed, "text": verdict.text}))
+        elif core.obeyed:
+            print(verdict.text)
+
+    reach = Reach(mission, timeout_s, seat, speedup)
+    return fulfil(StartWish(without, reason), reach, source="--without", tell=tell)
 
 
 @seated

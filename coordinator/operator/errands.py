@@ -16,8 +16,8 @@ whenever `next_deadline_s` comes. The process behind it takes its seat without a
 answers to its questions always tell what is known of the operator's own registers, which is
 how an order is confirmed. It should have asked once before it gives anything, lest it speaks
 below what other operators have said. Leaves out: the mission (coordinator.observer), the
-wishes themselves (coordinator.operator.commanding, coordinator.operator.task_orders), and who
-may have them.
+wishes themselves (coordinator.operator.commanding, coordinator.operator.starting,
+coordinator.operator.task_orders), and who may have them.
 """
 
 from __future__ import annotations
@@ -28,17 +28,19 @@ from typing import Protocol
 
 from coordinator.observer import Observer
 from coordinator.operator.commanding import Commanding, CommandWish
+from coordinator.operator.starting import Starting, StartWish
 from coordinator.operator.task_orders import NewTask, Ordering, Withdrawal
 from coordinator.operator.verdict import Result, Verdict
 from swarm.config import Timing
 from swarm.events import Ask, BusFact, Publish, Wish
 from swarm.model.ids import OPERATOR
 from swarm.state.voice import Voice
-from swarm.wire.messages import Brief, Command, Message, TaskOrder
+from swarm.wire.messages import Brief, Command, Message, StartWithout, TaskOrder
 
 __all__ = ["Errand", "Errands", "OperatorWish"]
 
-OperatorWish = CommandWish | NewTask | Withdrawal
+OperatorWish = CommandWish | StartWish | NewTask | Withdrawal
+Said = Command | StartWithout | TaskOrder
 
 
 class Deed(Protocol):
@@ -46,7 +48,7 @@ class Deed(Protocol):
 
     asks: bool
 
-    def body(self, brief: Brief) -> Command | TaskOrder | Verdict:
+    def body(self, brief: Brief) -> Said | Verdict:
         """What to say; or why it cannot be said."""
         ...
 
@@ -71,7 +73,7 @@ class Errand:
         deed: does it.
     """
 
-    def __init__(self, wish: OperatorWish, deed: Commanding | Ordering) -> None:
+    def __init__(self, wish: OperatorWish, deed: Commanding | Starting | Ordering) -> None:
         self.wish = wish
         self.deed = deed
         """Tells more than the verdict: whom a command concerns, who knows of a task order."""
@@ -123,9 +125,11 @@ class Errands:
             now_s: now.
         """
         observer, brief = self._observer, self._observer.replica.brief
-        deed: Commanding | Ordering
+        deed: Commanding | Starting | Ordering
         if isinstance(wish, CommandWish):
             deed = Commanding(wish, observer, self._patience_s)
+        elif isinstance(wish, StartWish):
+            deed = Starting(wish, observer, self._patience_s)
         else:
             deed = Ordering(wish, observer, self._timing, self._patience_s)
         errand = Errand(wish, deed)
@@ -164,7 +168,7 @@ class Errands:
         self.open = [errand for errand in self.open if errand.verdict is None]
         return [*wishes, Ask()] if asks else wishes
 
-    def _say(self, errand: Errand, body: Command | TaskOrder, now_s: float) -> Message:
+    def _say(self, errand: Errand, body: Said, now_s: float) -> Message:
         """State ``body`` above all that is known of any operator."""
         for message in self._observer.replica.messages({OPERATOR}):
             self._voice.outdo(message.stamp)
@@ -176,7 +180,7 @@ class Errands:
     def _said_for_this_run(self, errand: Errand, now_s: float) -> Message | None:
         """What was said; anew, if the brief turns out to be of another run than it was told of."""
         said, brief = errand.said, self._observer.replica.brief
-        if said is None or brief is None or not isinstance(said.body, Command | TaskOrder):
+        if said is None or brief is None or not isinstance(said.body, Said):
             return said
         if said.body.run == brief.run:
             return said

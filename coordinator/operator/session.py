@@ -14,6 +14,7 @@ from coordinator.joining import joined, onlooking
 from coordinator.operator.commanding import CommandWish
 from coordinator.operator.errands import OperatorWish
 from coordinator.operator.seat import OperatorSeat
+from coordinator.operator.starting import StartWish
 from coordinator.operator.verdict import Result, Verdict
 from swarm.bus.seat import Seat
 from swarm.clock import ScaledClock, incarnation
@@ -91,7 +92,7 @@ def fulfil(
         if verdict is None:
             raise SwarmError("nothing was said")
         if verdict.result.is_wrong_input:
-            name = wish.target if isinstance(wish, CommandWish) else wish.task
+            name = wish.target if isinstance(wish, CommandWish | StartWish) else wish.task
             taken = verdict.result is Result.TAKEN_ID
             problem = f"{name!r} is {'taken' if taken else 'not'} in mission {mission}"
             raise InputError(Fault(source, "", problem, verdict.text))

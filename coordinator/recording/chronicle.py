@@ -36,6 +36,7 @@ from swarm.wire.messages import (
     Message,
     Outcome,
     Result,
+    StartWithout,
     Status,
     StatusPhase,
     TaskOrder,
@@ -152,7 +153,9 @@ class Chronicle:
         match body:
             case Board():
                 self._tell_posting(body.task, body, by="the coordinator")
-            case TaskOrder() | Command() if brief is not None and body.run != brief.run:
+            case TaskOrder() | Command() | StartWithout() if (
+                brief is not None and body.run != brief.run
+            ):
                 pass  # of another flight
             case TaskOrder():
                 self._tell_posting(body.task, body, by="the operator")
@@ -165,6 +168,10 @@ class Chronicle:
                 self._tell_epoch(body)
             case Command():
                 self._tell_command(body)
+            case StartWithout():
+                why = f": {body.reason}" if body.reason else ""
+                text = f"The operator let the mission start without {body.uav}{why}."
+                self._tell("command", text, uavs=[body.uav])
             case Brief():
                 pass
 

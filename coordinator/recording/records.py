@@ -37,6 +37,7 @@ from swarm.wire.messages import (
     Outcome,
     Snapshot,
     Stamp,
+    StartWithout,
     TaskOrder,
 )
 
@@ -304,7 +305,7 @@ def _topic(message: Message) -> str:
     """Its bus key, without the task where there is one: a topic for each would be too many."""
     key = f"/{message.key}"
     match message.body:
-        case Board() | Outcome() | TaskOrder() | Command():
+        case Board() | Outcome() | TaskOrder() | Command() | StartWithout():
             return key.rpartition("/")[0]
         case _:
             return key

@@ -10,9 +10,17 @@ from __future__ import annotations
 
 from swarm.model.ids import FLEET
 from swarm.state.registers import Replica
-from swarm.wire.messages import Command, CommandKind, Stamp
+from swarm.wire.messages import Command, CommandKind, Stamp, StartWithout
 
-__all__ = ["BEING_STOPPED", "CANNOT_HOLD", "aborted", "in_force", "newest", "words"]
+__all__ = [
+    "BEING_STOPPED",
+    "CANNOT_HOLD",
+    "aborted",
+    "dispensable",
+    "in_force",
+    "newest",
+    "words",
+]
 
 BEING_STOPPED = "being stopped, "
 """Begins the note of a held UAV whose vehicle has not been seen to stand yet."""
@@ -44,6 +52,14 @@ def newest(replica: Replica, uav: str) -> tuple[Stamp, Command] | None:
 def aborted(replica: Replica) -> Command | None:
     """The command that has ended this flight; None if there is none."""
     return in_force(replica).get(FLEET) if replica.commands else None
+
+
+def dispensable(replica: Replica) -> dict[str, StartWithout]:
+    """UAV -> the operator's word that this flight may start without it."""
+    brief = replica.brief
+    if brief is None:
+        return {}
+    return {uav: start for uav, start in replica.starts.items() if start.run == brief.run}
 
 
 def words(command: Command) -> str:

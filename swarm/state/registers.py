@@ -30,6 +30,7 @@ from swarm.wire.messages import (
     Outcome,
     Snapshot,
     Stamp,
+    StartWithout,
     Status,
     TaskOrder,
     disowned,
@@ -92,6 +93,8 @@ class Replica:
         """By target, those for other flights of the mission among them; see swarm.state.commands.
 
         All have one writer, so their stamps tell which is the newest of several."""
+        self.starts: dict[str, StartWithout] = {}
+        """By UAV id, for whom the operator does not wait; see swarm.state.commands."""
         self.stale = 0
         """Statements that were older than what was known."""
         self.overfull = 0
@@ -145,6 +148,8 @@ class Replica:
                 self._note(message)
             case Command(target=target) as command:
                 self.commands[target] = message.stamp, command
+            case StartWithout(uav=uav) as start:
+                self.starts[uav] = start
         return True
 
     def _has_room(self, message: Message) -> bool:

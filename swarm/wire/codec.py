@@ -57,6 +57,7 @@ from swarm.wire.messages import (
     SignedRoster,
     Snapshot,
     Stamp,
+    StartWithout,
     Status,
     TaskOrder,
     as_heard,
@@ -374,7 +375,7 @@ def _may_say(writer: str, body: Body) -> bool:
     match body:
         case Brief() | Epoch() | Board():
             return writer == COORDINATOR
-        case Command() | TaskOrder():
+        case Command() | TaskOrder() | StartWithout():
             return writer == OPERATOR
         case SignedRoster():
             return writer == AUTHORITY

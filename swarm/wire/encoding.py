@@ -27,6 +27,7 @@ from swarm.wire.messages import (
     Outcome,
     SignedRoster,
     Snapshot,
+    StartWithout,
     Status,
     TaskOrder,
     as_heard,
@@ -62,6 +63,7 @@ KINDS: Final[dict[str, type[Body]]] = {
     "choice": Choice,
     "command": Command,
     "task": TaskOrder,
+    "start": StartWithout,
     "roster": SignedRoster,
 }
 NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in KINDS.items()}

@@ -1,8 +1,9 @@
 """Key expressions of one mission; every register key has exactly one writer.
 
 ``swarm/<mission>/…``: ``brief``, ``plan`` and ``board/<task>`` are written by the
-coordinator, ``uav/<id>/…`` by that UAV's agent, ``operator/<target>`` and
-``operator/task/<task>`` by the operator, ``roster`` by the mission authority;
+coordinator, ``uav/<id>/…`` by that UAV's agent, ``operator/<target>``,
+``operator/task/<task>`` and ``operator/start/<uav>`` by the operator, ``roster`` by the
+mission authority;
 ``alive/<id>`` holds the liveliness token of a process and ``state/<id>`` answers what that
 process knows.
 """
@@ -85,6 +86,10 @@ class Keys:
         """A task that the operator has added or withdrawn; ``*`` for all."""
         return f"{self.root}/operator/task/{task}"
 
+    def operator_start(self, uav: str) -> str:
+        """That the mission may start without a UAV; ``*`` for all."""
+        return f"{self.root}/operator/start/{uav}"
+
     def choice(self, uav: str) -> str:
         """Why a UAV took a task; ``*`` for all."""
         return f"{self.root}/uav/{uav}/choice"
@@ -102,7 +107,7 @@ class Keys:
         match key.removeprefix(f"{self.root}/").split("/"):
             case ["brief"] | ["plan"] | ["board", _]:
                 return COORDINATOR
-            case ["operator", _] | ["operator", "task", _]:
+            case ["operator", _] | ["operator", "task" | "start", _]:
                 return OPERATOR
             case ["roster"]:
                 return AUTHORITY

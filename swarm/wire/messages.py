@@ -61,6 +61,7 @@ __all__ = [
     "SignedRoster",
     "Snapshot",
     "Stamp",
+    "StartWithout",
     "Status",
     "StatusPhase",
     "TaskOrder",
@@ -324,6 +325,23 @@ class TaskOrder:
 
 
 @dataclass(frozen=True, slots=True)
+class StartWithout:
+    """Register ``operator/start/<uav>``: the operator lets the mission start without a UAV.
+
+    Apart from the commands to that UAV, which hold as they are: it is told nothing by this, and
+    takes part as soon as it is ready.
+    """
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    uav: Id
+    run: Count
+    """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
+    reason: Words
+    """Why, in the operator's words; empty when there are none."""
+
+
+@dataclass(frozen=True, slots=True)
 class SignedRoster:
     """Register ``roster``: who belongs to the mission, in the words of its authority.
 
@@ -337,7 +355,17 @@ class SignedRoster:
 
 
 Body = (
-    Brief | Epoch | Board | Claim | Outcome | Status | Choice | Command | TaskOrder | SignedRoster
+    Brief
+    | Epoch
+    | Board
+    | Claim
+    | Outcome
+    | Status
+    | Choice
+    | Command
+    | TaskOrder
+    | StartWithout
+    | SignedRoster
 )
 
 
@@ -417,6 +445,8 @@ def _key_of(mission: str, writer: str, body: Body) -> str:
             return keys.operator(target)
         case TaskOrder(task=task):
             return keys.operator_task(task)
+        case StartWithout(uav=uav):
+            return keys.operator_start(uav)
         case SignedRoster():
             return keys.roster
 

@@ -9,6 +9,8 @@ import pytest
 
 from agent.mavlink.config import CommandStyle
 from agent.vehicle import VehicleReady
+from coordinator.operator.seat import OperatorSeat
+from coordinator.operator.starting import StartWish
 from sim.autopilot.flavours import FlavourName
 from sim.world import Recall
 from swarm.config import Timing
@@ -44,6 +46,26 @@ def test_one_whose_agent_died_is_not_waited_for_and_joins_when_it_is_back(
     assert fleet.done_by("u0") != ()
     assert fleet.phase("u0") is StatusPhase.HOME
     assert set(fleet.world.finished.values()) == {0}
+
+
+def test_on_the_operators_word_the_others_start_at_once(
+    flavour: FlavourName, style: CommandStyle
+) -> None:
+    fleet = BridgedFleet(
+        flavour, style, mission=SLOW, timing=TIMING, faults={"u0": "gps-lost@0+35"}
+    )
+    said_s = HOVER_S
+    seats: list[OperatorSeat] = []
+    fleet.at(said_s, lambda: seats.append(fleet.world.operate(StartWish("u0", "no GPS"))))
+    fleet.fly()
+
+    assert fleet.world.zero_s is not None
+    assert said_s <= fleet.world.zero_s < said_s + 2.0
+    assert [seat.verdict and seat.verdict.text for seat in seats] == [
+        "the mission has started without u0"
+    ]
+    assert fleet.done_by("u0") != ()
+    fleet.assert_all_done()
 
 
 def test_one_that_gets_ready_too_late_joins_the_mission_that_runs(

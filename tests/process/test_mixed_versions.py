@@ -11,6 +11,7 @@ import contextlib
 import json
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
@@ -18,12 +19,25 @@ import zenoh
 import swarm
 from swarm.bus.config import DEFAULT_LEASE_S
 from swarm.bus.zenoh_session import session_config
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.scenario import load_scenario
 from swarm.scenario.shipped import resolve_scenario
-from swarm.wire.codec import Codec
+from swarm.wire.codec import Codec, encode
 from swarm.wire.keys import Keys
-from swarm.wire.messages import Board, Brief, Claim, Epoch, Outcome, Status
+from swarm.wire.messages import (
+    Board,
+    Brief,
+    Claim,
+    Command,
+    CommandKind,
+    Epoch,
+    Message,
+    Outcome,
+    Snapshot,
+    Stamp,
+    StartWithout,
+    Status,
+)
 from tests.process.by_hand import ByHand
 from tests.releases import kept_releases, python_of, unpacked
 
@@ -79,6 +93,27 @@ def release(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return unpacked(request.param, tmp_path_factory.mktemp("release"))
 
 
+def read_by(release: Path, messages: str) -> dict[str, Any]:
+    """What a release makes of messages and answers."""
+    words = [*python_of(release, READ), MISSION]
+    told = subprocess.run(words, check=False, input=messages, capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    found: dict[str, Any] = json.loads(told.stdout)
+    return found
+
+
+def test_an_earlier_release_drops_and_counts_what_it_does_not_know(release: Path) -> None:
+    start = Message(MISSION, OPERATOR, Stamp(9, 1), StartWithout("uav1", 1, "no GPS"))
+    hold = Message(MISSION, OPERATOR, Stamp(9, 2), Command("uav1", CommandKind.HOLD, 1, ""))
+    answer = encode(Snapshot(MISSION, "uav1", 1, None, (start, hold)))
+    said = [(start.key, encode(start).hex())]
+    answered = [(Keys(MISSION).state("uav1"), answer.hex())]
+
+    theirs = read_by(release, json.dumps([said, answered]))
+
+    assert theirs == {"dropped": {"unknown kind": 2}, "registers": 1}
+
+
 @pytest.mark.parametrize("earlier", ["uav1", COORDINATOR])
 def test_a_process_of_an_earlier_release_takes_its_part(
     earlier: str, release: Path, tmp_path: Path
@@ -95,12 +130,7 @@ def test_a_process_of_an_earlier_release_takes_its_part(
         flight.assert_all_done()
         assert f"event=begins mission={MISSION} release={swarm.__version__} " in flight.log("uav2")
 
-    words = [*python_of(release, READ), MISSION]
-    told = subprocess.run(
-        words, check=False, input=listener.as_json(), capture_output=True, text=True
-    )
-    assert told.returncode == 0, told.stderr
-    theirs = json.loads(told.stdout)
+    theirs = read_by(release, listener.as_json())
     ours = Codec(MISSION)
     heard = [ours.decode(key, data) for key, data in listener.said]
     answers = [ours.decode_snapshot(key, data) for key, data in listener.answered]

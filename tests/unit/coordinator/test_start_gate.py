@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from swarm.wire.messages import EpochPhase
+from swarm.model.ids import OPERATOR
+from swarm.wire.messages import EpochPhase, StartWithout
 from tests.builders import OUT, PAUSED, mission, task, uav
 from tests.lone_coordinator import (
     START_TIMEOUT_S,
@@ -16,6 +17,7 @@ from tests.lone_coordinator import (
 
 TRIO = mission([uav("u0"), uav("u1"), uav("u2")], [task("t0", 5.0), task("t1", 9.0)])
 RESTART_S, HOVER_S = 10.0, 30.0
+RUN = 1
 GATE = replace(TIMING, restart_s=RESTART_S, hover_s=HOVER_S)
 
 
@@ -147,6 +149,43 @@ def test_one_that_said_it_is_out_is_not_waited_for_although_its_agent_has_ended(
 
     assert planned_for(coordinator) == ["u0", "u2"]
     assert because(coordinator) == ["u1: takes no part"]
+
+
+def test_the_operator_may_say_whom_not_to_wait_for() -> None:
+    coordinator = fleet()
+    coordinator.see("u1")
+    coordinator.ready("u0", "u2")
+    coordinator.hear(OPERATOR, StartWithout("u1", RUN, "no GPS"))
+
+    assert planned_for(coordinator) == ["u0", "u2"]
+    assert because(coordinator) == ["u1: the operator does not wait for it (no GPS)"]
+    coordinator.answer_plan("u0", "u2")
+    assert coordinator.phase is EpochPhase.RUNNING
+    assert coordinator.reason == "without u1: the operator does not wait for it (no GPS)"
+
+
+def test_the_operators_word_is_about_one_uav_and_one_flight() -> None:
+    coordinator = fleet()
+    coordinator.see("u1", "u2")
+    coordinator.ready("u0")
+    coordinator.hear(OPERATOR, StartWithout("u1", RUN, ""))
+    coordinator.hear(OPERATOR, StartWithout("u2", RUN + 1, ""))
+
+    assert planned_for(coordinator) == ["u0", "u1", "u2"]
+    coordinator.ready("u1", "u2")
+    coordinator.answer_plan("u0", "u1", "u2")
+    assert coordinator.reason == "every UAV is airborne"
+
+
+def test_on_the_operators_word_nobody_starts_without_anybody_in_the_air() -> None:
+    coordinator = fleet()
+    coordinator.see("u0", "u1", "u2")
+    for name in coordinator.uavs:
+        coordinator.hear(OPERATOR, StartWithout(name, RUN, ""))
+    assert coordinator.phase is None
+
+    coordinator.ready("u2")
+    assert planned_for(coordinator) == ["u2"]
 
 
 def test_while_it_waits_for_a_plan_it_sleeps() -> None:

@@ -129,7 +129,11 @@ export class Card {
     const sets = [...list.planned, ...list.flown].map((id) => [id, picture.tasks.get(id)?.state]);
     return [
       ["state", [row.does, row.lost], () => this.#drawn(drawDoing, row)],
-      ["actions", [row.does, row.claim, row.lost, this.operator.able], () => this.#uavActions(row)],
+      [
+        "actions",
+        [row.does, row.claim, row.lost, this.operator.able, picture.head?.phase],
+        () => this.#uavActions(row),
+      ],
       ["facts", facts.map(([title, value, key]) => [title, key ?? String(value)]), () => definition(facts)],
       [
         "lists",
@@ -188,6 +192,9 @@ export class Card {
         : action("hold", "Hold", gone && row.does !== "returning"),
       row.does === "holding" ? null : action("resume", "Resume", row.claim !== "paused"),
       action("return", "Return home", gone),
+      this.picture.head?.phase === "preparing" && row.claim === null
+        ? action("start", "Start without it", false)
+        : null,
     ];
   }
 

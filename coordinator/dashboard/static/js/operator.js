@@ -8,6 +8,11 @@ import { COMMAND_SIGNS, degrees, number } from "./words.js";
 const VERDICT_MS = 7000;
 
 const COMMANDS = {
+  start: {
+    title: (uav) => `Start without ${uav}?`,
+    text: "The others begin as soon as all of them are airborne. It joins in when it is ready after all.",
+    confirm: "Start without it",
+  },
   hold: {
     title: (uav) => `Hold ${uav}?`,
     text: "It stops where it is, gives its task up and waits. On the ground it stays there.",
@@ -65,7 +70,7 @@ export class Operator {
         this.#post(
           "api/command",
           { command: kind, uav, reason: form.get("reason").trim() },
-          `${kind} ${uav}`,
+          kind === "start" ? `start without ${uav}` : `${kind} ${uav}`,
         ),
     });
   }

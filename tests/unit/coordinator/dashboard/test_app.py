@@ -169,6 +169,15 @@ def test_an_aborted_mission_takes_no_tasks(page: TestClient, play: DeskPlay) -> 
     assert task.json()["error"] == "the mission has ended: nothing is taken up any more"
 
 
+def test_a_mission_that_runs_is_not_started_without_anybody(
+    page: TestClient, play: DeskPlay
+) -> None:
+    late = page.post("/api/command", json={"command": "start", "uav": "u1"})
+
+    assert (late.status_code, play.said) == (400, [])
+    assert late.json()["error"] == "the mission has started already: nobody waits for u1"
+
+
 def test_a_task_is_said_as_it_was_drawn(page: TestClient, play: DeskPlay) -> None:
     page.post(
         "/api/task",
@@ -188,6 +197,7 @@ def test_a_task_is_said_as_it_was_drawn(page: TestClient, play: DeskPlay) -> Non
         ("/api/command", {"command": "hold", "uav": "u9"}, "no such UAV: the fleet is u1, u2"),
         ("/api/command", {"command": "hold"}, "hold concerns one UAV: name it"),
         ("/api/command", {"command": "abort", "uav": "u1"}, "abort concerns all UAVs"),
+        ("/api/command", {"command": "start"}, "start concerns one UAV: name it"),
         ("/api/command", {"command": "explode", "uav": "u1"}, "command: input should be"),
         ("/api/command", {"command": "hold", "uav": "u1", "x": 1}, "x: "),
         ("/api/command", {"command": "hold", "uav": "u1", "reason": "r" * 151}, "reason: "),

@@ -111,6 +111,7 @@ def contents(replica: Replica) -> tuple[object, ...]:
         replica.claims,
         replica.outcomes,
         replica.commands,
+        replica.starts,
         replica.digest(),
     )
 
