@@ -41,6 +41,7 @@ from agent.vehicle import (
     Refused,
     Return,
     ReturnAdvised,
+    ReturnBegun,
     Telemetry,
     VehicleReady,
 )
@@ -135,6 +136,8 @@ class AgentCore:
         self._stage = StatusPhase.LEARNING
         self._flew_before = False
         """Whether the vehicle may be in the air though this life has not brought it there."""
+        self._flown = False
+        """Whether the vehicle has been in the air in this life."""
         self._left_in_air = False
         """Whether an earlier life was last heard to have it in the air."""
         self._homebound = False
@@ -273,7 +276,10 @@ class AgentCore:
                 self._explain(reason, now_s)
             case HeardAgain(reason) if self.phase is StatusPhase.OUT:
                 self._turn_home(reason, now_s, hurry=True)
+            case ReturnBegun():
+                self._flown = True
             case ReturnAdvised(reason):
+                self._flown = True
                 if self.phase is not StatusPhase.OUT:
                     self._go_home(reason, now_s, hurry=True)
             case Held() if self._stage is StatusPhase.HOLDING:
@@ -292,6 +298,7 @@ class AgentCore:
     def _become_airborne(self, now_s: float) -> None:
         if self._stage is not StatusPhase.PREPARING or self._tasking.airborne:
             return
+        self._flown = True
         self._speech.note = self._caution[:200]
         me = self._picture.me
         if self._picture.place_enu_m is None and me is not None:
@@ -336,8 +343,15 @@ class AgentCore:
         held = self._stage is StatusPhase.HOLDING and self._homebound
         if held or self.phase is StatusPhase.RETURNING:
             self._enter(StatusPhase.HOME, self._speech.note)
-            self._actions.append(Note("landed at home"))
+            self._actions.append(Note(self._how_it_ended))
             self._finish(self._exit_status, now_s)
+
+    @property
+    def _how_it_ended(self) -> str:
+        """What is true of a vehicle that is said to be home."""
+        if self._flown:
+            return "landed at home"
+        return "is on the ground" if self._flew_before else "ends without having taken off"
 
     def _changes_nothing_else(self, now_s: float) -> bool:
         """Whether nothing follows from where the vehicle is: known before, and nothing is due."""

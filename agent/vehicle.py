@@ -203,7 +203,7 @@ class ReturnBegun:
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """The vehicle has landed and disarmed."""
+    """The vehicle is on the ground and disarmed: it has landed, or has not taken off."""
 
 
 Report = (

@@ -13,11 +13,11 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from coordinator.dashboard.source import CommandRow, CommandState, Refusal, RefusedError
+from coordinator.desertion import deserted
 from coordinator.observer import Observer
 from coordinator.operator.errands import Errand, Errands, OperatorWish
 from coordinator.operator.verdict import Result
 from coordinator.status.onlooker import Onlooker
-from coordinator.status.watch import deserted
 from swarm.config import Timing
 from swarm.deadline import earliest
 from swarm.events import (

@@ -10,6 +10,7 @@ import contextlib
 import math
 from typing import Protocol
 
+from coordinator.desertion import deserted
 from coordinator.joining import onlooking
 from coordinator.observer import Observer
 from coordinator.status.onlooker import Onlooker, only_mission
@@ -19,17 +20,13 @@ from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.clock import ScaledClock
 from swarm.config import Timing
 from swarm.errors import SwarmError
-from swarm.state.commands import aborted
-from swarm.wire.messages import EpochPhase, StatusPhase
 
-__all__ = ["Shows", "deserted", "watch"]
+__all__ = ["Shows", "watch"]
 
 FRAME_S = 0.2
 """Wall time between two pictures."""
 FOREVER_S = 1e9
 """As long as it takes."""
-_ENDS = (StatusPhase.HOME, StatusPhase.OUT)
-"""Where an agent's part ends."""
 
 
 class Shows(Protocol):
@@ -78,28 +75,6 @@ async def watch(
         await _look_on(name, bus, timing, clock, shows, limit_s)
     finally:
         bus.close()
-
-
-def deserted(observer: Observer) -> bool:
-    """Whether the mission is over and nobody is there any more, as far as is known.
-
-    A mission without a coordinator is over when no task is left, or it was aborted. While the
-    own link is down nobody is seen leaving: who was home then needs no watching, as when the
-    bus ends with the mission.
-    """
-    if observer.replica.brief is None:
-        return False
-    done = observer.phase is EpochPhase.RUNNING and not observer.board.unfinished
-    if not (done or observer.phase is EpochPhase.ENDED or aborted(observer.replica) is not None):
-        return False
-    there = observer.present
-    if observer.cut_since_s is not None:
-        there = {
-            uav
-            for uav, status in observer.statuses.items()
-            if uav in there and status.phase not in _ENDS
-        }
-    return not there
 
 
 async def _look_on(

@@ -15,6 +15,7 @@ from rich.control import Control
 from rich.live import Live
 from rich.text import Text
 
+from coordinator.desertion import deserted
 from coordinator.observer import Happening, Observer
 from coordinator.view.alerts import alerts
 from coordinator.view.fleet_table import fit, fleet_table, lists, table_width
@@ -161,7 +162,7 @@ class LiveView:
             line = story_line(happening, ascii_only=self._ascii_only)
             self._console.print(Text(line), soft_wrap=True)
         self._told = len(observer.story)
-        cut = observer.cut_since_s is not None
+        cut = observer.cut_since_s is not None and not deserted(observer)
         if cut != self._cut:
             self._cut = cut
             self._notice(f"own link to the bus is {'lost' if cut else 'back'}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from coordinator.desertion import deserted
 from coordinator.observer import Observer
 from coordinator.view.signs import short_names
 from swarm.allocation.objective import evaluate
@@ -101,7 +102,8 @@ class Scene:
     optimum: float | None
     """The largest J there can be, where it is proven."""
     cut_s: float | None
-    """For how long the own link to the bus has been down [s of the observer's clock]."""
+    """For how long the own link to the bus has been down [s of the observer's clock]; that the
+    bus ends when everybody has left is no loss."""
     coordinator: bool
     """Whether it is there."""
     commands: tuple[Command, ...]
@@ -123,7 +125,7 @@ def scene_of(observer: Observer, now_s: float) -> Scene:
     """What ``observer`` knows at ``now_s``, in its own clock's seconds."""
     result = observer.result()
     mission, plan, epoch = observer.mission, observer.plan, observer.replica.epoch
-    mission_s = observer.mission_s(now_s)
+    mission_s, cut_since_s = observer.mission_s(now_s), observer.cut_since_s
     numbers = {uav.id: number for number, uav in enumerate(mission.uavs)}
     by: dict[str, int] = {}
     for uav_id, route in result.executed_routes.items():
@@ -163,7 +165,7 @@ def scene_of(observer: Observer, now_s: float) -> Scene:
         objective=result.executed_objective,
         planned_objective=planned_objective,
         optimum=None if plan is None else plan.optimum,
-        cut_s=None if observer.cut_since_s is None else now_s - observer.cut_since_s,
+        cut_s=None if cut_since_s is None or deserted(observer) else now_s - cut_since_s,
         coordinator=COORDINATOR in observer.present,
         commands=tuple(in_force(observer.replica).values()),
         dropped=sum(count.total() for count in observer.dropped.values()),

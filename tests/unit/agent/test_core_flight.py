@@ -14,13 +14,23 @@ from agent.vehicle import (
     Refused,
     Return,
     ReturnAdvised,
+    ReturnBegun,
     VehicleReady,
 )
 from swarm.events import Heard, Stop
 from swarm.model.ids import COORDINATOR
 from swarm.wire.messages import Board, ClaimPhase, EpochPhase, Result, StatusPhase
 from tests.builders import IDLE, OUT, done, entry, epoch, failed, held, proposed, uav
-from tests.lone_agent import ABOVE_START, LoneAgent, claims, finishes, orders, outcomes, statuses
+from tests.lone_agent import (
+    ABOVE_START,
+    LoneAgent,
+    claims,
+    finishes,
+    notes,
+    orders,
+    outcomes,
+    statuses,
+)
 
 NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
 
@@ -173,6 +183,36 @@ def test_at_the_end_of_the_mission_it_returns_and_ends_once_it_is_home() -> None
     assert finishes(actions) == [0]
     assert statuses(actions)[-1].phase is StatusPhase.HOME
     assert agent.core.next_deadline_s() is None
+
+
+def landed(agent: LoneAgent) -> str:
+    """What the log says of a vehicle that is home."""
+    return notes(agent.happen(Home()))[-1]
+
+
+def test_only_a_vehicle_that_was_in_the_air_is_said_to_have_landed() -> None:
+    prepared = LoneAgent(uav("u0"))
+    prepared.learn(prepared.statement(COORDINATOR, prepared.brief))
+    waiting = LoneAgent(uav("u0"))
+    climbed = LoneAgent(uav("u0"))
+    climbed.learn(climbed.statement(COORDINATOR, climbed.brief))
+    flew = flying(NEAR)
+    for agent in (prepared, waiting, climbed, flew):
+        agent.happen(Stop("told"))
+    climbed.happen(ReturnBegun())
+
+    assert landed(prepared) == "ends without having taken off"
+    assert landed(waiting) == "ends without having taken off"
+    assert landed(climbed) == "landed at home"
+    assert landed(flew) == "landed at home"
+
+
+def test_of_a_vehicle_that_an_earlier_life_brought_down_it_says_where_it_is() -> None:
+    agent = LoneAgent(uav("u0"))
+    mine, ended = agent.statement("u0", OUT), epoch("u0", phase=EpochPhase.ENDED, reason="over")
+    agent.learn(mine, *agent.coordinators(agent.brief, ended), mission_s=9.0)
+
+    assert landed(agent) == "is on the ground"
 
 
 def test_told_to_stop_it_returns_whatever_it_does() -> None:

@@ -8,11 +8,12 @@ import json
 import pytest
 from rich.console import Console
 
+from coordinator.desertion import deserted
 from coordinator.observer import Observer
 from coordinator.status.cli import JsonLines
 from coordinator.status.onlooker import Onlooker
-from coordinator.status.watch import deserted
 from coordinator.view.live import LiveView
+from coordinator.view.scene import scene_of
 from swarm.config import Timing
 from swarm.events import Heard, Learned, LinkChanged, PeerGone, PeerSeen, Tick
 from swarm.model.ids import COORDINATOR, FLEET
@@ -94,6 +95,20 @@ def test_a_bus_that_ends_with_the_mission_leaves_nobody_who_is_not_home() -> Non
     assert not deserted(seen.observer)
     seen.core.step(LinkChanged(False), 5.0)
     assert deserted(seen.observer)
+
+
+def test_a_bus_that_ends_with_the_mission_is_no_lost_link() -> None:
+    console = Console(file=io.StringIO(), width=100)
+    seen = Seen().say(COORDINATOR, epoch("u0", "u1", phase=EpochPhase.ENDED))
+    for uav_id in ("u0", "u1"):
+        seen.say(uav_id, status(StatusPhase.HOME, 9.0))
+    seen.core.step(LinkChanged(False), 5.0)
+    with LiveView(console) as view:
+        view.update(seen.observer, 9.0)
+
+    assert isinstance(console.file, io.StringIO)
+    assert "link" not in console.file.getvalue()
+    assert scene_of(seen.observer, 9.0).cut_s is None
 
 
 @pytest.mark.parametrize("pace", [1.0, 20.0])
