@@ -24,6 +24,7 @@ __all__ = [
     "Orders",
     "Prepare",
     "Refused",
+    "Remark",
     "Report",
     "Return",
     "ReturnAdvised",
@@ -155,6 +156,13 @@ class Refused:
 
 
 @dataclass(frozen=True, slots=True)
+class Remark:
+    """Something that people should know of the vehicle, and from which nothing else follows."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class HandedOver:
     """The vehicle is no longer ours to command (pilot took over, rebooted, link lost)."""
 
@@ -214,6 +222,7 @@ Report = (
     | AttemptFailed
     | Telemetry
     | Refused
+    | Remark
     | HandedOver
     | HandOverExplained
     | HeardAgain

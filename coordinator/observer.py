@@ -79,6 +79,8 @@ class Happening:
 
 _LEAVING = {StatusPhase.OUT: "gave its vehicle up", StatusPhase.RETURNING: "goes home"}
 """Parts of an agent's life in which it takes no tasks any more, in words."""
+_IN_FLIGHT = (StatusPhase.IDLE, StatusPhase.FLYING, StatusPhase.SERVING)
+"""Parts in which a note is a remark about the vehicle."""
 
 
 NAMES_TOLD = 5
@@ -132,6 +134,8 @@ class Observer:
         self.replica = Replica()
         self.board = TaskBoard(self.replica, mission.name)
         self._left: set[str] = set()
+        self._remarks: dict[str, str] = {}
+        """What was told last of each UAV's vehicle."""
         """UAVs of which has been told why they left, while there was something to do."""
         self.statuses: dict[str, Status] = {}
         """Newest status by UAV id, whatever order they arrived in."""
@@ -423,6 +427,9 @@ class Observer:
         if status.phase in _LEAVING and status.note and unfinished and uav not in self._left:
             self._left.add(uav)
             self._tell(f"{uav} {_LEAVING[status.phase]}: {status.note}", now_s)
+        elif status.phase in _IN_FLIGHT and status.note and status.note != self._remarks.get(uav):
+            self._remarks[uav] = status.note
+            self._tell(f"{uav}: {status.note}", now_s)
 
     def _disown(self, names: Collection[str], now_s: float) -> None:
         """What has been heard under those names is no measure of what is said from now on."""

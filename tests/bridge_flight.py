@@ -16,6 +16,7 @@ from agent.vehicle import (
     NotReady,
     Orders,
     Prepare,
+    Remark,
     Report,
     ReturnBegun,
     Telemetry,
@@ -69,9 +70,11 @@ class BridgeFlight:
             self.copter.power_on(100.0)
         self.now_s = self.copter.now_s
         self.reports: list[Report] = []
-        """All but telemetry and what was seen, in order."""
+        """All but telemetry, remarks and what was seen, in order."""
         self.seen: list[Report] = []
         """What was seen of the effect of orders, in order."""
+        self.remarks: list[str] = []
+        """What people are told of the vehicle, in order."""
         self._read = 0
         self.telemetry: list[Telemetry] = []
         self.happen(LinkUp())
@@ -87,8 +90,10 @@ class BridgeFlight:
             else:
                 reports.append(action)
         self.telemetry += [r for r in reports if isinstance(r, Telemetry)]
+        self.remarks += [r.text for r in reports if isinstance(r, Remark)]
         self.seen += [r for r in reports if isinstance(r, Held | ReturnBegun)]
-        self.reports += [r for r in reports if not isinstance(r, Telemetry | Held | ReturnBegun)]
+        aside = Telemetry | Remark | Held | ReturnBegun
+        self.reports += [r for r in reports if not isinstance(r, aside)]
         self._carry(answers)
         return reports
 

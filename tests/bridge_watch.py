@@ -217,6 +217,9 @@ class BridgeWatch:
         if name == "COMMAND_LONG" and message.command == INTERVAL:
             hold(message.param2 > 0.0, f"message interval {message.param2}")
             return
+        if name in ("PARAM_REQUEST_READ", "PARAM_SET") and message.param_id in self.fake.jerk_names:
+            self._see_jerk(message)
+            return
         hold(not self._silent, f"{name} after a hand-over: {message}")
         if name in ("PARAM_REQUEST_READ", "PARAM_SET"):
             hold(Phase.PREPARING in phases, f"{name} while {before}, {after}")
@@ -235,6 +238,16 @@ class BridgeWatch:
             self._see_command(message, phases, missions=missions)
         else:
             hold(False, f"sends {name}")
+
+    def _see_jerk(self, message: Any) -> None:
+        """Raised in flight only; put back at any time, even after a hand-over: it moves nothing."""
+        flavour = self.bridge._seat.flavour
+        lending = None if flavour is None else flavour.lending(by_missions=True)
+        hold(lending is not None, f"{message.param_id} of a vehicle that needs no other")
+        if message.get_type() == "PARAM_SET" and lending is not None:
+            raised = message.param_value > lending.value
+            hold(message.param_value <= 1.01 * lending.value, f"jerk {message.param_value}")
+            hold(not (raised and self._silent), "jerk raised after a hand-over")
 
     def _see_giving(self, name: str, phases: set[Phase]) -> None:
         """What a vehicle that is no longer prepared was being given is given whole, or cleared."""

@@ -55,6 +55,8 @@ class FakeCopter:
         }
     )
     """What may be read of it besides."""
+    jerk_names: tuple[str, ...] = ("WP_JERK", "WPNAV_JERK")
+    """Names that the parameter of the greatest jerk may have."""
 
     def __init__(
         self,
@@ -79,6 +81,8 @@ class FakeCopter:
         self.deaf_to: set[int] = set()
         """Streams that are acknowledged and never sent."""
         self.silent = False
+        self.fastest_m_s = math.inf
+        """What its limits of tilt and thrust allow, whatever speed it acknowledges."""
         self.stuck = False
         """Acknowledges targets and does not move."""
         self.prearm_ok = True
@@ -88,6 +92,7 @@ class FakeCopter:
         """MAV_STATE to say instead of the true one."""
         self.parameters: dict[str, float] = {
             "WP_SPD": default_speed_m_s,
+            "WP_JERK": 1.0,
             "FS_GCS_ENABLE": 1.0,
             "FS_GCS_TIMEOUT": 5.0,
             "MAV_GCS_SYSID": 255.0,
@@ -341,7 +346,7 @@ class FakeCopter:
             self.velocity_m_s = (0.0, 0.0, 0.0)
             return
         away_m = math.dist(self.position_m, self.target_m)
-        speed_m_s = _CLIMB_M_S if self.in_takeoff else self.speed_m_s
+        speed_m_s = _CLIMB_M_S if self.in_takeoff else min(self.speed_m_s, self.fastest_m_s)
         share = min(1.0, speed_m_s * duration_s / away_m) if away_m > 0.0 else 1.0
         before = self.position_m
         east, north, up = (a + share * (b - a) for a, b in zip(before, self.target_m, strict=True))

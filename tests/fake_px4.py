@@ -53,6 +53,7 @@ class FakePx4(FakeCopter):
     failsafe_names = frozenset(
         {"NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_DL_LOSS_T", "COM_LOW_BAT_ACT", "SWARM_SIMULATED"}
     )
+    jerk_names = ("MPC_JERK_AUTO",)
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._texts = 0
@@ -60,6 +61,7 @@ class FakePx4(FakeCopter):
         self.ekf_flags = 895
         self.parameters = {
             "MPC_XY_CRUISE": self.default_speed_m_s,
+            "MPC_JERK_AUTO": 4.0,
             "NAV_DLL_ACT": 2.0,
             "COM_DLL_EXCEPT": 0.0,
             "COM_DL_LOSS_T": 30.0,

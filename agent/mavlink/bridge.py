@@ -167,11 +167,9 @@ class Bridge:
             self._on_reboot()
         seat.vehicle.on_message(heartbeat, seat.now_s)
         if seat.flavour is None or not seat.flavour.flies(heartbeat):
-            flavour = seat.flavour = flavour_of(heartbeat)
+            flavour = flavour_of(heartbeat)
             self._streams = Streams(self.config, flavour) if flavour else None
-            if flavour is not None:
-                seat.commands.acknowledged_twice = flavour.acknowledged_twice
-            seat.forget_mission()
+            seat.meet(flavour)
             self._work.forget_preparation()
         self._check_authority(heartbeat)
         self._check_guards()

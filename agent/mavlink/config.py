@@ -101,6 +101,9 @@ class BridgeConfig:
     """Charge below which the vehicle should go home, 0..1; None leaves that to the autopilot."""
     position_timeout_s: float = 5.0
     """A vehicle in the air that has told no position for that long is no longer commanded."""
+    raises_jerk: bool = True
+    """The vehicle's limit of jerk is raised for the flight where that spares time, and put back
+    after it (agent.mavlink.lent_parameter)."""
     fence_radius_m: float = 20_000.0
     """Targets farther from the origin are refused [m, horizontally]."""
     fence_height_m: float = 1_000.0

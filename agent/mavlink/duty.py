@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 
 from agent.mavlink.commands import CommandEnded
+from agent.mavlink.cruise import CruiseWatch
 from agent.mavlink.messages import Inbound, Landed, Position
 from agent.mavlink.orders import OrderTaker
 from agent.mavlink.preparation import Preparation
@@ -23,11 +24,13 @@ from agent.vehicle import (
     Hold,
     Home,
     Refused,
+    Remark,
     Return,
     ReturnAdvised,
     ReturnBegun,
     VehicleReady,
 )
+from swarm.deadline import earliest
 
 __all__ = ["Duty"]
 
@@ -50,6 +53,7 @@ class Duty:
         self._seat = seat
         self._work = work
         self._orders = orders
+        self._cruise = CruiseWatch()
 
     # What the vehicle says.
 
@@ -59,6 +63,8 @@ class Duty:
             self._seat.say(*self._work.preparation.on_message(message, self._seat.now_s))
         if self._seat.mission is not None:
             self._seat.say(*self._seat.mission.on_message(message, self._seat.now_s))
+        if self._seat.lent is not None:
+            self._seat.lent.on_message(message)
 
     def on_position(self, position: Position, place_enu_m: Point) -> None:
         """Take a fresh position."""
@@ -72,7 +78,10 @@ class Duty:
         if self._seat.mission is not None:
             self._seat.mission.on_position(place_enu_m, now_s)
         if self._work.target is not None:
-            self._work.target.on_position(place_enu_m, position.velocity_enu_m_s)
+            velocity_enu_m_s, told_m_s = position.velocity_enu_m_s, self._work.speed_m_s
+            if remark := self._cruise.judge(velocity_enu_m_s, told_m_s, now_s):
+                self._seat.report(Remark(remark))
+            self._work.target.on_position(place_enu_m, velocity_enu_m_s)
             self._judge_target()
 
     def on_ended(self, ended: Sequence[CommandEnded]) -> None:
@@ -103,6 +112,7 @@ class Duty:
         """Do what time and state ask for."""
         if not self._seat.silent:
             self._advance_mission()
+            self._advance_lent()
         match self._work.phase:
             case Phase.PREPARING:
                 self._advance_preparation()
@@ -117,13 +127,15 @@ class Duty:
 
     def next_deadline_s(self) -> float:
         """When `advance` may have something to do."""
-        now_s, mission = self._seat.now_s, self._seat.mission
+        seat, now_s, mission = self._seat, self._seat.now_s, self._seat.mission
         busy = self._work.phase in (Phase.PREPARING, Phase.HOLDING, Phase.RETURNING)
         starting = mission is not None and mission.is_starting
         if busy or self._work.search is not None or starting:
             return now_s + _POLL_S
         at_s = None if mission is None else mission.next_deadline_s()
-        return math.inf if at_s is None else max(at_s, now_s)
+        lent = None if seat.silent else seat.lent
+        due_s = earliest(at_s, None if lent is None else lent.next_deadline_s())
+        return math.inf if due_s is None else max(due_s, now_s)
 
     def _advance_preparation(self) -> None:
         heartbeat, order = self._seat.vehicle.heartbeat, self._work.prepare
@@ -204,6 +216,17 @@ class Duty:
             self._orders.come_home(Return(reason), flavour)
         elif mission.unverified:
             self._orders.begin_holding(Hold("which mission it flies is not known"))
+
+    def _advance_lent(self) -> None:
+        """Raise the limit of jerk for as long as we tell the vehicle where to fly."""
+        seat, returning = self._seat, self._work.returning
+        if seat.lent is None:
+            return
+        flies_home = returning is not None and not returning.on_detour
+        seat.lent.want(self._work.in_our_hands() and not flies_home)
+        seat.say(*seat.lent.advance(seat.now_s))
+        if complaint := seat.lent.take_complaint():
+            seat.report(Remark(complaint))
 
     def _advance_holding(self) -> None:
         holding, heartbeat = self._work.holding, self._seat.vehicle.heartbeat

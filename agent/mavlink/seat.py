@@ -12,6 +12,7 @@ from agent.mavlink.contact import Contact
 from agent.mavlink.events import Action, Send
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.guards import Guards
+from agent.mavlink.lent_parameter import LentParameter
 from agent.mavlink.messages import Outbound
 from agent.mavlink.signing import Signing
 from agent.mavlink.standing_mission import StandingMission
@@ -46,6 +47,8 @@ class Seat:
         self.flavour: Flavour | None = None
         self.mission: StandingMission | None = None
         """What stands on the vehicle; None if missions are not our way to command it."""
+        self.lent: LentParameter | None = None
+        """What is another parameter during a flight; None if nothing is."""
         self.now_s = 0.0
         self._actions: list[Action] = []
 
@@ -64,14 +67,29 @@ class Seat:
             distrusted=self.codec.distrusted,
         )
 
+    def meet(self, flavour: Flavour | None) -> None:
+        """Speak to it as to that kind of vehicle."""
+        self.flavour = flavour
+        lending = None
+        if flavour is not None:
+            self.commands.acknowledged_twice = flavour.acknowledged_twice
+            lending = flavour.lending(by_missions=self._by_missions)
+        self.lent = None
+        if lending is not None and self.config.raises_jerk:
+            self.lent = LentParameter(lending, self.config)
+        self.forget_mission()
+
     def forget_mission(self) -> None:
         """Know nothing of what stands on the vehicle."""
-        by_missions = self.config.command is CommandStyle.MISSION
         self.mission = (
             StandingMission(self.config, self.commands, self.flavour)
-            if by_missions and self.flavour is not None
+            if self._by_missions and self.flavour is not None
             else None
         )
+
+    @property
+    def _by_missions(self) -> bool:
+        return self.config.command is CommandStyle.MISSION
 
     def flies_for_us(self, custom_mode: int) -> bool:
         """Whether that mode is our doing, as far as targets go."""
@@ -110,5 +128,5 @@ class Seat:
         self.vehicle = VehicleState()
         self.guards = Guards(self.config)
         self.whereabouts = Whereabouts()
-        self.flavour = self.mission = None
+        self.flavour = self.mission = self.lent = None
         self.commands.cancel_all()

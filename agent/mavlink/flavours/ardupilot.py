@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from agent.mavlink.flavours.base import SpeedParameter
 from agent.mavlink.flavours.copter import COPTER_TYPES, UNCHANGED, Copter, set_mode
 from agent.mavlink.flavours.failsafes import ARDUCOPTER_NAMES, Failsafes, arducopter_failsafes
+from agent.mavlink.lent_parameter import Lending
 from agent.mavlink.messages import (
     AltitudeFrame,
     Battery,
@@ -72,6 +73,10 @@ _MODE_NAMES = {
 _STATE_STANDBY = 3
 _STATE_ACTIVE = 4
 
+_MISSION_JERK = Lending(("WP_JERK", "WPNAV_JERK"), 5.0)
+"""[m/s³] What its position controller is allowed anyway, as in GUIDED (PSC_NE_JERK); missions
+are flown with 1 by default, which costs 2.5 s at each start and stop together."""
+
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_REPOSITION = 192
 
@@ -83,6 +88,10 @@ class ArduCopter(Copter):
     def speed_parameters(self) -> tuple[SpeedParameter, ...]:
         """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""
         return (SpeedParameter("WP_SPD", 1.0), SpeedParameter("WPNAV_SPEED", 100.0))
+
+    def lending(self, *, by_missions: bool) -> Lending | None:
+        """The jerk of missions; GUIDED does not go by it."""
+        return _MISSION_JERK if by_missions else None
 
     @property
     def failsafe_names(self) -> tuple[tuple[str, ...], ...]:

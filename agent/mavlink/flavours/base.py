@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from agent.mavlink.flavours.failsafes import Failsafes
+from agent.mavlink.lent_parameter import Lending
 from agent.mavlink.messages import CommandInt, CommandLong, Heartbeat, Inbound, Parameter
 from agent.mavlink.state import VehicleState
 
@@ -31,6 +32,14 @@ class Flavour(Protocol):
     @property
     def speed_parameters(self) -> tuple[SpeedParameter, ...]:
         """Every name that the cruise speed has had."""
+        ...
+
+    def lending(self, *, by_missions: bool) -> Lending | None:
+        """The parameter without which legs take longer than they need to; None without one.
+
+        Args:
+            by_missions: targets are told as missions.
+        """
         ...
 
     @property

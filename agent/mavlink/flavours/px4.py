@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from agent.mavlink.flavours.base import SpeedParameter
 from agent.mavlink.flavours.copter import COPTER_TYPES, UNCHANGED, Copter, set_mode
 from agent.mavlink.flavours.failsafes import PX4_NAMES, Failsafes, px4_failsafes
+from agent.mavlink.lent_parameter import Lending
 from agent.mavlink.messages import (
     AltitudeFrame,
     CommandInt,
@@ -61,6 +62,11 @@ _MODE_NAMES = {
     (10, 0): "TERMINATION",
 }
 
+_JERK = Lending(("MPC_JERK_AUTO",), 20.0)
+"""[m/s³] PX4 brakes so early that the jerk, 4 by default, costs ever more time the nearer the
+target is: speed is at most (√(b² + 8·a·d) - b)/2 at a distance d from it, with b = 4·a²/jerk
+(computeMaxSpeedFromDistance of its TrajMath.hpp)."""
+
 _STATE_STANDBY, _STATE_CRITICAL, _STATE_EMERGENCY = 3, 5, 6
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_SET_MODE = 176
@@ -78,6 +84,11 @@ class Px4Copter(Copter):
     def speed_parameters(self) -> tuple[SpeedParameter, ...]:
         """MPC_XY_CRUISE [m/s], which also survives a restart of the vehicle."""
         return (SpeedParameter("MPC_XY_CRUISE", 1.0),)
+
+    def lending(self, *, by_missions: bool) -> Lending | None:
+        """The jerk of every flight to a target, however told."""
+        del by_missions
+        return _JERK
 
     @property
     def failsafe_names(self) -> tuple[tuple[str, ...], ...]:

@@ -199,6 +199,8 @@ class ArduCopter:
             Parameter("ARMING_SKIPCHK", 0.0, _INT32),
             Parameter("WP_SPD", config.cruise_m_s, _REAL, Setting.CRUISE_M_S, least=0.1),
             Parameter("WP_SPD_UP", config.climb_m_s, _REAL, Setting.CLIMB_M_S, least=0.1),
+            Parameter("WP_ACC", 2.5, _REAL, least=0.5),
+            Parameter("WP_JERK", 1.0, _REAL, least=1.0),
             Parameter("WP_RADIUS_M", 2.0, _REAL, least=0.05),
             Parameter("LAND_SPD_MS", config.land_m_s, _REAL, Setting.LAND_M_S, least=0.1),
             Parameter("RTL_ALT_M", 15.0, _REAL, Setting.RETURN_HEIGHT_M, least=0.0),
@@ -217,6 +219,8 @@ class ArduCopter:
             Parameter(
                 "WPNAV_SPEED_UP", config.climb_m_s / cm, _REAL, Setting.CLIMB_M_S, cm, least=10.0
             ),
+            Parameter("WPNAV_ACCEL", 250.0, _REAL, least=50.0),
+            Parameter("WPNAV_JERK", 1.0, _REAL, least=1.0),
             Parameter("WPNAV_RADIUS", 200.0, _REAL, least=5.0),
             Parameter("LAND_SPEED", config.land_m_s / cm, _INT16, Setting.LAND_M_S, cm, least=10.0),
             Parameter("RTL_ALT", 1500.0, _INT32, Setting.RETURN_HEIGHT_M, cm, least=0.0),

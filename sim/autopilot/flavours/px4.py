@@ -218,6 +218,8 @@ class Px4:
             Parameter("MAV_SYS_ID", float(config.system_id), _INT32, read_only=True),
             Parameter("MAV_TYPE", float(mavlink.MAV_TYPE_QUADROTOR), _INT32, read_only=True),
             Parameter("MIS_TAKEOFF_ALT", 2.5, _REAL, Setting.TAKE_OFF_HEIGHT_M, least=0.0),
+            Parameter("MPC_ACC_HOR", 3.0, _REAL, least=2.0),
+            Parameter("MPC_JERK_AUTO", 4.0, _REAL, least=1.0),
             Parameter("MPC_LAND_SPEED", config.land_m_s, _REAL, Setting.LAND_M_S, least=0.6),
             Parameter("MPC_TKO_SPEED", config.climb_m_s, _REAL, Setting.TAKE_OFF_M_S, least=0.1),
             Parameter("MPC_XY_CRUISE", config.cruise_m_s, _REAL, Setting.CRUISE_M_S, least=0.1),

@@ -269,7 +269,7 @@ def test_speed_goes_by_parameter_if_the_command_is_refused(fake: type[FakeCopter
 
     assert copter.parameters[name] == (400.0 if name == "WPNAV_SPEED" else 4.0)
     asked = {m.param_id for m in copter.heard if m.get_type() == "PARAM_REQUEST_READ"}
-    assert asked - fake.failsafe_names == set(fake.speed_names)
+    assert asked - fake.failsafe_names - set(fake.jerk_names) == set(fake.speed_names)
 
 
 def test_speed_that_cannot_be_set_at_all_is_said(fake: type[FakeCopter]) -> None:
