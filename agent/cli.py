@@ -122,6 +122,15 @@ def agent(
             "the battery to the autopilot.",
         ),
     ] = 0.2,
+    keep_jerk: Annotated[
+        bool,
+        typer.Option(
+            "--keep-jerk",
+            help="Leave the vehicle's limit of jerk as it is: by default it is raised for the "
+            "flight where that spares seconds of each leg (WP_JERK with --command mission, "
+            "MPC_JERK_AUTO), and put back after it.",
+        ),
+    ] = False,
     fence_radius_m: Annotated[
         float,
         typer.Option(
@@ -239,6 +248,7 @@ def agent(
                 acceptance_radius_m=acceptance_radius_m,
                 position_rate_hz=position_rate_hz,
                 battery_reserve_frac=battery_reserve or None,
+                raises_jerk=not keep_jerk,
                 fence_radius_m=fence_radius_m,
                 fence_height_m=fence_height_m,
             ).for_speedup(speedup)

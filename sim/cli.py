@@ -113,6 +113,13 @@ def run(
             show_default=False,
         ),
     ] = None,
+    keep_jerk: Annotated[
+        bool,
+        typer.Option(
+            "--keep-jerk",
+            help="Leave the vehicles' limits of jerk as they are. See swarm agent.",
+        ),
+    ] = False,
     fence_radius_m: Annotated[
         float | None,
         typer.Option(
@@ -304,6 +311,7 @@ def run(
         forward=tuple(forward or ()),
         signing_key=signing_key,
         battery_reserve=battery_reserve,
+        keep_jerk=keep_jerk,
         fence=fence_around(mission, fence_radius_m, fence_height_m),
         without_bus_s=without_bus_s,
         # Firmware that is started here flies in a simulator, with parameters of its own.

@@ -34,6 +34,7 @@ class HandedOn:
     signing_key: Path | None = None
     """Of all vehicles, or a folder with each UAV's own."""
     battery_reserve: float | None = None
+    keep_jerk: bool = False
     fence: Fence | None = None
     without_bus_s: float | None = None
     accept_no_failsafe: bool = False
@@ -47,6 +48,7 @@ class HandedOn:
             *([] if style is None else ["--command", style]),
             *(word for url in self.forward for word in ("--forward", url)),
             *_given("--battery-reserve", self.battery_reserve),
+            *(["--keep-jerk"] if self.keep_jerk else []),
             *([] if self.fence is None else self.fence.to_agent()),
             *_given("--without-bus-s", self.without_bus_s),
             *(["--accept-no-failsafe"] if self.accept_no_failsafe else []),

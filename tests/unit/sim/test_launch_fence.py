@@ -50,10 +50,12 @@ def test_fence_of_a_shipped_scenario_is_a_fence(name: str) -> None:
 
 
 def test_agents_are_told_their_fence_and_how_long_to_fly_without_a_bus() -> None:
-    told = HandedOn(battery_reserve=0.3, fence=Fence(800.0, 130.0), without_bus_s=20.0)
+    fence = Fence(800.0, 130.0)
+    told = HandedOn(battery_reserve=0.3, keep_jerk=True, fence=fence, without_bus_s=20.0)
 
     assert told.to_agent("uav1") == [
         *("--battery-reserve", "0.3"),
+        "--keep-jerk",
         *("--fence-radius-m", "800.0", "--fence-height-m", "130.0"),
         *("--without-bus-s", "20.0"),
     ]
