@@ -39,7 +39,6 @@ from agent.vehicle import (
     NotReady,
     Prepare,
     Refused,
-    Remark,
     Return,
     ReturnAdvised,
     ReturnBegun,
@@ -262,6 +261,8 @@ class AgentCore:
                 self._actions.append(Note("vehicle not ready", {"reason": reason}))
             case Caution(reason):
                 self._caution = reason
+                if self._tasking.airborne:  # before and after, the note says what it waits for
+                    self._speech.note = reason[:200]
                 self._actions.append(Note("caution", {"reason": reason}))
             case Arrived(leg):
                 self._tasking.arrive(leg, now_s)
@@ -271,10 +272,6 @@ class AgentCore:
                 self._picture.move(telemetry)
             case Refused(order, reason):
                 self._give_up_order(order, reason, now_s)
-            case Remark(text):
-                if self._tasking.airborne:  # before and after, the note says what it waits for
-                    self._speech.note = text
-                self._actions.append(Note("of the vehicle", {"remark": text}))
             case HandedOver(reason, silent):
                 self._leave_vehicle(reason, now_s, handed_over=not silent)
             case HandOverExplained(reason) if self.phase is StatusPhase.OUT:

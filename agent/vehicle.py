@@ -24,7 +24,6 @@ __all__ = [
     "Orders",
     "Prepare",
     "Refused",
-    "Remark",
     "Report",
     "Return",
     "ReturnAdvised",
@@ -113,7 +112,7 @@ class NotReady:
 
 @dataclass(frozen=True, slots=True)
 class Caution:
-    """What a person should know of the vehicle before it flies; nothing else follows from it."""
+    """What a person should know of the vehicle; nothing else follows from it."""
 
     reason: str
 
@@ -153,13 +152,6 @@ class Refused:
 
     order: Orders
     reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Remark:
-    """Something that people should know of the vehicle, and from which nothing else follows."""
-
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +214,6 @@ Report = (
     | AttemptFailed
     | Telemetry
     | Refused
-    | Remark
     | HandedOver
     | HandOverExplained
     | HeardAgain

@@ -11,12 +11,12 @@ from agent.mavlink.config import BridgeConfig
 from agent.mavlink.events import Event, LinkUp, Received, Send, Tick
 from agent.mavlink.signing import Signing, SigningKey
 from agent.vehicle import (
+    Caution,
     GoTo,
     Held,
     NotReady,
     Orders,
     Prepare,
-    Remark,
     Report,
     ReturnBegun,
     Telemetry,
@@ -70,10 +70,10 @@ class BridgeFlight:
             self.copter.power_on(100.0)
         self.now_s = self.copter.now_s
         self.reports: list[Report] = []
-        """All but telemetry, remarks and what was seen, in order."""
+        """All but telemetry, cautions and what was seen, in order."""
         self.seen: list[Report] = []
         """What was seen of the effect of orders, in order."""
-        self.remarks: list[str] = []
+        self.cautions: list[str] = []
         """What people are told of the vehicle, in order."""
         self._read = 0
         self.telemetry: list[Telemetry] = []
@@ -90,9 +90,9 @@ class BridgeFlight:
             else:
                 reports.append(action)
         self.telemetry += [r for r in reports if isinstance(r, Telemetry)]
-        self.remarks += [r.text for r in reports if isinstance(r, Remark)]
+        self.cautions += [r.reason for r in reports if isinstance(r, Caution)]
         self.seen += [r for r in reports if isinstance(r, Held | ReturnBegun)]
-        aside = Telemetry | Remark | Held | ReturnBegun
+        aside = Telemetry | Caution | Held | ReturnBegun
         self.reports += [r for r in reports if not isinstance(r, aside)]
         self._carry(answers)
         return reports

@@ -116,7 +116,7 @@ class FakePx4(FakeCopter):
 
     def _say_parameter(self, name: str) -> None:
         value, kind = self.parameters[name], _REAL32
-        if name != "MPC_XY_CRUISE":
+        if not name.startswith("MPC_"):
             kind = _INT32
             (value,) = struct.unpack("<f", struct.pack("<i", round(value)))
         self.say(mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 65535))

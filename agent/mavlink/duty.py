@@ -24,7 +24,6 @@ from agent.vehicle import (
     Hold,
     Home,
     Refused,
-    Remark,
     Return,
     ReturnAdvised,
     ReturnBegun,
@@ -80,7 +79,7 @@ class Duty:
         if self._work.target is not None:
             velocity_enu_m_s, told_m_s = position.velocity_enu_m_s, self._work.speed_m_s
             if remark := self._cruise.judge(velocity_enu_m_s, told_m_s, now_s):
-                self._seat.report(Remark(remark))
+                self._work.tell_caution(remark)
             self._work.target.on_position(place_enu_m, velocity_enu_m_s)
             self._judge_target()
 
@@ -226,7 +225,7 @@ class Duty:
         seat.lent.want(self._work.in_our_hands() and not flies_home)
         seat.say(*seat.lent.advance(seat.now_s))
         if complaint := seat.lent.take_complaint():
-            seat.report(Remark(complaint))
+            self._work.tell_caution(complaint)
 
     def _advance_holding(self) -> None:
         holding, heartbeat = self._work.holding, self._seat.vehicle.heartbeat

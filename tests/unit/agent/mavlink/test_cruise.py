@@ -45,4 +45,4 @@ def test_people_hear_of_a_vehicle_whose_limits_forbid_the_speed() -> None:
     flight.copter.fastest_m_s = 3.0
     flight.order(GoTo(1, (100.0, 0.0, 10.0)))
     flight.run(10.0)
-    assert flight.remarks == ["it flies at 3.0 m/s, asked for 4: its own limits forbid more"]
+    assert flight.cautions == ["it flies at 3.0 m/s, asked for 4: its own limits forbid more"]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from agent.mavlink.config import BridgeConfig, CommandStyle
-from agent.vehicle import Caution, VehicleReady
+from agent.vehicle import VehicleReady
 from tests.bridge_flight import ORIGIN, START, BridgeFlight, rough_link
 from tests.fake_copter import ARM, FakeCopter
 from tests.fake_px4 import FakePx4
@@ -50,7 +50,7 @@ def setting(**parameters: float | None) -> Change:
 
 
 def cautions(flight: BridgeFlight) -> list[str]:
-    return [r.reason for r in flight.reports if isinstance(r, Caution)]
+    return flight.cautions
 
 
 def assert_not_armed(flight: BridgeFlight, why: str) -> None:

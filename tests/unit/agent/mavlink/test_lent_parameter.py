@@ -49,7 +49,7 @@ def test_it_is_raised_for_the_flight_and_put_back_before_the_landing(
     flight.order(Return("mission ended"))
     flight.run_until(Home())
     assert is_own(flight)
-    assert flight.remarks == []
+    assert flight.cautions == []
 
 
 def test_it_stays_as_long_as_the_vehicle_is_not_armed(fake: type[FakeCopter]) -> None:
@@ -130,7 +130,7 @@ def test_a_vehicle_without_it_flies_all_the_same_and_people_are_told(
     flight = BridgeFlight(copter, MISSIONS).prepared()
     flight.run(20.0)
     names = " or ".join(fake.jerk_names)
-    assert flight.remarks == [f"{names} cannot be set for the flight, so legs take longer"]
+    assert flight.cautions == [f"{names} cannot be set for the flight, so legs take longer"]
 
 
 @pytest.mark.parametrize("own", [1.0, 4.0, 4.25, 0.5, 19.99])
