@@ -15,7 +15,16 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from agent.mavlink.bridge import Bridge, Phase
 from agent.mavlink.config import BridgeConfig, CommandStyle
 from agent.mavlink.events import Action, Event, LinkUp, Received, Send, Tick
-from agent.vehicle import Arrived, HandedOver, Orders, Refused, Report, ReturnAdvised, Telemetry
+from agent.vehicle import (
+    Arrived,
+    HandedOver,
+    HandOverExplained,
+    Orders,
+    Refused,
+    Report,
+    ReturnAdvised,
+    Telemetry,
+)
 from coordinator.operator.seat import OperatorSeat
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.faults import VehicleFault, parse_fault
@@ -37,6 +46,7 @@ __all__ = ["FIELD", "KINDS", "BridgedFleet", "Change", "Logbook", "Sent", "fault
 
 KINDS = [(flavour, style) for flavour in FlavourName for style in CommandStyle]
 LIMIT_S = 400.0
+_WITH_REASON = HandedOver | HandOverExplained | Refused | ReturnAdvised
 FIELD = Mission(
     "field",
     600.0,
@@ -92,7 +102,7 @@ class Logbook:
         return [
             report.reason
             for _, report in self.reported
-            if isinstance(report, kind) and isinstance(report, HandedOver | Refused | ReturnAdvised)
+            if isinstance(report, kind) and isinstance(report, _WITH_REASON)
         ]
 
     def first_s(self, kind: type) -> float:

@@ -26,6 +26,7 @@ SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, INTERVAL = 176, 400, 22, 192, 178, 51
 _CLIMB_M_S = 2.5
 _AUTO_DISARM_S = 10.0
 _RTL_ALT_M = 15.0
+_GEOFENCE = 1 << 20
 
 
 class FakeCopter:
@@ -85,6 +86,8 @@ class FakeCopter:
         """What its limits of tilt and thrust allow, whatever speed it acknowledges."""
         self.stuck = False
         """Acknowledges targets and does not move."""
+        self.fence_radius_m = math.inf
+        """Of its own fence, beyond which it flies to no target."""
         self.prearm_ok = True
         self.battery_percent = 80
         self.ekf_flags = 831
@@ -194,7 +197,8 @@ class FakeCopter:
                 self.position()
             case 1:
                 health = bit if self.ready and self.prearm_ok else 0
-                fields = (bit, bit, health, 0, 12600, 0, self.battery_percent, 0, 0, 0, 0, 0, 0)
+                enabled = bit | (_GEOFENCE if self.fence_radius_m < math.inf else 0)
+                fields = (bit, enabled, health, 0, 12600, 0, self.battery_percent, 0, 0, 0, 0, 0, 0)
                 self.say(mavlink.MAVLink_sys_status_message(*fields))
             case 193:
                 flags = self.ekf_flags if self.ready else 167
@@ -274,11 +278,14 @@ class FakeCopter:
         if self.mode != GUIDED and not int(m.param2) & 1:
             return DENIED
         assert m.frame in (0, 5), "above mean sea level"
+        target_m = enu_from_wgs84(self.origin, m.x / 1e7, m.y / 1e7, m.z)
+        if math.hypot(*target_m[:2]) > self.fence_radius_m:
+            return FAILED  # without a word
         if self.in_takeoff:
             self.in_takeoff = False
             self.speed_m_s = self.default_speed_m_s
         if not self.stuck:
-            self.target_m = enu_from_wgs84(self.origin, m.x / 1e7, m.y / 1e7, m.z)
+            self.target_m = target_m
         return ACCEPTED
 
     def _obey_mode(self, mode: int) -> int:

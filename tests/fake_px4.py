@@ -57,6 +57,8 @@ class FakePx4(FakeCopter):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._texts = 0
+        self.late_texts: list[tuple[int, str]] = []
+        """To be said once what it heard is answered."""
         super().__init__(*args, **kwargs)
         self.ekf_flags = 895
         self.parameters = {
@@ -177,13 +179,14 @@ class FakePx4(FakeCopter):
             self.set_mode(AUTO_LOITER)
         if m.param1 > 0.0:
             self.speed_m_s = m.param1
-        if not self.stuck:
-            self.target_m = (
-                self.position_m
-                if nowhere
-                else enu_from_wgs84(self.origin, m.x / 1e7, m.y / 1e7, m.z)
-            )
-        return ACCEPTED
+        target_m = (
+            self.position_m if nowhere else enu_from_wgs84(self.origin, m.x / 1e7, m.y / 1e7, m.z)
+        )
+        if math.hypot(*target_m[:2]) > self.fence_radius_m:
+            self.late_texts.append((2, "Reposition is outside geofence"))
+        elif not self.stuck:
+            self.target_m = target_m
+        return ACCEPTED  # by another part of it than the one that minds its fence
 
     def set_mode(self, mode: int) -> None:
         """By command, by the pilot's switch, by a failsafe or by itself.
@@ -205,6 +208,8 @@ class FakePx4(FakeCopter):
             self._lifts_off_at_s = math.inf
             self.airborne = self.in_takeoff = True
             self.text(6, "Takeoff detected")
+        while self.late_texts:
+            self.text(*self.late_texts.pop(0))
         armed = self.armed
         said = super().advance(now_s)
         if armed and not self.armed:

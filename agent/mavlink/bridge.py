@@ -15,8 +15,9 @@ it is heard again as it was left. One that obeys and is in trouble is *advised t
 from __future__ import annotations
 
 import math
+from functools import partial
 
-from agent.mavlink.authority import intervention
+from agent.mavlink.authority import Explanation, intervention
 from agent.mavlink.codec import MavlinkCodec
 from agent.mavlink.commands import CommandEnded
 from agent.mavlink.config import BridgeConfig
@@ -126,6 +127,8 @@ class Bridge:
         silent_at_s = seat.vehicle.silent_at_s(self.config.silence_timeout_s)
         if silent_at_s is not None and self._work.in_our_hands() and not seat.silent:
             deadlines_s.append(silent_at_s)
+        if self._work.explanation is not None:
+            deadlines_s.append(self._work.explanation.due_s)
         return min(deadlines_s)
 
     # What is heard.
@@ -179,16 +182,18 @@ class Bridge:
         seat, work = self._seat, self._work
         if seat.flavour is None or not work.in_our_hands():
             return
-        reason = intervention(
+        why = partial(
+            intervention,
             seat.vehicle,
             heartbeat,
             seat.flavour,
-            seat.now_s,
             expected=work.expects(heartbeat),
             may_disarm=work.may_disarm,
         )
+        reason = why(seat.now_s)
         if reason is not None:
             work.hand_over(reason)
+            work.explanation = Explanation(reason, why, seat.now_s)
 
     def _check_guards(self) -> None:
         """Let go of a vehicle that has lost its way, and advise one in trouble to go home."""
@@ -249,6 +254,15 @@ class Bridge:
                 self._streams.on_ended(one, self._seat.now_s)
         self._duty.on_ended(ended)
 
+    def _explain(self) -> None:
+        """Complete the reason of a hand-over once the words for it have had their time."""
+        explanation = self._work.explanation
+        if explanation is None or self._seat.now_s < explanation.due_s:
+            return
+        self._work.explanation = None
+        if (reason := explanation.better()) is not None:
+            self._seat.report(HandOverExplained(reason))
+
     def _look_for_lost(self) -> None:
         """Take a vehicle back that is heard again as it was left, or say what became of it."""
         loss = self._work.loss
@@ -272,6 +286,7 @@ class Bridge:
         self._on_ended(ended)
         if seat.silent and self._work.in_our_hands():
             self._work.lose()
+        self._explain()
         self._look_for_lost()
         if self._streams is not None and not seat.silent:
             seat.say(*self._streams.advance(seat.commands, now_s))

@@ -317,6 +317,7 @@ def _system_status(raw: Any) -> Inbound | None:
         prearm_ok=healthy if reported else None,
         prearm_healthy=healthy,
         battery_frac=_battery_frac(raw.battery_remaining),
+        fence_enabled=bool(raw.onboard_control_sensors_enabled & mavlink.MAV_SYS_STATUS_GEOFENCE),
     )
 
 

@@ -64,6 +64,9 @@ class Duty:
             self._seat.say(*self._seat.mission.on_message(message, self._seat.now_s))
         if self._seat.lent is not None:
             self._seat.lent.on_message(message)
+        if self._work.target is not None:
+            self._work.target.on_message(message)
+            self._judge_target()
 
     def on_position(self, position: Position, place_enu_m: Point) -> None:
         """Take a fresh position."""
@@ -247,9 +250,10 @@ class Duty:
         elif mission is not None and returning is None:
             mission.carry_on()
         if holding.failure is not None:
-            self._seat.report(Refused(holding.order, holding.failure))
+            failure = self._seat.in_its_words(holding.failure)
+            self._seat.report(Refused(holding.order, failure))
             if prepare is not None:
-                self._seat.report(Refused(prepare, holding.failure))
+                self._seat.report(Refused(prepare, failure))
             if returning is not None:
                 self._work.returning, self._work.phase = returning, Phase.RETURNING
                 self._seat.say(*returning.go_straight(self._seat.now_s))
@@ -275,7 +279,8 @@ class Duty:
         elif returning.failure is not None:
             self._work.drop()
             self._work.phase = Phase.HOVERING
-            self._seat.report(Refused(returning.order, returning.failure))
+            failure = self._seat.in_its_words(returning.failure)
+            self._seat.report(Refused(returning.order, failure))
 
     def _judge_target(self) -> None:
         outcome = None if self._work.target is None else self._work.target.outcome()

@@ -126,7 +126,7 @@ class Guards:
         alarmed = vehicle.heartbeat is not None and flavour.alarmed(vehicle.heartbeat)
         if alarmed and not self._alarm_told:
             self._alarm_told = True
-            text = vehicle.recent_warning(now_s)
+            text = vehicle.telling_warning(now_s)
             return f"the autopilot reports a failsafe{f' ({text})' if text else ''}"
         return None
 

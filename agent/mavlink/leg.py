@@ -9,11 +9,11 @@ it happens to be. Leaves out: what follows arrival, and the leg by mission
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from typing import Protocol
 
-from agent.mavlink.commands import CommandEnded, Commands, Ending, result_text
+from agent.mavlink.commands import CommandEnded, Commands, Ending
 from agent.mavlink.config import BridgeConfig
 from agent.mavlink.messages import CommandInt, Outbound
 
@@ -49,6 +49,10 @@ class Leg(Protocol):
 
     def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of a command."""
+        ...
+
+    def ignored(self, text: str) -> None:
+        """The vehicle says that it does not fly to the target, whatever it acknowledged."""
         ...
 
     def on_position(
@@ -114,6 +118,7 @@ class RepositionLeg:
         message: the command that says so in the autopilot's terms.
         config: radius, speed and patience.
         commands: carries it.
+        why: the words for the result of a refusal.
         insists: the target is told again if the vehicle stands still elsewhere. If not, one
             that stopped on its way is taken to be somebody else's.
     """
@@ -124,10 +129,12 @@ class RepositionLeg:
         message: CommandInt,
         config: BridgeConfig,
         commands: Commands,
+        why: Callable[[int | None], str],
         *,
         insists: bool = True,
     ) -> None:
         self._insists = insists
+        self._why = why
         self._message = message
         self._commands = commands
         self._approach = Approach(target_enu_m, config)
@@ -148,7 +155,12 @@ class RepositionLeg:
         if ended.ending is Ending.ACCEPTED:
             self.accepted = True
         else:
-            self.failure = f"the autopilot did not take the target ({result_text(ended.result)})"
+            self.failure = f"the autopilot did not take the target ({self._why(ended.result)})"
+
+    def ignored(self, text: str) -> None:
+        """The vehicle says that it does not fly to the target, whatever it acknowledged."""
+        if not self.arrived:
+            self.failure = f"the autopilot did not take the target: {text}"
 
     def on_position(
         self, position_enu_m: Point, velocity_enu_m_s: Point, now_s: float

@@ -101,6 +101,8 @@ class SystemStatus:
     prearm_healthy: bool
     """The bit of the pre-arm checks among the healthy sensors, reported as present or not."""
     battery_frac: float | None
+    fence_enabled: bool = False
+    """Whether the autopilot minds a fence of its own."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,6 +70,9 @@ class MissionLeg:
     def on_ended(self, ended: CommandEnded) -> None:
         """Nothing: the mission takes the outcomes of its commands itself."""
 
+    def ignored(self, text: str) -> None:
+        """Nothing: a mission is taken as a whole, or not."""
+
     def on_position(
         self, position_enu_m: Point, velocity_enu_m_s: Point, now_s: float
     ) -> Sequence[Outbound]:

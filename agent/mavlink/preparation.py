@@ -23,7 +23,7 @@ from agent.mavlink.failsafe_check import FailsafeCheck
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.guards import Guards
 from agent.mavlink.leg import RepositionLeg
-from agent.mavlink.messages import Heartbeat, Inbound, Landed, Outbound, Position
+from agent.mavlink.messages import Heartbeat, Inbound, Landed, Outbound, Position, Text
 from agent.mavlink.speed import SpeedSetting
 from agent.mavlink.standing_mission import StandingMission
 from agent.mavlink.state import VehicleState
@@ -59,7 +59,9 @@ class _Step:
     """Wait for the effect of an accepted command to be seen."""
     count: int = 0
     next_at_s: float = -math.inf
-    refusal: str = ""
+    accepted: bool = True
+    result: int | None = None
+    """MAV_RESULT of the last answer, if it was not accepted."""
 
 
 class Preparation:
@@ -138,7 +140,7 @@ class Preparation:
         step = self._steps.get(ended.tag)
         if step is not None:
             accepted = ended.ending is Ending.ACCEPTED
-            step.refusal = "" if accepted else result_text(ended.result)
+            step.accepted, step.result = accepted, ended.result
             wait_s = step.effect_timeout_s if accepted else self._config.retry_delay_s
             step.next_at_s = now_s + wait_s
         if self._leg is not None:
@@ -148,6 +150,9 @@ class Preparation:
     def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
         """Take what matters of a message beside the vehicle's state."""
         self._failsafes.on_message(message)
+        leg, ignores = self._leg, self._flavour.ignores_target
+        if leg is not None and isinstance(message, Text) and ignores(message.text):
+            leg.ignored(message.text)
         return self._speed.on_message(message, now_s)
 
     def on_position(self, position: Position, now_s: float) -> list[Outbound]:
@@ -337,7 +342,11 @@ class Preparation:
             place = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
             message = self._flavour.reposition(*place, self._order.speed_m_s)
             self._leg = RepositionLeg(
-                self._order.position_enu_m, message, self._config, self._commands
+                self._order.position_enu_m,
+                message,
+                self._config,
+                self._commands,
+                lambda result: self._flavour.place_refusal(vehicle, result),
             )
             out += self._leg.start(now_s)
         leg = self._leg
@@ -395,9 +404,14 @@ class Preparation:
     def _ask(
         self, step: _Step, command: Command, vehicle: VehicleState, now_s: float
     ) -> list[Outbound]:
-        refusal = step.refusal
-        if refusal and (text := vehicle.recent_warning(now_s)):
-            refusal = f"{refusal}: {text}"
+        refusal = ""
+        if not step.accepted:
+            # Of modes and motors nothing depends on a place.
+            of_place = step is self._takeoff
+            words = self._flavour.place_refusal(vehicle, step.result) if of_place else None
+            refusal = words or result_text(step.result)
+            if text := vehicle.telling_warning(now_s):
+                refusal = f"{refusal}: {text}"
         self._wait(f"{step.what} refused ({refusal}), trying again" if refusal else step.what)
         if self._commands.pending(step.tag) or now_s < step.next_at_s:
             return []

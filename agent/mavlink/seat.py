@@ -110,6 +110,11 @@ class Seat:
             and not self.flies_for_us(heartbeat.custom_mode)
         )
 
+    def in_its_words(self, failure: str) -> str:
+        """A failure, and what the autopilot has said about it lately."""
+        text = self.vehicle.telling_warning(self.now_s)
+        return f"{failure}: {text}" if text and text not in failure else failure
+
     def say(self, *messages: Outbound) -> None:
         """To the vehicle."""
         self._actions += [Send(self.codec.encode(message)) for message in messages]

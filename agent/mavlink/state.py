@@ -5,7 +5,8 @@ Leaves out: what follows from it (agent.mavlink.bridge).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 from enum import Enum, auto
 
 from agent.mavlink.messages import (
@@ -30,8 +31,14 @@ _BOOT_WRAP_S = 2**32 / 1e3
 _HEARTLESS = 3.0
 """Without a heartbeat for that many silence timeouts it is silent, whatever else it says."""
 _EKF_POS_HORIZ_ABS = 16
-_WARNING = 4
-"""MAV_SEVERITY_WARNING; smaller is worse."""
+_WARNING, _NOTICE = 4, 5
+"""MAV_SEVERITY; smaller is worse. ArduPilot tells of a breached fence in a notice."""
+_WARNINGS = 8
+_RECENT_S = 5.0
+_FAILSAFE_WORDS = ("failsafe", "breach")
+_TELLING_WORDS = (*_FAILSAFE_WORDS, "fence")
+_NO_REASONS = ("auto mission changed",)
+"""ArduCopter says CRITICAL that a mission was replaced in flight, which is our doing."""
 
 
 class PositionNews(Enum):
@@ -61,12 +68,13 @@ class VehicleState:
     prearm_healthy: bool = False
     prearm_heard: bool = False
     """Whether SYS_STATUS has come at all: an autopilot may leave pre-arm checks out."""
+    fence_enabled: bool = False
+    """Whether it minds a fence of its own."""
     ekf_flags: int | None = None
     landed: Landed = Landed.UNDEFINED
     battery_frac: float | None = None
-    warning: str = ""
-    """The autopilot's last warning."""
-    warning_at_s: float | None = None
+    _warnings: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=_WARNINGS))
+    """The autopilot's last warnings, and when each came."""
     _newest_boot_s: float | None = None
     _suspect_boot_s: float = 0.0
     _suspect_messages: int = 0
@@ -118,15 +126,15 @@ class VehicleState:
                 self.prearm_healthy = message.prearm_healthy
                 self.prearm_heard = True
                 self.battery_frac = message.battery_frac
+                self.fence_enabled = message.fence_enabled
             case Battery(battery_frac) if battery_frac is not None:
                 self.battery_frac = battery_frac
             case EkfStatus(flags):
                 self.ekf_flags = flags
             case ExtendedState(landed):
                 self.landed = landed
-            case Text(severity, text) if severity <= _WARNING and text:
-                self.warning = text
-                self.warning_at_s = now_s
+            case Text(severity, text) if _is_reason(severity, text):
+                self._warnings.append((now_s, text))
             case _:
                 pass
 
@@ -153,8 +161,35 @@ class VehicleState:
         self.position = position
         return PositionNews.FRESH
 
-    def recent_warning(self, now_s: float, window_s: float = 5.0) -> str:
+    def recent_warning(self, now_s: float, window_s: float = _RECENT_S) -> str:
         """The last warning if it is younger than ``window_s``, else an empty text."""
-        if self.warning_at_s is None or now_s - self.warning_at_s > window_s:
-            return ""
-        return self.warning
+        return next(iter(self._recent(now_s, window_s)), "")
+
+    def telling_warning(self, now_s: float) -> str:
+        """The last recent warning of a failsafe or fence, else the last one; empty without."""
+        recent = self._recent(now_s, _RECENT_S)
+        telling = (text for text in recent if _has_word(text, _TELLING_WORDS))
+        return next(telling, next(iter(recent), ""))
+
+    def failsafe_told(self, now_s: float) -> bool:
+        """Whether it has said lately that a failsafe acts."""
+        return any(_is_failsafe(text) for text in self._recent(now_s, _RECENT_S))
+
+    def _recent(self, now_s: float, window_s: float) -> list[str]:
+        """What it warned of lately, newest first."""
+        return [text for at_s, text in reversed(self._warnings) if now_s - at_s <= window_s]
+
+
+def _is_reason(severity: int, text: str) -> bool:
+    """Whether a text may be the reason of something."""
+    bad = severity <= _WARNING or (severity <= _NOTICE and _is_failsafe(text))
+    return bad and bool(text) and not _has_word(text, _NO_REASONS)
+
+
+def _is_failsafe(text: str) -> bool:
+    """Whether a text says that a failsafe acts, and not that it is over."""
+    return _has_word(text, _FAILSAFE_WORDS) and not _has_word(text, ("cleared",))
+
+
+def _has_word(text: str, words: tuple[str, ...]) -> bool:
+    return any(word in text.lower() for word in words)

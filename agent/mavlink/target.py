@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from agent.mavlink.commands import CommandEnded
 from agent.mavlink.flavours import Flavour
 from agent.mavlink.leg import Leg, RepositionLeg
-from agent.mavlink.messages import Outbound
+from agent.mavlink.messages import Inbound, Outbound, Text
 from agent.mavlink.mission_leg import MissionLeg
 from agent.mavlink.seat import Seat
 from agent.vehicle import Arrived, GoTo, HandedOver, Refused
@@ -35,6 +35,7 @@ class Target:
     def __init__(self, order: GoTo, seat: Seat, flavour: Flavour, speed_m_s: float) -> None:
         self._order = order
         self._seat = seat
+        self._flavour = flavour
         self._leg = _leg_to(order, seat, flavour, speed_m_s)
 
     def start(self) -> None:
@@ -44,6 +45,11 @@ class Target:
     def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of a command."""
         self._leg.on_ended(ended)
+
+    def on_message(self, message: Inbound) -> None:
+        """Take what the vehicle says of the target."""
+        if isinstance(message, Text) and self._flavour.ignores_target(message.text):
+            self._leg.ignored(message.text)
 
     def on_position(self, place_enu_m: Point, velocity_enu_m_s: Point) -> None:
         """Judge arrival."""
@@ -61,8 +67,7 @@ class Target:
         failure = self._leg.failure
         if failure is None:
             return None
-        text = self._seat.vehicle.recent_warning(self._seat.now_s)
-        return Refused(self._order, f"{failure}: {text}" if text else failure)
+        return Refused(self._order, self._seat.in_its_words(failure))
 
 
 def _leg_to(order: GoTo, seat: Seat, flavour: Flavour, speed_m_s: float) -> Leg:
@@ -72,4 +77,11 @@ def _leg_to(order: GoTo, seat: Seat, flavour: Flavour, speed_m_s: float) -> Leg:
     place = wgs84_from_enu(config.origin, target_enu_m)
     message = flavour.reposition(*place, speed_m_s)
     insists = not flavour.pilots_stop_it_there
-    return RepositionLeg(target_enu_m, message, config, seat.commands, insists=insists)
+    return RepositionLeg(
+        target_enu_m,
+        message,
+        config,
+        seat.commands,
+        lambda result: flavour.place_refusal(seat.vehicle, result),
+        insists=insists,
+    )

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from enum import Enum
 
+from agent.mavlink.authority import Explanation
 from agent.mavlink.holding import Holding
 from agent.mavlink.link_loss import LinkLoss
 from agent.mavlink.messages import Heartbeat
@@ -62,6 +63,8 @@ class Work:
         """Cruise speed of the last preparation [m/s]."""
         self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
         """Where the vehicle was last told to fly: of the newest it may not have heard."""
+        self.explanation: Explanation | None = None
+        """Of a hand-over whose reason may not have been said in full."""
         self.loss: LinkLoss | None = None
         """Of a vehicle that was handed over for its silence, as long as it may be ours."""
         self._told_not_ready: str | None = None
@@ -103,7 +106,7 @@ class Work:
 
     def drop(self) -> None:
         """Give up whatever is under way; nothing is sent about it any more."""
-        self.target = self.search = self.loss = None
+        self.target = self.search = self.loss = self.explanation = None
         self.prepare = self.preparation = self.prepare_next = None
         self.returning = self.holding = None
         self._seat.commands.cancel_all()

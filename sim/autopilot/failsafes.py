@@ -116,9 +116,12 @@ class FailSafes:
             return
         if pilot.flavour.autopilot == mavlink.MAV_AUTOPILOT_PX4:
             texts = _PX4
+        # ArduCopter tells the mode some milliseconds before the words, which wait in line; PX4
+        # tells it with its next heartbeat, whatever comes first here.
+        on_ground = pilot.flight.on_ground
+        if not on_ground and not pilot.set_mode(mode, now_s):
+            pilot.set_mode(Mode.LAND, now_s)
         for severity, text in texts:
             pilot.outbox.text(severity, text)
-        if pilot.flight.on_ground:
+        if on_ground:
             pilot.disarm(now_s, forced=False)
-        elif not pilot.set_mode(mode, now_s):
-            pilot.set_mode(Mode.LAND, now_s)

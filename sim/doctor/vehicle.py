@@ -6,6 +6,7 @@ read as the bridge reads it. Leaves out: sockets (sim.doctor.link).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
@@ -239,7 +240,8 @@ class Listening:
         if problem == _BOOTING:
             return warns(what, problem, "wait, and keep it still")
         if problem is not None:
-            said = f"; it says: {state.warning}" if state.warning else ""
+            warning = state.recent_warning(self._now_s, math.inf)
+            said = f"; it says: {warning}" if warning else ""
             return warns(what, f"not yet: {problem}{said}{battery}", _advice(problem))
         if charge is not None and charge < 0.2:
             return warns(what, f"battery {charge:.0%}", "charge it: below 20 % nothing is armed")

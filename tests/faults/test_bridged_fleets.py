@@ -13,7 +13,14 @@ from dataclasses import replace
 import pytest
 
 from agent.mavlink.config import CommandStyle
-from agent.vehicle import HandedOver, NotReady, Refused, ReturnAdvised, VehicleReady
+from agent.vehicle import (
+    HandedOver,
+    HandOverExplained,
+    NotReady,
+    Refused,
+    ReturnAdvised,
+    VehicleReady,
+)
 from sim.autopilot.flavours import FlavourName
 from sim.bridged_vehicle import Equipment
 from swarm.wire.messages import StatusPhase
@@ -31,9 +38,10 @@ def assert_let_go(fleet: BridgedFleet, uav: str, reason: str) -> None:
     """It was handed over for that reason, says so, and was not commanded any more."""
     told = fleet.books[uav].reasons(HandedOver)
     assert len(told) == 1
-    assert reason in told[0]
+    in_full = [*told, *fleet.books[uav].reasons(HandOverExplained)][-1]
+    assert reason in in_full
     assert fleet.phase(uav) is StatusPhase.OUT
-    assert fleet.note(uav) == told[0]
+    assert fleet.note(uav) == in_full
     claim = fleet.world.observer.replica.claims[uav]
     assert (claim.task, claim.handed_over) == (None, True)
     fleet.assert_left_alone_after(uav, HandedOver)

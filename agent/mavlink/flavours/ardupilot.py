@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from agent.mavlink.commands import result_text
 from agent.mavlink.flavours.base import SpeedParameter
 from agent.mavlink.flavours.copter import COPTER_TYPES, UNCHANGED, Copter, set_mode
 from agent.mavlink.flavours.failsafes import ARDUCOPTER_NAMES, Failsafes, arducopter_failsafes
@@ -70,6 +71,7 @@ _MODE_NAMES = {
     28: "TURTLE",
 }
 
+_RESULT_FAILED = 4
 _STATE_STANDBY = 3
 _STATE_ACTIVE = 4
 
@@ -186,6 +188,17 @@ class ArduCopter(Copter):
         a remote control (FS_OPTIONS).
         """
         del heartbeat
+        return False
+
+    def place_refusal(self, vehicle: VehicleState, result: int | None) -> str:
+        """FAILED is all that it says of a place beyond its own fence, and of little else."""
+        text = result_text(result)
+        fenced = vehicle.fence_enabled and result == _RESULT_FAILED
+        return f"{text}, probably by its own fence" if fenced else text
+
+    def ignores_target(self, text: str) -> bool:
+        """Never: what it acknowledges it flies to."""
+        del text
         return False
 
     def unready(self, vehicle: VehicleState) -> str | None:

@@ -125,6 +125,14 @@ class Flavour(Protocol):
         """Whether a failsafe acts, or is about to, that the mode does not show."""
         ...
 
+    def place_refusal(self, vehicle: VehicleState, result: int | None) -> str:
+        """Why a target or a takeoff was refused, in words, from its MAV_RESULT."""
+        ...
+
+    def ignores_target(self, text: str) -> bool:
+        """Whether the text says that a target was acknowledged and is not flown to."""
+        ...
+
     def unready(self, vehicle: VehicleState) -> str | None:
         """What keeps the vehicle from being armed, in words; None if nothing does."""
         ...

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from agent.mavlink.commands import result_text
 from agent.mavlink.flavours.base import SpeedParameter
 from agent.mavlink.flavours.copter import COPTER_TYPES, UNCHANGED, Copter, set_mode
 from agent.mavlink.flavours.failsafes import PX4_NAMES, Failsafes, px4_failsafes
@@ -68,6 +69,7 @@ target is: speed is at most (√(b² + 8·a·d) - b)/2 at a distance d from it, 
 (computeMaxSpeedFromDistance of its TrajMath.hpp)."""
 
 _STATE_STANDBY, _STATE_CRITICAL, _STATE_EMERGENCY = 3, 5, 6
+_OUTSIDE_FENCE = "outside geofence"
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_SET_MODE = 176
 _CMD_DO_REPOSITION = 192
@@ -185,6 +187,15 @@ class Px4Copter(Copter):
     def alarmed(self, heartbeat: Heartbeat) -> bool:
         """CRITICAL or EMERGENCY: PX4 warns, or holds for some seconds before it acts."""
         return heartbeat.system_status in (_STATE_CRITICAL, _STATE_EMERGENCY)
+
+    def place_refusal(self, vehicle: VehicleState, result: int | None) -> str:
+        """By the result alone: what it minds it says in words."""
+        del vehicle
+        return result_text(result)
+
+    def ignores_target(self, text: str) -> bool:
+        """One beyond its own fence: its commander acknowledges, its navigator then minds."""
+        return _OUTSIDE_FENCE in text.lower()
 
     def unready(self, vehicle: VehicleState) -> str | None:
         """Pre-arm checks, whose bit PX4 sets in the health of SYS_STATUS alone, then a position.

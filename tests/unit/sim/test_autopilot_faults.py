@@ -191,6 +191,22 @@ def test_firmware_lands_after_a_while_without_a_position_where_that_is_asked_for
     assert not ground.vehicle.pilot.armed
 
 
+def test_a_failsafe_is_told_in_the_mode_before_it_is_told_in_words() -> None:
+    ground = with_faults("failsafe-rtl@10")
+    ground.take_off(10.0)
+    before = len(ground.heard)
+    ground.wait(10.0)
+
+    told = [
+        message
+        for message in ground.heard[before:]
+        if message.get_type() == "STATUSTEXT"
+        or (message.get_type() == "HEARTBEAT" and message.custom_mode == RTL)
+    ]
+    assert told[0].get_type() == "HEARTBEAT"
+    assert "Radio Failsafe" in ground.texts()
+
+
 def test_charge_drops_to_the_stated_level_at_once() -> None:
     ground = with_faults("battery-low=0.35@10")
     ground.take_off(10.0)

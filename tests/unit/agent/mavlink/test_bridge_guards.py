@@ -14,6 +14,7 @@ from agent.vehicle import (
     Arrived,
     GoTo,
     HandedOver,
+    HandOverExplained,
     Hold,
     Home,
     Prepare,
@@ -24,7 +25,7 @@ from agent.vehicle import (
     VehicleReady,
 )
 from tests.bridge_flight import ORIGIN, START, BridgeFlight
-from tests.fake_copter import FAILED, INTERVAL, REPOSITION, SET_MODE, FakeCopter
+from tests.fake_copter import DENIED, FAILED, INTERVAL, REPOSITION, SET_MODE, FakeCopter
 from tests.fake_px4 import FakePx4
 
 Fake = type[FakeCopter]
@@ -143,6 +144,74 @@ def test_a_vehicle_that_is_no_longer_ours_is_handed_over_and_not_commanded(
     assert flight.order(order) == [Refused(order, "the vehicle is handed over")]
     flight.run(5.0)
     assert set(flight.copter.count()) <= {INTERVAL}
+
+
+@pytest.mark.parametrize(
+    ("said", "quoted"),
+    [
+        ([(4, "Battery 1 is low 10.40V used 3100 mAh"), (4, "Battery Failsafe")], -1),
+        ([(2, "EKF variance: 0.9"), (2, "EKF Failsafe: changed to LAND Mode")], -1),
+        ([(5, "Circle fence breached")], -1),
+        ([(4, "GCS Failsafe")], -1),
+        ([(4, "Radio Failsafe"), (4, "Something else")], 0),
+    ],
+)
+def test_words_that_follow_the_mode_of_a_failsafe_complete_the_reason(
+    fake: Fake, said: list[tuple[int, str]], quoted: int
+) -> None:
+    """It is handed over at once, and nothing is commanded while they are waited for."""
+    flight = flying(fake)
+    flight.copter.set_mode(fake.return_mode)
+    handed = flight.run_until(HandedOver)
+    mode, words = fake.mode_names[fake.return_mode], said[quoted][1]
+    assert handed == HandedOver(f"its pilot or a failsafe switched it to {mode}")
+    flight.run(0.1)
+    for line in said:
+        flight.copter.text(*line)
+    told_s = flight.now_s
+    explained = flight.run_until(HandOverExplained)
+    assert explained == HandOverExplained(f"a failsafe switched it to {mode} ({words})")
+    assert flight.now_s - told_s <= 0.5
+    flight.run(10.0)
+    assert len(flight.reports) == 2
+    assert set(flight.copter.count()) <= {INTERVAL}
+
+
+@pytest.mark.parametrize("text", ["", "Radio Failsafe Cleared"])
+def test_a_reason_that_nothing_is_added_to_is_told_once(fake: Fake, text: str) -> None:
+    """Nor by words that come later than half a second, or that end a failsafe."""
+    flight = flying(fake)
+    flight.copter.set_mode(fake.pilot_mode)
+    flight.run_until(HandedOver)
+    flight.run(0.6)
+    flight.copter.text(4, "Battery Failsafe")
+    flight.run(5.0)
+    assert len(flight.reports) == 1
+
+    flight = flying(fake)
+    if text:
+        flight.copter.text(4, text)
+    flight.copter.set_mode(fake.pilot_mode)
+    handed = flight.run_until(HandedOver)
+    assert isinstance(handed, HandedOver)
+    assert handed.reason.startswith("its pilot switched it to ")
+
+
+def test_an_uploads_echo_is_the_reason_of_nothing(fake: Fake) -> None:
+    flight = flying(fake)
+    flight.copter.text(2, "Auto mission changed, restarted command")
+    flight.copter.set_mode(fake.return_mode)
+    mode = fake.mode_names[fake.return_mode]
+    handed = flight.run_until(HandedOver)
+    assert handed == HandedOver(f"its pilot or a failsafe switched it to {mode}")
+
+    flight = flying(fake)
+    flight.copter.text(2, "Auto mission changed, restarted command")
+    flight.copter.verdicts[REPOSITION] = [DENIED]
+    order = GoTo(2, (0.0, 0.0, 10.0))
+    flight.order(order)
+    refused = flight.run_until(Refused)
+    assert refused == Refused(order, "the autopilot did not take the target (denied)")
 
 
 def test_a_position_that_the_estimator_does_not_trust_counts_for_none(fake: Fake) -> None:
@@ -374,13 +443,68 @@ def test_a_target_the_autopilot_refuses_is_told_with_its_own_words(fake: Fake) -
     flight = flying(fake)
     flight.copter.verdicts[REPOSITION] = [FAILED]
     order = GoTo(2, (0.0, 0.0, 10.0))
-    flight.copter.text(4, "Reposition is outside geofence")
+    flight.copter.text(4, "No terrain data there")
     flight.order(order)
     refused = flight.run_until(Refused)
     assert refused == Refused(
         order,
-        "the autopilot did not take the target (failed): Reposition is outside geofence",
+        "the autopilot did not take the target (failed): No terrain data there",
     )
+
+
+FENCE_WORDS = {
+    FakeCopter: "the autopilot did not take the target (failed, probably by its own fence)",
+    FakePx4: "the autopilot did not take the target: Reposition is outside geofence",
+}
+"""ArduCopter refuses without a word; PX4 acknowledges, and then says why it does not fly."""
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_target_beyond_the_autopilots_own_fence_is_refused_and_the_fence_named(
+    fake: Fake, moving: bool
+) -> None:
+    flight = flying(fake)
+    flight.copter.fence_radius_m = 80.0
+    flight.run(1.0)
+    if not moving:
+        flight.run_until(Arrived(1))
+    order = GoTo(2, (0.0, 100.0, 10.0))
+    ordered_s = flight.now_s
+    flight.order(order)
+    assert flight.run_until(Refused) == Refused(order, FENCE_WORDS[fake])
+    assert flight.now_s - ordered_s < 1.0
+    flight.order(GoTo(3, (0.0, 70.0, 10.0)))
+    flight.run_until(Arrived(3))
+
+
+def test_a_failure_of_a_vehicle_without_a_fence_is_not_laid_to_one(fake: Fake) -> None:
+    flight = flying(fake)
+    flight.copter.verdicts[REPOSITION] = [FAILED]
+    order = GoTo(2, (0.0, 0.0, 10.0))
+    flight.order(order)
+    refused = flight.run_until(Refused)
+    assert refused == Refused(order, "the autopilot did not take the target (failed)")
+
+
+def test_a_start_beyond_the_autopilots_own_fence_is_named(fake: Fake) -> None:
+    copter = fake(ORIGIN)
+    copter.fence_radius_m = 3.0
+    flight = BridgeFlight(copter)
+    flight.order(START)
+    assert flight.run_until(ReturnAdvised) == ReturnAdvised(FENCE_WORDS[fake])
+
+
+def test_a_return_that_is_refused_is_told_with_the_autopilots_own_words(fake: Fake) -> None:
+    flight = flying(fake)
+    flight.copter.verdicts[SET_MODE] = [FAILED] * 99
+    order = Return("mission ended")
+    flight.order(order)
+    words = "Mode change to RTL failed: in fence recovery"
+    while not any(isinstance(report, Refused) for report in flight.reports):
+        flight.copter.text(4, words)
+        flight.run(1.0)
+    refusal = f"the return mode cannot be set (failed): {words}"
+    assert flight.reports == [Refused(order, refusal)]
 
 
 def test_lost_heartbeats_are_no_silence_while_other_messages_come(fake: type[FakeCopter]) -> None:
