@@ -17,6 +17,7 @@ from sim.autopilot.events import Outbox
 from sim.autopilot.flavours.base import Flavour
 from sim.autopilot.flight import Flight
 from sim.autopilot.modes import Mode
+from sim.autopilot.params import ParameterTable
 from sim.autopilot.readiness import Readiness
 from sim.kinematics import Point
 
@@ -27,6 +28,7 @@ _Texts = list[tuple[int, str]]
 
 _PX4: _Texts = [(mavlink.MAV_SEVERITY_CRITICAL, "Failsafe activated")]
 _RADIO: _Texts = [(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe")]
+_GROUND: _Texts = [(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe")]
 _POSITION: _Texts = [(mavlink.MAV_SEVERITY_CRITICAL, "EKF Failsafe: changed to Land Mode")]
 
 
@@ -38,6 +40,7 @@ class FailSafePilot(Protocol):
     outbox: Outbox
     readiness: Readiness
     flight: Flight
+    parameters: ParameterTable
     mode: Mode
     armed: bool
 
@@ -66,22 +69,43 @@ class FailSafes:
         self._pilot = pilot
         self._battery = battery
         self._position_s: float | None = None
+        self._ground_s: dict[int, float] = {}
+        """When the heartbeat of each ground station was heard last, by system id."""
 
     def deadline_s(self) -> float | None:
         """When the firmware acts next [s]; None if not foreseen."""
-        battery_s = self._battery.deadline_s()
-        if battery_s is None or self._position_s is None:
-            return self._position_s if battery_s is None else battery_s
-        return min(battery_s, self._position_s)
+        due_s = (self._battery.deadline_s(), self._position_s, self._ground_lost_s())
+        return min((each_s for each_s in due_s if each_s is not None), default=None)
 
     def advance(self, at_s: float) -> None:
         """Act at the deadline ``at_s``."""
+        ground_s = self._ground_lost_s()
         if self._position_s is not None and self._position_s <= at_s:
             self._position_s = None
             if self._pilot.mode.needs_position:
                 self._act(Mode.LAND, _POSITION, at_s)
+        elif ground_s is not None and ground_s <= at_s:
+            self._lose_ground(at_s)
         else:
             self._protect_battery(at_s)
+
+    def hear_ground(self, system_id: int, now_s: float) -> None:
+        """A ground station is there."""
+        self._ground_s[system_id] = now_s
+
+    def _ground_lost_s(self) -> float | None:
+        lost = self._pilot.flavour.ground_lost(self._pilot.parameters)
+        if lost is None:
+            return None
+        heard_s = [at_s for system_id, at_s in self._ground_s.items() if system_id in lost.listens]
+        return max(heard_s) + lost.after_s if heard_s else None
+
+    def _lose_ground(self, at_s: float) -> None:
+        """Act once, until a ground station is heard again."""
+        lost = self._pilot.flavour.ground_lost(self._pilot.parameters)
+        self._ground_s.clear()
+        if lost is not None and self._pilot.mode not in lost.spared:
+            self._act(lost.mode, _GROUND, at_s)
 
     def lose_gps(self, now_s: float) -> None:
         """Be without a position from now on."""

@@ -123,6 +123,11 @@ class ParameterTable:
         parameter = self._table[name]
         return parameter.value * parameter.unit_si
 
+    def value(self, name: str) -> float:
+        """The value of a parameter as ground stations see it; 0 if there is none."""
+        parameter = self._table.get(name)
+        return 0.0 if parameter is None else parameter.value
+
     def write(self, name: str, value: float) -> Parameter:
         """Change a value; the parameter as it is then."""
         changed = replace(self._table[name], value=value)

@@ -101,7 +101,7 @@ class Vehicle:
         )
         self._heartbeat_s = now_s
         self._handlers: dict[int, _Handler] = {
-            mavlink.MAVLINK_MSG_ID_HEARTBEAT: lambda _message, _sender, _now_s: None,
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat,
             mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._on_command,
             mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._on_command,
             mavlink.MAVLINK_MSG_ID_SET_MODE: self._on_set_mode,
@@ -226,6 +226,10 @@ class Vehicle:
             said = self._outbox.take()
             self._reboot(now_s)
             self._outbox.put(said)
+
+    def _on_heartbeat(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
+        if message.type == mavlink.MAV_TYPE_GCS:
+            self._pilot.failsafes.hear_ground(sender.system, now_s)
 
     def _on_command(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
         self._commands.handle(command_from_message(message), sender, now_s)

@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.flavours.base import (
+    GroundLost,
     MissionHabits,
     MissionView,
     ModeHabits,
@@ -23,11 +24,13 @@ from sim.autopilot.flavours.base import (
 )
 from sim.autopilot.modes import Mode
 from sim.autopilot.occasions import Occasion, OwnCommand, Text
-from sim.autopilot.params import Parameter, ParameterHabits, Setting
+from sim.autopilot.params import Parameter, ParameterHabits, ParameterTable, Setting
 from sim.autopilot.readiness import Stage
 
 __all__ = ["ArduCopter"]
 
+_GROUND_LOST_LANDS = (5.0, 7.0)
+"""Values of FS_GCS_ENABLE."""
 _REAL = mavlink.MAV_PARAM_TYPE_REAL32
 _INT8 = mavlink.MAV_PARAM_TYPE_INT8
 _INT16 = mavlink.MAV_PARAM_TYPE_INT16
@@ -226,6 +229,16 @@ class ArduCopter:
             Parameter("RTL_ALT", 1500.0, _INT32, Setting.RETURN_HEIGHT_M, cm, least=0.0),
             Parameter("SR0_POSITION", 0.0, _INT16, least=0.0),
         )
+
+    def ground_lost(self, parameters: ParameterTable) -> GroundLost | None:
+        """Returns, or lands; it listens to one system id, or to some next to each other."""
+        action = parameters.value("FS_GCS_ENABLE")
+        if not action:
+            return None
+        lowest = int(parameters.value("SYSID_MYGCS" if self._old_names else "MAV_GCS_SYSID"))
+        highest = max(lowest, int(parameters.value("MAV_GCS_SYSID_HI")))
+        mode = Mode.LAND if action in _GROUND_LOST_LANDS else Mode.RTL
+        return GroundLost(mode, parameters.value("FS_GCS_TIMEOUT"), range(lowest, highest + 1))
 
     def disarm_delay(self, mode: Mode) -> Setting | None:
         """At once where the mode was to land; otherwise as after arming."""

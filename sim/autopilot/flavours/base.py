@@ -12,7 +12,7 @@ from typing import Protocol
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.modes import Mode
 from sim.autopilot.occasions import Occasion, OwnCommand, Text
-from sim.autopilot.params import Parameter, ParameterHabits, Setting
+from sim.autopilot.params import Parameter, ParameterHabits, ParameterTable, Setting
 from sim.autopilot.readiness import Stage
 
 __all__ = ["Flavour", "MissionHabits", "MissionView", "ModeHabits", "Refusals", "Sensors"]
@@ -113,6 +113,19 @@ class Sensors:
     health: int
 
 
+@dataclass(frozen=True, slots=True)
+class GroundLost:
+    """What the firmware does when it hears no ground station any more."""
+
+    mode: Mode
+    after_s: float
+    """After so long without a heartbeat [s]."""
+    listens: range
+    """To the system ids of those."""
+    spared: frozenset[Mode] = frozenset()
+    """Modes in which it does nothing."""
+
+
 class Flavour(Protocol):
     """Numbers, names and habits of one firmware."""
 
@@ -163,6 +176,10 @@ class Flavour(Protocol):
 
     def parameters(self, config: VehicleConfig) -> tuple[Parameter, ...]:
         """The parameter table at power-up; it has every `Setting` that has no default."""
+        ...
+
+    def ground_lost(self, parameters: ParameterTable) -> GroundLost | None:
+        """What it does when its ground station falls silent; None if it flies on."""
         ...
 
     def disarm_delay(self, mode: Mode) -> Setting | None:

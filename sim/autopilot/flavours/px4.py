@@ -18,6 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.flavours.base import (
+    GroundLost,
     MissionHabits,
     MissionView,
     ModeHabits,
@@ -26,7 +27,7 @@ from sim.autopilot.flavours.base import (
 )
 from sim.autopilot.modes import Mode
 from sim.autopilot.occasions import Occasion, OwnCommand, Text
-from sim.autopilot.params import Parameter, ParameterHabits, Setting
+from sim.autopilot.params import Parameter, ParameterHabits, ParameterTable, Setting
 from sim.autopilot.readiness import Stage
 
 __all__ = ["Px4"]
@@ -57,6 +58,12 @@ _HEALTHY = 0x0320C83F
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 """Told in the health bits alone."""
 
+_GROUND_LOST_MODES = {2: Mode.RTL, 3: Mode.LAND}
+"""By NAV_DLL_ACT; it holds, and falls, in other ways than are simulated."""
+_GROUND_LOST_SPARED = {1: Mode.AUTO, 2: Mode.LOITER}
+"""By bit of COM_DLL_EXCEPT."""
+_GROUND_LOST_WARNING_S = 5.0
+"""COM_FAIL_ACT_T."""
 _UNKNOWN_TOTAL = 65535
 _MISSION_MODE_ACTIVE = 1
 _MISSION_MODE_SUSPENDED = 2
@@ -232,6 +239,16 @@ class Px4:
             Parameter("RTL_RETURN_ALT", 30.0, _REAL, Setting.RETURN_HEIGHT_M, least=0.0),
             Parameter("SYS_AUTOSTART", 10040.0, _INT32, least=0.0),
         )
+
+    def ground_lost(self, parameters: ParameterTable) -> GroundLost | None:
+        """Returns, or lands, after it has warned for a while; any ground station will do."""
+        mode = _GROUND_LOST_MODES.get(int(parameters.value("NAV_DLL_ACT")))
+        if mode is None:
+            return None
+        after_s = parameters.value("COM_DL_LOSS_T") + _GROUND_LOST_WARNING_S
+        excepted = int(parameters.value("COM_DLL_EXCEPT"))
+        spared = {each for bit, each in _GROUND_LOST_SPARED.items() if excepted & bit}
+        return GroundLost(mode, after_s, range(1, 256), frozenset(spared))
 
     def disarm_delay(self, mode: Mode) -> Setting | None:
         """The same after every landing."""
