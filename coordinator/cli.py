@@ -102,6 +102,7 @@ def plan(
     """
     from json import dumps
 
+    from coordinator.briefing import FlightLayers, height_warning
     from coordinator.export import require_origin
     from coordinator.plan_report import plan_as_json, plan_table
     from coordinator.planner.exact import ProblemTooLargeError
@@ -113,6 +114,8 @@ def plan(
 
     _check_plan_options(method, plot, firmware)
     mission = load_scenario(scenario)
+    if (warning := height_warning(mission, FlightLayers())) is not None:
+        print(f"warning: {warning}", file=sys.stderr)
     if export is not None:
         require_origin(mission, str(scenario))
     clock = SystemClock()
@@ -297,7 +300,7 @@ def coordinator(
     import asyncio
     from json import dumps
 
-    from coordinator.briefing import FlightLayers
+    from coordinator.briefing import FlightLayers, height_warning
     from coordinator.core import CoordinatorCore
     from coordinator.dashboard.keeper import page_beside
     from coordinator.dashboard.place import parse_place
@@ -307,7 +310,7 @@ def coordinator(
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.clock import ScaledClock, SystemClock, incarnation
     from swarm.identity import Role
-    from swarm.log import configure_logging, identify
+    from swarm.log import configure_logging, get_logger, identify
     from swarm.model.ids import COORDINATOR
     from swarm.process import run_until_stopped
     from swarm.scenario import load_scenario
@@ -330,6 +333,9 @@ def coordinator(
         return made
 
     identify(mission=mission.name)
+    layers = FlightLayers(lowest_layer_m, layer_spacing_m)
+    if (warning := height_warning(mission, layers)) is not None:
+        get_logger(COORDINATOR).warning(warning)
 
     def core(memory: Snapshot | None, memory_age_s: float) -> CoordinatorCore:
         life = incarnation()
@@ -341,7 +347,7 @@ def coordinator(
             incarnation=life,
             timing=timing,
             start_timeout_s=start_timeout_s * max(1.0, speedup),
-            layers=FlightLayers(lowest_layer_m, layer_spacing_m),
+            layers=layers,
             memory=memory,
             memory_age_s=memory_age_s,
         )

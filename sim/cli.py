@@ -278,6 +278,7 @@ def run(
 
     from rich.console import Console
 
+    from coordinator.briefing import FlightLayers, height_warning
     from coordinator.dashboard.place import parse_place
     from coordinator.planner.plan import check_online_method
     from coordinator.recording.flight_recorder import recording_or_none, wall_ns
@@ -353,6 +354,8 @@ def run(
 
     for line in () if plain.dashboard is None else plain.dashboard.lines:
         say(line)
+    if (warning := height_warning(mission, FlightLayers())) is not None:
+        say(f"warning: {warning}")
 
     async def work(options: LaunchOptions) -> int:
         about = About(mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario))

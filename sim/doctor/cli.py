@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from sim.doctor.link import Vehicle
     from swarm.bus.config import BusConfig
     from swarm.identity import Identity
-    from swarm.model import Mission
 
 __all__ = ["doctor"]
 
@@ -189,6 +188,7 @@ async def _checks(
         read_folder,
         read_limits,
     )
+    from sim.doctor.scenario import check_scenario
     from swarm.clock import unix_s
 
     for finding in _software():
@@ -196,7 +196,7 @@ async def _checks(
     yield check_clock(read_clock())
     flown = None
     if scenario is not None:
-        flown, findings = _scenario(scenario)
+        flown, findings = check_scenario(scenario)
         for finding in findings:
             yield finding
     for finding in check_limits(read_limits(), len(flown.uavs) if flown else _DEFAULT_UAVS):
@@ -252,25 +252,6 @@ def _planned() -> Mapping[str, float]:
     mission = load_scenario(shipped_scenarios()["table-1"])
     methods = ("greedy", "exact")
     return {m: make_plan(mission, m, clock=SystemClock(), seed=0).objective for m in methods}
-
-
-def _scenario(path: Path) -> tuple[Mission | None, list[Finding]]:
-    from sim.doctor.finding import fails, fine, warns
-    from swarm.errors import InputError
-    from swarm.scenario import load_scenario
-
-    try:
-        mission = load_scenario(path)
-    except InputError as error:
-        return None, [
-            fails("scenario", f"{fault.source}: {fault.place}: {fault.problem}", fault.remedy)
-            for fault in error.faults
-        ]
-    text = f"{mission.name}: {len(mission.uavs)} UAVs, {len(mission.tasks)} tasks"
-    if mission.origin is None:
-        remedy = "give it [origin] with the place of your field before flying outdoors"
-        return mission, [warns("scenario", f"{text}, and no origin", remedy)]
-    return mission, [fine("scenario", f"{text}, D = {mission.horizon_s:g} s")]
 
 
 def _key(path: Path) -> tuple[SigningKey | None, Finding]:
