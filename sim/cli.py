@@ -371,6 +371,7 @@ def run(
                     on_frame=view.update,
                     on_log=log if verbose or kept else None,
                     recorder=recorder,
+                    on_private=lambda fault: say(f"commands do not find this run: {fault}"),
                 )
         except asyncio.CancelledError:
             console.print("interrupted: the mission was given up and every process ended")

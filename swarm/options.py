@@ -163,7 +163,8 @@ BusOption = Annotated[
         metavar="mesh|router|FILE",
         autocompletion=among("mesh", "router"),
         help="How processes reach each other: as peers, through routers, or as a Zenoh "
-        "configuration file says.",
+        "configuration file says. Those that look on or command find a 'swarm run' of this "
+        "machine by themselves where nothing is named; run names it, run:PID one of several.",
     ),
 ]
 

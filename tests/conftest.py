@@ -1,8 +1,21 @@
-"""Settings of all tests: no property test depends on how fast the machine is."""
+"""Settings of all tests: no property test depends on how fast the machine is, no run is found."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import pytest
 from hypothesis import settings
 
 settings.register_profile("any machine", settings(deadline=None))
 settings.load_profile("any machine")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def runs_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Commands of these tests find no runs of the user, nor of tests that go on beside them."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("runtime")
+        folder.chmod(0o700)
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        yield

@@ -1,30 +1,30 @@
 """Names on the bus that complete what an operator types: quickly, or not at all.
 
-A shell waits for it, so it looks for a moment only where a router accepts connections, and is
-silent about everything that is wrong. Leaves out: every other completion (swarm.complete).
+A shell waits for it, so it looks for a moment only where a run is on or a router accepts
+connections, and is silent about everything that is wrong. Leaves out: every other completion
+(swarm.complete).
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import re
-import socket
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import typer
 
 from swarm.bus.config import DEFAULT_ROUTER, DEFAULT_SECURE_ROUTER
+from swarm.bus.seat import Seat, accepts
+from swarm.errors import SwarmError
 
 if TYPE_CHECKING:
     from swarm.bus.config import BusConfig
 
 __all__ = ["complete_uav"]
 
-_DIAL_S = 0.1
 _OPEN_S = 0.5
 _LOOK_S = 0.3
-_TCP = re.compile(r"(?:tcp|tls)/(\[[^\]]+\]|[^:]+):(\d+)")
 
 
 def complete_uav(ctx: typer.Context, incomplete: str) -> list[str]:
@@ -43,28 +43,18 @@ def complete_uav(ctx: typer.Context, incomplete: str) -> list[str]:
 def _writers(ctx: typer.Context) -> set[tuple[str, str]]:
     """Mission and name of whoever shows a token; nobody where no router is at hand."""
     keys, clear = ctx.params.get("keys"), bool(ctx.params.get("unencrypted"))
-    default = DEFAULT_ROUTER if keys is None else DEFAULT_SECURE_ROUTER
-    endpoints = list(ctx.params.get("connect") or ()) or [default]
-    near = [endpoint for endpoint in endpoints if _accepts(endpoint)]
-    if not near:
-        return set()
-    from swarm.bus.seat import Seat
-    from swarm.errors import SwarmError
-
+    named = list(ctx.params.get("connect") or ())
+    seat = Seat(connect=named, keys=keys, unencrypted=clear)
     with contextlib.suppress(SwarmError, OSError):
-        return asyncio.run(_look(Seat(connect=near, keys=keys, unencrypted=clear).config()))
+        place = seat.found(ctx.params.get("mission"))
+        if place is seat:
+            default = DEFAULT_ROUTER if keys is None else DEFAULT_SECURE_ROUTER
+            near = [endpoint for endpoint in named or [default] if accepts(endpoint)]
+            if not near:
+                return set()
+            place = replace(seat, connect=near)
+        return asyncio.run(_look(place.config()))
     return set()
-
-
-def _accepts(endpoint: str) -> bool:
-    match = _TCP.fullmatch(endpoint)
-    if match is None:
-        return False
-    try:
-        socket.create_connection((match[1].strip("[]"), int(match[2])), _DIAL_S).close()
-    except OSError:
-        return False
-    return True
 
 
 async def _look(config: BusConfig) -> set[tuple[str, str]]:

@@ -106,8 +106,9 @@ def fulfil(
 
 async def _sit(wish: OperatorWish, reach: Reach) -> tuple[str, OperatorSeat]:
     """Take a seat on the bus and say what is wanted; the mission's name, and the seat."""
-    settings = reach.seat.network
-    config = reach.seat.config(mission=reach.mission, roles=(Role.OPERATOR,))
+    place = reach.seat.found(reach.mission, operator=True)
+    settings = place.network
+    config = place.config(mission=reach.mission, roles=(Role.OPERATOR,))
     clock = ScaledClock(reach.speedup)
     async with joined(reach.mission, config, reach.timeout_s) as (mission, bus):
         seat = OperatorSeat(

@@ -89,6 +89,7 @@ def record(
     configure_logging(LogLevel.ERROR)
     check_mission(mission)
     check_new_recording(file)
+    seat = seat.found(mission)
     network = seat.network
     config = seat.config(mission=mission)
     timing = network.timing.scaled(speedup)

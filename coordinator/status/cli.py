@@ -93,6 +93,7 @@ def status(
 
     configure_logging(LogLevel.ERROR)
     check_mission(mission)
+    seat = seat.found(mission)
     config = seat.config(mission=mission)
     timing = seat.network.timing.scaled(speedup)
     console, clock = Console(highlight=False), ScaledClock(speedup)

@@ -5,6 +5,7 @@ Leaves out: starting and ending them (sim.launch.run).
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -19,6 +20,7 @@ from sim.launch.handed_on import HandedOn
 from sim.launch.keys import RunKeys
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology, Topology
 from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.local_runs import LocalRun, begun
 from swarm.bus.privacy import is_loopback
 from swarm.config import Link, preset
 from swarm.identity import load_identity
@@ -176,6 +178,22 @@ class Layout:
         if (folder := self._keys_of(name)) is None:
             return BusConfig(topology, lease_s, unencrypted=self._unencrypted)
         return BusConfig(topology, lease_s, load_identity(folder, mission=self._mission.name))
+
+    @property
+    def local_run(self) -> LocalRun:
+        """How others on this machine find the run that this process starts."""
+        keys, pid = self._options.keys, os.getpid()
+        return LocalRun(
+            pid=pid,
+            begun=begun(pid),
+            mission=self._mission.name,
+            mesh=not self.routers,
+            endpoints=tuple(self._endpoints.values()),
+            link=self._options.link,
+            viewer_keys=None if keys is None else str(keys.of_onlooker(ONLOOKER).absolute()),
+            operator_keys=None if keys is None else str(keys.of_operator().absolute()),
+            unencrypted=self._unencrypted,
+        )
 
     def router(self, name: str) -> list[str]:
         """Arguments of a router's process."""

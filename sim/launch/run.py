@@ -21,6 +21,7 @@ from coordinator.recording.flight_recorder import FlightRecorder
 from sim.launch.fleet import DASHBOARD, LaunchOptions
 from sim.launch.launch import Launch, OnLog, Through
 from sim.launch.process import Child, ChildFailedError
+from swarm.bus.local_runs import announced
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.clock import ScaledClock
 from swarm.config import preset
@@ -244,6 +245,7 @@ async def open_run(
     through: Through | None = None,
     onlookers: Sequence[str] = (),
     recorder: FlightRecorder | None = None,
+    on_private: Callable[[str], object] | None = None,
 ) -> AsyncIterator[Run]:
     """Start to fly ``mission``; all processes are gone when the context ends.
 
@@ -257,6 +259,8 @@ async def open_run(
         through: see `Launch`.
         onlookers: see `Launch`.
         recorder: writes down what the onlooker hears; closed by whoever made it.
+        on_private: commands on this machine shall find the run by themselves; called with the
+            reason if they cannot. None to keep it to itself.
 
     Raises:
         ChildFailedError: a process could not be started.
@@ -273,12 +277,16 @@ async def open_run(
     )
     launch = run.launch
     run.frame()
-    try:
-        await launch.start()
-        async with _watching(run):
-            yield run
-    finally:
-        await launch.stop()
+    told = contextlib.nullcontext() if on_private is None else announced(launch.layout.local_run)
+    with told as fault:
+        if fault is not None and on_private is not None:
+            on_private(fault)
+        try:
+            await launch.start()
+            async with _watching(run):
+                yield run
+        finally:
+            await launch.stop()
 
 
 async def fly(
@@ -288,6 +296,7 @@ async def fly(
     on_frame: OnFrame,
     on_log: OnLog | None = None,
     recorder: FlightRecorder | None = None,
+    on_private: Callable[[str], object] | None = None,
 ) -> Flight:
     """Fly ``mission`` to its end; see `open_run`.
 
@@ -295,7 +304,12 @@ async def fly(
         What came of it; processes are gone by then.
     """
     async with open_run(
-        mission, options, on_frame=on_frame, on_log=on_log, recorder=recorder
+        mission,
+        options,
+        on_frame=on_frame,
+        on_log=on_log,
+        recorder=recorder,
+        on_private=on_private,
     ) as run:
         await run.finish()
     return run.flight()
