@@ -12,6 +12,7 @@ counts of an earlier life's memory (agent.recall), which of the operator's comma
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
@@ -132,6 +133,7 @@ class AgentCore:
         self._obedience = Obedience(uav, self.replica, rejoin=rejoin)
         self._solitude = Solitude(without_bus_s)
         self._pulse = Pulse(timing.pause_s)
+        self._keep_again_s = timing.recall_s / 4.0
         self._actions: list[Action] = []
         self._stage = StatusPhase.LEARNING
         self._flew_before = False
@@ -150,6 +152,9 @@ class AgentCore:
         self._finished = False
         self._deadline_s: float | None = None
         self._kept: object = None
+        self._kept_tasks = 0
+        """Of the replica's task versions, the one that is kept."""
+        self._kept_at_s = -math.inf
 
     # -- the one entry point ------------------------------------------------------
 
@@ -158,7 +163,7 @@ class AgentCore:
         self._recall.begin(now_s)
         self._learning.doubt(now_s)
         self._actions += self._learning.questions(now_s, lacking=True)
-        return self._end_step()
+        return self._end_step(now_s)
 
     def step(self, event: Event, now_s: float) -> list[Action]:
         """React to one event.
@@ -176,7 +181,7 @@ class AgentCore:
             self._handle(event, now_s)
         if not self._finished:
             self._advance(now_s)
-        return self._end_step()
+        return self._end_step(now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a `Tick` at the latest; None when it has finished."""
@@ -560,10 +565,10 @@ class AgentCore:
             note=self._speech.note[:200],
         )
 
-    def _end_step(self) -> list[Action]:
+    def _end_step(self, now_s: float) -> list[Action]:
         """What came of the step; a change worth it is kept for a later life."""
         actions, self._actions = self._actions, []
-        if self._stage is not StatusPhase.LEARNING and self._worth_keeping(actions):
+        if self._stage is not StatusPhase.LEARNING and self._worth_keeping(actions, now_s):
             actions.insert(0, Save())
         # The vehicle first: it waits, while keeping and telling take their time.
         if len(actions) > 1:
@@ -572,14 +577,27 @@ class AgentCore:
         self._pulse.promise(self._deadline_s)
         return actions
 
-    def _worth_keeping(self, actions: list[Action]) -> bool:
-        """Whether this agent has spoken, or coordinator or operator has said something new."""
-        epoch = self.replica.epoch
-        plan = None if epoch is None else (epoch.number, epoch.phase)
-        commands = tuple(self.replica.commands.values())
-        before, self._kept = self._kept, (plan, self.replica.board_version, commands)
-        said = [action.message.body for action in actions if isinstance(action, Publish)]
-        return before != self._kept or not all(isinstance(body, Status) for body in said)
+    def _worth_keeping(self, actions: list[Action], now_s: float) -> bool:
+        """Whether this agent, coordinator or operator has said something new.
+
+        What others have done follows with its next announcement, and so does all when what is
+        kept is about to grow old: each time is a write to a memory that wears out.
+        """
+        replica = self.replica
+        plan = None if replica.epoch is None else (replica.epoch.number, replica.epoch.phase)
+        commands, own = tuple(replica.commands.values()), replica.heads.get(self.uav)
+        before, self._kept = self._kept, (plan, replica.board_version, commands, own)
+        worth = before != self._kept
+        if not worth and any(_is_register(action) for action in actions):
+            old = now_s - self._kept_at_s >= self._keep_again_s
+            worth = old or replica.task_version != self._kept_tasks
+        if worth:
+            self._kept_at_s, self._kept_tasks = now_s, replica.task_version
+        return worth
+
+
+def _is_register(action: Action) -> bool:
+    return isinstance(action, Publish) and not isinstance(action.message.body, Status)
 
 
 def _place(action: Action) -> int:

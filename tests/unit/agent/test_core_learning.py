@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from agent.events import Action
@@ -406,10 +407,34 @@ def test_its_own_words_and_the_coordinators_are_kept_and_nothing_else() -> None:
     assert saves(agent.end_mission(11.0)) == 1
 
 
-def test_what_is_kept_stays_young_as_long_as_it_lives() -> None:
-    agent = flying(entry("far", east_m=500.0))
+def saved_at_s(agent: LoneAgent, until_s: float) -> list[float]:
+    """Mission times at which it wants its memory kept, until then."""
+    times_s: list[float] = []
+    while (due_s := agent.core.next_deadline_s()) is not None and due_s < ZERO_S + until_s:
+        times_s += [agent.now_s - ZERO_S] * saves(agent.tick_when_due())
+    return times_s
 
-    assert saves(agent.run_until(100.5)) >= 100.0 / TIMING.announce_s - 1
+
+def test_what_is_kept_stays_young_and_wears_no_flash_out_while_nothing_changes() -> None:
+    agent = flying(entry("far", east_m=5000.0))
+    agent.run_until(2.0)
+
+    times_s = saved_at_s(agent, 602.0)
+    gaps_s = np.diff([2.0, *times_s, 602.0])
+    assert len(times_s) <= 4 * 10, "four times a minute"
+    assert max(gaps_s) <= TIMING.recall_s / 4 + TIMING.announce_s
+
+
+def test_what_others_have_done_is_kept_soon_but_not_each_word_for_itself() -> None:
+    theirs = [entry(f"t{n}", 9000.0 + n, number=n) for n in range(9)]
+    agent = flying(entry("far", east_m=5000.0), *theirs)
+    agent.run_until(2.0)
+    for number in range(9):
+        assert saves(agent.hear("u1", done(f"t{number}"))) == 0
+
+    times_s = saved_at_s(agent, 2.0 + 2 * TIMING.announce_s)
+    assert len(times_s) == 1
+    assert times_s[0] <= 2.0 + TIMING.announce_s
 
 
 def test_its_memory_holds_what_everyone_has_said() -> None:
