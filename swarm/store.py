@@ -73,7 +73,9 @@ class Store:
         speedup: float = 1.0,
         unix_s: Callable[[], float] = system_unix_s,
     ) -> None:
-        self.path = directory / f"{mission}.{writer}.state"
+        names = mission, writer
+        self.path = directory / ".".join((*(_without_dots(name) for name in names), "state"))
+        self._path_of_0_1_0 = directory / ".".join((*names, "state"))
         self._next = self.path.with_suffix(".next")
         self._directory = directory
         self._mission = mission
@@ -94,14 +96,15 @@ class Store:
             seal: tells whose word of all that is remembered still counts.
         """
         try:
-            data = self.path.read_bytes()
+            saved_unix_s, snapshot = self._decode(self.path.read_bytes(), seal)
         except FileNotFoundError:
-            return None
+            found = self._left_by_0_1_0(seal)
+            if found is None:
+                return None
+            saved_unix_s, snapshot = found
         except OSError as fault:
             self._set_aside(fault.strerror or str(fault))
             return None
-        try:
-            saved_unix_s, snapshot = self._decode(data, seal)
         except ValueError as fault:
             self._set_aside(str(fault))
             return None
@@ -111,6 +114,15 @@ class Store:
         age_s = max(0.0, age_s) * self._speedup
         mission_s = None if snapshot.mission_s is None else snapshot.mission_s + age_s
         return Memory(replace(snapshot, mission_s=mission_s), age_s)
+
+    def _left_by_0_1_0(self, seal: Seal | None) -> tuple[float, Snapshot] | None:
+        """What a file holds whose name does not tell whose it is, if it is of this process."""
+        if self._path_of_0_1_0 == self.path:
+            return None
+        try:
+            return self._decode(self._path_of_0_1_0.read_bytes(), seal)
+        except (OSError, ValueError):
+            return None
 
     def save(self, snapshot: Snapshot) -> None:
         """Have ``snapshot`` written, unless a newer one follows soon; returns at once."""
@@ -193,6 +205,11 @@ class Store:
         )
         with contextlib.suppress(OSError):
             self.path.replace(bad)
+
+
+def _without_dots(name: str) -> str:
+    """``name`` as one part of a file's name: a dot parts those, and no id has the sign for it."""
+    return name.replace(".", "@")
 
 
 def _encode(unix_s: float, snapshot: Snapshot) -> bytes:

@@ -62,6 +62,53 @@ def test_what_was_saved_comes_back(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+def state(mission: str, writer: str) -> Snapshot:
+    said = replace(CLAIM, mission=mission, writer=writer)
+    return Snapshot(mission, writer, 7, 40.0, (said,))
+
+
+PAIRS = [("a", "b"), ("a.b", "c"), ("a", "b.c"), ("a.b.c", "d"), ("a.b", "c.d"), ("a", "b.c.d")]
+
+
+def test_no_two_processes_share_a_file_whatever_dots_their_names_have(tmp_path: Path) -> None:
+    paths = set[Path]()
+    for mission, writer in PAIRS:
+        store = Store(tmp_path, mission, writer, unix_s=WallClock())
+        assert store.load() is None
+        store.save(state(mission, writer))
+        store.close()
+        paths.add(store.path)
+
+    assert len(paths) == len(PAIRS)
+    for mission, writer in PAIRS:
+        store = Store(tmp_path, mission, writer, unix_s=WallClock())
+        assert store.load() == Memory(state(mission, writer), 0.0)
+        store.close()
+    assert set(tmp_path.iterdir()) == paths
+
+
+def test_a_file_that_0_1_0_has_left_is_read_by_whom_it_is_of(tmp_path: Path) -> None:
+    """It put no more than a dot between two names that may have dots."""
+    store = Store(tmp_path, "a.b", "c", unix_s=WallClock())
+    store.save(state("a.b", "c"))
+    store.close()
+    store.path.rename(tmp_path / "a.b.c.state")
+
+    other = Store(tmp_path, "a", "b.c", unix_s=WallClock())
+    assert other.load() is None
+    other.save(state("a", "b.c"))
+    other.close()
+    assert not list(tmp_path.glob("*.bad"))
+
+    again = Store(tmp_path, "a.b", "c", unix_s=WallClock())
+    assert again.load() == Memory(state("a.b", "c"), 0.0)
+    again.save(replace(state("a.b", "c"), mission_s=50.0))
+    again.close()
+    last = Store(tmp_path, "a.b", "c", unix_s=WallClock())
+    assert last.load() == Memory(replace(state("a.b", "c"), mission_s=50.0), 0.0)
+    last.close()
+
+
 def test_mission_time_goes_on_while_nobody_runs(tmp_path: Path) -> None:
     wall = WallClock()
     saved(tmp_path, SNAPSHOT, wall=wall)
