@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from swarm.wire.messages import MAX_COUNT, Body, Message, Stamp
+from swarm.wire.codec import encode
+from swarm.wire.messages import MAX_COUNT, Body, Choice, Message, Stamp, Status, as_heard
 
 __all__ = ["Voice"]
 
@@ -21,13 +22,17 @@ class Voice:
         return self._stamp.incarnation
 
     def say(self, body: Body) -> Message:
-        """``body`` as this writer's newest statement."""
+        """``body`` as this writer's newest statement; a register with its bytes.
+
+        Those are wanted again and again: repeated, in answers, in digests, on the disk.
+        """
         incarnation, counter = self._stamp.incarnation, self._stamp.counter
         if counter < MAX_COUNT:
             self._stamp = Stamp(incarnation, counter + 1)
         elif incarnation < MAX_COUNT:
             self._stamp = Stamp(incarnation + 1, 1)
-        return Message(self.mission, self.writer, self._stamp, body)
+        message = Message(self.mission, self.writer, self._stamp, body)
+        return message if isinstance(body, Status | Choice) else as_heard(message, encode(message))
 
     def outdo(self, heard: Stamp) -> bool:
         """Speak above ``heard``, which others remember of an earlier life of this writer.

@@ -30,7 +30,6 @@ from swarm.wire.messages import (
     StartWithout,
     Status,
     TaskOrder,
-    as_heard,
 )
 
 __all__ = [
@@ -78,13 +77,12 @@ LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
 def encode(what: Message | Snapshot) -> bytes:
     """The bytes of a message or snapshot, as a bus without keys carries them.
 
-    A message that was heard gives the very bytes that were heard.
+    A message that was heard gives the very bytes that were heard, and so does one that is kept.
+    Nothing is written into it, so any thread may encode what another one has.
     """
     if isinstance(what, Snapshot):
         return snapshot_bytes(what, [encode(message) for message in what.messages])
-    if what.said is None:
-        as_heard(what, _message_bytes(what))
-    return what.said or b""
+    return _message_bytes(what) if what.said is None else what.said
 
 
 def encode_memory(snapshot: Snapshot) -> bytes:

@@ -384,8 +384,9 @@ class Message:
     key: str = field(init=False, repr=False, compare=False)
     """The one key on which it may be said; names its register."""
     said: bytes | None = field(init=False, default=None, repr=False, compare=False)
-    """The very bytes that were heard, what this release does not understand among them; None
-    for what was made here. Copies made by `dataclasses.replace` say something else: None."""
+    """The very bytes that were heard, what this release does not understand among them, or that
+    were made here of a register; None for what is said once. Copies made by
+    `dataclasses.replace` say something else: None."""
     envelope: bytes | None = field(init=False, default=None, repr=False, compare=False)
     """Those bytes with their writer's signature, where the bus has keys; see swarm.wire.seal."""
 
@@ -406,7 +407,11 @@ class Snapshot:
 
 
 def as_heard(message: Message, said: bytes, envelope: bytes | None = None) -> Message:
-    """``message``, just made of these bytes, so that it can be repeated exactly."""
+    """``message``, just made of these bytes, so that it can be repeated exactly.
+
+    For who makes a message, before anybody else has it; and for the one thread that publishes,
+    which adds the envelope, whose bytes were there before.
+    """
     object.__setattr__(message, "said", said)
     object.__setattr__(message, "envelope", envelope)
     return message

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from swarm.state.voice import Voice
 from swarm.wire.codec import Codec, encode
 from swarm.wire.messages import MAX_COUNT, Stamp
-from tests.builders import IDLE, MISSION
+from tests.builders import IDLE, MISSION, message, status
 from tests.message_strategies import stamps
 
 LARGEST = Stamp(MAX_COUNT, MAX_COUNT)
@@ -21,6 +21,14 @@ def test_every_statement_is_later_than_the_one_before() -> None:
     said = [voice.say(IDLE).stamp for _ in range(3)]
 
     assert said == [Stamp(5, 1), Stamp(5, 2), Stamp(5, 3)]
+
+
+def test_a_register_is_said_with_its_bytes_which_are_wanted_again_and_again() -> None:
+    voice = Voice(MISSION, "u0", 5)
+
+    claim, news = voice.say(IDLE), voice.say(status())
+    assert claim.said == encode(claim) == encode(message("u0", IDLE, 1, 5))
+    assert news.said is None
 
 
 @given(stamps)

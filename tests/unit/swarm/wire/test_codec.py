@@ -22,6 +22,7 @@ from swarm.wire.codec import (
     SNAPSHOT_LIMIT_BYTES,
     Codec,
     encode,
+    encode_memory,
     fit,
 )
 from swarm.wire.keys import Keys
@@ -105,6 +106,15 @@ def test_every_snapshot_comes_back_as_it_was_said(
 
     assert codec.decode_snapshot(Keys(MISSION).state("u0"), encode(snapshot)) == snapshot
     assert codec.dropped.total() == 0
+
+
+@given(messages())
+def test_encoding_writes_nothing_into_what_it_encodes(said: Message) -> None:
+    """The thread that writes the state file encodes what another one may be sealing."""
+    encode(Snapshot(MISSION, "u0", 1, None, (said,)))
+    encode_memory(Snapshot(MISSION, "u0", 1, None, (said,)))
+
+    assert (encode(said), said.said, said.envelope) == (encode(said), None, None)
 
 
 def test_whole_numbers_are_taken_for_measures() -> None:
