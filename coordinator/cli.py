@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 
 __all__ = ["coordinator", "plan"]
 
-_BOUND_S = 3.0
-"""Time `plan` spends on an upper bound [s]."""
+_BOUND_S, _BOUND_FRAC = 3.0, 0.25
+"""Time `plan` spends on an upper bound [s], and the most of its limit that it keeps for that."""
 
 
 def plan(
@@ -92,7 +92,8 @@ def plan(
     """Compute the priority sequence, and the task lists it leads to.
 
     Tasks that appear later are unknown to a plan. The same seed gives the same plan,
-    unless --time-limit-s cuts the search short. Ctrl-C ends the search with the best so far.
+    unless --time-limit-s cuts the search short. That limit holds for all but drawing and exporting:
+    reading, searching and the bound. Ctrl-C ends the search with the best so far.
 
     Examples:
         swarm plan table-1
@@ -100,6 +101,11 @@ def plan(
         swarm plan valley-survey --method guided --export plans
         swarm plan table-1 --method exact --json
     """
+    from swarm.clock import SystemClock
+
+    clock = SystemClock()
+    begin_s = clock.now_s()
+
     from json import dumps
 
     from coordinator.briefing import FlightLayers, height_warning
@@ -108,7 +114,6 @@ def plan(
     from coordinator.planner.exact import ProblemTooLargeError
     from coordinator.planner.plan import make_plan
     from coordinator.planner.stop import after_time, first_of
-    from swarm.clock import SystemClock
     from swarm.process import EXIT_INTERRUPTED
     from swarm.scenario import load_scenario
 
@@ -118,10 +123,9 @@ def plan(
         print(f"warning: {warning}", file=sys.stderr)
     if export is not None:
         require_origin(mission, str(scenario))
-    clock = SystemClock()
     try:
         with _searching() as (interrupted, progress):
-            limit = None if time_limit_s is None else after_time(clock, time_limit_s)
+            limit = None if time_limit_s is None else after_time(clock, time_limit_s, begin_s)
             result = make_plan(
                 mission,
                 method,
@@ -130,6 +134,7 @@ def plan(
                 stop=interrupted if limit is None else first_of(limit, interrupted),
                 progress=progress,
                 bound_s=_BOUND_S if bound else None,
+                bound_frac=min(_BOUND_FRAC, _BOUND_S / time_limit_s) if time_limit_s else 0.0,
             )
             told_to_stop = interrupted(0)
     except ProblemTooLargeError as error:

@@ -127,7 +127,10 @@ def _worth(mission: Mission, plan: Plan, late: list[TaskId]) -> list[tuple[str, 
         noun = "task appears" if pop_ups == 1 else "tasks appear"
         rows.append(("pop-ups", f"{pop_ups} {noun} later and cannot be planned"))
     runs = "evaluation" if plan.evaluations == 1 else "evaluations"
-    rows.append(("search", f"{plan.evaluations} {runs}, {plan.elapsed_s:.3f} s, seed {plan.seed}"))
+    spent = f"{plan.evaluations} {runs}, {plan.elapsed_s:.3f} s, seed {plan.seed}"
+    if plan.evaluations == 0 and plan.method in ("greedy", "lookahead") and plan.completion_s:
+        spent += "; stopped in the first one, so the last decisions are greedy"
+    rows.append(("search", spent))
     return rows
 
 

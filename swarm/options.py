@@ -106,7 +106,7 @@ TimeLimitOption = Annotated[
         "--time-limit-s",
         min=0.0,
         metavar="S",
-        help="Stop searching after this many seconds and take the best so far.",
+        help="Be done after this many seconds, with the best found so far.",
         show_default=False,
     ),
 ]

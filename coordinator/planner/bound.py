@@ -30,12 +30,12 @@ from functools import partial
 
 import numpy as np
 
-from coordinator.planner.stop import ShouldStop, never
+from coordinator.planner.stop import Limit, ShouldStop, never
 from swarm.allocation.guided import route_arrays
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import FloatArray, IntArray, Problem
 from swarm.kernels.routes import TeamArrays
-from swarm.kernels.routes_bound import MOST_BUCKETS, priced_lists, shortest_leg_s
+from swarm.kernels.routes_bound import priced_lists, shortest_legs_s
 
 __all__ = ["Pricing", "UpperBound", "lagrangian_bound", "trivial_bound", "upper_bound"]
 
@@ -53,6 +53,10 @@ _OPERATIONS = 4e10
 """Of the dynamic programme in all: some 8 s on two cores."""
 _FINEST, _COARSEST = 400.0, 50.0
 """Buckets up to the horizon."""
+_SHORT_FRAC = 0.1
+"""Of the tasks, those from which a leg may be below a bucket."""
+_MOST_BUCKETS = 4000.0
+"""However short legs are: with more, legs of a few buckets take most of the time."""
 _ROUNDING = 1e-9
 
 
@@ -99,22 +103,29 @@ def upper_bound(
     """The better of the trivial and the Lagrangian bound; some seconds at 50 UAVs × 500 tasks.
 
     Where the dynamic programme would take much longer only the trivial bound is given: thousands
-    of tasks, or legs that are very short against the horizon.
+    of tasks, or most legs very short against the horizon.
 
     Args:
         problem: the mission, from its start.
         lists: good ones; the better they are the sooner the prices are right.
-        should_stop: asked between cycles of price changes with the cycles made.
+        should_stop: asked between cycles of price changes with the cycles made, and about 0 every
+            few milliseconds.
         threads: at most this many; does not change the result.
     """
     trivial = trivial_bound(problem)
+    if problem.n_task < 2 or problem.n_uav == 0 or should_stop(0.0):
+        return UpperBound(trivial, "trivial", 0)
+    if _affordable_cycles(problem, _COARSEST) < _FEWEST_CYCLES:
+        return UpperBound(trivial, "trivial", 0)
     team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
     bucket_s, cycles = _affordable(problem, team)
     if cycles < _FEWEST_CYCLES:
         return UpperBound(trivial, "trivial", 0)
     known = max(0.0, evaluate(problem, lists)[0])
     price = _marginal_worth(problem, lists)
-    pricing = partial(priced_lists, bucket_s=bucket_s, threads=threads)
+    pricing = partial(
+        priced_lists, bucket_s=bucket_s, threads=threads, should_stop=lambda: should_stop(0.0)
+    )
     lowest, made = lagrangian_bound(
         team, pricing, price, cycles, known=known, should_stop=should_stop
     )
@@ -138,15 +149,15 @@ def lagrangian_bound(
     Args:
         team: mission and state.
         pricing: bounds the best lists of the active UAVs from above, given prices, and tells how
-            often some such lists visit each task.
+            often some such lists visit each task; NaN where it was told to stop.
         price: (n_task,) to begin with [value·s]; >= 0.
         cycles: over all UAVs, at most.
         known: worth of lists that are known; no bound is below it.
         expected: guess of the optimum, which scales the first step; ``known`` when None.
-        should_stop: asked between cycles with the cycles made.
+        should_stop: asked between cycles with the cycles made; along a `Limit` the steps shrink.
 
     Returns:
-        The bound [value·s], and the cycles made.
+        The bound [value·s], infinite if it was stopped before there was any, and the cycles made.
     """
     n_uav = team.mission.n_uav
     n_group = min(_GROUPS, n_uav)
@@ -154,46 +165,53 @@ def lagrangian_bound(
         replace(team, active=np.asarray(team.active) & (np.arange(n_uav) % n_group == group))
         for group in range(n_group)
     ]
-    lowest, made, stride = np.inf, 0, 0.0
+    lowest, made, first_stride = np.inf, 0, 0.0
     while True:
         if made % _BETWEEN_BOUNDS == 0 or made == cycles or should_stop(made):
             worth, visits = pricing(team, price)
+            if np.isnan(worth):
+                break
             bound = float(price.sum()) + worth
             lowest = min(lowest, bound)
             slope = 1.0 - visits
             slope[(price <= 0.0) & (slope > 0.0)] = 0.0
             square = float(slope @ slope)
             if made == 0 and square > 0.0:
-                stride = (
-                    _FIRST_STRIDE * (bound - (known if expected is None else expected)) / square
-                )
+                guess = known if expected is None else expected
+                first_stride = _FIRST_STRIDE * (bound - guess) / square
             if made == cycles or square == 0.0 or bound <= known or should_stop(made):
                 break
+        spent = should_stop.spent_frac(made) if isinstance(should_stop, Limit) else 0.0
+        shrunk: float = (_LAST_STRIDE / _FIRST_STRIDE) ** min(1.0, max(spent, made / cycles))
         for group in groups:
             _, visits = pricing(group, price)
-            price = np.maximum(0.0, price - stride * (1.0 / n_group - visits))
-        stride *= (_LAST_STRIDE / _FIRST_STRIDE) ** (1.0 / cycles)
+            price = np.maximum(0.0, price - first_stride * shrunk * (1.0 / n_group - visits))
         made += 1
     return lowest + _ROUNDING * abs(lowest), made
 
 
 def _affordable(problem: Problem, team: TeamArrays) -> tuple[float, int]:
-    """Width of buckets [s] and cycles that `_OPERATIONS` allow; 0 cycles where that is too few."""
-    shortest_s = shortest_leg_s(team)
-    if shortest_s <= 0.0 or problem.n_task < 2 or problem.n_uav == 0:
-        return 0.0, 0
+    """Width of buckets [s] and cycles that `_OPERATIONS` allow; 0 cycles where that is too few.
+
+    Tasks joined by legs below a bucket are worth to each other what all of them are worth, so most
+    legs should be longer. That a few are not costs little: what it joins are pairs.
+    """
     horizon_s = problem.horizon_s
+    short_s = max(float(np.quantile(shortest_legs_s(team), _SHORT_FRAC)), horizon_s / _MOST_BUCKETS)
     bucket_s, cycles = 0.0, 0
     for most in (_FINEST, _COARSEST):
-        bucket_s = min(shortest_s, horizon_s / most)
-        if horizon_s / bucket_s > MOST_BUCKETS:
-            return bucket_s, 0
-        each = problem.n_uav * problem.n_task**2 * (horizon_s / bucket_s / 2.0 + 10.0)
-        passes = _OPERATIONS / each
-        cycles = int(min(_MOST_CYCLES, passes * _BETWEEN_BOUNDS / (_BETWEEN_BOUNDS + 1.0) - 1.0))
+        bucket_s = min(short_s, horizon_s / most)
+        cycles = _affordable_cycles(problem, horizon_s / bucket_s)
         if cycles >= _MOST_CYCLES / 2:
             break
     return bucket_s, cycles
+
+
+def _affordable_cycles(problem: Problem, buckets: float) -> int:
+    """Cycles that `_OPERATIONS` allow with so many buckets."""
+    each = problem.n_uav * problem.n_task**2 * (buckets / 2.0 + 10.0)
+    passes = _OPERATIONS / max(1.0, each)
+    return int(min(_MOST_CYCLES, passes * _BETWEEN_BOUNDS / (_BETWEEN_BOUNDS + 1.0) - 1.0))
 
 
 def _marginal_worth(problem: Problem, lists: Sequence[Sequence[int]]) -> FloatArray:

@@ -7,7 +7,10 @@ ones. Leaves out: anything approximate.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
 
 from swarm.allocation.problem import Problem
 from swarm.errors import SwarmError
@@ -20,6 +23,7 @@ __all__ = [
     "ProblemTooLargeError",
     "estimated_s",
     "optimum",
+    "optimum_before",
     "worst_value",
 ]
 
@@ -78,7 +82,25 @@ def optimum(problem: Problem, limit_s: float = _LIMIT_S, *, threads: int | None 
     Raises:
         ProblemTooLargeError: more than `MAX_TASKS` tasks, or the estimate is above ``limit_s``.
     """
-    return _solved(problem, limit_s, worst=False, threads=threads)
+    solved = _solved(problem, limit_s, threads=threads)
+    assert solved is not None  # noqa: S101 - nobody stops it
+    return solved
+
+
+def optimum_before(
+    problem: Problem, should_stop: Callable[[], bool], *, threads: int | None = None
+) -> Optimum | None:
+    """The best lists; None if told to stop before they are proven.
+
+    Args:
+        problem: the mission.
+        should_stop: asked every few milliseconds.
+        threads: at most this many; does not change the result.
+
+    Raises:
+        ProblemTooLargeError: as `optimum`.
+    """
+    return _solved(problem, _LIMIT_S, threads=threads, should_stop=should_stop)
 
 
 def worst_value(problem: Problem, limit_s: float = _LIMIT_S) -> float:
@@ -87,18 +109,29 @@ def worst_value(problem: Problem, limit_s: float = _LIMIT_S) -> float:
     Raises:
         ProblemTooLargeError: as `optimum`.
     """
-    return _solved(problem, limit_s, worst=True).objective
+    solved = _solved(problem, limit_s, worst=True)
+    assert solved is not None  # noqa: S101 - nobody stops it
+    return solved.objective
 
 
 def _solved(
-    problem: Problem, limit_s: float, *, worst: bool, threads: int | None = None
-) -> Optimum:
+    problem: Problem,
+    limit_s: float,
+    *,
+    worst: bool = False,
+    threads: int | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Optimum | None:
     estimate_s = estimated_s(problem)
     if estimate_s > limit_s:
         raise ProblemTooLargeError(
             problem.n_uav, problem.n_task, _most_tasks(problem), estimate_s, limit_s
         )
-    objective, routes = kernel.optimum(problem.kernel, worst=worst, threads=threads)
+    objective, routes = kernel.optimum(
+        problem.kernel, worst=worst, threads=threads, should_stop=should_stop
+    )
+    if np.isnan(objective):
+        return None
     return Optimum(objective, tuple(tuple(route) for route in routes))
 
 

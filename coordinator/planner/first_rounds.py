@@ -72,7 +72,7 @@ class FirstRounds:
             most: of them.
             most_partial: of those of only some UAVs, at once.
             most_decisions: that may be needed.
-            should_stop: asked after each UAV; to stop is to find too many.
+            should_stop: asked after each decision; to stop is to find too many.
         """
         rounds: dict[FirstRound, tuple[Sequence, TaskSet]]
         rounds = {(_UNDECIDED,) * len(self._uavs): ((), 0)}
@@ -81,12 +81,15 @@ class FirstRounds:
             for first_round, (sequence, taken) in sorted(rounds.items(), key=lambda item: item[1]):
                 for place, uav in enumerate(self._uavs):
                     if first_round[place] == _UNDECIDED and not self._twin_waits(uav, sequence):
+                        known = self.decisions
                         task = self._first_task(uav, taken)
+                        if self.decisions > known and should_stop():
+                            return None
                         extended = (*first_round[:place], task, *first_round[place + 1 :])
                         if extended not in longer:
                             longer[extended] = (*sequence, uav), taken | _only(task)
                 too_many = len(longer) > most_partial or self.decisions > most_decisions
-                if too_many or should_stop():
+                if too_many or should_stop():  # decisions known already take time too
                     return None
             rounds = longer
         if len(rounds) > most:

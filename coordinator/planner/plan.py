@@ -11,12 +11,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from coordinator.planner.bound import upper_bound
-from coordinator.planner.exact import estimated_s, optimum
+from coordinator.planner.exact import Optimum, estimated_s, optimum_before
 from coordinator.planner.methods import METHODS, ONLINE_METHODS
 from coordinator.planner.routes import Progress, guided_plan
 from coordinator.planner.sequence import EXHAUSTIVE_UAVS, SearchLimits, best_sequence
-from coordinator.planner.stop import Limit, ShouldStop, after_time, never
-from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
+from coordinator.planner.stop import (
+    Limit,
+    ShouldStop,
+    after_evaluations,
+    after_time,
+    first_of,
+    never,
+    part_of,
+)
+from swarm.allocation import Problem, evaluate, rule_by_name
 from swarm.allocation.rules import EXACT_TASKS
 from swarm.clock import Clock
 from swarm.errors import Fault, InputError
@@ -27,6 +35,10 @@ __all__ = ["METHODS", "ONLINE_METHODS", "check_online_method", "make_plan"]
 
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""
+_PROOF_FRAC = 0.5
+"""Of what a limit leaves, the most that such a proof takes."""
+_INSTEAD_OF_PROOF = 4_000
+"""Iterations of ``guided`` where the proof of ``exact`` was stopped: some 20 ms."""
 _EXHAUSTIVE_DECISIONS = 3_000_000
 """Decisions all first rounds together may take to be tried one by one: some seconds."""
 _LOCAL_DECISIONS = 600_000
@@ -48,6 +60,7 @@ def make_plan(
     stop: ShouldStop | None = None,
     progress: Progress | None = None,
     bound_s: float | None = None,
+    bound_frac: float = 0.0,
     threads: int | None = None,
     modest: bool = False,
 ) -> Plan:
@@ -60,18 +73,21 @@ def make_plan(
         method: one of `METHODS`.
         clock: measures the elapsed time; nothing is decided by it.
         seed: of ``guided`` and of the local search, which only large fleets need.
-        stop: ends the search for a sequence or for lists; None means after a few seconds' worth of
-            work.
+        stop: ends planning with the best so far; None means that a search ends after a few
+            seconds' worth of work.
         progress: told the evaluations or iterations and the best J so far, again and again.
         bound_s: work out an upper bound on J for about this long where the optimum is not proven
             [s]; not at all when None.
+        bound_frac: share of a limit that is kept for that bound, within 0..1.
         threads: at most this many; as many as there are processors when None. Changes nothing but
             speed.
         modest: spend little on the search for a sequence, for studies of many missions; costs
             some 0.1 % of J at 10 × 50 and saves most of the time.
 
     Returns:
-        The plan. Its sequence is None for ``exact``, which has none.
+        The plan. Its sequence is None for ``exact``, which has none. Where the limit came before
+        the end of the very first evaluation it has 0 evaluations, and the last decisions are
+        greedy.
 
     Raises:
         ValueError: there is no such method.
@@ -81,38 +97,48 @@ def make_plan(
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
+    ends = never if stop is None else stop
+    proven = _proven(problem, method, ends, threads)
+    bounded = proven is None and bound_s is not None
+    search_ends = part_of(ends, 1.0 - bound_frac) if bounded and bound_frac > 0.0 else ends
     sequence: tuple[int, ...] | None = None
     evaluations = 0
-    proven: float | None = None
     routes: Sequence[Sequence[int]]
-    if method == "exact":
-        routes = optimum(problem, threads=threads).routes
-        proven = evaluate(problem, routes)[0]
-    elif method == "guided":
-        guided = guided_plan(problem, seed=seed, stop=stop, progress=progress, threads=threads)
-        routes, sequence, evaluations = guided.routes, guided.sequence, guided.iterations
-        if estimated_s(problem) <= _PROOF_S:
-            proven = evaluate(problem, optimum(problem, threads=threads).routes)[0]
+    if method == "exact" and proven is not None:
+        routes = proven.routes
+    elif method in ("exact", "guided"):
+        guided = guided_plan(
+            problem,
+            seed=seed,
+            stop=after_evaluations(_INSTEAD_OF_PROOF)
+            if method == "exact"
+            else None
+            if stop is None
+            else search_ends,
+            progress=progress,
+            threads=threads,
+        )
+        routes, evaluations = guided.routes, guided.iterations
+        sequence = guided.sequence if method == "guided" else None
     else:
         search = best_sequence(
             problem,
-            rule := rule_by_name(method),
+            rule_by_name(method),
             np.random.default_rng(seed),
-            never if stop is None else stop,
+            search_ends,
             limits=_limits(problem, method, stopped=isinstance(stop, Limit), modest=modest),
             progress=progress,
             threads=threads,
         )
-        sequence, evaluations = search.sequence, search.evaluations
-        routes, _ = run(problem, TeamState.at_start(problem), rank_of(sequence), rule)
-        if estimated_s(problem) <= _PROOF_S:
-            proven = evaluate(problem, optimum(problem, threads=threads).routes)[0]
+        routes, sequence, evaluations = search.routes, search.sequence, search.evaluations
     objective, completion_s = evaluate(problem, routes)
-    if proven is not None:
-        proven = max(proven, objective)  # the same lists summed in another order may be 1e-15 off
+    best: float | None = None
+    if proven is not None:  # the same lists summed in another order may be 1e-15 off
+        best = max(evaluate(problem, proven.routes)[0], objective)
     bound: float | None = None
-    if proven is None and bound_s is not None:
-        bound = upper_bound(problem, routes, after_time(clock, bound_s), threads=threads).objective
+    if bounded and bound_s is not None:
+        bound_ends = first_of(after_time(clock, bound_s), ends)
+        bound = upper_bound(problem, routes, bound_ends, threads=threads).objective
     return Plan(
         scenario=mission.name,
         method=method,
@@ -125,12 +151,22 @@ def make_plan(
             problem.task_ids[task]: float(completion_s[task]) for route in routes for task in route
         },
         sequence=None if sequence is None else tuple(problem.uav_ids[uav] for uav in sequence),
-        optimum=proven,
+        optimum=best,
         evaluations=evaluations,
         elapsed_s=clock.now_s() - begin_s,
         seed=seed,
         bound=bound,
     )
+
+
+def _proven(problem: Problem, method: str, ends: ShouldStop, threads: int | None) -> Optimum | None:
+    """The optimum where it is asked for or quickly proven; None otherwise, or if stopped."""
+    if method == "exact":
+        return optimum_before(problem, lambda: ends(0.0), threads=threads)
+    if estimated_s(problem) > _PROOF_S:
+        return None
+    proof_ends = part_of(ends, _PROOF_FRAC)
+    return optimum_before(problem, lambda: proof_ends(0.0), threads=threads)
 
 
 def check_online_method(method: str) -> None:

@@ -75,10 +75,12 @@ class SequenceSearch:
 
     sequence: Sequence
     """UAV indices, first decider first; inactive UAVs come last."""
+    routes: tuple[tuple[int, ...], ...]
+    """Task indices per UAV in order of execution: what the sequence leads to."""
     objective: float
     """Σ of eq. 1 over the decisions taken from the state on [value·s]."""
     evaluations: int
-    """Lower-level runs spent."""
+    """Lower-level runs spent; 0 if the first was stopped, whose last decisions then are greedy."""
     exhaustive: bool
     """No sequence gives a better objective."""
     interrupted: bool = False
@@ -99,15 +101,16 @@ def best_sequence(
     """Search until all first rounds are tried, or until stopped, by Ctrl-C too.
 
     Equal objectives: the sequence first in lexicographic order of UAV indices among those tried.
-    At least one sequence is always evaluated. With a large fleet the search ends by itself only
-    where it meets no new first round any more.
+    At least one sequence is always evaluated; if ``should_stop`` ends that evaluation, the
+    decisions left in it are greedy. With a large fleet the search ends by itself only where it
+    meets no new first round any more.
 
     Args:
         problem: the mission.
         rule: how UAVs decide.
         rng: moves of the local search; small fleets draw nothing from it.
         should_stop: asked again and again, also whether to stop after evaluations that are not
-            spent yet, so as to spend no more than it allows.
+            spent yet, so as to spend no more than it allows; about 0 every few milliseconds.
         state: where the team stands; at its start when None.
         limits: when to prefer the local search.
         progress: told after every batch of evaluations.
@@ -167,11 +170,19 @@ class _Search:
         self._first_rounds = FirstRounds(problem, rule, state, self.uavs, self._twins)
         self._values: dict[bytes, float] = {}
         self._best: tuple[float, Sequence] = (-np.inf, self.uavs)
+        self._lists: list[list[int]] = [[] for _ in range(problem.n_uav)]
+        self._cut = False
+        """An evaluation was stopped under way."""
 
     def result(self, *, exhaustive: bool, interrupted: bool) -> SequenceSearch:
         objective, sequence = self._best
         return SequenceSearch(
-            sequence + self._inactive, objective, self.evaluations, exhaustive, interrupted
+            sequence + self._inactive,
+            tuple(map(tuple, self._lists)),
+            objective,
+            self.evaluations,
+            exhaustive,
+            interrupted,
         )
 
     def try_each(self, sequences: Iterable[Sequence]) -> bool:
@@ -211,7 +222,9 @@ class _Search:
         """Climb by swaps and insertions, from constructed and then from disturbed sequences."""
         self._most_evaluations = np.inf if most_evaluations is None else most_evaluations
         starts = self._starts(rng)
-        values = self._values_of(starts)
+        # Where even first rounds take long, what is certain is one whole run.
+        first = self._evaluate(starts[:1]) if self._takes_long else []
+        values = self._values_of(starts, [value for value, _ in first])
         if values is None:
             return
         best_first = sorted(range(len(starts)), key=lambda i: -values[i])
@@ -254,8 +267,10 @@ class _Search:
                 if values[best] > value:
                     sequence, value, improved = near[best], values[best], True
 
-    def _values_of(self, sequences: list[Sequence]) -> list[float] | None:
-        """J of each; None if stopped before the end.
+    def _values_of(
+        self, sequences: list[Sequence], known: list[float] | None = None
+    ) -> list[float] | None:
+        """J of each, of which the first ones may be ``known``; None if stopped before the end.
 
         Evaluated once per first round; that later ties may tell sequences apart is left.
         """
@@ -263,6 +278,11 @@ class _Search:
             return None
         sequences = [self._in_twin_order(sequence) for sequence in sequences]
         keys = self._first_round_keys(sequences)
+        if keys is None:
+            if not self.evaluations:
+                self._evaluate(sequences[:1])
+            return None
+        self._values.update(zip(keys, known or (), strict=False))
         unknown = {
             key: sequence
             for key, sequence in zip(reversed(keys), reversed(sequences), strict=True)
@@ -275,8 +295,8 @@ class _Search:
         )
         return [self._values[key] for key in keys] if len(found) == len(fresh) else None
 
-    def _first_round_keys(self, sequences: list[Sequence]) -> list[bytes]:
-        """What tells apart sequences that may lead to different lists."""
+    def _first_round_keys(self, sequences: list[Sequence]) -> list[bytes] | None:
+        """What tells apart sequences that may lead to different lists; None if stopped."""
         ranks = self._ranks(sequences)
         if not self.plain:
             return [row.tobytes() for row in ranks]
@@ -284,8 +304,10 @@ class _Search:
         looks = len(ranks) * len(self.uavs) * self._looks_per_decision()
         threads = self._threads if looks > _THREAD_LOOKS else 1
         tasks = kernel.first_rounds(
-            self._problem.kernel, self._state, ranks, self._rule.code, threads
+            self._problem.kernel, self._state, ranks, self._rule.code, threads, self._is_over
         )
+        if (tasks == kernel.UNDONE).any():
+            return None
         return [row.tobytes() for row in tasks]
 
     def _ranks(self, sequences: list[Sequence]) -> IntArray:
@@ -308,19 +330,31 @@ class _Search:
             if not count:
                 break
             batch = sequences[begin : begin + count]
-            objectives, tied = kernel.evaluate_sequences(
+            runs = kernel.run_sequences(
                 self._problem.kernel,
                 self._state,
                 self._ranks(batch),
                 self._rule.code,
                 self._threads,
+                self._is_over,
             )
-            self.evaluations += count
-            for sequence, value in zip(batch, objectives.tolist(), strict=True):
+            self._cut = not runs.by_rule.all()
+            whole = int(runs.by_rule.argmin()) if self._cut else count
+            self.evaluations += whole
+            values = runs.objective.tolist()
+            # of those that were stopped only the very first one, for want of any other
+            candidates = range(whole if self.evaluations else 1)
+            best = None
+            for run in candidates:
                 best_value, best_sequence_ = self._best
+                value, sequence = values[run], batch[run]
                 if value > best_value or (value == best_value and sequence < best_sequence_):
-                    self._best = (value, sequence)
-            results += zip(objectives.tolist(), tied.tolist(), strict=True)
+                    self._best, best = (value, sequence), run
+            if best is not None:
+                self._lists = runs.lists(best, self._problem.n_uav)
+            results += zip(values[:whole], runs.tied[:whole].tolist(), strict=True)
+            if self._cut:
+                break
             if self._progress is not None:
                 self._progress(self.evaluations, self._best[0])
         return results
@@ -329,18 +363,23 @@ class _Search:
         """Evaluations to do between two questions whether to stop."""
         n_open = int(np.count_nonzero(self._state.open))
         looks = n_open * (n_open / 2 + 100.0) + 1.0
-        if self._rule.code == kernel.LOOKAHEAD and n_open > EXACT_TASKS:
+        if self._takes_long:
             looks += n_open * _LOOKAHEAD_LOOKS
         return int(min(max(_CHUNK_LOOKS / looks, 1.0), 512.0)) * self._threads
 
     def _looks_per_decision(self) -> int:
         n_open = int(np.count_nonzero(self._state.open))
-        long = self._rule.code == kernel.LOOKAHEAD and n_open > EXACT_TASKS
-        return _LOOKAHEAD_LOOKS if long else n_open
+        return _LOOKAHEAD_LOOKS if self._takes_long else n_open
+
+    @property
+    def _takes_long(self) -> bool:
+        """Whether a single decision takes some milliseconds."""
+        n_open = int(np.count_nonzero(self._state.open))
+        return self._rule.code == kernel.LOOKAHEAD and n_open > EXACT_TASKS
 
     def _allowed(self, count: int) -> int:
         """How many of the next ``count`` evaluations may be spent; the first one always."""
-        least = 0 if self.evaluations else 1
+        least = 0 if self.evaluations or self._cut else 1
         while count > least and self._stops_at(self._work() + count - 1):
             count //= 2
         return max(count, least)
@@ -349,7 +388,11 @@ class _Search:
         return work >= self._most_evaluations or self._should_stop(work)
 
     def _stopped(self) -> bool:
-        return self.evaluations > 0 and self._stops_at(self._work())
+        return self._cut or (self.evaluations > 0 and self._stops_at(self._work()))
+
+    def _is_over(self) -> bool:
+        """Whether to leave what is under way."""
+        return self._should_stop(0.0)
 
     def _work(self) -> float:
         """Evaluations spent, each first decision counting as its part of one."""

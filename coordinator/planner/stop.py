@@ -1,7 +1,8 @@
 """Limits of a search: how many evaluations, how long, or whatever the caller says.
 
-A limit is a function of the work done so far, so searches themselves read no clock. Those made
-here also say how much of them is spent, which an annealing search cools by.
+A limit is a function of the work done so far, so searches themselves read no clock. Asked about 0
+evaluations it says what is over by time alone, or by somebody's wish: that ends also what spends no
+evaluations. Those made here also say how much of them is spent, which an annealing search cools by.
 """
 
 from __future__ import annotations
@@ -11,10 +12,11 @@ from dataclasses import dataclass
 
 from swarm.clock import Clock
 
-__all__ = ["Limit", "ShouldStop", "after_evaluations", "after_time", "first_of", "never"]
+__all__ = ["Limit", "ShouldStop", "after_evaluations", "after_time", "first_of", "never", "part_of"]
 
 ShouldStop = Callable[[float], bool]
-"""Given the evaluations spent so far (a part of one counts as its part), whether to stop."""
+"""Given the evaluations spent so far (a part of one counts as its part), whether to stop; given 0,
+whether to stop whatever is going on."""
 
 
 def never(evaluations: float) -> bool:
@@ -34,6 +36,12 @@ class Limit:
         """Whether to stop."""
         return self.spent_frac(evaluations) >= 1.0
 
+    def part(self, frac: float) -> Limit:
+        """A limit that is spent when ``frac`` (> 0) of this one is."""
+        if not frac > 0.0:
+            raise ValueError(f"frac must be > 0, not {frac}")
+        return Limit(lambda evaluations: self.spent_frac(evaluations) / frac)
+
 
 def after_evaluations(limit: int) -> Limit:
     """Stop once ``limit`` (>= 1) evaluations are spent."""
@@ -42,11 +50,11 @@ def after_evaluations(limit: int) -> Limit:
     return Limit(lambda evaluations: evaluations / limit)
 
 
-def after_time(clock: Clock, limit_s: float) -> Limit:
-    """Stop ``limit_s`` (>= 0) seconds of ``clock`` from now."""
+def after_time(clock: Clock, limit_s: float, begin_s: float | None = None) -> Limit:
+    """Stop ``limit_s`` (>= 0) seconds of ``clock`` after ``begin_s``, which is now when None."""
     if not limit_s >= 0.0:
         raise ValueError(f"limit_s must be >= 0 s, not {limit_s}")
-    begin_s = clock.now_s()
+    begin_s = clock.now_s() if begin_s is None else begin_s
     end_s = begin_s + limit_s
 
     def spent_frac(evaluations: float) -> float:
@@ -55,6 +63,11 @@ def after_time(clock: Clock, limit_s: float) -> Limit:
         return 1.0 if now_s >= end_s else (now_s - begin_s) / limit_s
 
     return Limit(spent_frac)
+
+
+def part_of(stop: ShouldStop, frac: float) -> ShouldStop:
+    """``frac`` (> 0) of ``stop`` where it is a limit; else all of it."""
+    return stop.part(frac) if isinstance(stop, Limit) else stop
 
 
 def first_of(*stops: ShouldStop) -> Limit:

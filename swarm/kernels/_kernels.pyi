@@ -152,11 +152,42 @@ def run(
         NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
     rule: int,
+    should_stop: object | None = None,
 ) -> tuple[
     Annotated[NDArray[numpy.int64], dict(shape=(None,))],
     Annotated[NDArray[numpy.int64], dict(shape=(None,))],
     Annotated[NDArray[numpy.float64], dict(shape=(None,))],
     Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+]: ...
+def run_sequences(
+    problem: KernelProblem,
+    free_s: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    place_enu_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    survived: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    open: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    active: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    rank: Annotated[
+        NDArray[numpy.int64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    rule: int,
+    threads: int,
+    should_stop: object | None = None,
+) -> tuple[
+    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+    Annotated[NDArray[numpy.bool_], dict(shape=(None,))],
+    Annotated[NDArray[numpy.bool_], dict(shape=(None,))],
+    Annotated[NDArray[numpy.int64], dict(shape=(None, None))],
+    Annotated[NDArray[numpy.int64], dict(shape=(None, None))],
 ]: ...
 def evaluate_sequences(
     problem: KernelProblem,
@@ -206,13 +237,16 @@ def first_rounds(
     ],
     rule: int,
     threads: int,
+    should_stop: object | None = None,
 ) -> Annotated[NDArray[numpy.int64], dict(shape=(None, None))]: ...
 
 MOST_TASKS: int = 18
 
 MOST_UNCERTAIN_TASKS: int = 16
 
-def optimum(problem: KernelProblem, worst: bool, threads: int) -> tuple[float, list[list[int]]]: ...
+def optimum(
+    problem: KernelProblem, worst: bool, threads: int, should_stop: object | None = None
+) -> tuple[float, list[list[int]]]: ...
 def guided_choice(
     instance: RouteInstance,
     free_s: Annotated[
@@ -296,7 +330,7 @@ class RouteSearch:
         seed: int,
     ) -> None: ...
     def round(self, iterations: int, heat: float, threads: int) -> None: ...
-    def polish(self) -> None: ...
+    def polish(self, should_stop: object | None = None) -> None: ...
     def n_lane(self) -> int: ...
     def best_value(self) -> float: ...
     def best(
@@ -330,7 +364,7 @@ def improve_routes(
     Annotated[NDArray[numpy.int64], dict(shape=(None,))],
     Annotated[NDArray[numpy.int64], dict(shape=(None,))],
 ]: ...
-def shortest_leg_s(
+def shortest_legs_s(
     instance: RouteInstance,
     free_s: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
@@ -344,7 +378,7 @@ def shortest_leg_s(
     active: Annotated[
         NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
-) -> float: ...
+) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
 class Timetable:
     def __init__(
@@ -391,4 +425,5 @@ def priced_lists(
     timetable: Timetable | None,
     expansions: int,
     threads: int,
+    should_stop: object | None = None,
 ) -> tuple[float, Annotated[NDArray[numpy.int64], dict(shape=(None,))]]: ...

@@ -17,6 +17,7 @@
 #include "parallel.hpp"
 #include "problem.hpp"
 #include "tours.hpp"
+#include "watch_binding.hpp"
 
 namespace peckorder {
 
@@ -26,10 +27,12 @@ using Size = std::size_t;
 using Mask = std::uint32_t;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::int64_t kSubsetsPerStep = 8;  // of a Watch
 
 // One UAV's tours over some tasks.
 struct UavTours {
-    UavTours(const Problem& problem, int uav, double sign, const std::vector<int>& tasks) {
+    UavTours(const Problem& problem, int uav, double sign, const std::vector<int>& tasks,
+             Watch& watch) {
         const Size n = tasks.size();
         const double* start = &problem.start_m[3 * static_cast<Size>(uav)];
         std::vector<double> weight(n), survival(n), leg_s(n * n);
@@ -47,7 +50,7 @@ struct UavTours {
             }
         }
         table = std::make_unique<TourTable>(static_cast<int>(n), weight.data(), survival.data(),
-                                            leg_s.data(), problem.horizon_s);
+                                            leg_s.data(), problem.horizon_s, watch);
     }
 
     std::vector<double> completion_s;
@@ -56,7 +59,7 @@ struct UavTours {
 
 // Best worth of every subset of the universe for one UAV; -infinity where a task is beyond it.
 std::vector<double> subset_values(const Problem& problem, int uav, double sign,
-                                  const std::vector<int>& universe) {
+                                  const std::vector<int>& universe, Watch& watch) {
     std::vector<int> own;
     std::vector<Mask> bits;
     for (Size i = 0; i < universe.size(); ++i) {
@@ -65,9 +68,10 @@ std::vector<double> subset_values(const Problem& problem, int uav, double sign,
             bits.push_back(Mask{1} << i);
         }
     }
-    const UavTours tours(problem, uav, sign, own);
+    const UavTours tours(problem, uav, sign, own, watch);
+    if (watch.stopped()) return {};
     std::vector<double> inside(Size{1} << own.size());
-    tours.table->values(tours.completion_s.data(), inside.data());
+    tours.table->values(tours.completion_s.data(), inside.data(), watch);
     std::vector<double> values(Size{1} << universe.size(), -kInfinity);
     std::vector<Mask> spread(inside.size(), 0);
     for (Size s = 0; s < inside.size(); ++s) {
@@ -83,17 +87,21 @@ std::vector<double> subset_values(const Problem& problem, int uav, double sign,
 
 // For every set the best of first[set without s] + second[s] over its subsets s.
 std::vector<double> divide(const std::vector<double>& first, const std::vector<double>& second,
-                           int threads) {
+                           int threads, Watch& watch) {
     std::vector<double> best(first.size());
     parallel_for(first.size(), threads, 256, [&] {
         return [&](Size job) {
             const Mask set = static_cast<Mask>(job);
+            if (watch.stopped()) return;
+            std::int64_t looked = 0;
             double most = first[set] + second[0];
             for (Mask s = set; s; s = (s - 1) & set) {
                 const double worth = first[set ^ s] + second[s];
                 most = worth > most ? worth : most;
+                ++looked;
             }
             best[set] = most;
+            watch.stops_after(looked / kSubsetsPerStep + 1);
         };
     });
     return best;
@@ -101,7 +109,53 @@ std::vector<double> divide(const std::vector<double>& first, const std::vector<d
 
 using Lists = std::vector<std::vector<int>>;
 
-std::tuple<double, Lists> optimum(const Problem& problem, bool worst, int threads) {
+// The best lists of the tasks in the universe, and what they are worth; of no use once the watch
+// has stopped it.
+double best_lists(const Problem& problem, const std::vector<int>& universe, double sign,
+                  int threads, Watch& watch, Lists& routes) {
+    const Size n_uav = static_cast<Size>(problem.n_uav);
+    std::vector<std::vector<double>> own(n_uav), best(n_uav);
+    parallel_for(n_uav, threads, 1, [&] {
+        return [&](Size uav) {
+            own[uav] = subset_values(problem, static_cast<int>(uav), sign, universe, watch);
+        };
+    });
+    if (watch.stopped()) return 0.0;
+    best[0] = own[0];  // best[j][subset]: its worth divided among UAVs 0..j
+    for (Size j = 1; j + 1 < n_uav; ++j) best[j] = divide(best[j - 1], own[j], threads, watch);
+    double objective = 0.0;
+    Mask left = static_cast<Mask>((Size{1} << universe.size()) - 1);
+    for (Size j = n_uav; j-- > 0 && !watch.stopped();) {
+        Mask chosen = left;
+        double most_worth = j ? best[j - 1][left] + own[j][0] : best[0][left];
+        if (j) {
+            chosen = 0;
+            for (Mask s = (0 - left) & left; s; s = (s - left) & left) {
+                const double worth = best[j - 1][left ^ s] + own[j][s];
+                if (worth > most_worth) {
+                    most_worth = worth;
+                    chosen = s;
+                }
+            }
+        }
+        if (j + 1 == n_uav) objective = most_worth;
+        std::vector<int> tasks;
+        for (Size i = 0; i < universe.size(); ++i) {
+            if (chosen >> i & 1) tasks.push_back(universe[i]);
+        }
+        const UavTours tours(problem, static_cast<int>(j), sign, tasks, watch);
+        if (watch.stopped()) break;
+        const Mask all = static_cast<Mask>((Size{1} << tasks.size()) - 1);
+        for (const int place : tours.table->best_tour(all, tours.completion_s.data())) {
+            routes[j].push_back(tasks[static_cast<Size>(place)]);
+        }
+        left ^= chosen;
+    }
+    return objective;
+}
+
+std::tuple<double, Lists> optimum(const Problem& problem, bool worst, int threads,
+                                  nb::handle should_stop) {
     const double sign = worst ? -1.0 : 1.0;
     const Size n_uav = static_cast<Size>(problem.n_uav);
     std::vector<int> universe;
@@ -123,43 +177,14 @@ std::tuple<double, Lists> optimum(const Problem& problem, bool worst, int thread
     if (threads < 1 || threads > 1024) refuse("threads must be within 1..1024");
     Lists routes(n_uav);
     double objective = 0.0;
+    bool stopped = false;
     if (!universe.empty()) {
-        nb::gil_scoped_release released;
-        std::vector<std::vector<double>> own(n_uav), best(n_uav);
-        parallel_for(n_uav, threads, 1, [&] {
-            return [&](Size uav) {
-                own[uav] = subset_values(problem, static_cast<int>(uav), sign, universe);
-            };
+        PythonWatch(should_stop).released([&](Watch& watch) {
+            objective = best_lists(problem, universe, sign, threads, watch, routes);
+            stopped = watch.stopped();
         });
-        best[0] = own[0];  // best[j][subset]: its worth divided among UAVs 0..j
-        for (Size j = 1; j + 1 < n_uav; ++j) best[j] = divide(best[j - 1], own[j], threads);
-        Mask left = static_cast<Mask>((Size{1} << universe.size()) - 1);
-        for (Size j = n_uav; j-- > 0;) {
-            Mask chosen = left;
-            double most_worth = j ? best[j - 1][left] + own[j][0] : best[0][left];
-            if (j) {
-                chosen = 0;
-                for (Mask s = (0 - left) & left; s; s = (s - left) & left) {
-                    const double worth = best[j - 1][left ^ s] + own[j][s];
-                    if (worth > most_worth) {
-                        most_worth = worth;
-                        chosen = s;
-                    }
-                }
-            }
-            if (j + 1 == n_uav) objective = most_worth;
-            std::vector<int> tasks;
-            for (Size i = 0; i < universe.size(); ++i) {
-                if (chosen >> i & 1) tasks.push_back(universe[i]);
-            }
-            const UavTours tours(problem, static_cast<int>(j), sign, tasks);
-            const Mask all = static_cast<Mask>((Size{1} << tasks.size()) - 1);
-            for (const int place : tours.table->best_tour(all, tours.completion_s.data())) {
-                routes[j].push_back(tasks[static_cast<Size>(place)]);
-            }
-            left ^= chosen;
-        }
     }
+    if (stopped) return {std::numeric_limits<double>::quiet_NaN(), Lists(n_uav)};
     return {worst ? 0.0 - objective : objective, std::move(routes)};
 }
 
@@ -168,7 +193,8 @@ std::tuple<double, Lists> optimum(const Problem& problem, bool worst, int thread
 void bind_exact(nb::module_& module) {
     module.attr("MOST_TASKS") = TourTable::kMostTasks;
     module.attr("MOST_UNCERTAIN_TASKS") = TourTable::kMostUncertainTasks;
-    module.def("optimum", &optimum, nb::arg("problem"), nb::arg("worst"), nb::arg("threads"));
+    module.def("optimum", &optimum, nb::arg("problem"), nb::arg("worst"), nb::arg("threads"),
+               nb::arg("should_stop") = nb::none());
 }
 
 }  // namespace peckorder

@@ -1,6 +1,11 @@
-"""The exact optimum of eq. 1 by dynamic programming over subsets. Leaves out: limits in time."""
+"""The exact optimum of eq. 1 by dynamic programming over subsets.
+
+Leaves out: the clock, which is the caller's.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelProblem
@@ -15,7 +20,11 @@ MOST_UNCERTAIN_TASKS: int = _kernels.MOST_UNCERTAIN_TASKS
 
 
 def optimum(
-    problem: KernelProblem, *, worst: bool = False, threads: int | None = None
+    problem: KernelProblem,
+    *,
+    worst: bool = False,
+    threads: int | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> tuple[float, list[list[int]]]:
     """The best lists from the starts, or the worst, that hold all tasks some UAV is capable of.
 
@@ -26,12 +35,14 @@ def optimum(
         problem: the prepared mission.
         worst: minimise J instead.
         threads: how many work at it; as many as there are processors when None.
+        should_stop: asked every few milliseconds whether to give up.
 
     Returns:
-        J [value·s], as the dynamic programme's sums have it, and a list of task indices per UAV.
+        J [value·s], as the dynamic programme's sums have it, and a list of task indices per UAV;
+        NaN and empty lists where it was told to give up.
 
     Raises:
         ValueError: too many tasks.
     """
     count = default_threads() if threads is None else threads
-    return _kernels.optimum(problem, worst, count)
+    return _kernels.optimum(problem, worst, count, should_stop)

@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <tuple>
@@ -14,6 +15,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "parallel.hpp"
+#include "watch_binding.hpp"
 
 namespace peckorder {
 
@@ -24,6 +26,8 @@ using Size = std::size_t;
 // Larger missions let other Python threads run meanwhile; a decision of smaller ones is over sooner
 // than the lock can be handed over.
 constexpr int kBriefTasks = 2048;
+
+constexpr std::int64_t kUndone = -2;  // all along a row of first_rounds
 
 class Lease {  // a workspace for one scope
   public:
@@ -140,23 +144,23 @@ std::vector<std::pair<int, double>> valued(const Problem& problem, In<double, 1>
 
 using Run = std::tuple<Out<std::int64_t, 1>, Out<std::int64_t, 1>, Out<double, 1>, Out<double, 1>>;
 
-Run run(const Problem& problem, const Team& team, In<std::int64_t, 1> rank, int rule_code) {
+Run run(const Problem& problem, const Team& team, In<std::int64_t, 1> rank, int rule_code,
+        nb::handle should_stop) {
     const RuleCode rule = checked_rule(rule_code);
     const TeamView view = team.checked(problem);
     require_shape("rank", rank, {static_cast<Size>(problem.n_uav)});
     std::vector<std::int64_t> uavs, tasks;
     std::vector<double> completion_s, scores;
-    {
-        nb::gil_scoped_release released;
+    PythonWatch(should_stop).released([&](Watch& watch) {
         const Lease lease(problem);
-        simulate(problem, view, rank.data(), rule, true, *lease,
+        simulate(problem, view, rank.data(), rule, true, *lease, watch,
                  [&](const Decider& decider, const Choice& choice, bool) {
                      uavs.push_back(decider.uav);
                      tasks.push_back(choice.task);
                      completion_s.push_back(choice.completion_s);
                      scores.push_back(choice.score);
                  });
-    }
+    });
     return {give(std::move(uavs)), give(std::move(tasks)), give(std::move(completion_s)),
             give(std::move(scores))};
 }
@@ -173,54 +177,71 @@ struct Sequences {
     }
 };
 
-std::tuple<Out<double, 1>, Out<bool, 1>> evaluate_sequences(const Problem& problem,
-                                                            const Team& team,
-                                                            const Sequences& sequences,
-                                                            int rule_code) {
+Out<bool, 1> give_flags(std::vector<std::uint8_t>&& values) {
+    const Size count = values.size();
+    auto* kept = new std::vector<std::uint8_t>(std::move(values));
+    nb::capsule owner(kept, [](void* p) noexcept {
+        delete static_cast<std::vector<std::uint8_t>*>(p);
+    });
+    return Out<bool, 1>(kept->data(), {count}, owner);
+}
+
+using Runs = std::tuple<Out<double, 1>, Out<bool, 1>, Out<bool, 1>, Out<std::int64_t, 2>,
+                        Out<std::int64_t, 2>>;
+
+// Told to stop, it ends those under way greedily and begins no other, but always the first.
+Runs run_sequences(const Problem& problem, const Team& team, const Sequences& sequences,
+                   int rule_code, nb::handle should_stop) {
     const RuleCode rule = checked_rule(rule_code);
     const TeamView view = team.checked(problem);
     const Size count = sequences.checked(problem), n_uav = static_cast<Size>(problem.n_uav);
-    std::vector<double> objectives(count, 0.0);
-    std::vector<std::uint8_t> tied(count, 0);
-    {
-        nb::gil_scoped_release released;
+    const Size n_task = static_cast<Size>(problem.n_task);
+    std::vector<double> objectives(count, std::numeric_limits<double>::quiet_NaN());
+    std::vector<std::uint8_t> tied(count, 0), whole(count, 0);
+    std::vector<std::int64_t> uavs(count * n_task, -1), tasks(count * n_task, -1);
+    PythonWatch(should_stop).released([&](Watch& watch) {
         parallel_for(count, sequences.threads, 1, [&] {
             return [&, lease = Lease(problem)](Size job) {
+                if (job > 0 && watch.stopped()) return;
                 double objective = 0.0;
                 bool any_tie = false;
-                simulate(problem, view, sequences.rank.data() + job * n_uav, rule, true, *lease,
-                         [&](const Decider& decider, const Choice& choice, bool tie) {
-                             const double weight =
-                                 problem.weight[problem.cell(decider.uav, choice.task)];
-                             const double left_s = problem.horizon_s - choice.completion_s;
-                             objective += (decider.survived * weight) * left_s;
-                             any_tie = any_tie || tie;
-                         });
+                Size at = job * n_task;
+                whole[job] = simulate(
+                    problem, view, sequences.rank.data() + job * n_uav, rule, true, *lease, watch,
+                    [&](const Decider& decider, const Choice& choice, bool tie) {
+                        const double weight =
+                            problem.weight[problem.cell(decider.uav, choice.task)];
+                        const double left_s = problem.horizon_s - choice.completion_s;
+                        objective += (decider.survived * weight) * left_s;
+                        any_tie = any_tie || tie;
+                        uavs[at] = decider.uav;
+                        tasks[at++] = choice.task;
+                    });
                 objectives[job] = objective;
                 tied[job] = any_tie;
             };
         });
-    }
-    auto* flags = new std::vector<std::uint8_t>(std::move(tied));
-    nb::capsule owner(flags, [](void* p) noexcept {
-        delete static_cast<std::vector<std::uint8_t>*>(p);
     });
-    Out<bool, 1> given(flags->data(), {count}, owner);
-    return {give(std::move(objectives)), given};
+    const Size shape[2] = {count, n_task};
+    return {give(std::move(objectives)), give_flags(std::move(tied)), give_flags(std::move(whole)),
+            give<std::int64_t, 2>(std::move(uavs), shape),
+            give<std::int64_t, 2>(std::move(tasks), shape)};
 }
 
-// What each UAV takes first when all decide once, in the order of their ranks alone.
+// What each UAV takes first when all decide once, in the order of their ranks alone; told to stop, it
+// leaves rows undone.
 Out<std::int64_t, 2> first_rounds(const Problem& problem, const Team& team,
-                                  const Sequences& sequences, int rule_code) {
+                                  const Sequences& sequences, int rule_code,
+                                  nb::handle should_stop) {
     const RuleCode rule = checked_rule(rule_code);
     const TeamView view = team.checked(problem);
     const Size count = sequences.checked(problem), n_uav = static_cast<Size>(problem.n_uav);
-    std::vector<std::int64_t> tasks(count * n_uav, -1);
-    {
-        nb::gil_scoped_release released;
+    std::vector<std::int64_t> tasks(count * n_uav, kUndone);
+    PythonWatch(should_stop).released([&](Watch& watch) {
         parallel_for(count, sequences.threads, 16, [&] {
             using Place = std::pair<std::int64_t, int>;  // rank, then UAV
             return [&, lease = Lease(problem), order = std::vector<Place>()](Size job) mutable {
+                if (watch.stopped()) return;
                 const std::int64_t* rank = sequences.rank.data() + job * n_uav;
                 order.clear();
                 for (int uav = 0; uav < problem.n_uav; ++uav) {
@@ -229,19 +250,24 @@ Out<std::int64_t, 2> first_rounds(const Problem& problem, const Team& team,
                     }
                 }
                 std::sort(order.begin(), order.end());
+                std::vector<std::int64_t> row(n_uav, -1);
                 Workspace& workspace = *lease;
-                workspace.open.assign(problem, view.open);
+                OpenTasks& open = workspace.open;
+                open.assign(problem, view.open);
                 for (const auto& [place, uav] : order) {
                     (void)place;
-                    const Choice choice = workspace.decide(problem, workspace.open,
-                                                           view.decider(uav), rule, true);
+                    if (watch.stops_after(steps_of_decision(rule, open.size()))) return;
+                    const Choice choice =
+                        workspace.decide(problem, open, view.decider(uav), rule, true);
                     if (choice.task < 0) continue;
-                    tasks[job * n_uav + static_cast<Size>(uav)] = choice.task;
-                    workspace.open.remove_task(choice.task);
+                    row[static_cast<Size>(uav)] = choice.task;
+                    open.remove_task(choice.task);
                 }
+                std::copy(row.begin(), row.end(),
+                          tasks.begin() + static_cast<std::ptrdiff_t>(job * n_uav));
             };
         });
-    }
+    });
     return give<std::int64_t, 2>(std::move(tasks), {count, n_uav});
 }
 
@@ -257,18 +283,32 @@ void bind_lower_level(nb::module_& module) {
         "run",
         [](const Problem& problem, In<double, 1> free_s, In<double, 2> place_enu_m,
            In<double, 1> survived, In<bool, 1> open, In<bool, 1> active, In<std::int64_t, 1> rank,
-           int rule) {
-            return run(problem, {free_s, place_enu_m, survived, open, active}, rank, rule);
+           int rule, nb::handle should_stop) {
+            return run(problem, {free_s, place_enu_m, survived, open, active}, rank, rule,
+                       should_stop);
         },
         nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(), nb::arg("survived").noconvert(),
-        nb::arg("open").noconvert(), nb::arg("active").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"));
+        nb::arg("open").noconvert(), nb::arg("active").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"),
+        nb::arg("should_stop") = nb::none());
     module.def(
-        "evaluate_sequences",
+        "run_sequences",
+        [](const Problem& problem, In<double, 1> free_s, In<double, 2> place_enu_m,
+           In<double, 1> survived, In<bool, 1> open, In<bool, 1> active, In<std::int64_t, 2> rank,
+           int rule, int threads, nb::handle should_stop) {
+            return run_sequences(problem, {free_s, place_enu_m, survived, open, active},
+                                 {rank, threads}, rule, should_stop);
+        },
+        nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(), nb::arg("survived").noconvert(),
+        nb::arg("open").noconvert(), nb::arg("active").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"), nb::arg("threads"),
+        nb::arg("should_stop") = nb::none());
+    module.def(
+        "evaluate_sequences",  // as released in 0.1.0, whose sources fly with these kernels
         [](const Problem& problem, In<double, 1> free_s, In<double, 2> place_enu_m,
            In<double, 1> survived, In<bool, 1> open, In<bool, 1> active, In<std::int64_t, 2> rank,
            int rule, int threads) {
-            return evaluate_sequences(problem, {free_s, place_enu_m, survived, open, active},
-                                      {rank, threads}, rule);
+            auto runs = run_sequences(problem, {free_s, place_enu_m, survived, open, active},
+                                      {rank, threads}, rule, nb::none());
+            return std::make_tuple(std::get<0>(runs), std::get<1>(runs));
         },
         nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(), nb::arg("survived").noconvert(),
         nb::arg("open").noconvert(), nb::arg("active").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"), nb::arg("threads"));
@@ -276,12 +316,13 @@ void bind_lower_level(nb::module_& module) {
         "first_rounds",
         [](const Problem& problem, In<double, 1> free_s, In<double, 2> place_enu_m,
            In<double, 1> survived, In<bool, 1> open, In<bool, 1> active, In<std::int64_t, 2> rank,
-           int rule, int threads) {
+           int rule, int threads, nb::handle should_stop) {
             return first_rounds(problem, {free_s, place_enu_m, survived, open, active},
-                                {rank, threads}, rule);
+                                {rank, threads}, rule, should_stop);
         },
         nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(), nb::arg("survived").noconvert(),
-        nb::arg("open").noconvert(), nb::arg("active").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"), nb::arg("threads"));
+        nb::arg("open").noconvert(), nb::arg("active").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"), nb::arg("threads"),
+        nb::arg("should_stop") = nb::none());
 }
 
 }  // namespace peckorder

@@ -9,6 +9,7 @@
 
 #include "problem.hpp"
 #include "rules.hpp"
+#include "watch.hpp"
 
 namespace peckorder {
 
@@ -84,12 +85,20 @@ class Turns {
     std::vector<Turn> waiting_;  // a binary heap
 };
 
+// About how many of a Watch's steps a decision among so many open tasks is.
+inline std::int64_t steps_of_decision(RuleCode rule, std::size_t n_open) {
+    constexpr std::int64_t kLooksPerStep = 4, kTable = 50'000, kLongTour = 1'500'000;
+    if (rule == RuleCode::kGreedy) return static_cast<std::int64_t>(n_open) / kLooksPerStep + 1;
+    return n_open > kExactTasks ? kLongTour : kTable;
+}
+
 // Decide in the order of Fig. 1 until nobody has an open task it is capable of. Calls
 // took(decider, choice, tied) for each decision; tied: another UAV waited that was free at the same
-// time, and this one had decided before.
+// time, and this one had decided before. Told to stop, all decide greedily from then on, which takes
+// no time to speak of; returns whether every decision was by the rule.
 template <typename Took>
-void simulate(const Problem& problem, const TeamView& team, const std::int64_t* rank, RuleCode rule,
-              bool brief, Workspace& workspace, const Took& took) {
+bool simulate(const Problem& problem, const TeamView& team, const std::int64_t* rank, RuleCode rule,
+              bool brief, Workspace& workspace, Watch& watch, const Took& took) {
     struct Flying {
         Decider decider;
         bool decided;
@@ -104,7 +113,13 @@ void simulate(const Problem& problem, const TeamView& team, const std::int64_t* 
     }
     OpenTasks& open = workspace.open;
     open.assign(problem, team.open);
+    bool by_rule = true;
     while (!turns.empty() && !open.empty()) {
+        if (by_rule && watch.stops_after(steps_of_decision(rule, open.size()))) {
+            by_rule = false;
+            rule = RuleCode::kGreedy;
+            brief = true;
+        }
         Flying& next = fleet[static_cast<std::size_t>(turns.next())];
         Decider& decider = next.decider;
         const Choice choice = workspace.decide(problem, open, decider, rule, brief);
@@ -127,6 +142,7 @@ void simulate(const Problem& problem, const TeamView& team, const std::int64_t* 
             turns.drop_next();
         }
     }
+    return by_rule;
 }
 
 }  // namespace peckorder

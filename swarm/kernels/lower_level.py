@@ -7,7 +7,8 @@ A UAV that is free at infinity takes no decision. Leaves out: rules that are not
 from __future__ import annotations
 
 import os
-from typing import Literal, Protocol
+from collections.abc import Callable
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -20,14 +21,17 @@ __all__ = [
     "EXACT_TASKS",
     "GREEDY",
     "LOOKAHEAD",
+    "UNDONE",
     "Fields",
     "RuleCode",
+    "Runs",
     "Team",
     "decide",
     "default_threads",
     "evaluate_sequences",
     "first_rounds",
     "run",
+    "run_sequences",
     "valued",
 ]
 
@@ -43,6 +47,9 @@ LOOKAHEAD: RuleCode = 1
 
 EXACT_TASKS: int = _kernels.EXACT_TASKS
 """Lookahead is exact up to this many open tasks that the UAV is capable of."""
+
+UNDONE = -2
+"""In `first_rounds`."""
 
 Fields = tuple[int, int, float, float, float, float | None, bool, bool]
 """A decision: uav, task, decided_s, completion_s, score, second_score, certificate, exact."""
@@ -116,7 +123,11 @@ def valued(
 
 
 def run(
-    problem: KernelProblem, team: Team, rank: npt.ArrayLike, rule: RuleCode
+    problem: KernelProblem,
+    team: Team,
+    rank: npt.ArrayLike,
+    rule: RuleCode,
+    should_stop: Callable[[], bool] | None = None,
 ) -> tuple[_Ints, _Ints, _Floats, _Floats]:
     """All decisions of Fig. 1 from ``team`` on, in order.
 
@@ -125,6 +136,7 @@ def run(
         team: where the team stands; left unchanged.
         rank: (n_uav,) place of each UAV in the priority sequence; smaller decides first.
         rule: `GREEDY` or `LOOKAHEAD`.
+        should_stop: asked every few milliseconds; once it says so the decisions left are greedy.
 
     Returns:
         (k,) UAVs, (k,) the tasks they take, (k,) completion times [s], (k,) scores [value·s].
@@ -133,7 +145,7 @@ def run(
         ValueError: names the argument whose shape or numbers are wrong.
     """
     ranks = converted("rank", rank, np.int64, 1)
-    return _kernels.run(problem, *_converted(team), ranks, rule)
+    return _kernels.run(problem, *_converted(team), ranks, rule, should_stop)
 
 
 def evaluate_sequences(
@@ -159,9 +171,59 @@ def evaluate_sequences(
     Raises:
         ValueError: names the argument whose shape or numbers are wrong.
     """
+    objective, tied, *_ = run_sequences(problem, team, ranks, rule, threads)
+    return objective, tied
+
+
+class Runs(NamedTuple):
+    """Runs of the lower level, by k priority sequences."""
+
+    objective: _Floats
+    """(k,) Σ of eq. 1 over the decisions taken, added in their order [value·s]; NaN of what was
+    not begun."""
+    tied: _Bools
+    """(k,) whether the sequence mattered after the first round."""
+    by_rule: _Bools
+    """(k,) whether all decisions were taken, and by the rule."""
+    uavs: _Ints
+    """(k, n_task) who decided, in order; then -1."""
+    tasks: _Ints
+    """(k, n_task) on what."""
+
+    def lists(self, run: int, n_uav: int) -> list[list[int]]:
+        """Task indices per UAV in order of execution of one of them."""
+        routes: list[list[int]] = [[] for _ in range(n_uav)]
+        for uav, task in zip(self.uavs[run].tolist(), self.tasks[run].tolist(), strict=True):
+            if task >= 0:
+                routes[uav].append(task)
+        return routes
+
+
+def run_sequences(
+    problem: KernelProblem,
+    team: Team,
+    ranks: npt.ArrayLike,
+    rule: RuleCode,
+    threads: int | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Runs:
+    """What many priority sequences lead to; see `evaluate_sequences`.
+
+    Args:
+        problem: the prepared mission.
+        team: where the team stands; left unchanged.
+        ranks: (k, n_uav) a row for every sequence, as for `run`.
+        rule: `GREEDY` or `LOOKAHEAD`.
+        threads: how many work at it; as many as there are processors when None.
+        should_stop: asked every few milliseconds; once it says so, what is under way, and the first
+            one at any rate, ends with greedy decisions, and no other begins.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong.
+    """
     rows = converted("rank", ranks, np.int64, 2)
     count = default_threads() if threads is None else threads
-    return _kernels.evaluate_sequences(problem, *_converted(team), rows, rule, count)
+    return Runs(*_kernels.run_sequences(problem, *_converted(team), rows, rule, count, should_stop))
 
 
 def first_rounds(
@@ -170,20 +232,22 @@ def first_rounds(
     ranks: npt.ArrayLike,
     rule: RuleCode,
     threads: int | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> _Ints:
     """What each UAV takes if all active ones decide once, in the order of their ranks alone.
 
-    Arguments as for `evaluate_sequences`.
+    Arguments as for `run_sequences`.
 
     Returns:
-        (k, n_uav) task indices; -1 for UAVs that take nothing.
+        (k, n_uav) task indices; -1 for UAVs that take nothing, `UNDONE` all along the rows that it
+        was told to stop before.
 
     Raises:
         ValueError: names the argument whose shape or numbers are wrong.
     """
     rows = converted("rank", ranks, np.int64, 2)
     count = default_threads() if threads is None else threads
-    return _kernels.first_rounds(problem, *_converted(team), rows, rule, count)
+    return _kernels.first_rounds(problem, *_converted(team), rows, rule, count, should_stop)
 
 
 def _converted(team: Team) -> tuple[_Floats, _Floats, _Floats, _Bools, _Bools]:

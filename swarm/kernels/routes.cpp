@@ -6,11 +6,13 @@
 #include <utility>
 #include <vector>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "routes_binding.hpp"
 #include "routes_bound.hpp"
 #include "routes_local.hpp"
 #include "routes_team.hpp"
+#include "watch_binding.hpp"
 
 namespace nb = nanobind;
 
@@ -38,9 +40,8 @@ class BoundSearch {
     team_.round(iterations, heat, threads);
   }
 
-  void polish() {
-    const nb::gil_scoped_release released;
-    team_.polish();
+  void polish(nb::handle should_stop) {
+    PythonWatch(should_stop).released([&](Watch& watch) { team_.polish(watch); });
   }
 
   int n_lane() const { return team_.n_lane(); }
@@ -59,7 +60,7 @@ double local_search(const Instance& instance, const StartArrays& start, const Li
   const std::vector<Route> routes = lists.routes();
   for (const int uav : solution.allowed()) solution.set_route(uav, routes[uav]);
   const nb::gil_scoped_release released;
-  improve(solution);
+  improve(solution, solution.allowed());
   improved = solution.routes();
   return solution.total();
 }
@@ -94,6 +95,7 @@ void bind_routes(nb::module_& module) {
           [](BoundSearch* self, const Instance& instance, const Vector& free_s,
              const Matrix& place_m, const Vector& survived, const Mask& active,
              const Indices& flat, const Indices& offsets, const Mask& open, std::uint64_t seed) {
+            const nb::gil_scoped_release released;
             new (self) BoundSearch(instance, {free_s, place_m, survived, active}, {flat, offsets},
                                    open, seed);
           },
@@ -102,7 +104,7 @@ void bind_routes(nb::module_& module) {
           nb::arg("open"), nb::arg("seed"))
       .def("round", &BoundSearch::round, nb::arg("iterations"), nb::arg("heat"),
            nb::arg("threads"))
-      .def("polish", &BoundSearch::polish)
+      .def("polish", &BoundSearch::polish, nb::arg("should_stop") = nb::none())
       .def("n_lane", &BoundSearch::n_lane)
       .def("best_value", &BoundSearch::best_value)
       .def("best", &BoundSearch::best);
@@ -120,12 +122,16 @@ void bind_routes(nb::module_& module) {
       nb::arg("active"), nb::arg("flat"), nb::arg("offsets"));
 
   module.def(
-      "shortest_leg_s",
+      "shortest_legs_s",
       [](const Instance& instance, const Vector& free_s, const Matrix& place_m,
          const Vector& survived, const Mask& active) {
         const Start start = StartArrays{free_s, place_m, survived, active}.start(instance);
-        const nb::gil_scoped_release released;
-        return shortest_leg_s(instance, start);
+        std::vector<double> legs_s;
+        {
+          const nb::gil_scoped_release released;
+          legs_s = shortest_legs_s(instance, start);
+        }
+        return give(std::move(legs_s));
       },
       nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"));
@@ -144,22 +150,24 @@ void bind_routes(nb::module_& module) {
       "priced_lists",
       [](const Instance& instance, const Vector& free_s, const Matrix& place_m,
          const Vector& survived, const Mask& active, const Mask& open, const Vector& prices,
-         double bucket_s, const Timetable* timetable, long expansions, int threads) {
+         double bucket_s, const Timetable* timetable, long expansions, int threads,
+         nb::handle should_stop) {
         const Start start = StartArrays{free_s, place_m, survived, active}.start(instance);
         const std::vector<int> tasks = open_tasks(open);
         const std::vector<double> price = copied(prices);
         std::vector<int> visits;
         double value;
-        {
-          const nb::gil_scoped_release released;
+        PythonWatch(should_stop).released([&](Watch& watch) {
           value = priced_lists(instance, start,
-                               {tasks, price, bucket_s, timetable, expansions, threads}, visits);
-        }
+                               {tasks, price, bucket_s, timetable, expansions, threads}, visits,
+                               watch);
+        });
         return std::make_pair(value, to_array({visits.begin(), visits.end()}));
       },
       nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("bucket_s"),
-      nb::arg("timetable").none(), nb::arg("expansions"), nb::arg("threads"));
+      nb::arg("timetable").none(), nb::arg("expansions"), nb::arg("threads"),
+      nb::arg("should_stop") = nb::none());
 }
 
 }  // namespace peckorder

@@ -45,6 +45,9 @@ _LONG_LIST = 100
 """Tasks; the time of an iteration grows with the lists, so slices of longer ones are smaller."""
 _COOL_START = 0.3
 """Heat while it is unknown how long the search will be."""
+_FIRST_POLISH_FRAC, _LAST_POLISH_FRAC = 0.3, 0.05
+"""Of a limit in time, the most that local search may take before the annealing, and what is kept
+for it afterwards."""
 _ITERATIONS_FOR_FULL_HEAT = 1600.0
 """Per task; the annealing of a shorter search begins cooler, by the fourth root."""
 
@@ -180,8 +183,8 @@ def optimise_routes(
     """Lists that hold every open task some active UAV is capable of, late ones too.
 
     With ``iterations`` the result follows from the arguments alone, on every machine and with
-    any number of threads. With ``spent_frac`` it depends on how many slices fit into what is
-    spent, but for that number of slices and the fractions told it is again the same.
+    any number of threads. With ``spent_frac`` it depends on how much work fits into what is
+    spent, but for the same work and the fractions told it is again the same.
     The search works in slices of at most some 10 to 20 ms. An exception raised by a callable, such
     as KeyboardInterrupt, ends it without a result; to stop with the best lists, say 1.
 
@@ -190,7 +193,9 @@ def optimise_routes(
         seed: 0..2**64 - 1.
         iterations: removals and re-insertions in all; >= 0. Give this or ``spent_frac``.
         spent_frac: given the iterations so far, the share of the time or work that is spent; the
-            annealing cools along it and ends at 1.
+            annealing cools along it and ends at 1. What it says of 0 iterations is spent by time
+            alone, or by whoever wants an end: local search, before and after the annealing, keeps
+            to that, asking every few milliseconds.
         lists: to begin with, disjoint; tasks that are not open are dropped, missing ones added.
         progress: told the iterations so far and the best J to go after each slice.
         threads: at most this many; as many as there are processors when None.
@@ -217,7 +222,11 @@ def optimise_routes(
         np.asarray(team.open),
         seed,
     )
-    search.polish()
+
+    def time_spent_frac() -> float:
+        return 0.0 if spent_frac is None else float(spent_frac(0))
+
+    search.polish(lambda: not time_spent_frac() < _FIRST_POLISH_FRAC)
     lanes = search.n_lane()
     n_open = int(np.sum(team.open))
     length = team.mission.n_task / max(1, int(np.sum(team.active)))
@@ -225,7 +234,7 @@ def optimise_routes(
     done = 0
     while True:
         if spent_frac is not None:
-            spent = float(spent_frac(done))
+            spent = max(float(spent_frac(done)), time_spent_frac() / (1.0 - _LAST_POLISH_FRAC))
         else:
             spent = done / iterations if iterations else 1.0
         if not spent < 1.0:
@@ -238,7 +247,7 @@ def optimise_routes(
         done += now * lanes
         if progress is not None:
             progress(done, search.best_value())
-    search.polish()
+    search.polish(lambda: not time_spent_frac() < 1.0)
     return _routes(*search.best()), search.best_value()
 
 

@@ -16,6 +16,7 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kNever = -kInfinite;
 constexpr double kDown = 1.0 - 1e-12;  // rounding in a quotient must not lengthen a leg
 constexpr int kBlock = 8;              // buckets worked on side by side
+constexpr int kLegsPerStep = 4;        // of a Watch
 constexpr double kNear = 1e-5;         // of a value: as good as reached by the search
 
 // One UAV's tasks, what they are worth to it and when it can complete them, times counted from when
@@ -67,13 +68,14 @@ struct Offer {
 // afterwards as it may be.
 class RelaxedLists {
  public:
-  RelaxedLists(const Offer& offer, double bucket_s)
+  // Of no use once the watch has stopped it.
+  RelaxedLists(const Offer& offer, double bucket_s, Watch& watch)
       : offer_(offer), n_(offer.n()), bucket_s_(bucket_s) {
     double last_s = n_ == 0 ? -1.0 : *std::max_element(offer.latest_s.begin(), offer.latest_s.end());
     last_s = std::min(last_s, offer.left_s);
     last_ = offer.left_s <= 0.0 || last_s < 0.0 ? -1 : upwards(last_s);
     row_ = static_cast<std::size_t>((last_ / kBlock + 2) * kBlock);
-    if (last_ >= 0) fill();
+    if (last_ >= 0) fill(watch);
   }
 
   // Beyond it nothing can be completed; -1 if nothing can at all.
@@ -126,7 +128,7 @@ class RelaxedLists {
     return static_cast<int>(std::min(time_s / bucket_s_ / kDown, 1e6));
   }
 
-  void fill() {
+  void fill(Watch& watch) {
     opens_.resize(n_);
     closes_.resize(n_);
     for (int i = 0; i < n_; ++i) {
@@ -154,6 +156,7 @@ class RelaxedLists {
     for (int begin = last_ / kBlock * kBlock; begin >= 0; begin -= kBlock) {
       for (int i = 0; i < n_; ++i) {
         if (offer_.ends(i)) continue;
+        if (watch.stops_after(n_ / kLegsPerStep + 1)) return;
         const int* shift = &shift_[static_cast<std::size_t>(i) * n_];
         double best[kBlock] = {};
         for (int l = 0; l < n_; ++l) {
@@ -166,6 +169,7 @@ class RelaxedLists {
       for (int r = kBlock - 1; r >= 0; --r) {
         const int bucket = begin + r;
         if (bucket > last_) continue;
+        if (watch.stops_after(static_cast<std::int64_t>(short_legs.size()) / kLegsPerStep + 1)) return;
         for (const Short& leg : short_legs) {
           if (bucket + leg.shift > last_ || offer_.ends(leg.from)) continue;
           double& best = rest_[leg.from * row_ + bucket];
@@ -230,7 +234,7 @@ class RealLists {
  public:
   RealLists(const Offer& offer, const RelaxedLists& relaxed) : offer_(offer), relaxed_(relaxed) {}
 
-  double best(long expansions, std::vector<int>& list) {
+  double best(long expansions, std::vector<int>& list, Watch& watch) {
     std::vector<char> on_it(offer_.n(), 0);
     const auto mark = [&](int at, char is) {
       for (int k = at; k >= 0; k = nodes_[k].before) on_it[nodes_[k].task] = is;
@@ -246,6 +250,7 @@ class RealLists {
         return bound;
       }
       open_.pop();
+      if (watch.stops_after(offer_.n())) return 0.0;
       const Node node = nodes_[at];
       const double survived = node.survived * offer_.survival[node.task];
       mark(at, 1);
@@ -295,31 +300,33 @@ class RealLists {
 };
 
 double priced_list(const Instance& instance, const Start& start, int uav, const Pricing& pricing,
-                   std::vector<int>& list) {
+                   std::vector<int>& list, Watch& watch) {
   const Offer offer(instance, start, uav, pricing);
-  const RelaxedLists relaxed(offer, pricing.bucket_s);
-  if (relaxed.last() < 0) return 0.0;
+  watch.stops_after(static_cast<std::int64_t>(offer.n()) * offer.n() / 2);
+  const RelaxedLists relaxed(offer, pricing.bucket_s, watch);
+  if (relaxed.last() < 0 || watch.stopped()) return 0.0;
   if (pricing.expansions == 0) return relaxed.best(list);
-  return RealLists(offer, relaxed).best(pricing.expansions, list);
+  return RealLists(offer, relaxed).best(pricing.expansions, list, watch);
 }
 
 }  // namespace
 
-double shortest_leg_s(const Instance& instance, const Start& start) {
-  double shortest_s = kInfinite;
+std::vector<double> shortest_legs_s(const Instance& instance, const Start& start) {
   double least_pace = kInfinite;
   for (int uav = 0; uav < instance.n_uav(); ++uav)
     if (start.active[uav]) least_pace = std::min(least_pace, instance.pace(uav));
+  std::vector<double> shortest_s(instance.n_task(), kInfinite);
+  if (least_pace == kInfinite) return shortest_s;
   for (int a = 0; a < instance.n_task(); ++a)
     for (int b = 0; b < instance.n_task(); ++b)
       if (a != b)
-        shortest_s = std::min(shortest_s, instance.distance_m(a, b) * least_pace +
-                                              instance.service_s(b));
+        shortest_s[a] = std::min(shortest_s[a], instance.distance_m(a, b) * least_pace +
+                                                    instance.service_s(b));
   return shortest_s;
 }
 
 double priced_lists(const Instance& instance, const Start& start, const Pricing& pricing,
-                    std::vector<int>& visits) {
+                    std::vector<int>& visits, Watch& watch) {
   std::vector<int> uavs;
   for (int uav = 0; uav < instance.n_uav(); ++uav)
     if (start.active[uav]) uavs.push_back(uav);
@@ -328,7 +335,8 @@ double priced_lists(const Instance& instance, const Start& start, const Pricing&
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t k; (k = next.fetch_add(1)) < uavs.size();)
-      values[k] = priced_list(instance, start, uavs[k], pricing, lists[k]);
+      if (!watch.stopped())
+        values[k] = priced_list(instance, start, uavs[k], pricing, lists[k], watch);
   };
   std::vector<std::thread> helpers;
   for (int k = 1; k < std::min<int>(pricing.threads, static_cast<int>(uavs.size())); ++k)
@@ -336,6 +344,7 @@ double priced_lists(const Instance& instance, const Start& start, const Pricing&
   work();
   for (std::thread& helper : helpers) helper.join();
   visits.assign(instance.n_task(), 0);
+  if (watch.stopped()) return std::numeric_limits<double>::quiet_NaN();
   double sum = 0.0;
   for (std::size_t k = 0; k < uavs.size(); ++k) {
     sum += values[k];

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "routes_instance.hpp"
+#include "watch.hpp"
 
 namespace peckorder {
 
@@ -37,12 +38,13 @@ struct Pricing {
   int threads;
 };
 
-// The shortest leg any active UAV can fly, service included, also from its start [s].
-double shortest_leg_s(const Instance& instance, const Start& start);
+// Per task, the shortest leg from completing it to completing another that any active UAV can fly;
+// infinite without another task or such a UAV [s].
+std::vector<double> shortest_legs_s(const Instance& instance, const Start& start);
 
 // Σ over active UAVs of max(0, best relaxed list); visits[i] counts task i on the lists found.
-// The same for any number of threads.
+// The same for any number of threads. NaN once the watch has stopped it.
 double priced_lists(const Instance& instance, const Start& start, const Pricing& pricing,
-                    std::vector<int>& visits);
+                    std::vector<int>& visits, Watch& watch);
 
 }  // namespace peckorder

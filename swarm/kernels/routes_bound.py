@@ -12,6 +12,7 @@ Leaves out: how prices are found.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,7 +21,7 @@ import numpy.typing as npt
 from swarm.kernels import _kernels
 from swarm.kernels.routes import FloatArray, TeamArrays
 
-__all__ = ["MOST_BUCKETS", "Timetable", "priced_lists", "shortest_leg_s"]
+__all__ = ["MOST_BUCKETS", "Timetable", "priced_lists", "shortest_legs_s"]
 
 MOST_BUCKETS = 100_000
 
@@ -59,12 +60,12 @@ class Timetable:
         object.__setattr__(self, "kernel", kernel)
 
 
-def shortest_leg_s(team: TeamArrays) -> float:
-    """Least time between completing one task and another, by any active UAV [s].
+def shortest_legs_s(team: TeamArrays) -> FloatArray:
+    """(n_task,) least time from completing each task to completing another, by any active UAV [s].
 
     Infinite where there are fewer than two tasks or no active UAV.
     """
-    return _kernels.shortest_leg_s(team.mission.kernel, *team.arguments())
+    return _kernels.shortest_legs_s(team.mission.kernel, *team.arguments())
 
 
 def priced_lists(
@@ -75,6 +76,7 @@ def priced_lists(
     timetable: Timetable | None = None,
     expansions: int = 0,
     threads: int | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> tuple[float, npt.NDArray[np.int64]]:
     """Best lists of all active UAVs, each for itself, over the open tasks; relaxed ones at first.
 
@@ -89,10 +91,11 @@ def priced_lists(
         expansions: beginnings of lists that the search among real ones continues at most, per UAV;
             0: no such search.
         threads: at most this many; does not change the result.
+        should_stop: asked every few milliseconds whether to give up.
 
     Returns:
         Sum of what the lists are worth after paying, each at least 0, and (n_task,) how often each
-        task is visited by them.
+        task is visited by them; NaN and 0 where it was told to give up.
 
     Raises:
         ValueError: names the argument that is wrong.
@@ -121,6 +124,7 @@ def priced_lists(
         None if timetable is None else timetable.kernel,
         expansions,
         (os.cpu_count() or 1) if threads is None else threads,
+        should_stop,
     )
 
 

@@ -21,9 +21,10 @@ struct Change {
 
 class LocalSearch {
  public:
-  LocalSearch(Solution& solution, const std::vector<int>& uavs)
+  LocalSearch(Solution& solution, const std::vector<int>& uavs, Watch& watch)
       : solution_(solution),
         instance_(solution.instance()),
+        watch_(watch),
         uavs_(uavs),
         dirty_(instance_.n_uav(), 1) {
     if (!uavs.empty()) {
@@ -34,7 +35,7 @@ class LocalSearch {
   }
 
   void run() {
-    for (bool again = true; again;) {
+    for (bool again = true; again && !watch_.stopped();) {
       again = false;
       for (const int uav : uavs_)
         if (dirty_[uav])
@@ -54,6 +55,7 @@ class LocalSearch {
   std::vector<int> beside(int a, const std::vector<std::uint8_t>& was_dirty) const {
     std::vector<std::uint8_t> found(instance_.n_uav(), 0);
     const bool idle = solution_.route(a).empty();
+    watch_.stops_after(static_cast<long>(solution_.route(a).size()) * kNearForPair);
     for (const int task : solution_.route(a)) {
       const int most = std::min(kNearForPair, instance_.n_near());
       for (int k = 0; k < most; ++k) {
@@ -96,6 +98,7 @@ class LocalSearch {
     Change best;
     best.gain = least_;
     for (int i = 0; i + 1 < size; ++i) {
+      if (watch_.stops_after(size - i)) return false;
       const double now = worth_now(uav, i);
       Segment reversed = one(uav, route[i]);
       for (int k = i + 1; k < size; ++k) {
@@ -105,6 +108,7 @@ class LocalSearch {
     }
     // neighbouring parts [a, b) and [b, c) change places; the short one may turn round
     for (int a = 0; a + 1 < size; ++a) {
+      if (watch_.stops_after(2 * kMostMoved * (size - a))) return false;
       Segment part, turned;
       for (int b = a + 1; b < size && b - a <= kMostMoved; ++b) {
         part = join(uav, part, one(uav, route[b - 1]));
@@ -121,6 +125,7 @@ class LocalSearch {
       }
     }
     for (int c = size; c > 1; --c) {
+      if (watch_.stops_after(2 * kMostMoved * c)) return false;
       Segment part, turned;
       for (int b = c - 1; b > 0 && c - b <= kMostMoved; --b) {
         part = join(uav, one(uav, route[b]), part);
@@ -187,6 +192,7 @@ class LocalSearch {
     const int size = static_cast<int>(source.size());
     const int room = static_cast<int>(target.size());
     for (int i = 0; i < size; ++i) {
+      if (watch_.stops_after(2 * kMostMoved * (room + 1))) return;
       const double now = worth_now(from, i);
       Segment part, turned;
       for (int end = i + 1; end <= size && end - i <= kMostMoved; ++end) {
@@ -213,6 +219,7 @@ class LocalSearch {
     try_moving(a, b, best, kMoveTo);
     try_moving(b, a, best, kMoveFrom);
     for (int i = 0; i < n; ++i) {
+      if (watch_.stops_after(m + 1)) return false;
       if (!instance_.capable(b, first[i])) continue;
       const Segment given = one(b, first[i]);
       const double now = worth_now(a, i);
@@ -227,6 +234,7 @@ class LocalSearch {
     foreign_tails(a, b, tails_of_a_, able_a);
     foreign_tails(b, a, tails_of_b_, able_b);
     for (int i = able_a; i <= n; ++i) {
+      if (watch_.stops_after(m + 1)) return false;
       const double now = worth_now(a, i);
       for (int k = able_b; k <= m; ++k) {
         const double gain = worth_from(solution_, a, i, tails_of_b_[k], n) - now +
@@ -269,6 +277,7 @@ class LocalSearch {
 
   Solution& solution_;
   const Instance& instance_;
+  Watch& watch_;
   const std::vector<int> uavs_;
   std::vector<std::uint8_t> dirty_;
   double least_ = 0.0;
@@ -301,8 +310,8 @@ double worth_from(const Solution& solution, int uav, int place, const Segment& m
   return survived * worth;
 }
 
-void improve(Solution& solution, const std::vector<int>& uavs) {
-  LocalSearch(solution, uavs).run();
+void improve(Solution& solution, const std::vector<int>& uavs, Watch& watch) {
+  LocalSearch(solution, uavs, watch).run();
 }
 
 }  // namespace peckorder

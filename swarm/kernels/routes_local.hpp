@@ -7,14 +7,18 @@
 #pragma once
 
 #include "routes_solution.hpp"
+#include "watch.hpp"
 
 namespace peckorder {
 
-// Apply the best move of a list or of a pair of lists until none gains; deterministic. Only the
-// lists of `uavs`, ascending, change.
-void improve(Solution& solution, const std::vector<int>& uavs);
+// Apply the best move of a list or of a pair of lists until none gains, or until the watch stops
+// it; deterministic but for that. Only the lists of `uavs`, ascending, change.
+void improve(Solution& solution, const std::vector<int>& uavs, Watch& watch);
 
-inline void improve(Solution& solution) { improve(solution, solution.allowed()); }
+inline void improve(Solution& solution, const std::vector<int>& uavs) {
+  Watch never;
+  improve(solution, uavs, never);
+}
 
 // Worth, for `uav`, of flying `middle` from `place` on and then its own list from `next` on.
 double worth_from(const Solution& solution, int uav, int place, const Segment& middle, int next);

@@ -63,12 +63,14 @@ void TeamSearch::round(long iterations, double heat, int threads) {
   join();
 }
 
-void TeamSearch::polish() {
+void TeamSearch::polish(Watch& watch) {
   Solution solution(instance_, start_);
   for (const int uav : uavs_) solution.set_route(uav, best_[uav]);
-  improve(solution);
-  best_ = solution.routes();
+  improve(solution, uavs_, watch);
+  current_ = best_ = solution.routes();
   best_value_ = solution.total();
+  if (divided_) return;  // each round loads its lanes anew
+  for (Search& lane : lanes_) lane.load(current_, uavs_);
 }
 
 // As many UAVs to each lane, by the middles of their lists along a random direction.

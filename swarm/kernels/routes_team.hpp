@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "routes_search.hpp"
+#include "watch.hpp"
 
 namespace peckorder {
 
@@ -20,8 +21,9 @@ class TeamSearch {
   // `iterations` per lane; heat within 0..1, 1 at the beginning of the annealing, 0 at its end.
   void round(long iterations, double heat, int threads);
 
-  // Local search on the best lists, until no move gains.
-  void polish();
+  // Local search on the best lists, until no move gains or the watch stops it; the search goes on
+  // from there.
+  void polish(Watch& watch);
 
   double best_value() const { return best_value_; }
   const std::vector<Route>& best() const { return best_; }

@@ -381,8 +381,9 @@ const Workspace::Table& Workspace::table(const Problem& problem, int uav) {
         }
     }
     known.tasks = wanted;
+    Watch never;
     known.tours = std::make_unique<TourTable>(static_cast<int>(n), weight.data(), survival.data(),
-                                              leg_s.data(), problem.horizon_s);
+                                              leg_s.data(), problem.horizon_s, never);
     table_bytes_ += known.tours->bytes();
     return known;
 }

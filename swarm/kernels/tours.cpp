@@ -18,13 +18,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 TourTable::TourTable(int n, const double* weight, const double* survival, const double* leg_s,
-                     double horizon_s)
+                     double horizon_s, Watch& watch)
     : n_(n), certain_(true), horizon_s_(horizon_s), leg_s_(leg_s, leg_s + n * n) {
     for (int i = 0; i < n; ++i) certain_ = certain_ && survival[i] == 1.0;
     if (certain_) {
-        build_costs(weight);
+        build_costs(weight, watch);
     } else {
-        build_labels(weight, survival);
+        build_labels(weight, survival, watch);
     }
 }
 
@@ -33,7 +33,7 @@ std::size_t TourTable::bytes() const {
            sizeof(std::uint64_t) * offset_.size() + sizeof(Label) * labels_.size();
 }
 
-void TourTable::build_costs(const double* weight) {
+void TourTable::build_costs(const double* weight, Watch& watch) {
     const std::size_t n = static_cast<std::size_t>(n_), sets = std::size_t{1} << n_;
     total_.assign(sets, 0.0);
     for (std::size_t i = 0; i < n; ++i) {  // every sum is added in ascending order of position
@@ -47,6 +47,7 @@ void TourTable::build_costs(const double* weight) {
     cost_.assign(sets * n, kInfinity);
     std::fill(cost_.begin(), cost_.begin() + n_, 0.0);
     for (std::size_t s = 1; s < sets; ++s) {
+        if (watch.stops_after(static_cast<std::int64_t>(n * n / 8))) return;
         double* row = &cost_[s * n];
         for (std::size_t first = 0; first < n; ++first) {
             if (!(s >> first & 1)) continue;
@@ -60,7 +61,7 @@ void TourTable::build_costs(const double* weight) {
     }
 }
 
-void TourTable::build_labels(const double* weight, const double* survival) {
+void TourTable::build_labels(const double* weight, const double* survival, Watch& watch) {
     const std::size_t n = static_cast<std::size_t>(n_), sets = std::size_t{1} << n_;
     offset_.assign(sets * n + 1, 0);
     std::vector<Label> candidates;
@@ -83,6 +84,7 @@ void TourTable::build_labels(const double* weight, const double* survival) {
                                               weight[first] + survival[first] * label.slope});
                     }
                 }
+                if (watch.stops_after(static_cast<std::int64_t>(8 * candidates.size()))) return;
                 keep_envelope(candidates);
                 labels_.insert(labels_.end(), candidates.begin(), candidates.end());
             }
@@ -133,10 +135,11 @@ void TourTable::first_values(std::uint32_t mask, const double* completion_s, dou
     }
 }
 
-void TourTable::values(const double* completion_s, double* best) const {
+void TourTable::values(const double* completion_s, double* best, Watch& watch) const {
     double by_first[kMostTasks];
     best[0] = 0.0;
     for (std::uint32_t mask = 1; mask < std::uint32_t{1} << n_; ++mask) {
+        if (watch.stops_after(n_)) return;
         first_values(mask, completion_s, by_first);
         best[mask] = *std::max_element(by_first, by_first + n_);
     }
@@ -182,8 +185,9 @@ void bind_tours(nb::module_& module) {
                     refuse("weight must name at most " + std::to_string(most) + " tasks");
                 }
                 nb::gil_scoped_release released;
+                Watch never;
                 new (self) TourTable(static_cast<int>(n), weight.data(), survival.data(),
-                                     leg_s.data(), horizon_s);
+                                     leg_s.data(), horizon_s, never);
             },
             nb::arg("weight").noconvert(), nb::arg("survival").noconvert(), nb::arg("leg_s").noconvert(), nb::arg("horizon_s"))
         .def("first_values",
@@ -203,7 +207,8 @@ void bind_tours(nb::module_& module) {
                  std::vector<double> best(std::size_t{1} << n);
                  {
                      nb::gil_scoped_release released;
-                     self.values(completion_s.data(), best.data());
+                     Watch never;
+                     self.values(completion_s.data(), best.data(), never);
                  }
                  return give(std::move(best));
              },

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "watch.hpp"
+
 namespace peckorder {
 
 // For every set of tasks and every first task of it: what the rest of the best tour is worth as a
@@ -17,8 +19,9 @@ class TourTable {
 
     // weight[n]: p·m; negative ones find the worst tours. survival[n]. leg_s[n * n]: time from
     // completing i to completing j at [i * n + j].
+    // Of no use once the watch has stopped it.
     TourTable(int n, const double* weight, const double* survival, const double* leg_s,
-              double horizon_s);
+              double horizon_s, Watch& watch);
 
     int size() const { return n_; }
     std::size_t bytes() const;
@@ -28,7 +31,7 @@ class TourTable {
     void first_values(std::uint32_t mask, const double* completion_s, double* values) const;
 
     // best[1 << n]: worth of the best tour over every subset; 0 for the empty one.
-    void values(const double* completion_s, double* best) const;
+    void values(const double* completion_s, double* best, Watch& watch) const;
 
     // Positions in order of the best tour over mask.
     std::vector<int> best_tour(std::uint32_t mask, const double* completion_s) const;
@@ -38,8 +41,8 @@ class TourTable {
         double constant, slope;
     };
 
-    void build_costs(const double* weight);
-    void build_labels(const double* weight, const double* survival);
+    void build_costs(const double* weight, Watch& watch);
+    void build_labels(const double* weight, const double* survival, Watch& watch);
     static void keep_envelope(std::vector<Label>& candidates);
 
     int n_;

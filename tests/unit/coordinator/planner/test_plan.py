@@ -6,7 +6,7 @@ import pytest
 
 from coordinator.planner.exact import ProblemTooLargeError
 from coordinator.planner.plan import METHODS, make_plan
-from coordinator.planner.stop import after_evaluations
+from coordinator.planner.stop import after_evaluations, after_time
 from sim.study.generator import mission_of, random_mission
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from tests.problems import table_1_mission
@@ -130,3 +130,44 @@ def test_modest_planning_costs_little_of_the_value_and_saves_most_of_the_work() 
     modest = [make_plan(flown, "greedy", clock=TickingClock(), modest=True) for flown in missions]
     assert sum(plan.objective for plan in modest) > 0.99 * sum(p.objective for p in thorough)
     assert max(plan.evaluations for plan in modest) <= 200
+
+
+class ExpiringClock:
+    """Stands still for ``readings`` readings, then it is an hour later."""
+
+    def __init__(self, readings: int) -> None:
+        self.left = readings
+
+    def now_s(self) -> float:
+        self.left -= 1
+        return 0.0 if self.left >= 0 else 3600.0
+
+    def wall_delay_s(self, delay_s: float) -> float:
+        return delay_s
+
+
+@pytest.mark.parametrize("method", ["greedy", "lookahead", "guided"])
+@pytest.mark.parametrize("readings", [2, 10])
+def test_whatever_the_limit_strikes_all_tasks_are_on_lists_at_once(
+    method: str, readings: int
+) -> None:
+    clock = ExpiringClock(readings)
+    mission = wide_mission(6, 90)
+
+    plan = make_plan(mission, method, clock=clock, stop=after_time(clock, 60.0), bound_s=3.0)
+
+    assert len(plan.completion_s) == 90
+    assert clock.left > -60  # readings after the end: one at each place that asks, none repeated
+
+
+def test_a_proof_that_the_limit_stops_leaves_good_lists_and_no_optimum() -> None:
+    clock = ExpiringClock(3)
+
+    plan = make_plan(wide_mission(2, 16), "exact", clock=clock, stop=after_time(clock, 60.0))
+
+    assert plan.optimum is None
+    assert plan.sequence is None
+    assert len(plan.completion_s) == 16
+    assert plan.objective == pytest.approx(
+        make_plan(wide_mission(2, 16), "exact", clock=TickingClock()).objective, rel=0.01
+    )

@@ -240,3 +240,27 @@ def test_stopped_among_many_first_rounds_the_climb_has_paid() -> None:
     assert not found.exhaustive
     best = best_of_all(problem, "greedy")
     assert found.objective >= 0.99 * best
+
+
+def test_stopped_in_the_first_evaluation_the_lists_are_whole_and_their_end_is_greedy() -> None:
+    problem = random_problem(np.random.default_rng(3), 9, 40)
+    greedy = best_sequence(problem, rule_by_name("greedy"), rng(), lambda _: True)
+
+    found = best_sequence(problem, rule_by_name("lookahead"), rng(), lambda _: True)
+
+    assert found.evaluations == 0
+    assert not found.exhaustive
+    assert sorted(task for route in found.routes for task in route) == list(range(40))
+    assert found.objective == pytest.approx(evaluate(problem, found.routes)[0])
+    assert found.objective == pytest.approx(greedy.objective)
+
+
+@pytest.mark.parametrize("rule", ["greedy", "lookahead"])
+def test_lists_are_those_the_sequence_leads_to(rule: str) -> None:
+    problem = random_problem(np.random.default_rng(8), 10, 20)
+
+    found = best_sequence(problem, rule_by_name(rule), rng(), after_evaluations(40))
+
+    state = TeamState.at_start(problem)
+    routes, _ = run(problem, state, rank_of(found.sequence), rule_by_name(rule))
+    assert [list(route) for route in found.routes] == routes

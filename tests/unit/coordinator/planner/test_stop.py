@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from coordinator.planner.stop import after_evaluations, after_time, first_of, never
+from coordinator.planner.stop import after_evaluations, after_time, first_of, never, part_of
 
 
 class HandClock:
@@ -47,3 +47,28 @@ def test_impossible_limits_are_refused() -> None:
         after_evaluations(0)
     with pytest.raises(ValueError, match="limit_s"):
         after_time(HandClock(), -1.0)
+    with pytest.raises(ValueError, match="frac"):
+        after_evaluations(2).part(0.0)
+
+
+def test_a_limit_in_time_may_have_begun_earlier() -> None:
+    clock = HandClock()
+
+    assert after_time(clock, 2.0, begin_s=98.0)(0)
+    assert after_time(clock, 4.0, begin_s=98.0).spent_frac(0) == 0.5
+
+
+def test_a_part_of_a_limit_ends_earlier() -> None:
+    half = part_of(after_evaluations(10), 0.5)
+
+    assert [half(n) for n in (4, 5)] == [False, True]
+    assert part_of(never, 0.5) is never
+
+
+def test_asked_about_nothing_only_time_and_wishes_end_it() -> None:
+    clock = HandClock()
+    stop = first_of(after_time(clock, 1.0), after_evaluations(1))
+
+    assert not stop(0)
+    clock.time_s += 1.0
+    assert stop(0)

@@ -76,3 +76,12 @@ def test_nothing_to_do_is_worth_nothing() -> None:
     for n_uav, n_task in ((0, 0), (0, 2), (2, 0)):
         problem = random_problem(np.random.default_rng(3), n_uav, n_task)
         assert optimum(problem.kernel) == (0.0, [[]] * n_uav)
+
+
+def test_told_to_give_up_it_has_no_answer() -> None:
+    problem = random_problem(np.random.default_rng(0), 2, 16)
+
+    objective, routes = optimum(problem.kernel, should_stop=lambda: True)
+
+    assert np.isnan(objective)
+    assert routes == [[], []]

@@ -8,15 +8,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm.allocation import Problem, TeamState, decisions, rank_of, reference, rule_by_name, run
+from swarm.allocation import (
+    Problem,
+    TeamState,
+    decisions,
+    evaluate,
+    rank_of,
+    reference,
+    rule_by_name,
+    run,
+)
 from swarm.allocation.rules import EXACT_TASKS
 from swarm.kernels.lower_level import (
     GREEDY,
     LOOKAHEAD,
+    UNDONE,
     RuleCode,
     decide,
     evaluate_sequences,
     first_rounds,
+    run_sequences,
     valued,
 )
 from swarm.kernels.lower_level import run as run_compiled
@@ -347,3 +358,76 @@ def test_odd_bytes_among_truth_values_are_truths() -> None:
     state.open = np.frombuffer(bytes([255, 2, 1, 128, 7, 1, 3, 4]), dtype=np.bool_)
 
     assert decide(problem.kernel, state, 1, GREEDY) == plain
+
+
+class Told:
+    """Says stop from the ``after``-th question on."""
+
+    def __init__(self, after: int) -> None:
+        self.after = after
+        self.asked = 0
+
+    def __call__(self) -> bool:
+        self.asked += 1
+        return self.asked > self.after
+
+
+def test_told_to_stop_a_run_ends_with_greedy_decisions() -> None:
+    problem = random_problem(np.random.default_rng(2), 3, 30)
+    state, rank = TeamState.at_start(problem), rank_of([0, 1, 2])
+    whole = run_compiled(problem.kernel, state, rank, LOOKAHEAD)[1].tolist()
+    greedy = run_compiled(problem.kernel, state, rank, GREEDY)[1].tolist()
+
+    _, at_once, _, _ = run_compiled(problem.kernel, state, rank, LOOKAHEAD, Told(0))
+    _, later, _, _ = run_compiled(problem.kernel, state, rank, LOOKAHEAD, Told(4))
+
+    assert at_once.tolist() == greedy
+    assert later[:4].tolist() == whole[:4]
+    assert sorted(later.tolist()) == list(range(30))
+
+
+def test_told_to_stop_only_the_first_of_many_sequences_is_run() -> None:
+    problem = random_problem(np.random.default_rng(2), 3, 30)
+    state, ranks = TeamState.at_start(problem), [[0, 1, 2], [1, 0, 2], [2, 1, 0]]
+
+    whole = run_sequences(problem.kernel, state, ranks, LOOKAHEAD, 1)
+    stopped = run_sequences(problem.kernel, state, ranks, LOOKAHEAD, 1, Told(2))
+
+    assert whole.by_rule.all()
+    assert whole.objective.tolist() == pytest.approx(
+        [evaluate(problem, whole.lists(k, 3))[0] for k in range(3)]
+    )
+    assert not stopped.by_rule.any()
+    assert np.isnan(stopped.objective).tolist() == [False, True, True]
+    assert sorted(task for route in stopped.lists(0, 3) for task in route) == list(range(30))
+    assert stopped.lists(1, 3) == [[], [], []]
+
+
+def test_told_to_stop_first_rounds_are_left_undone() -> None:
+    problem = random_problem(np.random.default_rng(2), 3, 30)
+    state, ranks = TeamState.at_start(problem), [[0, 1, 2], [1, 0, 2]]
+
+    rounds = first_rounds(problem.kernel, state, ranks, LOOKAHEAD, 1, Told(4))
+
+    assert rounds.tolist() == [
+        first_rounds(problem.kernel, state, ranks, LOOKAHEAD)[0].tolist(),
+        [UNDONE] * 3,
+    ]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_what_the_question_raises_ends_the_kernel(threads: int) -> None:
+    problem = random_problem(np.random.default_rng(2), 3, 30)
+
+    def interrupted() -> bool:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_sequences(
+            problem.kernel,
+            TeamState.at_start(problem),
+            [[0, 1, 2], [1, 0, 2]],
+            LOOKAHEAD,
+            threads,
+            interrupted,
+        )

@@ -256,3 +256,46 @@ def test_many_tasks_are_all_on_the_lists_too(seed: int, survival: float) -> None
     assert sorted(task for route in lists for task in route) == np.flatnonzero(able).tolist()
     assert all(problem.capable[uav, route].all() for uav, route in enumerate(lists))
     assert abs(team_worth(problem, state, lists) - worth) <= 1e-9 * (1.0 + abs(worth))
+
+
+class Told:
+    """Says that all time is spent from the ``after``-th question about time on."""
+
+    def __init__(self, after: int) -> None:
+        self.after = after
+        self.asked = 0
+
+    def __call__(self, iterations: int) -> float:
+        if iterations:
+            return 0.0
+        self.asked += 1
+        return float(self.asked > self.after)
+
+
+def test_local_search_leaves_off_when_the_time_is_spent() -> None:
+    problem = random_problem(np.random.default_rng(4), 1, 300, horizon_s=900.0)
+    _, whole = optimise_routes(team_of(problem), iterations=0)
+    told = Told(3)
+
+    lists, worth = optimise_routes(team_of(problem), spent_frac=told)
+
+    assert sorted(lists[0]) == list(range(300))
+    assert worth < whole
+    assert told.asked <= 8
+
+
+def test_the_search_goes_on_from_where_local_search_ended() -> None:
+    problem = random_problem(np.random.default_rng(5), 20, 400, horizon_s=100.0)
+    _, polished = optimise_routes(team_of(problem), iterations=0)
+
+    # so few iterations that from anywhere else it never gets there
+    best: list[float] = []
+    for seed in range(4):
+        optimise_routes(
+            team_of(problem),
+            iterations=1000,
+            seed=seed,
+            progress=lambda _, worth: best.append(worth),
+        )
+
+    assert max(best) > polished

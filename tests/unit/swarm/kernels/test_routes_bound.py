@@ -14,7 +14,7 @@ from swarm.allocation import TeamState
 from swarm.allocation.guided import route_arrays, team_arrays
 from swarm.allocation.reference_routes import list_worth, timed_list_worth
 from swarm.kernels.routes import TeamArrays
-from swarm.kernels.routes_bound import Timetable, priced_lists, shortest_leg_s
+from swarm.kernels.routes_bound import Timetable, priced_lists, shortest_legs_s
 from tests.problems import any_problem
 
 
@@ -31,7 +31,7 @@ def test_no_list_is_worth_more_after_paying(seed: int, n_task: int, share: float
     team = team_arrays(route_arrays(problem), state, state.active, 0.0)
     price = rng.uniform(0.0, 10.0, n_task)
 
-    worth, visits = priced_lists(team, price, share * shortest_leg_s(team))
+    worth, visits = priced_lists(team, price, share * shortest_legs_s(team).min())
 
     tasks = np.flatnonzero(problem.capable[0]).tolist()
     routes = chain.from_iterable(permutations(tasks, k) for k in range(len(tasks) + 1))
@@ -48,7 +48,7 @@ def test_with_fine_buckets_one_visit_is_worth_nearly_what_it_is() -> None:
     task = int(np.flatnonzero(problem.capable[0])[0])
     state.open[task] = True
     team = team_arrays(route_arrays(problem), state, state.active, 0.0)
-    shortest_s = shortest_leg_s(team)
+    shortest_s = shortest_legs_s(team).min()
 
     worth, visits = priced_lists(team, np.zeros(6), shortest_s / 1000.0)
 
@@ -112,7 +112,7 @@ def test_timed_lists_are_bounded_and_searched_as_the_plain_definition_says(
 def test_search_among_real_lists_only_lowers_the_bound() -> None:
     problem = any_problem(7, 3, 12)
     team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
-    price, bucket_s = np.full(12, 0.1), shortest_leg_s(team) / 2.0
+    price, bucket_s = np.full(12, 0.1), shortest_legs_s(team).min() / 2.0
 
     worths = [
         priced_lists(team, price, bucket_s, expansions=expansions)[0]
@@ -143,3 +143,15 @@ def test_wrong_timetables_are_refused_by_name(name: str, wrong: npt.NDArray[np.f
 
     with pytest.raises(ValueError, match=name):
         Timetable(**{**right, name: wrong})
+
+
+def test_told_to_give_up_it_has_no_answer() -> None:
+    problem = any_problem(1, 3, 200)
+    state = TeamState.at_start(problem)
+    team = team_arrays(route_arrays(problem), state, state.active, 0.0)
+    bucket_s = problem.horizon_s / 400.0
+
+    worth, visits = priced_lists(team, np.zeros(200), bucket_s, should_stop=lambda: True)
+
+    assert np.isnan(worth)
+    assert not visits.any()
