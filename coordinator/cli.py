@@ -38,6 +38,7 @@ from swarm.options import (
 if TYPE_CHECKING:
     from rich.status import Status
 
+    from coordinator.planner.stop import ShouldStop
     from swarm.model import Mission, Plan
     from swarm.wire.messages import Snapshot
 
@@ -331,9 +332,9 @@ def coordinator(
     timing = network.timing.scaled(speedup)
     timing = replace(timing, hover_s=hover_s * max(1.0, speedup))
 
-    def planner(what: Mission, how: str, planner_seed: int) -> Plan:
-        made = make_plan(what, how, clock=SystemClock(), seed=planner_seed)
-        if json:
+    def planner(what: Mission, how: str, planner_seed: int, unwanted: ShouldStop) -> Plan:
+        made = make_plan(what, how, clock=SystemClock(), seed=planner_seed, stop=unwanted)
+        if json and not unwanted(0.0):
             print(dumps(plan_as_json(made), allow_nan=False), flush=True)
         return made
 

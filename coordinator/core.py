@@ -20,7 +20,15 @@ from dataclasses import replace
 from coordinator.beginning import Beginning, Verdict
 from coordinator.briefing import FlightLayers, brief_of, differences
 from coordinator.ending import Ending
-from coordinator.events import Action, Event, PlanFailed, PlanMade, Replanned, Withdraw
+from coordinator.events import (
+    Action,
+    Event,
+    PlanFailed,
+    PlanMade,
+    Replanned,
+    StopPlanning,
+    Withdraw,
+)
 from coordinator.heritage import Heritage, inherit, statements, without_life
 from coordinator.inquiry import Inquiry
 from coordinator.planner.live import Situation
@@ -379,6 +387,7 @@ class CoordinatorCore:
             claims, timing = self.replica.claims, self._timing
             grace_s = timing.relink_grace_s if claims else timing.abandon_s
             self._ending.wait_until(now_s + grace_s)
+            self._stop_planning()
             self._replanning.begin(None, {}, now_s)
             epoch = replace(epoch, mission_s=self._mission_s(now_s))
         self._speech.outdo(theirs)
@@ -462,6 +471,12 @@ class CoordinatorCore:
         if wanted:
             self._actions += [wanted, Note("plans the rest", {"because": wanted.reason})]
 
+    def _stop_planning(self) -> None:
+        """What is being planned is for nothing, whatever it turns out to be."""
+        if self._replanning.is_under_way:
+            self._replanning.drop()
+            self._actions.append(StopPlanning())
+
     def _judge(self, replanned: Replanned, now_s: float) -> None:
         epoch, situation = self.replica.epoch, self._situation(now_s)
         if self._inquiry.unsure or epoch is None or situation is None or self._ended:
@@ -478,6 +493,7 @@ class CoordinatorCore:
             self._actions += [Note("ends before it began", {"reason": reason}), Finish(1)]
         elif not self._ended:
             self._beginning.leave()
+            self._stop_planning()
             self._ending.settle()
             self._say_next_epoch(now_s, EpochPhase.ENDED, reason)
             self._actions.append(Note("mission ends", {"reason": reason}))

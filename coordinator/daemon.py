@@ -10,7 +10,9 @@ coordinator.standby).
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable, Coroutine, Mapping
+from typing import TypeVar
 
 from coordinator.core import CoordinatorCore
 from coordinator.events import (
@@ -21,10 +23,11 @@ from coordinator.events import (
     PlanMade,
     Replan,
     Replanned,
+    StopPlanning,
     TakeSeat,
 )
 from coordinator.planner.live import NewPlan, replan
-from coordinator.planner.stop import after_time
+from coordinator.planner.stop import ShouldStop, after_time, first_of
 from coordinator.standby import StandbyCore
 from swarm.bus.port import Bus
 from swarm.clock import Clock, SystemClock
@@ -38,8 +41,10 @@ from swarm.wire.messages import Snapshot
 
 __all__ = ["run_coordinator"]
 
-REPLAN_S = 1.0
-"""Wall time that a running mission waits for a better plan, apart from valuing it."""
+T = TypeVar("T")
+
+REPLAN_S = 2.0
+"""Wall time that a running mission waits for a better plan, valuing it included."""
 
 
 async def run_coordinator(
@@ -47,7 +52,7 @@ async def run_coordinator(
     mission: Mission,
     bus: Bus,
     clock: Clock,
-    make_plan: Callable[[Mission, str, int], Plan],
+    make_plan: Callable[[Mission, str, int, ShouldStop], Plan],
     *,
     save: Callable[[Snapshot], None] | None = None,
     answer_s: float = PRESETS[Link.NORMAL].answer_s,
@@ -59,7 +64,7 @@ async def run_coordinator(
         mission: the scenario.
         bus: open; closed by whoever opened it.
         clock: gives ``now_s``.
-        make_plan: plans a mission by method and seed.
+        make_plan: plans a mission by method and seed; told to stop once nobody waits for the plan.
         save: keeps what the core knows for its next life.
         answer_s: how long a question waits for the slowest answer [wall s].
 
@@ -71,32 +76,38 @@ async def run_coordinator(
     keys = Keys(mission.name)
 
     async def plan(request: MakePlan) -> None:
-        def call() -> Plan:
-            return make_plan(request.mission, request.method, request.seed)
+        def call(unwanted: ShouldStop) -> Plan:
+            return make_plan(request.mission, request.method, request.seed, unwanted)
 
         try:
-            # On a thread that does not hold the process up when it is told to end.
-            made = await asyncio.wrap_future(call_in_background(call, "planner"))
+            made = await _planned_beside(call, "planner")
         except ValueError as fault:
             shell.step(PlanFailed(request.request, str(fault)))
         else:
             shell.step(PlanMade(request.request, made))
 
     async def plan_anew(request: Replan) -> None:
-        def call() -> NewPlan:
+        def call(unwanted: ShouldStop) -> NewPlan:
             return replan(
                 request.situation,
                 request.course,
                 request.method,
                 seed=request.seed,
-                stop=after_time(SystemClock(), REPLAN_S),
+                stop=first_of(after_time(SystemClock(), REPLAN_S), unwanted),
                 threads=1,  # agents on this machine must not wait for a processor
             )
 
-        made = await asyncio.wrap_future(call_in_background(call, "replanner"))
+        made = await _planned_beside(call, "replanner")
         shell.step(Replanned(request.request, made))
 
+    def cancel_all() -> list[asyncio.Task[None]]:
+        tasks = list(planning)
+        for task in tasks:
+            task.cancel()
+        return tasks
+
     def begin(work: Coroutine[None, None, None]) -> None:
+        cancel_all()  # whatever was planned before is superseded
         task = asyncio.get_running_loop().create_task(work)
         planning.add(task)
         task.add_done_callback(planned)
@@ -107,6 +118,8 @@ async def run_coordinator(
                 begin(plan(action))
             case Replan():
                 begin(plan_anew(action))
+            case StopPlanning():
+                cancel_all()
             case TakeSeat():
                 bus.serve(keys.state(COORDINATOR))
                 bus.declare_token(keys.alive(COORDINATOR))
@@ -146,7 +159,15 @@ async def run_coordinator(
     try:
         return await shell.run()
     finally:
-        tasks = list(planning)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await asyncio.gather(*cancel_all(), return_exceptions=True)
+
+
+async def _planned_beside(call: Callable[[ShouldStop], T], name: str) -> T:
+    """Plan on a thread that does not hold the process up, and learns when nobody waits for it."""
+    unwanted = threading.Event()
+    try:
+        return await asyncio.wrap_future(
+            call_in_background(lambda: call(lambda _: unwanted.is_set()), name)
+        )
+    finally:
+        unwanted.set()

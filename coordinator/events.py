@@ -16,6 +16,7 @@ __all__ = [
     "PlanMade",
     "Replan",
     "Replanned",
+    "StopPlanning",
     "TakeSeat",
     "Withdraw",
 ]
@@ -70,6 +71,11 @@ class Replanned:
 
 
 @dataclass(frozen=True, slots=True)
+class StopPlanning:
+    """Nobody waits for what is being planned any more."""
+
+
+@dataclass(frozen=True, slots=True)
 class Withdraw:
     """Take a task off the board: nobody need visit it any more."""
 
@@ -82,4 +88,4 @@ class TakeSeat:
 
 
 Event = BusFact | PlanMade | PlanFailed | Replanned | Withdraw
-Action = Wish | MakePlan | Replan | TakeSeat
+Action = Wish | MakePlan | Replan | StopPlanning | TakeSeat

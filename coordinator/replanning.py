@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from coordinator.events import Replan, Replanned
-from coordinator.planner.live import Course, Lists, Situation, worth
+from coordinator.planner.live import Course, Situation, whole_lists, worth
 from swarm.wire.messages import Epoch
 
 __all__ = ["DRIFT_FRAC", "MARGIN_FRAC", "Replanning"]
@@ -54,6 +54,11 @@ class Replanning:
         self._under_way: Replan | None = None
         self._request = 0
         self._quiet_until_s: float | None = None
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether a plan is being made."""
+        return self._under_way is not None
 
     def begin(
         self, situation: Situation | None, completion_s: Mapping[str, float], now_s: float
@@ -130,7 +135,7 @@ class Replanning:
             sequence=plan.sequence,
             mission_s=situation.now_s,
             reason=wanted.reason[: 200 - len(why)] + why,
-            routes=_whole_lists(situation, new.lists),
+            routes=whole_lists(situation, new.lists),
         )
 
     def next_deadline_s(self) -> float | None:
@@ -167,36 +172,6 @@ class Replanning:
             if task in self._expected_s
         ]
         return float(np.mean(late_s)) / left_s if late_s else 0.0
-
-
-def _whole_lists(situation: Situation, new: Lists) -> dict[str, tuple[str, ...]]:
-    """New lists after all that is closed or under way.
-
-    UAVs search anew at each decision while a task stands on no list. So every task is put on one,
-    except those that nobody has planned for, because they have opened since.
-    """
-    problem, state = situation.problem, situation.state
-    lists: dict[str, list[str]] = {}
-    listed: set[str] = set()
-
-    def add(uav: str, task: str) -> None:
-        if task not in listed:
-            listed.add(task)
-            lists.setdefault(uav, []).append(task)
-
-    for uav, tasks in situation.visited.items():
-        for task in tasks:
-            add(uav, task)
-    for uav, task in situation.under_way.items():
-        add(uav, task)
-    for uav, tasks in new.items():
-        for task in tasks:
-            add(uav, task)
-    takers = problem.capable[state.active].any(axis=0) & state.open
-    for task, able, may_be_taken in zip(problem.task_ids, problem.capable.T, takers, strict=True):
-        if able.any() and not may_be_taken:  # whose list it is on makes no difference now
-            add(problem.uav_ids[int(able.argmax())], task)
-    return {uav: tuple(tasks) for uav, tasks in lists.items()}
 
 
 def _some(ids: list[str]) -> str:

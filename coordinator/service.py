@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from coordinator.core import CoordinatorCore
 from coordinator.daemon import run_coordinator
+from coordinator.planner.stop import ShouldStop
 from coordinator.standby import MakeCoordinator, StandbyCore
 from swarm.bus.zenoh_bus import ZenohBus
 from swarm.clock import Clock
@@ -31,7 +32,7 @@ class Service:
 
     mission: Mission
     make_core: MakeCoordinator
-    make_plan: Callable[[Mission, str, int], Plan]
+    make_plan: Callable[[Mission, str, int, ShouldStop], Plan]
     open_bus: Callable[[], Awaitable[ZenohBus]]
     clock: Clock
     timing: Timing

@@ -15,7 +15,7 @@ import numpy as np
 
 from coordinator.planner.routes import guided_plan
 from coordinator.planner.sequence import best_sequence
-from coordinator.planner.stop import ShouldStop, after_evaluations, first_of, never
+from coordinator.planner.stop import ShouldStop, after_evaluations, first_of, never, part_of
 from swarm.allocation.guided import GuidedRule, route_arrays, team_arrays
 from swarm.allocation.lower_level import TeamState, run
 from swarm.allocation.objective import evaluate
@@ -27,7 +27,17 @@ from swarm.state.claims import holders
 from swarm.state.team import after_outcomes, finish_claim, ranks, rule_of
 from swarm.wire.messages import ClaimPhase, Epoch, Outcome, Result
 
-__all__ = ["Course", "Lists", "NewPlan", "Prediction", "Situation", "predicted", "replan", "worth"]
+__all__ = [
+    "Course",
+    "Lists",
+    "NewPlan",
+    "Prediction",
+    "Situation",
+    "predicted",
+    "replan",
+    "whole_lists",
+    "worth",
+]
 
 Lists = Mapping[str, tuple[str, ...]]
 """Task ids by UAV id, in order of execution."""
@@ -36,6 +46,9 @@ _ITERATIONS_PER_TASK = 400
 _SEQUENCES = 200
 """Tried at most: UAVs under way decide in the order in which they become free, and a sequence
 settles only what two of them decide at the same moment."""
+_GOING_ON_FRAC, _SEARCH_FRAC = 0.2, 0.7
+"""Of a limit in time, what has passed at most when it is known what comes of going on, and when the
+search ends; the rest is for what comes of the new plan."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,15 +160,21 @@ class NewPlan:
     """What happens without the new plan."""
 
 
-def predicted(situation: Situation, course: Course) -> Prediction:
-    """Let the fleet go on by ``course``, everybody deciding in turn, until nothing is left."""
+def predicted(situation: Situation, course: Course, stop: ShouldStop = never) -> Prediction:
+    """Let the fleet go on by ``course``, everybody deciding in turn, until nothing is left.
+
+    Told to stop, the rest is as the lists of ``course`` have it, repaired where tasks are on none;
+    without lists it is decided greedily.
+    """
     problem = situation.problem
     rule = rule_of(course.rule, course.routes)
     lists: list[list[int]] = [[] for _ in problem.uav_ids]
     if rule is not None:
         rank = ranks(course.sequence, problem.uav_ids)
         places = np.array([rank[uav] for uav in problem.uav_ids], dtype=np.int64)
-        lists, _ = run(problem, situation.state, places, rule)
+        lists, _ = run(problem, situation.state, places, rule, lambda: stop(0.0))
+        if course.rule == GuidedRule.name and stop(0.0):
+            lists = _ended_by_lists(situation, course.routes, lists)
     objective, times_s = evaluate(problem, lists, situation.state)
     free_s = situation.state.free_s
     completion_s = {
@@ -180,43 +199,77 @@ def replan(
 ) -> NewPlan:
     """The best plan found in a second's work or so for what is open, from where everybody is.
 
+    Predicted is what comes of the lists as they are published, see `whole_lists`.
+
     Args:
         situation: to plan from.
         course: by which the fleet goes on until there is another one.
         method: one of the online methods.
         seed: >= 0.
-        stop: ends the search earlier.
+        stop: ends it earlier, searching and predicting.
         threads: as many as there are processors when None; changes nothing but speed.
 
     Raises:
         ValueError: there is no such rule.
     """
     problem, state = situation.problem, situation.state
-    going_on = predicted(situation, course)
+    going_on = predicted(situation, course, part_of(stop, _GOING_ON_FRAC))
+    search_stop = part_of(stop, _SEARCH_FRAC)
     routes: Lists = {}
     n_open = int(np.count_nonzero(state.open))
     if method == GuidedRule.name:
         plan = guided_plan(
             problem,
             seed=seed,
-            stop=first_of(stop, after_evaluations(_ITERATIONS_PER_TASK * max(1, n_open))),
+            stop=first_of(search_stop, after_evaluations(_ITERATIONS_PER_TASK * max(1, n_open))),
             state=state,
             lists=_by_index(problem, going_on.lists),
             threads=threads,
         )
-        order, routes = plan.sequence, _by_id(problem, plan.routes)
+        order = plan.sequence
+        routes = whole_lists(situation, _by_id(problem, plan.routes))
     else:
         order = best_sequence(
             problem,
             rule_by_name(method),
             np.random.default_rng(seed),
-            first_of(stop, after_evaluations(_SEQUENCES)),
+            first_of(search_stop, after_evaluations(_SEQUENCES)),
             state,
             threads=threads,
         ).sequence
     sequence = tuple(str(problem.uav_ids[uav]) for uav in order if state.active[uav])
-    prediction = predicted(situation, Course(method, sequence, routes))
+    prediction = predicted(situation, Course(method, sequence, routes), stop)
     return NewPlan(method, sequence, prediction, going_on)
+
+
+def whole_lists(situation: Situation, new: Lists) -> Lists:
+    """New lists after all that is closed or under way.
+
+    UAVs search anew at each decision while a task stands on no list. So every task is put on one,
+    except those that nobody has planned for, because they have opened since.
+    """
+    problem, state = situation.problem, situation.state
+    lists: dict[str, list[str]] = {}
+    listed: set[str] = set()
+
+    def add(uav: str, task: str) -> None:
+        if task not in listed:
+            listed.add(task)
+            lists.setdefault(uav, []).append(task)
+
+    for uav, tasks in situation.visited.items():
+        for task in tasks:
+            add(uav, task)
+    for uav, task in situation.under_way.items():
+        add(uav, task)
+    for uav, tasks in new.items():
+        for task in tasks:
+            add(uav, task)
+    takers = problem.capable[state.active].any(axis=0) & state.open
+    for task, able, may_be_taken in zip(problem.task_ids, problem.capable.T, takers, strict=True):
+        if able.any() and not may_be_taken:  # whose list it is on makes no difference now
+            add(problem.uav_ids[int(able.argmax())], task)
+    return {uav: tuple(tasks) for uav, tasks in lists.items()}
 
 
 def worth(situation: Situation, lists: Lists) -> float:
@@ -233,6 +286,28 @@ def worth(situation: Situation, lists: Lists) -> float:
     team = team_arrays(arrays, state, state.active, situation.now_s)
     indices = _by_index(situation.problem, lists)
     return guided_choice(team, indices, int(next_s.argmin())).worth
+
+
+def _ended_by_lists(
+    situation: Situation, routes: Lists, begun: Sequence[Sequence[int]]
+) -> list[list[int]]:
+    """What has been decided, and then what ``routes`` have left."""
+    problem, state = situation.problem, situation.state
+    _, times_s = evaluate(problem, begun, state)
+    state = state.copy()
+    for uav, route in enumerate(begun):
+        for task in route:
+            state.free_s[uav] = times_s[task]
+            state.place_enu_m[uav] = problem.task_enu_m[task]
+            state.survived[uav] *= problem.survival[uav, task]
+            state.open[task] = False
+    rest = guided_plan(problem, stop=_at_once, state=state, lists=_by_index(problem, routes))
+    return [[*route, *more] for route, more in zip(begun, rest.routes, strict=True)]
+
+
+def _at_once(evaluations: float) -> bool:
+    del evaluations
+    return True
 
 
 def _visited(

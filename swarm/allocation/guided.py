@@ -11,6 +11,7 @@ publishing them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -23,6 +24,10 @@ __all__ = ["GuidedRule", "route_arrays", "team_arrays"]
 
 _REPAIR_ITERATIONS = 200
 """Steps of the search after a disturbance; some 3 ms in all at 50 UAVs × 500 tasks."""
+
+
+# With thousands of tasks it takes half a second, and a re-plan needs it at each of its steps.
+_ARRAYS: WeakKeyDictionary[Problem, RouteArrays] = WeakKeyDictionary()
 
 
 class GuidedRule:
@@ -111,7 +116,14 @@ class GuidedRule:
 
 
 def route_arrays(problem: Problem) -> RouteArrays:
-    """The problem laid out for route kernels."""
+    """The problem laid out for route kernels; worked out once for each problem."""
+    arrays = _ARRAYS.get(problem)
+    if arrays is None:
+        arrays = _ARRAYS[problem] = _laid_out(problem)
+    return arrays
+
+
+def _laid_out(problem: Problem) -> RouteArrays:
     return RouteArrays(
         problem.task_enu_m,
         problem.speed_m_s,

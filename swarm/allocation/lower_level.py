@@ -8,7 +8,7 @@ that a kernel knows. Leaves out: how a UAV chooses (`swarm.allocation.rules`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from math import isfinite
@@ -204,9 +204,21 @@ def next_decision(
 
 
 def run(
-    problem: Problem, state: TeamState, rank: IntArray, rule: Rule
+    problem: Problem,
+    state: TeamState,
+    rank: IntArray,
+    rule: Rule,
+    should_stop: Callable[[], bool] | None = None,
 ) -> tuple[list[list[int]], FloatArray]:
     """All decisions as lists.
+
+    Args:
+        problem: the mission.
+        state: where the team stands; left unchanged.
+        rank: (n_uav,) place of each UAV in the priority sequence; smaller decides first.
+        rule: how each UAV chooses.
+        should_stop: asked every few milliseconds, or between the decisions of a rule that is not
+            compiled. Once it says so the decisions left are greedy, or are not taken.
 
     Returns:
         Task indices per UAV in order of execution, and (n_task,) completion times [s], NaN for
@@ -215,7 +227,7 @@ def run(
     routes: list[list[int]] = [[] for _ in range(problem.n_uav)]
     completion_s = np.full(problem.n_task, np.nan)
     if isinstance(rule, CompiledRule):
-        uavs, tasks, times_s, _ = kernel.run(problem.kernel, state, rank, rule.code)
+        uavs, tasks, times_s, _ = kernel.run(problem.kernel, state, rank, rule.code, should_stop)
         for uav, task in zip(uavs.tolist(), tasks.tolist(), strict=True):
             routes[uav].append(task)
         completion_s[tasks] = times_s
@@ -223,4 +235,6 @@ def run(
     for decision in decisions(problem, state, rank, rule):
         routes[decision.uav].append(decision.task)
         completion_s[decision.task] = decision.completion_s
+        if should_stop is not None and should_stop():
+            break
     return routes, completion_s

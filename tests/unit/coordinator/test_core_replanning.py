@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.events import Action, Replan, Replanned
+from coordinator.events import Action, Replan, Replanned, StopPlanning
 from coordinator.planner.live import Course, NewPlan, Prediction
 from swarm.config import Timing
 from swarm.events import Learned, LinkChanged, Stop
@@ -122,6 +122,13 @@ def test_a_plan_that_comes_after_the_end_is_no_epoch() -> None:
 
     assert said(fleet.happen(made(request)), Epoch) == []
     assert fleet.phase is EpochPhase.ENDED
+
+
+def test_what_is_being_planned_is_stopped_at_the_end() -> None:
+    fleet, _ = after_a_loss()
+
+    assert StopPlanning() in fleet.happen(Stop("enough"))
+    assert StopPlanning() not in started().happen(Stop("enough"))
 
 
 def test_while_it_learns_it_publishes_no_epoch_and_afterwards_it_plans_again() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from coordinator.core import CoordinatorCore, FlightLayers
 from coordinator.daemon import run_coordinator
+from coordinator.planner.stop import ShouldStop
 from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import BusEvent, Sample
 from swarm.config import Timing
@@ -28,14 +29,14 @@ from tests.shell_play import LIMIT_S, HandClock, play, take_until, until
 
 KEYS = Keys(MISSION)
 WHOLE = mission([uav("u0")], [task("t0", 1.0)])
-MakePlan = Callable[[Mission, str, int], Plan]
+MakePlan = Callable[[Mission, str, int, ShouldStop], Plan]
 
 
 class OwnError(Exception):
     """Stands for a bug."""
 
 
-def planned(what: Mission, method: str, seed: int) -> Plan:
+def planned(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
     sequence = tuple(UavId(each.id) for each in what.uavs)
     routes = dict.fromkeys(sequence, ())
     return Plan(what.name, method, routes, 0.0, {}, sequence, None, 1, 0.0, seed)
@@ -115,9 +116,9 @@ def test_brief_and_board_are_said_at_once() -> None:
 def test_the_planner_is_asked_for_the_mission_as_it_is_known_off_the_loops_thread() -> None:
     asked: list[tuple[Mission, str, int, bool]] = []
 
-    def make_plan(what: Mission, method: str, seed: int) -> Plan:
+    def make_plan(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
         asked.append((what, method, seed, threading.current_thread() is threading.main_thread()))
-        return planned(what, method, seed)
+        return planned(what, method, seed, unwanted)
 
     async def scenario() -> None:
         async with at_work(make_plan) as played:
@@ -148,7 +149,7 @@ def test_a_mission_is_flown_to_its_end() -> None:
 
 
 def test_a_mission_that_cannot_be_planned_ends_with_the_reason() -> None:
-    def make_plan(what: Mission, method: str, seed: int) -> Plan:
+    def make_plan(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
         raise ValueError("no UAV can do it")
 
     async def scenario() -> None:
@@ -162,7 +163,7 @@ def test_a_mission_that_cannot_be_planned_ends_with_the_reason() -> None:
 
 
 def test_a_bug_in_the_planner_ends_the_coordinator_with_it() -> None:
-    def make_plan(what: Mission, method: str, seed: int) -> Plan:
+    def make_plan(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
         raise OwnError
 
     async def scenario() -> None:
@@ -174,12 +175,15 @@ def test_a_bug_in_the_planner_ends_the_coordinator_with_it() -> None:
 
 
 def test_a_plan_under_way_does_not_outlive_the_coordinator() -> None:
-    begun, may_end = threading.Event(), threading.Event()
+    begun, told, may_end = threading.Event(), threading.Event(), threading.Event()
 
-    def make_plan(what: Mission, method: str, seed: int) -> Plan:
+    def make_plan(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
         begun.set()
-        may_end.wait(LIMIT_S)
-        return planned(what, method, seed)
+        while not (unwanted(0.0) or may_end.wait(0.01)):
+            pass
+        if unwanted(0.0):
+            told.set()
+        return planned(what, method, seed, unwanted)
 
     async def scenario() -> None:
         async with at_work(make_plan) as played:
@@ -188,6 +192,7 @@ def test_a_plan_under_way_does_not_outlive_the_coordinator() -> None:
             with pytest.raises(asyncio.CancelledError):
                 await played.running
             assert len(asyncio.all_tasks()) == 1
+            await until(told.is_set, "the planner being told that nobody waits for its plan")
             may_end.set()
 
     play(scenario)

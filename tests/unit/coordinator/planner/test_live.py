@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coordinator.planner.live import Course, Prediction, Situation, predicted, replan, worth
-from coordinator.planner.stop import after_evaluations
+from coordinator.planner.stop import ShouldStop, after_evaluations, never
 from swarm.allocation import reference
 from swarm.allocation.objective import evaluate
 from swarm.allocation.reference_routes import team_worth
@@ -261,6 +261,54 @@ def test_there_may_be_nothing_to_plan() -> None:
 
     assert plan.sequence == ()
     assert plan.prediction.objective == plan.going_on.objective == 0.0
+
+
+def test_a_plan_is_predicted_by_the_lists_that_would_be_published(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    running = fork().say("a", done("t0", 10.0)).say("a", held("t1", 10.0, completion_s=30.0))
+    courses: list[Course] = []
+
+    def recording(situation: Situation, course: Course, stop: ShouldStop = never) -> Prediction:
+        courses.append(course)
+        return predicted(situation, course, stop)
+
+    monkeypatch.setattr("coordinator.planner.live.predicted", recording)
+    plan = replan(running.at(12.0), GREEDY, "guided")
+
+    # With a task on no list, done or claimed though it be, every decision would be searched anew.
+    assert courses[-1].routes == {"a": ("t0", "t1"), "b": ("t2",)}
+    assert plan.prediction.lists == {"a": (), "b": ("t2",)}
+
+
+def test_stopped_at_once_everything_has_a_prediction_all_the_same() -> None:
+    for seed in range(20):
+        situation = midway(seed, max_uavs=4, max_tasks=12)
+        course = Course("guided", (), {})
+
+        plan = replan(situation, course, "guided", stop=lambda _: True)
+
+        doable = situation.problem.capable[situation.state.active].any(axis=0)
+        wanted = np.flatnonzero(doable & situation.state.open)
+        for prediction in (plan.going_on, plan.prediction):
+            found = sorted(task for route in indices(situation, prediction) for task in route)
+            assert found == wanted.tolist()
+
+
+def test_stopped_after_some_decisions_the_lists_are_flown_to_their_end() -> None:
+    running = fork()
+    asked = 0
+
+    def after_one_decision(evaluations: float) -> bool:
+        nonlocal asked
+        asked += 1
+        return True
+
+    lists = {"a": ("t0", "t1"), "b": ("t2",)}
+    found = predicted(running.at(0.0), Course("guided", ("a", "b"), lists), after_one_decision)
+
+    assert found.lists == lists
+    assert found.completion_s == {"t0": 10.0, "t1": 30.0, "t2": 20.0}
 
 
 # -- valuing lists when time has passed ---------------------------------------------------
