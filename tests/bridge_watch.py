@@ -153,6 +153,8 @@ class BridgeWatch:
         """Whether `Prepare` has been ordered and not been answered."""
         self._silent = False
         """Handed over, and nothing ordered since."""
+        self._lost = False
+        """Handed over for its silence, and neither heard again nor handed over otherwise since."""
         self._heard_again = False
         """Since it was handed over."""
         self._mode_wanted: set[tuple[float, float]] = set()
@@ -336,16 +338,16 @@ class BridgeWatch:
 
     def _take(self, report: Report) -> None:
         match report:
-            case HandedOver():
+            case HandedOver(_, silent):
                 hold(self._heard_again or not self._silent, "handed over twice")
-                self._silent, self._heard_again = True, False
+                self._silent, self._heard_again, self._lost = True, False, silent
                 self._prepared = False
                 self._task = _Task(self._task.places_m)
             case HeardAgain():
-                hold(self._silent and not self._heard_again, "heard again, though it was not lost")
-                self._heard_again = True
+                hold(self._lost, "heard again, though it was not silent")
+                self._lost, self._heard_again = False, True
             case HandOverExplained():
-                hold(self._silent and not self._heard_again, "explained, though it is ours")
+                hold(self.bridge.phase is Phase.HANDED_OVER, "explained, though it is ours")
             case VehicleReady():
                 hold(self._prepared, "ready, though nobody asked")
                 self._prepared = False
