@@ -42,7 +42,7 @@ __all__ = [
     "fly_flooded",
     "long_mission",
     "times_for",
-    "told_status",
+    "watched",
 ]
 
 RATE_HZ = 24.0
@@ -57,8 +57,10 @@ TAKE_OFF_S = 9.0
 """From the first agent that is there to the mission's beginning [s]."""
 FLOODED_S = 1.9
 """When the paper's mission is done but for two tasks [s]."""
+LONGEST_LINE = 1 << 22
+"""Bytes in which `swarm status` tells how a mission stands."""
 READY_S, LOOK_S, FLOOD_LIMIT_S = 60.0, 60.0, 300.0
-"""Limits for the fleet to be there, for `swarm status` to answer and for the flood [wall s]."""
+"""Limits for the fleet to be there, for `swarm status` to tell and for the flood [wall s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,7 @@ class Flood:
     after: Mapping[str, Mapping[str, int]]
     """What each UAV had dropped when the mission was over, by reason."""
     shown: Mapping[str, Any]
-    """What `swarm status --json` told after the flood, while the mission still ran."""
+    """What `swarm status --watch --json` told next after the flood."""
     fates: tuple[str, ...]
     """How processes ended that should not have."""
 
@@ -152,7 +154,7 @@ async def fly_flooded(
     """Fly a mission of some ``3 times`` seconds under a flood that lasts almost to its end.
 
     The flood begins when all agents are there, before they take off, and ends when all
-    tasks but the last two are done, so that `swarm status` can be asked about it.
+    tasks but the last two are done, so that `swarm status` can still tell of it.
 
     Args:
         times: how long the mission is; see `long_mission`.
@@ -182,7 +184,10 @@ async def fly_flooded(
         )
         async with open_run(mission, options, onlookers=(HOSTILE, STATUS)) as run:
             tell("waiting for the mission to begin")
-            async with _hostile(run, mission, rng) as peer:
+            async with (
+                watched(run, mission.name) as watch,  # it starts while the agents do
+                _hostile(run, mission, rng) as peer,
+            ):
                 await run.until(
                     lambda: (
                         run.observer.replica.brief is not None
@@ -198,7 +203,7 @@ async def fly_flooded(
                     limit_s=FLOOD_LIMIT_S,
                 )
                 await asyncio.sleep(SETTLE_S)
-                shown = await told_status(run, mission.name)
+                shown = await watch.told()
                 tell("waiting for the end")
                 await run.finish()
                 after = _dropped(run)
@@ -286,24 +291,64 @@ async def _hostile(run: Run, mission: Mission, rng: np.random.Generator) -> Asyn
         bus.close()
 
 
-async def told_status(run: Run, mission: str) -> Mapping[str, Any]:
-    """What `swarm status` tells."""
-    words = ["status", "--mission", mission, "--json"]
+class Watched:
+    """What `swarm status --watch --json` tells, line by line.
+
+    It is there before it is needed: one that is started when the flood is over may find the
+    mission over, too.
+    """
+
+    def __init__(self, lines: asyncio.StreamReader) -> None:
+        self._lines = lines
+        self._newest: dict[str, Any] | None = None
+        self._news = asyncio.Condition()
+        self._ended = False
+
+    async def read(self) -> None:
+        """Take in what it tells, until it ends."""
+        while line := await self._lines.readline():
+            async with self._news:
+                self._newest = json.loads(line)
+                self._news.notify_all()
+        async with self._news:
+            self._ended = True
+            self._news.notify_all()
+
+    async def told(self) -> Mapping[str, Any]:
+        """What it tells next, or has told last if it has ended.
+
+        Raises:
+            SwarmError: it has told nothing.
+        """
+        async with asyncio.timeout(LOOK_S), self._news:
+            before = self._newest
+            await self._news.wait_for(lambda: self._ended or self._newest is not before)
+        if self._newest is None:
+            raise SwarmError("swarm status has told nothing")
+        return self._newest
+
+
+@contextlib.asynccontextmanager
+async def watched(run: Run, mission: str) -> AsyncIterator[Watched]:
+    """Let `swarm status` watch the mission; it looks on already when the context begins."""
+    words = ["status", "--watch", "--mission", mission, "--json"]
     words += run.launch.layout.seat_arguments(STATUS)
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         *("-m", "swarm", *words),
         stdin=asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
+        limit=LONGEST_LINE,
     )
+    if process.stdout is None:
+        raise SwarmError("swarm status has no output")
+    watch = Watched(process.stdout)
+    reading = asyncio.get_running_loop().create_task(watch.read())
     try:
-        async with asyncio.timeout(LOOK_S):
-            out, err = await process.communicate()
+        await watch.told()
+        yield watch
     finally:
         if process.returncode is None:
             process.kill()
-    if process.returncode != 0:
-        raise SwarmError(f"swarm status: {err.decode(errors='replace').strip()}")
-    told: dict[str, Any] = json.loads(out)
-    return told
+        await process.wait()
+        await reading

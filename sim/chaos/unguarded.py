@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from coordinator.observer import MissionResult
-from sim.chaos.flood import STATUS, long_mission, told_status
+from sim.chaos.flood import STATUS, long_mission, watched
 from sim.chaos.insider import Insider, Trick
 from sim.launch.fleet import BusKind, LaunchOptions, default_position_rate_hz
 from sim.launch.keys import RunKeys, fresh_keys
@@ -92,19 +92,20 @@ async def fly_unguarded(times: float, *, speedup: float = 1.0, seed: int = 0) ->
             router_file=_router_file(Path(folder), keys),
         )
         async with open_run(mission, options, onlookers=(LIAR, STATUS)) as run:
-            await run.until(
-                lambda: len(run.observer.statuses) == len(mission.uavs),
-                limit_s=READY_S,
-                what="all agents there",
-            )
-            async with _liar(run, mission, seed) as liar:
+            async with watched(run, mission.name) as watch:
                 await run.until(
-                    lambda: len(run.observer.result().done) >= len(mission.tasks) - 2,
-                    limit_s=READY_S + 10.0 * times,
-                    what="all tasks but two done",
+                    lambda: len(run.observer.statuses) == len(mission.uavs),
+                    limit_s=READY_S,
+                    what="all agents there",
                 )
-            await asyncio.sleep(SETTLE_S)
-            status = await told_status(run, mission.name)
+                async with _liar(run, mission, seed) as liar:
+                    await run.until(
+                        lambda: len(run.observer.result().done) >= len(mission.tasks) - 2,
+                        limit_s=READY_S + 10.0 * times,
+                        what="all tasks but two done",
+                    )
+                await asyncio.sleep(SETTLE_S)
+                status = await watch.told()
             await run.finish()
         flight = run.flight()
     if flight.plan is None:
