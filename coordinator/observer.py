@@ -58,7 +58,7 @@ from swarm.wire.messages import (
     TaskOrder,
 )
 
-__all__ = ["CHOICES_KEPT", "Happening", "MissionResult", "Observer"]
+__all__ = ["CHOICES_KEPT", "STORY_KEPT", "Happening", "MissionResult", "Observer"]
 
 _COMMANDED = {
     CommandKind.HOLD: "operator holds {}",
@@ -85,6 +85,10 @@ _IN_FLIGHT = (StatusPhase.IDLE, StatusPhase.FLYING, StatusPhase.SERVING)
 
 NAMES_TOLD = 5
 """Of those whose keys have changed."""
+STORY_KEPT = 20_000
+"""Lines of the story that an onlooker remembers; there are some for each task and each loss."""
+EPOCHS_KEPT = 16
+"""Epochs that an onlooker tells from new ones; one is restated soon after it was stated, or not."""
 CHOICES_KEPT = 2000
 """What an onlooker remembers of why tasks were taken."""
 
@@ -146,6 +150,9 @@ class Observer:
         self.lost: list[UavId] = []
         """UAVs that disappeared while they took part, and are not back."""
         self.story: list[Happening] = []
+        """The newest lines; where older ones are gone, the first tells how many."""
+        self._forgotten = 0
+        """Lines that were told before those."""
         self.choices: deque[tuple[str, Stamp, Choice]] = deque(maxlen=CHOICES_KEPT)
         """Why UAVs took tasks, in order of arrival; without `Basis.heads`, of which an onlooker
         makes nothing."""
@@ -159,7 +166,9 @@ class Observer:
         self._clock = MissionClock()
         """Against ``now_s`` times the pace."""
         self._orphans: dict[str, str] = {}
-        self._epochs: set[tuple[object, ...]] = set()
+        self._epochs: deque[tuple[object, ...]] = deque(maxlen=EPOCHS_KEPT)
+        """The last ones in which the mission ran."""
+        self._epochs_heard = 0
         self._stamps: dict[str, Stamp] = {}
         self._dropped_before: dict[str, Counter[str]] = {}
         self._repeated_visits = 0
@@ -200,7 +209,7 @@ class Observer:
                     self._hear_coordinator(message, now_s)
                 self._hear(message, now_s)
             case Learned(snapshots):
-                self._joining, told = self.replica.brief is None, len(self.story)
+                self._joining, told = self.replica.brief is None, self.told
                 for snapshot in snapshots:
                     is_word = snapshot.writer == COORDINATOR or not self._clock.is_set
                     if is_word and snapshot.mission_s is not None:
@@ -208,7 +217,10 @@ class Observer:
                     for message in snapshot.messages:
                         self._hear(message, now_s)
                 if self._joining:
-                    self.story[told:] = sorted(self.story[told:], key=lambda h: h.mission_s or 0.0)
+                    news = self.told_since(told)
+                    self.story[len(self.story) - len(news) :] = sorted(
+                        news, key=lambda h: h.mission_s or 0.0
+                    )
                     self._joining = False
                 self._membership.expect(self.replica.claims, now_s)
             case PeerSeen(writer):
@@ -353,13 +365,26 @@ class Observer:
             duplicate_visits=len(visits) - len(completion_s) + self._repeated_visits,
             makespan_s=max(completion_s.values(), default=0.0),
             lost_uavs=tuple(self.lost),
-            epochs=len(self._epochs),
+            epochs=self._epochs_heard,
             added=tuple(
                 task.id
                 for task in self.mission.tasks
                 if task.id not in self._scenario and task.id not in self.replica.posted
             ),
         )
+
+    @property
+    def told(self) -> int:
+        """How many lines the story has had so far."""
+        return self._forgotten + len(self.story)
+
+    def told_since(self, told: int) -> list[Happening]:
+        """The lines after the first ``told`` ever, as far as they are remembered."""
+        return self.story[max(0, told - self._forgotten) :]
+
+    def tell(self, text: str, now_s: float) -> None:
+        """Add to the story what happened now."""
+        self._tell(text, now_s)
 
     def _ask(self, now_s: float) -> list[Wish]:
         if not self._asking.due(now_s):
@@ -503,7 +528,8 @@ class Observer:
         if epoch.phase is EpochPhase.RUNNING:
             self._clock.hear(epoch.mission_s, now_s * self.pace)
         if epoch.phase is EpochPhase.RUNNING and course not in self._epochs:
-            self._epochs.add(course)
+            self._epochs.append(course)
+            self._epochs_heard += 1
             order = " > ".join(epoch.sequence)
             brief = self.replica.brief
             fleet = set() if brief is None else {uav.id for uav in brief.uavs}
@@ -587,3 +613,8 @@ class Observer:
     def _tell(self, text: str, now_s: float, at_s: float | None = None) -> None:
         """Add to the story what happened now, or at mission time ``at_s``."""
         self.story.append(Happening(self.mission_s(now_s) if at_s is None else at_s, text))
+        if len(self.story) > STORY_KEPT:
+            kept = self.story[-STORY_KEPT // 2 :]
+            gone = self.told - len(kept)
+            self.story = [Happening(None, f"{gone} earlier lines are no longer kept"), *kept]
+            self._forgotten = gone - 1

@@ -114,6 +114,8 @@ class RoughNetwork:
         self._open: set[tuple[Seat, Seat]] = set()
         """Transports: who has one, and to whom."""
         self._changes: Counter[tuple[Seat, Seat]] = Counter()
+        """How often each was to come or go: what was to happen before the last is not to any more.
+        None of who has left."""
         self._cuts: list[frozenset[str]] = []
         self._unplugged: Counter[str] = Counter()
         self._muted: Counter[tuple[str, str]] = Counter()
@@ -146,8 +148,10 @@ class RoughNetwork:
                 after_s = max(link.last_s - self._queue.now_s(), least_s)
                 self._change(viewer, seat, after_s, opens=False)
             elif (viewer, seat) not in self._open:
-                self._changes[viewer, seat] += 1  # it will not come up any more
+                self._changes.pop((viewer, seat), None)  # it will not come up any more
         self._open = {pair for pair in self._open if pair[0] is not seat}
+        for pair in [pair for pair in self._changes if pair[0] is seat]:
+            del self._changes[pair]
 
     def seat(self, seat: Seat, writer: str) -> None:
         """Show the token to all that have a transport."""
@@ -406,6 +410,8 @@ class RoughNetwork:
                     self._come_up(viewer, other)
                 else:
                     self._go_down(viewer, other)
+            if other is not self._router and other not in self._seats:
+                self._changes.pop(pair, None)
 
         if after_s is None:
             happen()

@@ -169,7 +169,8 @@ class Feed:
         self._head = self._head_of(observer, now_s)
         if observer is None:
             return
-        for number, happening in enumerate(observer.story[self._told :], self._told + 1):
+        news = observer.told_since(self._told)
+        for number, happening in enumerate(news, observer.told - len(news) + 1):
             row = {
                 "n": number,
                 "mission_s": _rounded(happening.mission_s, 3),
@@ -177,7 +178,7 @@ class Feed:
                 "trouble": is_trouble(happening),
             }
             self._story.add(as_text(row), self.seq)
-        self._told = len(observer.story)
+        self._told = observer.told
         self._look_at_choices(observer)
         if brief is not None:
             self._look_at_uavs(observer, brief, now_s)

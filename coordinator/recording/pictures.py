@@ -150,11 +150,11 @@ class Pictures:
             yield _scene("lists", entities)
 
     def _story(self, observer: Observer, time_ns: int) -> Iterator[Line]:
-        for happening in observer.story[self._told :]:
+        for happening in observer.told_since(self._told):
             when = "" if happening.mission_s is None else f"[{happening.mission_s:.2f} s] "
             level = "warning" if is_trouble(happening) else "info"
             yield log_line("story", when + happening.text, level, time_ns)
-        self._told = len(observer.story)
+        self._told = observer.told
 
     def _fixes(
         self, scene: Scene, origin: Origin, layers_m: dict[str, float], time_ns: int

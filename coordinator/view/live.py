@@ -158,10 +158,10 @@ class LiveView:
         self._live.update(frame, refresh=True)
 
     def _tell(self, observer: Observer) -> None:
-        for happening in observer.story[self._told :]:
+        for happening in observer.told_since(self._told):
             line = story_line(happening, ascii_only=self._ascii_only)
             self._console.print(Text(line), soft_wrap=True)
-        self._told = len(observer.story)
+        self._told = observer.told
         cut = observer.cut_since_s is not None and not deserted(observer)
         if cut != self._cut:
             self._cut = cut

@@ -15,7 +15,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from coordinator.observer import Happening, MissionResult, Observer
+from coordinator.observer import MissionResult, Observer
 from coordinator.plan_report import plan_from_json
 from coordinator.recording.flight_recorder import FlightRecorder
 from sim.launch.fleet import DASHBOARD, LaunchOptions
@@ -202,9 +202,7 @@ class Run:
     async def _mend(self, child: Child) -> None:
         """Start it anew, and tell so."""
         self._deaths[child.name] += 1
-        mission_s = self.observer.mission_s(self.clock.now_s())
-        text = f"{child.name} {child.fate}; started again"
-        self.observer.story.append(Happening(mission_s, text))
+        self.observer.tell(f"{child.name} {child.fate}; started again", self.clock.now_s())
         await self.launch.restart(child.name)
 
     def _hopeless(self) -> str | None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coordinator.observer import Observer
+from coordinator.observer import STORY_KEPT, Observer
 from swarm.config import Timing
 from swarm.events import (
     Ask,
@@ -529,6 +529,43 @@ def test_one_who_joins_late_tells_what_was_before_at_its_own_time() -> None:
         (9.0, "u1 ended t1: done"),
         (onlooker.observer.mission_s(onlooker.now_s), "u0 ended popup: done"),
     ]
+
+
+def test_a_story_without_end_is_kept_in_part_and_says_so() -> None:
+    onlooker = Onlooker().running()
+    observer = onlooker.observer
+    for number in range(3 * STORY_KEPT):
+        observer.tell(f"line {number}", onlooker.now_s)
+        assert len(observer.story) <= STORY_KEPT + 1
+
+    first = onlooker.story[0]
+    gone = observer.told - len(observer.story) + 1
+    assert first == f"{gone} earlier lines are no longer kept"
+    assert onlooker.story[1:] == [f"line {n}" for n in range(gone - 1, 3 * STORY_KEPT)]
+
+
+def test_who_reads_a_story_as_it_grows_is_told_each_line_once() -> None:
+    onlooker = Onlooker().running()
+    observer, told, read = onlooker.observer, 0, list[str]()
+    for number in range(2 * STORY_KEPT):
+        observer.tell(f"line {number}", onlooker.now_s)
+        if number % 7 == 0:
+            read += [line.text for line in observer.told_since(told)]
+            told = observer.told
+
+    assert [text for text in read if text.startswith("line")] == [
+        f"line {number}" for number in range(len(read) - 1)
+    ]
+
+
+def test_epochs_are_counted_and_not_kept_for_ever() -> None:
+    onlooker = Onlooker().running()
+    for number in range(2, 500):
+        for _ in range(2):  # a new coordinator restates it
+            onlooker.hear(COORDINATOR, epoch("u0", "u1", number=number))
+    assert onlooker.observer.result().epochs == 499
+    onlooker.hear(COORDINATOR, epoch("u0", "u1", number=490))
+    assert onlooker.observer.result().epochs == 499
 
 
 def leaving(phase: StatusPhase, note: str, counter: int, incarnation: int = 1) -> Heard:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -93,6 +95,30 @@ def said(writer: str, counter: int) -> Message:
 
 def kinds(facts: Sequence[BusFact]) -> set[BusFact]:
     return {fact for fact in facts if not isinstance(fact, Heard | Learned)}
+
+
+@pytest.mark.parametrize("topology", list(Topology))
+@pytest.mark.parametrize("cut", [False, True])
+def test_who_has_left_is_forgotten(topology: Topology, cut: bool) -> None:
+    """A machine that starts its process anew every second does so for hours."""
+    net = Net(topology)
+    left = list[weakref.ref[Listener]]()
+    for life in range(20):
+        seat = net.seat("d")
+        if life % 3:
+            net.after(0.4 * life % UP_S)
+        if cut:
+            net.network.cut("d")
+        net.network.leave(seat)
+        left.append(weakref.ref(seat))
+        del seat
+        net.after(UP_S + LEASE_S)
+        if cut:
+            net.network.heal("d")
+            net.after(UP_S + LEASE_S)
+
+    gc.collect()
+    assert [seat() for seat in left] == [None] * len(left)
 
 
 @pytest.mark.parametrize("topology", list(Topology))
