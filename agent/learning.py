@@ -2,7 +2,7 @@
 
 Its knowledge is old at the start, when its link is back and after it was itself held up.
 Until everyone has been asked since, and has had the time to answer, it goes on with the
-task it has and decides nothing new. Leaves out: what the answers say (agent.core).
+task it has and decides nothing new. Leaves out: what the answers say (agent.hearing).
 """
 
 from __future__ import annotations

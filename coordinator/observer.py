@@ -130,9 +130,9 @@ class Observer:
 
     def __init__(self, mission: Mission, timing: Timing) -> None:
         self._mission = mission
+        """The one being flown, with what the operator has added to it."""
         self._revision: Callable[[], Mission] | None = None
         """Gives the mission anew, as soon as somebody wants to know it."""
-        """The one being flown, with what the operator has added to it."""
         self.plan: Plan | None = None
         """The offline plan; set by whoever knows it."""
         self.replica = Replica()

@@ -3,7 +3,7 @@
 It watches without a token and says nothing. When the coordinator has been missed for a
 while and does not answer either, it becomes the coordinator itself: a `CoordinatorCore`
 that remembers all that was heard meanwhile. Leaves out: standing by anew when another one
-proves to be there (coordinator.daemon starts a new watch then).
+proves to be there (coordinator.service starts a new watch then).
 """
 
 from __future__ import annotations

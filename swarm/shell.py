@@ -3,8 +3,8 @@
 It decodes what the bus brings, steps the core, publishes what the core says,
 answers queries with the core's snapshot and ticks at the core's deadlines. On a bus
 with keys it says and believes only what is signed, and puts newer rosters in force.
-Leaves out: asking and answering (swarm.questions), and what only one kind of process does
-(agent.runner, coordinator.daemon, sim.launch), through `Shell.execute`.
+Leaves out: asking and answering (swarm.questions), and actions that only one kind of process
+knows, which it carries out itself (``execute``; agent.runner, coordinator.daemon).
 """
 
 from __future__ import annotations

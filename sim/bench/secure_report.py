@@ -1,6 +1,6 @@
 """How the result of `swarm bench secure` is shown.
 
-Leaves out: measuring (sim.bench.secure, sim.bench.hop, sim.bench.secure_flood).
+Leaves out: measuring (sim.bench.secure, sim.bench.hop, sim.bench.flooding).
 """
 
 from __future__ import annotations
