@@ -55,8 +55,8 @@ _FINEST, _COARSEST = 400.0, 50.0
 """Buckets up to the horizon."""
 _SHORT_FRAC = 0.1
 """Of the tasks, those from which a leg may be below a bucket."""
-_MOST_BUCKETS = 4000.0
-"""However short legs are: with more, legs of a few buckets take most of the time."""
+_MOST_BUCKETS = 1000.0
+"""However short legs are; with more, legs of a few buckets take most of the time."""
 _ROUNDING = 1e-9
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -54,6 +56,31 @@ def test_it_is_closer_than_the_trivial_bound() -> None:
     assert bound.method == "lagrangian"
     assert bound.gap(plan.objective) < 0.06
     assert 1.0 - plan.objective / trivial_bound(problem) > 0.15
+
+
+def test_two_tasks_in_one_place_do_not_spoil_it() -> None:
+    apart = random_mission(6, 24, 1)
+    places_m, service_s = apart.task_enu_m.copy(), apart.service_s.copy()
+    places_m[1], service_s[:2] = places_m[0], 0.0
+    together = replace(apart, task_enu_m=places_m, service_s=service_s)
+    gaps = []
+    for problem in (apart, together):
+        plan = guided_plan(problem, stop=after_evaluations(5000))
+
+        bound = upper_bound(problem, plan.routes)
+
+        assert bound.method == "lagrangian"
+        gaps.append(bound.gap(plan.objective))
+    assert gaps[1] < gaps[0] + 0.01
+
+
+def test_told_to_stop_before_there_is_any_it_is_the_trivial_one() -> None:
+    problem = random_mission(10, 50, 1)
+
+    bound = upper_bound(problem, guided_plan(problem).routes, lambda _: True)
+
+    assert bound.method == "trivial"
+    assert bound.objective == trivial_bound(problem)
 
 
 def test_threads_do_not_change_it_and_it_stops_when_told() -> None:
