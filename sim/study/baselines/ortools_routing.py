@@ -23,7 +23,8 @@ SHORTFALL = (
     "OR-Tools has no value that falls with time and depends on who serves: a task's lateness "
     "costs its value times the average p of the fleet (a soft upper bound of 0 on its arrival), "
     "each UAV's own p enters as a cost of the arc at half the horizon, survival not at all, and "
-    "times are whole numbers. Its routes are scored by J of eq. 1 like all others."
+    "times are whole numbers. Where p is the same for all UAVs and survival is 1 that is eq. 1 but "
+    "for rounding and a small cost of travel. Its routes are scored by J of eq. 1 like all others."
 )
 """What its model leaves out, for every output that shows its figures."""
 
