@@ -238,7 +238,9 @@ class _Search:
     def _starts(self, rng: np.random.Generator) -> list[Sequence]:
         """Sequences to begin with: constructed ones, greedy orders, and a few by chance."""
         inside = set(self.uavs)
-        constructed = single_stage(self._problem, self._state).sequence
+        # with large teams constructing takes a while, and so does loading what it takes
+        over = self._is_over()
+        constructed = self.uavs if over else single_stage(self._problem, self._state).sequence
         speed_m_s = self._problem.speed_m_s
         ability = self._problem.weight @ self._state.open
         return [
