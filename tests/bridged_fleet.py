@@ -82,9 +82,15 @@ class Sent:
 
     @property
     def harmless(self) -> bool:
-        """Whether it commands nothing: a heartbeat, or a request for messages."""
+        """Whether it commands nothing: a heartbeat, a request for messages, the old jerk."""
         asks = self.name == "COMMAND_LONG" and self.message.command == INTERVAL
-        return asks or self.name == "HEARTBEAT"
+        return asks or self.name == "HEARTBEAT" or self._puts_jerk_back
+
+    @property
+    def _puts_jerk_back(self) -> bool:
+        """`BridgeWatch` sees that it is not raised."""
+        names = {name for fake in _FAKES.values() for name in fake.jerk_names}
+        return self.name == "PARAM_SET" and self.message.param_id in names
 
 
 @dataclass(slots=True)

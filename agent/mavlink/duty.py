@@ -53,6 +53,7 @@ class Duty:
         self._work = work
         self._orders = orders
         self._cruise = CruiseWatch()
+        self._raises_jerk = False
 
     # What the vehicle says.
 
@@ -220,12 +221,16 @@ class Duty:
             self._orders.begin_holding(Hold("which mission it flies is not known"))
 
     def _advance_lent(self) -> None:
-        """Raise the limit of jerk for as long as we tell the vehicle where to fly."""
-        seat, returning = self._seat, self._work.returning
+        """Raise the limit of jerk from its preparation on, until it is told to go home."""
+        seat, work, returning = self._seat, self._work, self._work.returning
+        flies_home = returning is not None and not returning.on_detour
+        if work.phase is Phase.PREPARING:
+            self._raises_jerk = True
+        elif flies_home or not work.in_our_hands():
+            self._raises_jerk = False
         if seat.lent is None:
             return
-        flies_home = returning is not None and not returning.on_detour
-        seat.lent.want(self._work.in_our_hands() and not flies_home)
+        seat.lent.want(self._raises_jerk and work.in_our_hands())
         seat.say(*seat.lent.advance(seat.now_s))
         if complaint := seat.lent.take_complaint():
             self._work.tell_caution(complaint)

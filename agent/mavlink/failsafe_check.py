@@ -123,10 +123,12 @@ class FailsafeCheck:
     @property
     def objection(self) -> str | None:
         """Why the vehicle is not armed, in words; None if it may be."""
+        if self._by_missions or self._config.accept_no_failsafe:
+            return None
         if not self._settled:
             return "reading what it does if its agent dies"
         told = self._reading.failsafes
-        if not self._matters(told) or self._config.accept_no_failsafe:
+        if not self._matters(told):
             return None
         return (
             f"if its agent dies it {told.agent_lost}: {told.remedy}, "
@@ -137,12 +139,16 @@ class FailsafeCheck:
     def caution(self) -> str | None:
         """What people should know of a vehicle that is armed; None if there is nothing."""
         told = self._reading.failsafes
-        if self._reading.simulated:
+        if self._reading.simulated or not self._settled:
             return None
         lost = f"if its agent dies it {told.agent_lost}" if self._matters(told) else None
         return "; ".join(part for part in (lost, told.battery) if part is not None) or None
 
     def _matters(self, told: Failsafes) -> bool:
         """Whether nobody would bring the vehicle home."""
-        by_missions = self._config.command is CommandStyle.MISSION
-        return not (told.comes_home or by_missions or self._reading.simulated)
+        return not (told.comes_home or self._by_missions or self._reading.simulated)
+
+    @property
+    def _by_missions(self) -> bool:
+        """Whether every mission ends at home."""
+        return self._config.command is CommandStyle.MISSION

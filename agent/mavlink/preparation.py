@@ -116,14 +116,17 @@ class Preparation:
         self._leg: RepositionLeg | None = None
         self._speed = SpeedSetting(order.speed_m_s, flavour, config)
         self._failsafes = FailsafeCheck(flavour, config)
-        self.caution: str | None = None
-        """What people should know of a vehicle that is armed all the same."""
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
         self.done = False
         """The vehicle is where it should be, with its cruise speed set."""
         self.failure: str | None = None
         """Why it will not get there; None while it may."""
+
+    @property
+    def caution(self) -> str | None:
+        """What people should know of a vehicle that is armed all the same."""
+        return self._failsafes.caution
 
     @property
     def engaged(self) -> bool:
@@ -212,6 +215,8 @@ class Preparation:
         self._flew = True
         # Repeated now, it would interrupt what follows.
         out: list[Outbound] = [*self._commands.cancel(self._takeoff.tag, now_s)]
+        if self._arm.count:  # what it does without us may not have been read to the end
+            out += self._failsafes.ask(now_s)
         if self._climbing and not self._high_enough(position, now_s):
             return out
         self._climbing = False
@@ -238,7 +243,6 @@ class Preparation:
             return self._fail(fault)
         if objection := self._failsafes.objection:
             return self._wait(objection)
-        self.caution = self._failsafes.caution
         if self._mission is not None and not self._mission.is_laid:
             return self._lay(self._mission, now_s)
         self._consent.arm()
