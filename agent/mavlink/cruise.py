@@ -15,7 +15,7 @@ _STEADY_S = 3.0
 """A speed kept for that long is the one that is flown."""
 _STEADY_FRAC = 0.03
 """How much a steady speed may change meanwhile."""
-_SHORT_FRAC = 0.93
+_SHORT_FRAC = 0.9
 """Of the speed told, below which it is not reached."""
 _LEAST_FRAC = 0.3
 """Of the speed told, below which the vehicle is doing something else than cruising."""
