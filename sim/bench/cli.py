@@ -1,10 +1,11 @@
 """The commands of the family `swarm bench`.
 
 Leaves out: the commands about fleets that fly (`sim.bench.trouble_commands`,
-`sim.bench.turnaround_command`, `sim.bench.missions_command`), about simulated vehicles
-(`sim.bench.autopilot_commands`), about the dashboard (`sim.bench.dashboard_command`) and about
-keys (`sim.bench.secure_command`), what the others do (`sim.bench.plan_bench`,
-`sim.bench.decide`) and how it is shown (`sim.bench.plan_report`, `sim.bench.plan_plot`).
+`sim.bench.turnaround_command`, `sim.bench.legs_command`, `sim.bench.missions_command`), about
+simulated vehicles (`sim.bench.autopilot_commands`), about the dashboard
+(`sim.bench.dashboard_command`) and about keys (`sim.bench.secure_command`), what the others do
+(`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown (`sim.bench.plan_report`,
+`sim.bench.plan_plot`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import typer
 
 from sim.bench.autopilot_commands import AUTOPILOT_HELP, autopilot
 from sim.bench.dashboard_command import DASHBOARD_HELP, dashboard
+from sim.bench.legs_command import LEGS_HELP, legs
 from sim.bench.missions_command import MISSIONS_HELP, missions
 from sim.bench.secure_command import SECURE_HELP, secure
 from sim.bench.trouble_commands import FAILOVER_HELP, FLOOD_HELP, failover, flood
@@ -239,6 +241,7 @@ bench.command("secure", help=SECURE_HELP, short_help="Measure what keys and encr
 bench.command(
     "turnaround", help=TURNAROUND_HELP, short_help="Time from each arrival to the next target."
 )(turnaround)
+bench.command("legs", help=LEGS_HELP, short_help="Time of legs flown, beyond length / speed.")(legs)
 
 
 def _sources(scenario: Path | None, sizes: str | None, default: str) -> list[tuple[str, Source]]:

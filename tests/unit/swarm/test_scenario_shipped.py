@@ -19,7 +19,7 @@ from swarm.model import Mission
 from swarm.scenario import format_scenario, load_scenario, parse_scenario
 from swarm.scenario.shipped import resolve_scenario, shipped_scenarios
 
-NAMES = ["meadow", "table-1", "valley-popups", "valley-survey"]
+NAMES = ["meadow", "orchard", "table-1", "valley-popups", "valley-survey"]
 
 
 def shipped(name: str) -> Mission:
