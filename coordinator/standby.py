@@ -81,6 +81,7 @@ class StandbyCore:
         """When it takes the place of the coordinator, which is missing; None while it is there."""
         self._last_question = False
         """Whether it asks, before it takes over, if the coordinator does not answer either."""
+        self._saw_coordinator = False
         self._finished = False
 
     # -- the one entry point ----------------------------------------------------------
@@ -207,6 +208,9 @@ class StandbyCore:
             self._wait(now_s)
         if COORDINATOR in self._membership.present:
             self._due_at_s, self._last_question = None, False
+            if not self._saw_coordinator:
+                self._saw_coordinator = True
+                self._actions.append(Note("stands by for the coordinator"))
         elif self._due_at_s is not None and self._due_at_s <= now_s and self._is_informed:
             if self._last_question:
                 self._take_over(now_s)

@@ -16,6 +16,7 @@ from swarm.events import (
     Heard,
     Learned,
     LinkChanged,
+    Note,
     PeerGone,
     PeerSeen,
     Publish,
@@ -268,6 +269,18 @@ def test_it_says_nothing_and_shows_no_seat_while_it_watches() -> None:
     assert not watcher.took_over
     assert [action for action in watcher.log if isinstance(action, Publish)] == []
     assert watcher.core.snapshot(101.0).messages == ()
+
+
+def test_it_says_once_that_it_stands_by_when_it_has_seen_the_coordinator() -> None:
+    watcher = Watcher()
+    watcher.happen(Learned(()), PeerSeen("u0"))
+    assert Note("stands by for the coordinator") not in watcher.log
+
+    watcher.happen(PeerSeen(COORDINATOR))
+    assert watcher.log.count(Note("stands by for the coordinator")) == 1
+    watcher.happen(PeerGone(COORDINATOR), PeerSeen(COORDINATOR))
+    watcher.run_until(100.0 + 0.9 * TIMING.silence_s)
+    assert watcher.log.count(Note("stands by for the coordinator")) == 1
 
 
 def test_it_takes_over_with_all_that_it_has_heard() -> None:
