@@ -82,7 +82,7 @@ def test_killed_recorders_leave_whole_files_and_the_flight_goes_on(tmp_path: Pat
             onlooker.communicate(timeout=60)
         finally:
             onlooker.kill()
-        let_end(run)
+        let_end()
         status, told = run.result()
 
         assert status == 0, run.story()
@@ -128,7 +128,7 @@ def test_a_recorder_is_stopped_by_its_user_and_by_the_end_of_the_mission(tmp_pat
             _, said = recorders[0].communicate(timeout=60)
             assert recorders[0].returncode == 0, said
             assert str(files[0]) in said.splitlines()[-1]
-            let_end(run)
+            let_end()
             assert run.result()[0] == 0
             _, said = recorders[1].communicate(timeout=60)
             assert recorders[1].returncode == 0, said
