@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.chaos.flight import ChaosFlight, Verdict, open_chaos_flight
+from sim.chaos.flight import DONE_LINE, ChaosFlight, Verdict, open_chaos_flight
 from sim.launch.fleet import BusKind, LaunchOptions
 from swarm.config import Link
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.scenario.write import format_scenario
 
-__all__ = ["all_done", "play", "story", "survey"]
+__all__ = ["all_done", "logged_done", "play", "story", "survey", "told"]
 
 LIMIT_S = 150.0
 
@@ -81,9 +81,8 @@ def play(
                     await script(flight)
                     await flight.run.finish()
                 except BaseException as fault:
-                    told = [happening.text for happening in flight.run.observer.story]
                     logged = [f"{name}: {line}" for name, line in flight.lines[-40:]]
-                    fault.add_note("\n".join([*told, *logged]))
+                    fault.add_note("\n".join([*told(flight), *logged]))
                     raise
             return flight.verdict()
 
@@ -93,6 +92,16 @@ def play(
 def story(verdict: Verdict) -> list[str]:
     """What the onlooker told, line by line."""
     return [happening.text for happening in verdict.flight.observer.story]
+
+
+def told(flight: ChaosFlight) -> list[str]:
+    """What the onlooker has told so far, line by line."""
+    return [happening.text for happening in flight.run.observer.story]
+
+
+def logged_done(flight: ChaosFlight) -> list[str]:
+    """Tasks that UAVs have done so far by their logs, which need no bus; once for every visit."""
+    return [m[1] for _, line in flight.lines if (m := DONE_LINE.search(line))]
 
 
 def all_done(verdict: Verdict, n_task: int) -> None:

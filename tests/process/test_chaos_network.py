@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,25 +11,37 @@ from sim.chaos.checks import AGREE_WITHIN_S
 from sim.chaos.flight import ChaosFlight
 from sim.chaos.relay import Quality
 from sim.launch.fleet import BusKind
-from tests.process.chaos_play import all_done, play, story, survey
+from tests.process.chaos_play import all_done, logged_done, play, story, survey, told
 
 pytestmark = [pytest.mark.process]
 
 FAR = {f"uav{number:02}" for number in (2, 4, 6)}
-PARTED_S = 6.0
 SPEEDUP = 4.0
 
 
-async def part_and_heal(flight: ChaosFlight, group: set[str]) -> None:
+async def part_and_heal(
+    flight: ChaosFlight, group: set[str], parted: Callable[[], bool], what: str
+) -> None:
+    """Cut ``group`` off until what comes of that is seen."""
     flight.isolate(group)
-    await asyncio.sleep(PARTED_S)
+    await flight.until(parted, what)
     flight.heal()
+
+
+async def part_until_both_go_on(flight: ChaosFlight, group: set[str]) -> None:
+    """Cut ``group`` off until three tasks were done on both sides."""
+
+    def twice() -> bool:
+        done = logged_done(flight)
+        return len(done) >= len(set(done)) + 3
+
+    await part_and_heal(flight, group, twice, "tasks done on both sides")
 
 
 def test_parted_halves_of_a_mesh_agree_after_healing_and_lose_nothing(tmp_path: Path) -> None:
     async def script(flight: ChaosFlight) -> None:
         await flight.until_done(5)
-        await part_and_heal(flight, FAR)
+        await part_until_both_go_on(flight, FAR)
 
     verdict = play(survey(6, 42), tmp_path, script, bus=BusKind.MESH, speedup=SPEEDUP, relayed=True)
 
@@ -48,7 +60,7 @@ def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Pa
             if link.listener == "router 2" and relays[link].n_connection
         }
         assert len(served) == 3
-        await part_and_heal(flight, served | {"router 2"})
+        await part_until_both_go_on(flight, served | {"router 2"})
 
     verdict = play(
         survey(6, 42),
@@ -66,16 +78,22 @@ def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Pa
 
 
 def test_agents_cut_off_from_their_only_router_come_back(tmp_path: Path) -> None:
+    cut_off = {"uav01", "uav03", "uav05"}
+
     async def script(flight: ChaosFlight) -> None:
+        def missed() -> bool:
+            lines = told(flight)
+            return all(any(line.startswith(f"{uav} lost") for line in lines) for uav in cut_off)
+
         await flight.until_done(5)
-        await part_and_heal(flight, {"uav01", "uav03", "uav05"})
+        await part_and_heal(flight, cut_off, missed, "the loss of all who are cut off")
 
     verdict = play(
         survey(6, 40), tmp_path, script, bus=BusKind.ROUTER, speedup=SPEEDUP, relayed=True
     )
 
     all_done(verdict, 40)
-    for uav in ("uav01", "uav03", "uav05"):
+    for uav in cut_off:
         assert f"{uav} is back" in story(verdict)
     assert verdict.agreement_s <= AGREE_WITHIN_S
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from dataclasses import replace
 from itertools import pairwise
@@ -16,12 +15,13 @@ from sim.chaos.flight import ChaosFlight, Verdict
 from sim.launch.fleet import BusKind
 from swarm.model import Task, TaskId
 from swarm.wire.messages import Body, Claim, ClaimPhase, Status
-from tests.process.chaos_play import all_done, play, story, survey
+from tests.process.chaos_play import all_done, logged_done, play, story, survey, told
 
 pytestmark = [pytest.mark.process]
 
 SPEEDUP = 4.0
 VICTIM = "uav03"
+LOST = f"{VICTIM} lost"
 
 B = TypeVar("B", bound=Body)
 
@@ -92,23 +92,29 @@ def test_a_hung_agents_tasks_go_to_others_and_it_comes_back_in_peace(
     async def script(flight: ChaosFlight) -> None:
         await flight.until_done(5)
         flight.pause(VICTIM)
-        await asyncio.sleep(3.0)
+        await flight.until(lambda: any(LOST in line for line in told(flight)), LOST)
         flight.resume(VICTIM)
 
-    verdict = play(survey(6, 40), tmp_path, script, bus=bus, speedup=SPEEDUP)
+    # One task is for the one that hangs alone: however late it comes back, it has something to do.
+    mission = survey(6, 40)
+    own = Task(TaskId("own"), mission.uavs[0].position_enu_m, 1e-3)
+    others: dict[str, float] = {own.id: 0.0}
+    uavs = (u if u.id == VICTIM else replace(u, success=others) for u in mission.uavs)
+    mission = replace(mission, uavs=tuple(uavs), tasks=(*mission.tasks, own))
+    verdict = play(mission, tmp_path, script, bus=bus, speedup=SPEEDUP)
 
-    all_done(verdict, 40)
-    assert any(f"{VICTIM} lost" in line for line in story(verdict))
+    all_done(verdict, 41)
     assert f"{VICTIM} is back" in story(verdict)
     assert verdict.agreement_s <= AGREE_WITHIN_S
-    assert VICTIM in {visit.uav for visit in verdict.visits[20:]}
+    assert [visit.uav for visit in verdict.visits if visit.task == own.id] == [VICTIM]
 
 
 def test_the_fleet_rides_out_a_restart_of_its_only_router(tmp_path: Path) -> None:
     async def script(flight: ChaosFlight) -> None:
         await flight.until_done(5)
         await flight.kill("router 1")
-        await asyncio.sleep(2.0)
+        before = len(logged_done(flight))
+        await flight.until(lambda: len(logged_done(flight)) >= before + 5, "work without a bus")
         await flight.restart("router 1")
 
     verdict = play(survey(4, 28), tmp_path, script, bus=BusKind.ROUTER, speedup=SPEEDUP)
