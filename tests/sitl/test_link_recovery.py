@@ -326,8 +326,15 @@ async def test_serial_device_that_is_plugged_in_again_is_opened_again(tmp_path: 
 @in_loop
 async def test_why_a_link_does_not_open_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
     port, listener = free_port(socket.SOCK_STREAM), Listener()
+    said: list[str] = []
+
+    def told() -> list[str]:
+        said.extend(capsys.readouterr().err.splitlines())
+        return [line for line in said if "does not open" in line]
+
     async with opened(f"tcp:127.0.0.1:{port}", listener):
-        await asyncio.sleep(0.5)
-    lines = [line for line in capsys.readouterr().err.splitlines() if "does not open" in line]
+        await until(lambda: bool(told()))
+        await asyncio.sleep(0.5)  # in which it is tried again
+    lines = told()
     assert len(lines) == 1
     assert "Connect call failed" in lines[0]
