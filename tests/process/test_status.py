@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,8 @@ import pytest
 from swarm.bus.endpoints import free_loopback_endpoints
 from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
+from tests.process.kept_open import kept_open, let_end
 from tests.process.mission import SwarmRun, wait_until
-from tests.process.pace import pace
 from tests.process.router_processes import router
 
 pytestmark = [pytest.mark.process]
@@ -33,6 +34,11 @@ def status(*words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+def wait_for_text(file: Path, text: str) -> None:
+    """Wait until it is in the file, which may not be there yet."""
+    wait_until(lambda: file.exists() and text in file.read_text(), 100, f"{text!r} in {file.name}")
+
+
 def router_of(run: SwarmRun) -> str:
     """Endpoint of the router that the run has started."""
     (words,) = [words for words in run.children() if words.startswith("coordinator ")]
@@ -40,63 +46,73 @@ def router_of(run: SwarmRun) -> str:
 
 
 def test_a_running_mission_is_found_and_told(tmp_path: Path) -> None:
-    (scenario := tmp_path / "scenario.toml").write_text(format_scenario(survey(5, 30)))
-    options = ["--bus", "router", "--method", "greedy", "--speedup", f"{pace(3.0):g}"]
+    # Whoever has set off is under way or at work whenever it is asked for.
+    endless = replace(survey(5, 30, service_s=1e5), horizon_s=1e6)
+    (scenario := tmp_path / "scenario.toml").write_text(format_scenario(endless))
+    logs = tmp_path / "logs"
+    options = ["--bus", "router", "--method", "greedy", "--speedup", "1", "--logs", str(logs)]
     with SwarmRun([str(scenario), *options], tmp_path) as run:
         run.wait_for_line("epoch 1")
+        for uav in endless.uavs:
+            wait_for_text(logs / f"{uav.id}.jsonl", '"decided"')
         table = status("--connect", router_of(run))
         told = json.loads(status("--connect", router_of(run), "--json").stdout)
 
-        assert (table.returncode, table.stderr) == (0, "")
+        assert table.returncode == 0, table.stderr
+        # A slow machine may keep it waiting for the bus, which it says.
+        assert all(" waiting for " in line for line in table.stderr.splitlines()), table.stderr
         assert table.stdout.startswith("chaos · RUNNING · mission time ")
         assert max(len(line) for line in table.stdout.splitlines()) <= 80
         assert (told["mission"], told["phase"], told["epoch"]) == ("chaos", "running", 1)
         assert told["coordinator"]
         assert len(told["uavs"]) == 5
-        # On a busy machine a UAV may not have made it to its start in time.
-        assert sum(uav["does"] in ("flying", "serving") for uav in told["uavs"]) >= 3
+        assert all(uav["does"] in ("flying", "serving") for uav in told["uavs"])
         assert all(uav["position_enu_m"] and uav["link_age_s"] < 3.0 for uav in told["uavs"])
-        assert sum(told["tasks"][state] for state in ("open", "done", "failed")) == 30
+        assert told["tasks"]["open"] == 30
         assert told["mission_s"] > 0.0
 
 
 def test_a_mission_is_watched_to_its_end(tmp_path: Path) -> None:
-    arguments = ["table-1", "--bus", "router", "--method", "greedy", "--speedup", f"{pace(2.0):g}"]
+    (scenario := tmp_path / "scenario.toml").write_text(format_scenario(kept_open(survey(3, 8))))
+    arguments = [str(scenario), "--bus", "router", "--method", "greedy", "--speedup", "6"]
     with SwarmRun(arguments, tmp_path) as run:
-        wait_until(lambda: any(w.startswith("coord") for w in run.children()), 30, "coordinator")
+        wait_until(lambda: any(w.startswith("coord") for w in run.children()), 100, "coordinator")
         words = [sys.executable, "-m", "swarm", "status", "--watch", "--connect", router_of(run)]
         with contextlib.ExitStack() as stack:
-            lines, story, stopped = (
-                stack.enter_context(
+
+            def watching(name: str, *more: str) -> subprocess.Popen[bytes]:
+                said = stack.enter_context((tmp_path / name).open("w"))
+                process = stack.enter_context(
                     subprocess.Popen(
-                        [*words, *more],
-                        stdin=subprocess.DEVNULL,
-                        stdout=subprocess.PIPE,
-                        stderr=subprocess.PIPE,
-                        text=True,
+                        [*words, *more], stdin=subprocess.DEVNULL, stdout=said, stderr=said
                     )
                 )
-                for more in (["--json"], [], [])
-            )
-            for watching in (lines, story, stopped):
-                stack.callback(watching.kill)  # none of them ends by itself after a failure
+                stack.callback(process.kill)  # none of them ends by itself after a failure
+                return process
+
+            watchers = [watching("lines", "--json"), watching("story"), watching("stopped")]
             run.wait_for_line("epoch 1")
+            for name in ("lines", "story", "stopped"):
+                wait_for_text(tmp_path / name, "\n")
+            *stay, stopped = watchers
             stopped.send_signal(signal.SIGINT)
-            assert stopped.wait(20) == 130
-            status, _ = run.result()
-            told = [json.loads(line) for line in lines.communicate(timeout=60)[0].splitlines()]
-            text, complaints = story.communicate(timeout=60)
+            assert stopped.wait(60) == 130
+            let_end()
+            status, result = run.result()
+            assert [process.wait(60) for process in stay] == [0, 0]
+            told = [json.loads(line) for line in (tmp_path / "lines").read_text().splitlines()]
+            text = (tmp_path / "story").read_text()
 
         assert status == 0, run.story()
-        assert (lines.returncode, story.returncode, complaints) == (0, 0, "")
         assert [each["tasks"]["done"] for each in told] == sorted(
             each["tasks"]["done"] for each in told
         )
         assert (told[-1]["phase"], told[-1]["tasks"]["done"]) == ("ended", 8)
-        assert told[-1]["planned_objective"] == pytest.approx(118.4939, abs=5e-5)
+        assert told[-1]["planned_objective"] == pytest.approx(result["objective"], abs=5e-5)
         # Nobody has told how fast the mission is flown.
         ended_s = float(text.split("  mission ends")[0].split()[-2])
-        assert 3.0 < ended_s < 9.0
+        (end_s,) = [each["mission_s"] for each in result["story"] if "ends" in each["text"]]
+        assert ended_s == pytest.approx(end_s, rel=0.2)
         assert text.splitlines()[-1] == "the mission is over, and everybody has left"
 
 
