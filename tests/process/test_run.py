@@ -165,7 +165,7 @@ def test_ctrl_c_ends_every_process(tmp_path: Path, fleet: list[str]) -> None:
 
 def test_ctrl_c_before_the_start_ends_every_process(tmp_path: Path) -> None:
     with SwarmRun(["table-1"], tmp_path) as run:
-        wait_until(lambda: len(run.children()) >= 2, 30, "first children")
+        wait_until(lambda: len(run.children()) >= 2, 100, "first children")
 
         assert run.end(signal.SIGINT) == 130
         run.assert_nothing_left()
@@ -173,7 +173,7 @@ def test_ctrl_c_before_the_start_ends_every_process(tmp_path: Path) -> None:
 
 def test_killed_launcher_takes_every_process_along(tmp_path: Path) -> None:
     with SwarmRun(["table-1"], tmp_path) as run:
-        wait_until(lambda: len(run.children()) == 7, 30, "all children")
+        wait_until(lambda: len(run.children()) == 7, 100, "all children")
         agent = run.child("agent", "uav2")
 
         assert run.end(signal.SIGKILL) == -signal.SIGKILL
@@ -184,7 +184,7 @@ def test_killed_launcher_takes_every_process_along(tmp_path: Path) -> None:
 
 def test_scenario_that_cannot_be_read_starts_nothing(tmp_path: Path) -> None:
     with SwarmRun(["no-such-scenario"], tmp_path) as run:
-        assert run.process.wait(20) == 2
+        assert run.process.wait(100) == 2
         for reader in run._readers:
             reader.join(10)
         assert len(run.lines) == 1
