@@ -127,8 +127,8 @@ def agent(
         typer.Option(
             "--keep-jerk",
             help="Leave the vehicle's limit of jerk as it is: by default it is raised for the "
-            "flight where that spares seconds of each leg (WP_JERK with --command mission, "
-            "MPC_JERK_AUTO), and put back after it.",
+            "flight where that spares seconds of each leg (MPC_JERK_AUTO of PX4), and put back "
+            "after it.",
         ),
     ] = False,
     fence_radius_m: Annotated[

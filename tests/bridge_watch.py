@@ -96,8 +96,9 @@ _COMMANDS_OF_MISSIONS: dict[Phase, set[int]] = {
     Phase.FLYING: {SET_MODE, SPEED},
 }
 """What else, if targets are missions."""
-_MISSION_ITEMS = {_WAYPOINT, 20, SPEED}
-"""A place, and the speed and the way home around it."""
+_LIMITS, _GIVES_WAY = 222, 92
+_MISSION_ITEMS = {_WAYPOINT, 20, SPEED, _LIMITS, _GIVES_WAY}
+"""A place, and the speed, the time for targets and the way home around it."""
 
 
 Point = tuple[float, float, float]
@@ -236,6 +237,9 @@ class BridgeWatch:
                 hold(message.command in _MISSION_ITEMS, f"mission item {message.command}")
                 if message.command == _WAYPOINT:
                     self._see_place(message, phases)
+                elif message.command in (_LIMITS, _GIVES_WAY):
+                    hold(self.fake is FakeCopter, "an item that it does not know")
+                    hold(message.param1 >= 1.0, f"gives way for {message.param1} s")
         elif name in ("COMMAND_LONG", "COMMAND_INT"):
             self._see_command(message, phases, missions=missions)
         else:
@@ -244,7 +248,7 @@ class BridgeWatch:
     def _see_jerk(self, message: Any) -> None:
         """Raised in flight only; put back at any time, even after a hand-over: it moves nothing."""
         flavour = self.bridge._seat.flavour
-        lending = None if flavour is None else flavour.lending(by_missions=True)
+        lending = None if flavour is None else flavour.lending
         hold(lending is not None, f"{message.param_id} of a vehicle that needs no other")
         if message.get_type() == "PARAM_SET" and lending is not None:
             raised = message.param_value > lending.value

@@ -275,12 +275,14 @@ class FakeCopter:
         return ACCEPTED
 
     def _reposition(self, m: Any) -> int:
-        if self.mode != GUIDED and not int(m.param2) & 1:
+        if self.mode != GUIDED and not self.mission.gives_way and not int(m.param2) & 1:
             return DENIED
         assert m.frame in (0, 5), "above mean sea level"
         target_m = enu_from_wgs84(self.origin, m.x / 1e7, m.y / 1e7, m.z)
         if math.hypot(*target_m[:2]) > self.fence_radius_m:
             return FAILED  # without a word
+        if self.mission.gives_way:
+            self.mission.take_target(target_m)
         if self.in_takeoff:
             self.in_takeoff = False
             self.speed_m_s = self.default_speed_m_s

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tests.fake_copter import FakeCopter
 
 OK, ERROR, UNSUPPORTED, INVALID_SEQUENCE, DENIED, CANCELLED = 0, 1, 3, 13, 14, 15
-WAYPOINT, LAUNCH, SPEED = 16, 20, 178
+WAYPOINT, LAUNCH, GIVE_WAY, SPEED, LIMITS = 16, 20, 92, 178, 222
 _GROUND = (255, 191)
 
 
@@ -42,6 +42,9 @@ class CopterMissions:
         self._asked_s = self._heard_s = 0.0
         self._near_since_s: float | None = None
         self._holds_s = 0.0
+        self._limit_s = self._gives_way_until_s = 0.0
+        self._forgets_speed = False
+        self._speed_m_s: float | None = None
 
     # Transfer.
 
@@ -73,7 +76,8 @@ class CopterMissions:
         before = self.items[m.seq] if m.seq < len(self.items) else None
         self.items[m.seq : m.seq + 1] = [m]
         changed = before is None or _content(before) != _content(m)
-        if changed and m.seq == self.current and self.runs and not self.going_home:
+        flies_to_it = m.command == WAYPOINT and m.seq == self.current
+        if changed and flies_to_it and self.runs and not self.going_home:
             self.copter.text(2, "Auto mission changed, restarted command")
             self._fly(self.current)
         self._wanted += 1
@@ -135,15 +139,15 @@ class CopterMissions:
         if m.seq >= len(self.items):
             return
         self.set_current(max(m.seq, 1))
-        self.say_current()
+        self.copter.say(mavlink.MAVLink_mission_current_message(m.seq))  # as an acknowledgement
 
     def set_current(self, seq: int) -> None:
         if self.runs:
             self._fly(seq)
         else:
             self.current = seq
-            if self.items[seq].command == SPEED:
-                self.current = seq + 1
+            while self.items[self.current].command in (SPEED, LIMITS):
+                self.current += 1
 
     def say_current(self) -> None:
         self.copter.say(mavlink.MAVLink_mission_current_message(self.current))
@@ -158,7 +162,10 @@ class CopterMissions:
         """The mission mode begins: go on where it was left, commands before included."""
         self.going_home = False
         seq = max(self.current, 1)
-        self._fly(seq - 1 if self.items[seq - 1].command == SPEED else seq)
+        while self.items[seq - 1].command in (SPEED, LIMITS):
+            seq -= 1
+        self._limit_s = 0.0
+        self._fly(seq)
 
     def leave(self) -> None:
         self.going_home = False
@@ -166,20 +173,41 @@ class CopterMissions:
 
     def _fly(self, seq: int) -> None:
         copter = self.copter
-        while seq < len(self.items) and self.items[seq].command == SPEED:
-            copter.speed_m_s = self.items[seq].param2
+        while seq < len(self.items) and self.items[seq].command in (SPEED, LIMITS):
+            if self.items[seq].command == SPEED:
+                self._speed_m_s = copter.speed_m_s = self.items[seq].param2
+            else:
+                self._limit_s = self.items[seq].param1
             seq += 1
         self.current, self.going_home, self._near_since_s = seq, False, None
         item = self.items[seq]
         if item.command == LAUNCH:
             self._go_home()
             return
+        if item.command == GIVE_WAY:
+            self._forgets_speed, copter.target_m = True, None
+            self._gives_way_until_s = copter.now_s + (self._limit_s or math.inf)
+            return
+        copter.speed_m_s = self._speed_m_s or copter.speed_m_s
         assert item.frame in (0, 5), "above mean sea level"
         target_m = enu_from_wgs84(copter.origin, item.x / 1e7, item.y / 1e7, item.z)
         self._holds_s = float(int(item.param1))
         self.flown.append((round(target_m[0], 1), round(target_m[1], 1)))
         if not copter.stuck:
             copter.target_m = target_m
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether it flies to targets meanwhile."""
+        known = self.current < len(self.items)
+        return self.runs and known and self.items[self.current].command == GIVE_WAY
+
+    def take_target(self, target_m: tuple[float, float, float]) -> None:
+        """A target was told: the first one makes it forget the speed."""
+        self.flown.append((round(target_m[0], 1), round(target_m[1], 1)))
+        if self._forgets_speed:
+            self._forgets_speed = False
+            self.copter.speed_m_s = self.copter.default_speed_m_s
 
     def _go_home(self) -> None:
         self.going_home = True
@@ -194,6 +222,11 @@ class CopterMissions:
             elif copter.now_s - self._asked_s > self.ask_again_s:
                 self._ask()
         if not self.runs or self.going_home or self.current >= len(self.items):
+            return
+        if self.gives_way:
+            if copter.now_s >= self._gives_way_until_s:
+                self.say_reached(self.current)
+                self._fly(self.current + 1)
             return
         item = self.items[self.current]
         if self._near_since_s is None and self._is_near(item):
@@ -246,7 +279,7 @@ class Px4Missions(CopterMissions):
         self._heard_s = self.copter.now_s
         if m.seq != self._wanted:
             return
-        if (m.command != WAYPOINT) != (m.frame == 2):
+        if m.command in (GIVE_WAY, LIMITS) or (m.command != WAYPOINT) != (m.frame == 2):
             self._wanted = None
             self.ack(UNSUPPORTED)
             return

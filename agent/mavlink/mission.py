@@ -14,7 +14,7 @@ Protocol: https://mavlink.io/en/services/mission.html
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -108,6 +108,8 @@ class MissionTransfer:
         self._phase = _Phase.IDLE
         self._items: tuple[MissionItem, ...] = ()
         self._read_back: list[MissionItem] = []
+        self._count = 0
+        """Items that the vehicle says it holds, while they are read."""
         self._deadline_s = math.inf
         self._tries = 0
         self._last: list[Outbound] = []
@@ -118,8 +120,9 @@ class MissionTransfer:
         self._began_reading_anew = False
         self._cleared = False
         """The vehicle says that it cleared what it held."""
-        self._reading_count: int | None = None
-        """Items wanted of a vehicle that is only asked; None while something is uploaded."""
+        self._reading: Collection[int] | None = None
+        """How many items are worth reading of a vehicle that is only asked; None while
+        something is uploaded."""
         self._failure: str | None = None
         self.in_force: tuple[MissionItem, ...] | None = None
         """Items last verified on the vehicle; None if none ever were."""
@@ -142,19 +145,19 @@ class MissionTransfer:
             raise ValueError("a mission transfer is under way already")
         if not items or [item.seq for item in items] != list(range(len(items))):
             raise ValueError("mission items must be numbered 0, 1, 2, … without a gap")
-        self._failure = self._reading_count = None
+        self._failure = self._reading = None
         self.result, self._cleared = None, False
         return self._announce(tuple(items), now_s)
 
-    def read(self, count: int, now_s: float) -> list[Outbound]:
-        """Begin to ask what stands on the vehicle; only ``count`` items are read, no others.
+    def read(self, counts: Collection[int], now_s: float) -> list[Outbound]:
+        """Begin to ask what stands on the vehicle; only so many items are read, no others.
 
         Raises:
             ValueError: a transfer is under way.
         """
         if self.busy:
             raise ValueError("a mission transfer is under way already")
-        self._failure, self._reading_count = None, count
+        self._failure, self._reading = None, counts
         self.result, self._cleared = None, False
         return self._ask_count(now_s)
 
@@ -255,12 +258,13 @@ class MissionTransfer:
     def _on_count(self, count: int, now_s: float) -> list[Outbound]:
         if self._cleared:
             return self._on_count_of_cleared(count, now_s)
-        if self._reading_count is not None and count != self._reading_count:
+        if self._reading is not None and count not in self._reading:
             self._phase = _Phase.IDLE
             self.result = MissionRead(count, ())
             return [MissionAck(_ACCEPTED)]
-        if self._reading_count is None and count != len(self._items):
+        if self._reading is None and count != len(self._items):
             return self._differs(f"it holds {count} items, not {len(self._items)}", now_s)
+        self._count = count
         self._phase = _Phase.ASKING_ITEMS
         return self._say([MissionRequest(0)], now_s)
 
@@ -276,12 +280,12 @@ class MissionTransfer:
         wanted = len(self._read_back)
         if item.seq != wanted:
             return []  # doubled or late
-        reading = self._reading_count is not None
+        reading = self._reading is not None
         ours = reading or wanted < self._policy.vehicle_items or _same(item, self._items[wanted])
         if not ours:
             return self._differs(f"item {wanted} differs", now_s)
         self._read_back.append(item)
-        if len(self._read_back) < (self._reading_count or len(self._items)):
+        if len(self._read_back) < self._count:
             return self._say([MissionRequest(wanted + 1)], now_s)
         return self._verified()
 
@@ -294,8 +298,8 @@ class MissionTransfer:
 
     def _verified(self) -> list[Outbound]:
         self._phase = _Phase.IDLE
-        if self._reading_count is not None:
-            self.result = MissionRead(self._reading_count, tuple(self._read_back))
+        if self._reading is not None:
+            self.result = MissionRead(self._count, tuple(self._read_back))
             return [MissionAck(_ACCEPTED)]
         self._touched = False
         if self._failure is None:
@@ -309,7 +313,7 @@ class MissionTransfer:
         out: list[Outbound] = [MissionAck(_OPERATION_CANCELLED)]
         if self._failure is None:
             self._failure = reason
-            if self._touched and self._reading_count is None:
+            if self._touched and self._reading is None:
                 if self.in_force is not None:
                     return out + self._announce(self.in_force, now_s)
                 self._phase = _Phase.CLEARING

@@ -73,7 +73,7 @@ class Seat:
         lending = None
         if flavour is not None:
             self.commands.acknowledged_twice = flavour.acknowledged_twice
-            lending = flavour.lending(by_missions=self._by_missions)
+            lending = flavour.lending
         self.lent = None
         if lending is not None and self.config.raises_jerk:
             self.lent = LentParameter(lending, self.config)

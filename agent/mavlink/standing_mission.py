@@ -7,6 +7,9 @@ upload the vehicle goes on with the mission verified before. Leaves out: judging
 (agent.mavlink.mission_leg), who may command the vehicle (agent.mavlink.bridge), and ground
 stations that change the mission while it is flown.
 
+Where the mission gives way to targets first, its hold begins when that time is over, or later:
+what is said here of the hold counts from when the vehicle is near, so it is never too late.
+
 Protocol: https://mavlink.io/en/services/mission.html
 """
 
@@ -37,6 +40,9 @@ Point = tuple[float, float, float]
 
 _RENEWAL_FRAC = 0.5
 """The wait is renewed when that share of the patience is left."""
+_SPARE_S, _SPARE = 10.0, 1.5
+"""A mission gives way for that long, and for so many times the flight [s]."""
+_LEAST_CLIMB_M_S = 1.0
 _HOLD_SLACK_S = 2.0
 """A hold may end that much earlier than it seems: it begins before the mission is read back."""
 
@@ -59,7 +65,6 @@ class StandingMission:
         self._commands = commands
         self._flavour = flavour
         vehicle_items = flavour.mission_vehicle_items
-        self._seqs = MissionSeqs(vehicle_items)
         self._transfer = MissionTransfer(
             MissionPolicy(config.mission_reply_timeout_s, config.mission_tries, vehicle_items)
         )
@@ -110,7 +115,8 @@ class StandingMission:
         """Put a target in force, in place of the last one."""
         hold_s = math.ceil(stay_s + self._config.mission_patience_s)
         place = wgs84_from_enu(self._config.origin, target_enu_m)
-        plan = MissionPlan(*place, speed_m_s, min(max(1, hold_s), LONGEST_HOLD_S))
+        guided_s = self._guided_s(target_enu_m, speed_m_s)
+        plan = MissionPlan(*place, speed_m_s, min(max(1, hold_s), LONGEST_HOLD_S), guided_s)
         self._awaited, self._renewing = True, False
         self.failure, self.reached, self.unverified = None, False, False
         if self._stage is _Stage.IDLE and self._mode_seen:
@@ -125,7 +131,8 @@ class StandingMission:
         place = wgs84_from_enu(self._config.origin, target_enu_m)
         hold_s = min(math.ceil(self._config.mission_patience_s), LONGEST_HOLD_S)
         self.failure = None
-        out = self._want(MissionPlan(*place, speed_m_s, max(1, hold_s)), now_s)
+        guided_s = self._guided_s(target_enu_m, speed_m_s)
+        out = self._want(MissionPlan(*place, speed_m_s, max(1, hold_s), guided_s), now_s)
         self._stage = _Stage.LAYING
         return out
 
@@ -192,7 +199,9 @@ class StandingMission:
         if self._transfer.busy or self.is_ours is not None or now_s < self._look_at_s:
             return []
         self._look_at_s = now_s + self._config.retry_delay_s
-        return self._transfer.read(self._seqs.count, now_s)
+        own = self._flavour.mission_vehicle_items
+        counts = {MissionSeqs(own, gives_way).count for gives_way in (False, True)}
+        return self._transfer.read(counts, now_s)
 
     def expects(self, custom_mode: int, now_s: float) -> bool:
         """Whether that mode is the mission's doing; else somebody switched to it."""
@@ -211,11 +220,12 @@ class StandingMission:
         """Take what concerns missions."""
         if self._start is not None:
             self._start.on_message(message)
-        elif self._stage is _Stage.FLOWN:
+        elif self._stage is _Stage.FLOWN and self._standing is not None:
+            seqs = self._standing.seqs(self._flavour)
             match message:
-                case MissionCurrent(seq) if seq == self._seqs.home:
+                case MissionCurrent(seq) if seq == seqs.home:
                     self.coming_home = True
-                case MissionReached(seq) if seq == self._seqs.target:
+                case MissionReached(seq) if seq == seqs.target:
                     self._on_reached(now_s)
                 case _:
                     pass
@@ -242,6 +252,7 @@ class StandingMission:
             out += start.advance(heartbeat, heard_at_s, now_s)
             self._mode_asked |= start.mode_asked
             if start.done:
+                out += start.cancel(now_s)
                 self._become_flown()
             elif start.failure is not None:
                 in_mission = self._flavour.is_mission(heartbeat.custom_mode)
@@ -271,10 +282,11 @@ class StandingMission:
         if plan == self._standing:
             # Neither firmware begins an identical mission anew.
             plan = replace(plan, hold_s=plan.hold_s + 1)
+        out = [] if self._start is None else self._start.cancel(now_s)
         self._wanted, self._start = plan, None
         self._stage = _Stage.UPLOADING
         self.coming_home = False
-        return [] if self._transfer.busy else self._upload(plan, now_s)
+        return out if self._transfer.busy else out + self._upload(plan, now_s)
 
     def _upload(self, plan: MissionPlan, now_s: float) -> list[Outbound]:
         self._sent = plan
@@ -300,13 +312,18 @@ class StandingMission:
         elif laying:
             self._stage = _Stage.IDLE
         else:
-            self._begin(now_s)
+            # One that gives way is not taken up by itself: it goes on as it was begun.
+            self._begin(now_s, again=not self._renewing and self._wanted.guided_s > 0)
         return []
 
     def _begin(self, now_s: float, *, again: bool = False) -> None:
+        plan = self._standing
+        if plan is None:
+            return
         self._stage = _Stage.STARTING
         self._begun_s, self._near_since_s = now_s, None
-        self._start = MissionStart(self._config, self._commands, self._flavour, now_s, again=again)
+        parts = (self._config, self._commands, self._flavour, plan)
+        self._start = MissionStart(*parts, now_s, again=again)
 
     def _become_flown(self) -> None:
         self._stage, self._start = _Stage.FLOWN, None
@@ -350,6 +367,17 @@ class StandingMission:
         # Renewed once it is known that it is to wait: it may be called home.
         self._inherited = self._awaited = True
         self._begun_s, self._near_since_s = now_s, None
+
+    def _guided_s(self, target_enu_m: Point, speed_m_s: float) -> int:
+        """How long a mission gives way to targets: for the flight, with something to spare."""
+        if not self._flavour.missions_give_way:
+            return 0
+        place_enu_m = self._place_enu_m
+        if place_enu_m is None:
+            return min(math.ceil(_SPARE_S + self._config.mission_patience_s), LONGEST_HOLD_S)
+        climb_s = abs(target_enu_m[2] - place_enu_m[2]) / _LEAST_CLIMB_M_S
+        flight_s = math.dist(target_enu_m, place_enu_m) / speed_m_s + climb_s
+        return min(math.ceil(_SPARE_S + _SPARE * flight_s), LONGEST_HOLD_S)
 
     def _on_reached(self, now_s: float) -> None:
         """The item is done, which it cannot be before its hold time: else it is an echo."""

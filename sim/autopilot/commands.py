@@ -194,14 +194,14 @@ class Commands:
         change_mode = math.isfinite(flags) and bool(
             int(flags) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         )
-        needs_flag = habits.reposition_needs_flag or pilot.mode is not habits.for_reposition
+        needs_flag = habits.reposition_needs_flag or not pilot.takes_targets
         if needs_flag and not change_mode:
             return pilot.flavour.refusals.reposition_without_flag
         pause = pilot.flavour.pauses_anywhere and _is_nowhere(command)
         target_enu_m = pilot.position_enu_m(now_s) if pause else self._place(command)
         if target_enu_m is None:
             return _DENIED
-        if not pilot.set_mode(habits.for_reposition, now_s):
+        if not pilot.takes_targets and not pilot.set_mode(habits.for_reposition, now_s):
             return pilot.flavour.refusals.not_now
         if not (pause or pilot.within_fence(target_enu_m)):
             # Acknowledged all the same, and ignored.

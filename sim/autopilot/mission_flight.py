@@ -41,6 +41,10 @@ class Helm(Protocol):
         """Rise to a height in the local frame [m]."""
         ...
 
+    def let_targets(self, now_s: float) -> None:
+        """Stay, and fly to targets from now on as if the mode for them had been entered."""
+        ...
+
     def stay_on_ground(self, now_s: float) -> None:
         """Give up a take-off that has not begun to rise."""
         ...
@@ -69,11 +73,13 @@ class MissionFlight:
         self._flight = flight
         self._parameters = parameters
         self._after_climb: MissionItem | None = None
+        self._speed_m_s: float | None = None
+        """What the mission asked for, if it did."""
 
     def begin(self) -> None:
         """Hear that a mode has just been entered."""
         self.climb_due = self._flavour.missions.climbs_first
-        self._after_climb = None
+        self._after_climb = self._speed_m_s = None
 
     def continues(self, milestone: Milestone, at_s: float) -> bool:
         """Fly on to an item's place after the climb to its height; False if there was none."""
@@ -92,6 +98,8 @@ class MissionFlight:
     def mission_navigate(self, item: MissionItem, now_s: float) -> None:
         """Fly to the place of the item; from the ground only where it is risen to first."""
         self._after_climb = None
+        if self._speed_m_s is not None:
+            self._flight.override_cruise(self._speed_m_s, now_s)
         place = self._place(item, now_s)
         east_m, north_m, up_m = self._helm.position_enu_m(now_s)
         if self.climb_due and (self._flight.on_ground or place[2] > up_m + _CLIMB_LEAST_M):
@@ -110,6 +118,11 @@ class MissionFlight:
             self.climb_due = False
             self._flight.navigate(place, now_s)
 
+    def mission_give_way(self, now_s: float) -> None:
+        """Stay where the vehicle is, and fly to the targets that are told."""
+        self._after_climb = None
+        self._helm.let_targets(now_s)
+
     def mission_land(self, now_s: float) -> None:
         """Land where the vehicle is."""
         self.climb_due = False
@@ -124,6 +137,7 @@ class MissionFlight:
 
     def mission_change_speed(self, speed_m_s: float, now_s: float) -> None:
         """Fly at another speed [m/s] until AUTO is left."""
+        self._speed_m_s = speed_m_s
         self._flight.override_cruise(speed_m_s, now_s)
 
     def mission_finished(self, now_s: float) -> None:

@@ -44,7 +44,8 @@ _PLACES = frozenset(
         mavlink.MAV_CMD_NAV_TAKEOFF,
     }
 )
-_DONE_AT_ONCE = frozenset({mavlink.MAV_CMD_DO_CHANGE_SPEED})
+_DONE_AT_ONCE = frozenset({mavlink.MAV_CMD_DO_CHANGE_SPEED, mavlink.MAV_CMD_DO_GUIDED_LIMITS})
+_GIVES_WAY = frozenset({mavlink.MAV_CMD_NAV_GUIDED_ENABLE, mavlink.MAV_CMD_DO_GUIDED_LIMITS})
 _NAMES = {
     mavlink.MAV_CMD_NAV_WAYPOINT: "WP",
     mavlink.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
@@ -52,7 +53,9 @@ _NAMES = {
     mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
     mavlink.MAV_CMD_NAV_LAND: "Land",
     mavlink.MAV_CMD_NAV_TAKEOFF: "Takeoff",
+    mavlink.MAV_CMD_NAV_GUIDED_ENABLE: "GuidedEnable",
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed",
+    mavlink.MAV_CMD_DO_GUIDED_LIMITS: "GuidedLimits",
 }
 
 
@@ -100,9 +103,14 @@ def int_frame(frame: int) -> int:
     return _INT_FRAMES.get(frame, frame)
 
 
-def item_from_message(message: mavlink.MAVLink_message) -> MissionItem | int:
-    """The item in a MISSION_ITEM or MISSION_ITEM_INT, or the MAV_MISSION_RESULT of refusing it."""
-    if message.command not in _NAMES:
+def item_from_message(message: mavlink.MAVLink_message, *, gives_way: bool) -> MissionItem | int:
+    """The item in a MISSION_ITEM or MISSION_ITEM_INT, or the MAV_MISSION_RESULT of refusing it.
+
+    Args:
+        message: the message.
+        gives_way: the firmware knows items that let targets be told for a time.
+    """
+    if message.command not in _NAMES or (message.command in _GIVES_WAY and not gives_way):
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     # Yaw is given as NaN where it doesn't matter; one NaN, so that equal items are equal.
     yaw_deg = math.nan if math.isnan(message.param4) else message.param4

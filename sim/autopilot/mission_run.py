@@ -44,6 +44,10 @@ class MissionPilot(Protocol):
         """Fly to the place of the item."""
         ...
 
+    def mission_give_way(self, now_s: float) -> None:
+        """Stay where the vehicle is, and fly to the targets that are told."""
+        ...
+
     def mission_land(self, now_s: float) -> None:
         """Land where the vehicle is."""
         ...
@@ -89,6 +93,8 @@ class MissionRun:
         self._hold_until_s: float | None = None
         self._set_seq: int | None = None
         """Item that was asked for while the mission did not run, if it is begun there."""
+        self._limit_s = 0.0
+        """For how long the mission gives way to targets; 0: until it is told to go on."""
         self._landing = False
         """A landing item has reached its place and is descending."""
 
@@ -96,6 +102,13 @@ class MissionRun:
     def present(self) -> bool:
         """Whether there is anything to fly."""
         return self._store.next_navigation(self._first_seq) is not None
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether the mission runs, and lets targets be told."""
+        item = self._current_item()
+        gives_way = item is not None and item.command == mavlink.MAV_CMD_NAV_GUIDED_ENABLE
+        return self.state is RunState.RUNNING and gives_way
 
     @property
     def starts_with_take_off(self) -> bool:
@@ -106,6 +119,7 @@ class MissionRun:
 
     def start_or_resume(self, now_s: float) -> None:
         """Go on with the current item; from the beginning if there is none."""
+        self._limit_s = 0.0
         if self.state is RunState.STOPPED and self.current is not None:
             self.state = RunState.RUNNING
             self._begin_from(self.current if self._set_seq is None else self._set_seq, now_s)
@@ -153,9 +167,9 @@ class MissionRun:
     def mission_changed(self, old: tuple[MissionItem, ...], now_s: float) -> bool:
         """Take up a mission that replaced ``old`` while this one ran; True if it made a change.
 
-        The current item is begun anew if it or one of the next two differs, as
-        ArduCopter does, or the whole mission if anything differs, where the firmware
-        goes back to the first item; otherwise the vehicle flies on.
+        The current item is begun anew if it or one of the next two differs and it gives
+        no way to targets, as ArduCopter does, or the whole mission if anything differs, where
+        the firmware goes back to the first item; otherwise the vehicle flies on.
         """
         rewinds = self._habits.upload_rewinds and old != self._store.items
         if self.state is not RunState.RUNNING:
@@ -166,7 +180,8 @@ class MissionRun:
             self._repeat_s = None
             self._begin_from(self._first_seq, now_s)
             return True
-        if self.current is None or self._upcoming(old) == self._upcoming(self._store.items):
+        same = self._upcoming(old) == self._upcoming(self._store.items)
+        if self.current is None or same or self._gave_way(old):
             return False
         self._begin_from(self.current, now_s)
         return True
@@ -214,6 +229,10 @@ class MissionRun:
     def _current_item(self) -> MissionItem | None:
         return None if self.current is None else self._store.item(self.current)
 
+    def _gave_way(self, items: tuple[MissionItem, ...]) -> bool:
+        current = self.current or 0
+        return current < len(items) and items[current].command == mavlink.MAV_CMD_NAV_GUIDED_ENABLE
+
     def _upcoming(self, items: tuple[MissionItem, ...]) -> list[MissionItem]:
         upcoming = [item for item in items[self.current or 0 :] if item.is_navigation]
         return upcoming[:_ITEMS_COMPARED]
@@ -228,7 +247,9 @@ class MissionRun:
                 self._go_to(seq)
                 self._begin(item, now_s)
                 return
-            if item.params[1] > 0.0:
+            if item.command == mavlink.MAV_CMD_DO_GUIDED_LIMITS:
+                self._limit_s = item.params[0]
+            elif item.params[1] > 0.0:
                 self._pilot.mission_change_speed(item.params[1], now_s)
             self._reached(seq, now_s)
             seq += 1
@@ -240,6 +261,11 @@ class MissionRun:
         match item.command:
             case mavlink.MAV_CMD_NAV_TAKEOFF:
                 self._pilot.mission_take_off(item, now_s)
+            case mavlink.MAV_CMD_NAV_GUIDED_ENABLE if item.params[0] == 0.0:
+                self._complete_current(now_s)
+            case mavlink.MAV_CMD_NAV_GUIDED_ENABLE:
+                self._pilot.mission_give_way(now_s)
+                self._hold_until_s = now_s + self._limit_s if self._limit_s > 0.0 else None
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH if self._habits.forgets_mode:
                 self._leave_by_returning(now_s)
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:

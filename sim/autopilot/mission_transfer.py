@@ -146,7 +146,7 @@ class MissionTransfer:
         if message.seq != len(upload.items):
             self._acknowledge(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             return
-        item = item_from_message(message)
+        item = item_from_message(message, gives_way=self._habits.gives_way)
         if not isinstance(item, MissionItem):
             self._upload = None
             self._acknowledge(sender, item)

@@ -420,6 +420,18 @@ class Pilot:
                 self.flight.override_cruise(None, now_s)
         self.flight.navigate(target_enu_m, now_s, speed_m_s)
 
+    @property
+    def takes_targets(self) -> bool:
+        """Whether targets are flown to in the present mode."""
+        return self.mode is self.flavour.modes.for_reposition or (
+            self.mode is Mode.AUTO and self.run.gives_way
+        )
+
+    def let_targets(self, now_s: float) -> None:
+        """Stay, and fly to targets from now on as if the mode for them had been entered."""
+        self._position_control = False
+        self.flight.hold(now_s)
+
     def change_speed(self, speed_m_s: float, now_s: float) -> bool:
         """Fly on at another speed [m/s]; False in modes that have none of their own."""
         if self.mode not in self.flavour.modes.change_speed:

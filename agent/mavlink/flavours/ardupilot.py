@@ -75,10 +75,6 @@ _RESULT_FAILED = 4
 _STATE_STANDBY = 3
 _STATE_ACTIVE = 4
 
-_MISSION_JERK = Lending(("WP_JERK", "WPNAV_JERK"), 5.0)
-"""[m/s³] What its position controller is allowed anyway, as in GUIDED (PSC_NE_JERK); missions
-are flown with 1 by default, which costs 2.5 s at each start and stop together."""
-
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_REPOSITION = 192
 
@@ -91,9 +87,10 @@ class ArduCopter(Copter):
         """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""
         return (SpeedParameter("WP_SPD", 1.0), SpeedParameter("WPNAV_SPEED", 100.0))
 
-    def lending(self, *, by_missions: bool) -> Lending | None:
-        """The jerk of missions; GUIDED does not go by it."""
-        return _MISSION_JERK if by_missions else None
+    @property
+    def lending(self) -> Lending | None:
+        """None: targets are not flown by the jerk of missions, and missions give way to them."""
+        return None
 
     @property
     def failsafe_names(self) -> tuple[tuple[str, ...], ...]:
@@ -119,6 +116,11 @@ class ArduCopter(Copter):
     def mission_vehicle_items(self) -> int:
         """Item 0 is home, whatever is sent as such."""
         return 1
+
+    @property
+    def missions_give_way(self) -> bool:
+        """Yes: it flies to targets as in GUIDED, and to waypoints on a slower track."""
+        return True
 
     @property
     def acknowledged_twice(self) -> frozenset[int]:

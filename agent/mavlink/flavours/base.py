@@ -34,12 +34,9 @@ class Flavour(Protocol):
         """Every name that the cruise speed has had."""
         ...
 
-    def lending(self, *, by_missions: bool) -> Lending | None:
-        """The parameter without which legs take longer than they need to; None without one.
-
-        Args:
-            by_missions: targets are told as missions.
-        """
+    @property
+    def lending(self) -> Lending | None:
+        """The parameter without which legs take longer than they need to; None without one."""
         ...
 
     @property
@@ -63,6 +60,11 @@ class Flavour(Protocol):
     @property
     def mission_vehicle_items(self) -> int:
         """Leading items of a mission that belong to the vehicle and cannot be chosen."""
+        ...
+
+    @property
+    def missions_give_way(self) -> bool:
+        """Whether a mission may let targets be told for a time, and whether that is faster."""
         ...
 
     @property

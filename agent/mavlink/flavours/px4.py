@@ -87,9 +87,9 @@ class Px4Copter(Copter):
         """MPC_XY_CRUISE [m/s], which also survives a restart of the vehicle."""
         return (SpeedParameter("MPC_XY_CRUISE", 1.0),)
 
-    def lending(self, *, by_missions: bool) -> Lending | None:
+    @property
+    def lending(self) -> Lending | None:
         """The jerk of every flight to a target, however told."""
-        del by_missions
         return _JERK
 
     @property
@@ -119,6 +119,11 @@ class Px4Copter(Copter):
     def mission_vehicle_items(self) -> int:
         """None: item 0 is flown like any other."""
         return 0
+
+    @property
+    def missions_give_way(self) -> bool:
+        """No: it knows no such item."""
+        return False
 
     @property
     def acknowledged_twice(self) -> frozenset[int]:

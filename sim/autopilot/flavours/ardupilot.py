@@ -113,6 +113,7 @@ class ArduCopter:
         climbs_first=False,
         repeats_reached=0,
         keeps_number=False,
+        gives_way=True,
         forgets_mode=False,
     )
     refusals: Refusals = Refusals(

@@ -84,6 +84,8 @@ class MissionHabits:
     """How many times more MISSION_ITEM_REACHED is sent, once a second."""
     keeps_number: bool
     """Whether MISSION_CURRENT goes on telling the last item after the motors stopped."""
+    gives_way: bool
+    """Whether an item may let targets be told for a time."""
     forgets_mode: bool
     """Whether the mode becomes another one at the end, or at an item that returns home."""
 

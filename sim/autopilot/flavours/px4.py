@@ -109,6 +109,7 @@ class Px4:
         climbs_first=True,
         repeats_reached=10,
         keeps_number=True,
+        gives_way=False,
         forgets_mode=True,
     )
     refusals: Refusals = Refusals(

@@ -8,6 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import Received
+from sim.autopilot.flavours.px4 import Px4
 from tests.ground_station import (
     ACCEPTED,
     AUTO,
@@ -20,6 +21,7 @@ from tests.ground_station import (
 )
 
 CANCELLED, INVALID_SEQUENCE, DENIED, NO_SPACE = 15, 13, 14, 4
+DENIED_COMMAND = 2
 
 
 def reached(ground: GroundStation) -> list[int]:
@@ -266,6 +268,77 @@ def test_waypoint_is_reached_when_its_hold_time_is_over() -> None:
     assert reached(ground) == [1]
     ground.wait(1.0)
     assert reached(ground) == [1, 2]
+
+
+def giving_way(limit_s: float) -> GroundStation:
+    """A vehicle in AUTO, 12 m above home, whose mission gives way to targets before its place."""
+    ground = ground_station(cruise_m_s=5.0)
+    ground.take_off(12.0)
+    assert ground.upload(*_items_giving_way(ground, limit_s)) == 0
+    assert ground.set_mode(AUTO) == ACCEPTED
+    return ground
+
+
+def _items_giving_way(ground: GroundStation, limit_s: float, hold_s: float = 0.0) -> list[Any]:
+    speed, limits = mavlink.MAV_CMD_DO_CHANGE_SPEED, mavlink.MAV_CMD_DO_GUIDED_LIMITS
+    return [
+        ground.item(0),
+        ground.item(1, command=speed, params=(1.0, 4.0, -1.0, 0.0)),
+        ground.item(2, command=limits, params=(limit_s, 0.0, 0.0, 0.0)),
+        ground.item(3, command=mavlink.MAV_CMD_NAV_GUIDED_ENABLE, params=(1.0, 0.0, 0.0, 0.0)),
+        ground.item(4, 0.0, 20.0, params=(hold_s, 0.0, 0.0, 0.0)),
+    ]
+
+
+def test_mission_gives_way_to_targets_for_a_time_and_then_goes_on_at_its_own_speed() -> None:
+    ground = giving_way(10.0)
+    assert reached(ground) == [1, 2]
+    assert current(ground)[0] == 3
+    assert ground.reposition(20.0, 0.0, 12.0, change_mode=False) == ACCEPTED
+    ground.wait(4.1)
+    assert ground.position_enu_m == pytest.approx((20.0, 0.0, 12.0), abs=0.01), "it forgot 4 m/s"
+    assert current(ground)[0] == 3
+    ground.wait(5.8)
+    assert reached(ground) == [1, 2]
+    ground.wait(0.2)
+    assert reached(ground) == [1, 2, 3]
+    ground.wait(6.9)
+    assert reached(ground) == [1, 2, 3], "28 m at 4 m/s"
+    ground.wait(0.2)
+    assert reached(ground) == [1, 2, 3, 4]
+
+
+def test_a_speed_told_after_the_target_is_flown() -> None:
+    ground = giving_way(30.0)
+    ground.reposition(20.0, 0.0, 12.0, change_mode=False)
+    assert ground.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1.0, 2.0, -1.0) == ACCEPTED
+    ground.wait(5.0)
+    assert ground.position_enu_m[0] == pytest.approx(10.0, abs=0.1)
+
+
+def test_a_mission_that_gives_way_no_more_takes_no_targets() -> None:
+    ground = giving_way(2.0)
+    ground.wait(2.1)
+    assert current(ground)[0] == 4
+    assert ground.reposition(20.0, 0.0, 12.0, change_mode=False) == DENIED_COMMAND
+
+
+def test_another_mission_does_not_end_the_time_for_targets() -> None:
+    ground = giving_way(10.0)
+    ground.reposition(20.0, 0.0, 12.0, change_mode=False)
+    ground.wait(2.0)
+    assert ground.upload(*_items_giving_way(ground, 10.0, hold_s=3.0)) == 0
+    ground.wait(2.2)
+    assert ground.position_enu_m == pytest.approx((20.0, 0.0, 12.0), abs=0.01)
+    ground.wait(6.0)
+    assert current(ground)[0] == 4
+
+
+def test_px4_knows_no_missions_that_give_way() -> None:
+    ground = ground_station(Px4())
+    ground.wait(5.0)
+    limits = ground.item(0, command=mavlink.MAV_CMD_DO_GUIDED_LIMITS, frame=2)
+    assert ground.upload(limits, ground.item(1)) == mavlink.MAV_MISSION_UNSUPPORTED
 
 
 def test_whole_flight_from_take_off_to_landing_by_mission() -> None:

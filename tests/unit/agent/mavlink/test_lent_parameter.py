@@ -15,8 +15,14 @@ from tests.fake_px4 import FakePx4
 
 MISSIONS = BridgeConfig(1, ORIGIN, command=CommandStyle.MISSION, position_rate_hz=10.0)
 OWN = {"WP_JERK": 1.0, "MPC_JERK_AUTO": 4.0}
-RAISED = {"WP_JERK": 5.001, "MPC_JERK_AUTO": 20.004}
+RAISED = {"MPC_JERK_AUTO": 20.004}
 NORTH = (5.0, 30.0, 10.0)
+
+
+@pytest.fixture
+def fake() -> type[FakeCopter]:
+    """The only firmware that has one to lend."""
+    return FakePx4
 
 
 def jerk_of(copter: FakeCopter) -> tuple[str, float]:
@@ -114,11 +120,12 @@ def test_nothing_is_asked_where_the_vehicles_own_is_to_be_kept(fake: type[FakeCo
     assert asked == []
 
 
-def test_targets_of_an_arducopter_need_no_other_jerk() -> None:
-    flight = BridgeFlight(FakeCopter(ORIGIN)).prepared()
+@pytest.mark.parametrize("command", list(CommandStyle))
+def test_an_arducopter_needs_no_other_jerk(command: CommandStyle) -> None:
+    flight = BridgeFlight(FakeCopter(ORIGIN), replace(MISSIONS, command=command)).prepared()
     flight.run(5.0)
     assert is_own(flight)
-    assert is_raised(BridgeFlight(FakePx4(ORIGIN)).prepared())
+    assert not [m for m in flight.copter.heard if getattr(m, "param_id", "") in OWN]
 
 
 def test_a_vehicle_without_it_flies_all_the_same_and_people_are_told(

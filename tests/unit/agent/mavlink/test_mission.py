@@ -292,7 +292,7 @@ def test_loss_doubling_and_reordering_end_right_or_reported(seed: int) -> None:
 def test_vehicle_is_asked_what_stands_on_it() -> None:
     machine, store = MissionTransfer(MissionPolicy()), FakeStore()
     transfer(machine, store, OLD)
-    outbox = machine.read(len(OLD), 0.0)
+    outbox = machine.read({len(OLD)}, 0.0)
     while machine.result is None:
         answers = [answer for message in outbox for answer in store.on_message(message, 0.0)]
         outbox = [out for answer in answers for out in machine.on_message(answer, 0.0)]
@@ -303,12 +303,12 @@ def test_vehicle_is_asked_what_stands_on_it() -> None:
 
 def test_missions_of_another_length_are_not_read() -> None:
     machine = MissionTransfer(MissionPolicy())
-    assert machine.read(4, 0.0) == [MissionRequestList()]
+    assert machine.read({4}, 0.0) == [MissionRequestList()]
     machine.on_message(MissionCount(7), 0.1)
     assert machine.result == MissionRead(7, ())
     machine.upload(NEW, 0.2)
     with pytest.raises(ValueError, match="under way"):
-        machine.read(4, 0.2)
+        machine.read({4}, 0.2)
 
 
 def test_vehicle_busy_with_an_older_transfer_is_asked_again() -> None:

@@ -15,6 +15,7 @@ from agent.mavlink.messages import MissionItem
 from agent.mavlink.mission_plan import MissionPlan, recognise
 
 PLAN = MissionPlan(47.4, 8.5, 500.0, 4.0, 67)
+GIVING_WAY = replace(PLAN, guided_s=33)
 FLAVOURS = pytest.mark.parametrize("flavour", [ArduCopter(), Px4Copter()])
 
 
@@ -26,10 +27,13 @@ def over_the_wire(items: tuple[MissionItem, ...]) -> list[MissionItem]:
 
 
 @FLAVOURS
-def test_mission_is_known_again_after_a_journey_over_the_wire(flavour: Flavour) -> None:
-    known = recognise(over_the_wire(PLAN.items(flavour)), flavour)
+@pytest.mark.parametrize("plan", [PLAN, GIVING_WAY], ids=["as it was", "giving way"])
+def test_mission_is_known_again_after_a_journey_over_the_wire(
+    flavour: Flavour, plan: MissionPlan
+) -> None:
+    known = recognise(over_the_wire(plan.items(flavour)), flavour)
     assert known is not None
-    assert known == replace(PLAN, lat_deg=known.lat_deg, lon_deg=known.lon_deg)
+    assert known == replace(plan, lat_deg=known.lat_deg, lon_deg=known.lon_deg)
     assert (known.lat_deg, known.lon_deg) == pytest.approx((47.4, 8.5), abs=1e-7)
 
 
@@ -39,6 +43,23 @@ def test_items_are_numbered_and_begin_with_the_vehicles_own(flavour: Flavour) ->
     assert [item.seq for item in items] == list(range(flavour.mission_vehicle_items + 3))
     assert [item.command for item in items[-3:]] == [178, 16, 20]
     assert [item.seq for item in items if item.current] == [flavour.mission_vehicle_items]
+
+
+def test_the_time_for_targets_is_limited_before_it_begins() -> None:
+    items, seqs = GIVING_WAY.items(ArduCopter()), GIVING_WAY.seqs(ArduCopter())
+    assert [item.command for item in items] == [16, 178, 222, 92, 16, 20]
+    assert [item.seq for item in items] == list(range(seqs.count))
+    assert (seqs.speed, seqs.guided, seqs.target, seqs.home) == (1, 3, 4, 5)
+    assert (items[2].params[0], items[3].params[0]) == (33.0, 1.0)
+    assert PLAN.seqs(ArduCopter()).guided is None
+
+
+def test_missions_that_give_way_for_ever_are_not_ours() -> None:
+    items = list(GIVING_WAY.items(ArduCopter()))
+    for place, params in ((2, (0.0,) * 4), (2, (math.nan, 0.0, 0.0, 0.0)), (3, (0.0,) * 4)):
+        other = [*items]
+        other[place] = replace(items[place], params=params)
+        assert recognise(other, ArduCopter()) is None
 
 
 def test_only_firmwares_that_may_be_told_are_told_nothing_of_the_heading() -> None:
