@@ -131,6 +131,7 @@ class MissionFlight:
     def mission_return(self, now_s: float) -> None:
         """Return home and land, in the mode for it where the mission ends so."""
         if self._flavour.missions.forgets_mode:
+            self._helm.narrator.tell(Occasion.RETURN_ORDERED)
             self._helm.enter(Mode.RTL, now_s)
         else:
             self._flight.return_home(now_s)

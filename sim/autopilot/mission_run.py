@@ -97,6 +97,8 @@ class MissionRun:
         """For how long the mission gives way to targets; 0: until it is told to go on."""
         self._landing = False
         """A landing item has reached its place and is descending."""
+        self.begun = False
+        """It has been flown, as far as it came."""
 
     @property
     def present(self) -> bool:
@@ -159,7 +161,7 @@ class MissionRun:
         if self.state is RunState.RUNNING:
             self._begin_from(max(seq, self._first_seq), now_s)
         else:
-            self._go_to(first)
+            self._go_to(seq if self._habits.upload_rewinds else first)
             self._set_seq = max(seq, self._first_seq)
             self.state = RunState.STOPPED
         return True
@@ -241,18 +243,25 @@ class MissionRun:
         """Do what is done at once, and begin the first item that takes time."""
         self._hold_until_s = self._set_seq = None
         self._landing = False
+        self.begun = True
+        done: list[int] = []
         while (item := self._store.item(seq)) is not None:
             self._narrator.tell(Occasion.ITEM_BEGUN, seq=seq, name=item.name)
             if item.is_navigation:
-                self._go_to(seq)
-                self._begin(item, now_s)
-                return
+                break
             if item.command == mavlink.MAV_CMD_DO_GUIDED_LIMITS:
                 self._limit_s = item.params[0]
             elif item.params[1] > 0.0:
                 self._pilot.mission_change_speed(item.params[1], now_s)
-            self._reached(seq, now_s)
+            done.append(seq)
             seq += 1
+        # Told once the next item that takes time is begun.
+        for each in done:
+            self._reached(each, now_s)
+        if item is not None:
+            self._go_to(seq)
+            self._begin(item, now_s)
+            return
         self.state = RunState.COMPLETE
         self._repeat_s = None
         self._pilot.mission_finished(now_s)
@@ -292,6 +301,7 @@ class MissionRun:
     def _rewind(self) -> None:
         self.state = RunState.NOT_STARTED
         self.current = self._set_seq = None
+        self.begun = False
         self.told = 0
         self._repeat_s = None
 
@@ -315,7 +325,13 @@ class MissionRun:
         if self.current is None or (item := self._store.item(self.current)) is None:
             return
         seq = self.current
-        self._reached(seq, at_s)
+        following = self._store.item(seq + 1)
+        returns = (
+            following is not None and following.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        )
+        # Where returning leaves the mission, that is done at once too, and alone is told.
+        if not (returns and self._habits.forgets_mode):
+            self._reached(seq, at_s)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
             self._narrator.tell(Occasion.WAYPOINT_REACHED, seq=seq)
         self._begin_from(seq + 1, at_s)

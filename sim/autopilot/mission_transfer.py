@@ -206,7 +206,7 @@ class MissionTransfer:
                 sender.system,
                 sender.component,
                 seq,
-                int_frame(item.frame) if as_int and self._habits.int_frames else item.frame,
+                self._frame(item, as_int=as_int),
                 item.command,
                 int(self._habits.marks_current and seq == self._current()),
                 item.autocontinue,
@@ -216,6 +216,12 @@ class MissionTransfer:
                 item.height_m,
             ),
         )
+
+    def _frame(self, item: MissionItem, *, as_int: bool) -> int:
+        """The one it is given back in: ArduCopter keeps none of an item without a place."""
+        if not self._habits.int_frames:
+            return item.frame if item.is_place else int(mavlink.MAV_FRAME_GLOBAL)
+        return int_frame(item.frame) if as_int else item.frame
 
     def _acknowledge(self, to: Sender, result: int, mission_type: int = 0) -> None:
         self._outbox.reply(

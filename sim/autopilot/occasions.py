@@ -59,6 +59,8 @@ class Occasion(Enum):
     MISSION_OVER = auto()
     """In the air."""
     MISSION_OVER_ON_GROUND = auto()
+    RETURN_ORDERED = auto()
+    """By a command, from the ground or in a mission."""
     RETURN_BEGUN = auto()
     """[altitude_m, above_home_m]"""
     RETURN_LANDING = auto()
