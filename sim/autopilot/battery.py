@@ -74,6 +74,11 @@ class Battery:
         return max(0.0, self._charge_frac - (now_s - self._running_since_s) / self._endurance_s)
 
     @property
+    def level(self) -> ChargeLevel:
+        """How worried the firmware is."""
+        return self._level
+
+    @property
     def current_a(self) -> float:
         """Current drawn [A]."""
         return 0.0 if self._running_since_s is None else _FLIGHT_A

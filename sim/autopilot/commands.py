@@ -184,6 +184,7 @@ class Commands:
 
     def _return_to_launch(self, command: Command, sender: Sender, now_s: float) -> int:
         del command, sender
+        self._pilot.narrator.tell(Occasion.RETURN_ORDERED)
         return self._result(self._pilot.set_mode(Mode.RTL, now_s))
 
     def _reposition(self, command: Command, sender: Sender, now_s: float) -> int:
@@ -204,9 +205,8 @@ class Commands:
         if not pilot.takes_targets and not pilot.set_mode(habits.for_reposition, now_s):
             return pilot.flavour.refusals.not_now
         if not (pause or pilot.within_fence(target_enu_m)):
-            # Acknowledged all the same, and ignored.
             pilot.narrator.tell(Occasion.TARGET_OUTSIDE_FENCE)
-            return _ACCEPTED
+            return pilot.flavour.refusals.outside_fence
         own_speed = pilot.flavour.obeys_leg_speed and 0.0 < speed_m_s < math.inf
         pilot.fly_guided(target_enu_m, now_s, speed_m_s if own_speed else None)
         return _ACCEPTED

@@ -90,6 +90,8 @@ class Outbox:
         self._numbers_texts = numbers_texts
         """Texts end in a tab, are numbered, and are sent in pieces if they are long."""
         self._text_number = 0
+        self.muted = False
+        """Nobody is there to whom texts would be said."""
 
     def broadcast(self, message: mavlink.MAVLink_message) -> None:
         """Say something to every ground station."""
@@ -105,6 +107,8 @@ class Outbox:
 
     def text(self, severity: int, text: str) -> None:
         """Say a line to people (STATUSTEXT), cut at 50 characters unless texts are numbered."""
+        if self.muted:
+            return
         if not self._numbers_texts:
             self.broadcast(mavlink.MAVLink_statustext_message(severity, text.encode()[:_TEXT]))
             return

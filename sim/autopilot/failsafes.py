@@ -1,12 +1,15 @@
 """What the firmware does of its own when something fails: warn, return, land.
 
-Sources: ArduCopter's events.cpp and ekf_check.cpp, AP_BattMonitor; PX4's failsafe framework,
-which says the same line whatever the cause. Leaves out: failsafes that continue a mission,
+Sources: recordings of both firmwares; ArduCopter's events.cpp and ekf_check.cpp,
+AP_BattMonitor; PX4's failsafe framework, which says the same line whatever the cause, and
+holds for some seconds before it returns. Leaves out: failsafes that continue a mission,
 and what a firmware says without acting.
 """
 
 from __future__ import annotations
 
+import math
+from enum import Enum, auto
 from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -17,19 +20,24 @@ from sim.autopilot.events import Outbox
 from sim.autopilot.flavours.base import Flavour
 from sim.autopilot.flight import Flight
 from sim.autopilot.modes import Mode
+from sim.autopilot.occasions import Text
 from sim.autopilot.params import ParameterTable
 from sim.autopilot.readiness import Readiness
 from sim.kinematics import Point
 
 __all__ = ["FailSafePilot", "FailSafes"]
 
-_Texts = list[tuple[int, str]]
-"""MAV_SEVERITY and text of each line."""
+_RADIO = (Text(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe"),)
+_GROUND = (Text(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe"),)
 
-_PX4: _Texts = [(mavlink.MAV_SEVERITY_CRITICAL, "Failsafe activated")]
-_RADIO: _Texts = [(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe")]
-_GROUND: _Texts = [(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe")]
-_POSITION: _Texts = [(mavlink.MAV_SEVERITY_CRITICAL, "EKF Failsafe: changed to Land Mode")]
+
+class _Cause(Enum):
+    """What failed."""
+
+    BATTERY = auto()
+    GROUND = auto()
+    POSITION = auto()
+    RADIO = auto()
 
 
 class FailSafePilot(Protocol):
@@ -68,22 +76,66 @@ class FailSafes:
     def __init__(self, pilot: FailSafePilot, battery: Battery) -> None:
         self._pilot = pilot
         self._battery = battery
+        self._habits = pilot.flavour.failsafe_habits
         self._position_s: float | None = None
         self._ground_s: dict[int, float] = {}
         """When the heartbeat of each ground station was heard last, by system id."""
+        self._deaf_s: float | None = None
+        """When nobody is listening any more."""
+        self._causes: set[_Cause] = set()
+        """What the firmware has acted upon, and is not over."""
+        self._latched = False
+        """It goes on saying so until the motors stand, whatever the cause comes to."""
+        self._held: tuple[float, Mode] | None = None
+        """When it does more than hold its place, and what."""
+        pilot.outbox.muted = False
+
+    @property
+    def acts(self) -> bool:
+        """Whether a failsafe acts, so that the vehicle says that it is in a critical state."""
+        return self._latched or bool(self._causes)
+
+    @property
+    def obstacles(self) -> tuple[str, ...]:
+        """What of this keeps the vehicle from arming, in its words."""
+        if _Cause.BATTERY in self._causes:
+            return ("Battery 1 low voltage failsafe", "Battery failsafe")
+        # PX4's health report goes by its failsafes; ArduCopter checks other things on the ground.
+        return ("Failsafe",) if self._causes and self._habits.words else ()
+
+    def disarmed(self) -> None:
+        """The motors stand."""
+        self._held = None
+        self._latched = False
+        if not self._habits.critical_when_disarmed:
+            self._causes.clear()
+        self._causes.discard(_Cause.RADIO)
 
     def deadline_s(self) -> float | None:
         """When the firmware acts next [s]; None if not foreseen."""
-        due_s = (self._battery.deadline_s(), self._position_s, self._ground_lost_s())
+        due_s = (
+            self._battery.deadline_s(),
+            self._position_s,
+            self._ground_lost_s(),
+            self._deaf_s,
+            None if self._held is None else self._held[0],
+        )
         return min((each_s for each_s in due_s if each_s is not None), default=None)
 
     def advance(self, at_s: float) -> None:
         """Act at the deadline ``at_s``."""
         ground_s = self._ground_lost_s()
-        if self._position_s is not None and self._position_s <= at_s:
+        if self._held is not None and self._held[0] <= at_s:
+            _, mode = self._held
+            self._held = None
+            self._take_over(mode, (), at_s)
+        elif self._deaf_s is not None and self._deaf_s <= at_s:
+            self._deaf_s = None
+            self._pilot.outbox.muted = True
+        elif self._position_s is not None and self._position_s <= at_s:
             self._position_s = None
             if self._pilot.mode.needs_position:
-                self._act(Mode.LAND, _POSITION, at_s)
+                self._act(_Cause.POSITION, Mode.LAND, self._habits.position_words, at_s)
         elif ground_s is not None and ground_s <= at_s:
             self._lose_ground(at_s)
         else:
@@ -92,6 +144,15 @@ class FailSafes:
     def hear_ground(self, system_id: int, now_s: float) -> None:
         """A ground station is there."""
         self._ground_s[system_id] = now_s
+        self._pilot.outbox.muted = False
+        deaf_s = now_s + self._habits.deaf_after_s
+        self._deaf_s = deaf_s if deaf_s < math.inf else None
+        if _Cause.GROUND in self._causes and self._ground_lost_s() is not None:
+            self._causes.discard(_Cause.GROUND)
+            if not self._causes:
+                self._held = None
+            regained = self._habits.ground_regained
+            self._pilot.outbox.text(regained.severity, regained.template)
 
     def _ground_lost_s(self) -> float | None:
         lost = self._pilot.flavour.ground_lost(self._pilot.parameters)
@@ -105,7 +166,7 @@ class FailSafes:
         lost = self._pilot.flavour.ground_lost(self._pilot.parameters)
         self._ground_s.clear()
         if lost is not None and self._pilot.mode not in lost.spared:
-            self._act(lost.mode, _GROUND, at_s)
+            self._act(_Cause.GROUND, lost.mode, _GROUND, at_s)
 
     def lose_gps(self, now_s: float) -> None:
         """Be without a position from now on."""
@@ -119,33 +180,63 @@ class FailSafes:
         """Have a position again; a mode that was changed meanwhile stays."""
         self._pilot.readiness.regain_gps(now_s)
         self._position_s = None
+        self._causes.discard(_Cause.POSITION)
 
     def lose_radio(self, now_s: float) -> None:
         """Return, as when the remote control is not heard any more."""
-        self._act(Mode.RTL, _RADIO, now_s)
+        self._act(_Cause.RADIO, Mode.RTL, _RADIO, now_s)
 
     def _protect_battery(self, at_s: float) -> None:
         level = self._battery.advance(at_s)
-        volts = f"{self._battery.voltage_v(at_s):.2f}V"
-        used = f"used {self._battery.consumed_mah(at_s) or 0.0:.0f} mAh"
-        texts = [
-            (mavlink.MAV_SEVERITY_WARNING, f"Battery 1 is {level.name.lower()} {volts} {used}"),
-            (mavlink.MAV_SEVERITY_WARNING, "Battery Failsafe"),
-        ]
-        self._act(Mode.RTL if level is ChargeLevel.LOW else Mode.LAND, texts, at_s)
+        used_mah = self._battery.consumed_mah(at_s) or 0.0
+        fields = {
+            "level": level.name.lower(),
+            "volts": self._battery.voltage_v(at_s),
+            "used_mah": used_mah,
+        }
+        words = tuple(
+            Text(text.severity, text.template.format(**fields))
+            for text in self._habits.battery_words
+        )
+        mode = Mode.RTL if level is ChargeLevel.LOW else Mode.LAND
+        self._act(_Cause.BATTERY, mode, words, at_s)
 
-    def _act(self, mode: Mode, texts: _Texts, now_s: float) -> None:
+    def _act(self, cause: _Cause, mode: Mode, words: tuple[Text, ...], now_s: float) -> None:
+        """Do what the parameters say, at once or after a hold; only what returns is put off."""
         pilot = self._pilot
         if not pilot.armed:
             return
-        if pilot.flavour.autopilot == mavlink.MAV_AUTOPILOT_PX4:
-            texts = _PX4
-        # ArduCopter tells the mode some milliseconds before the words, which wait in line; PX4
-        # tells it with its next heartbeat, whatever comes first here.
+        self._causes.add(cause)
+        self._latched = not self._habits.critical_when_disarmed
+        own = bool(self._habits.words)
+        if own and cause is not _Cause.BATTERY:
+            words = ()
+        if mode is Mode.RTL and self._habits.hold_s > 0.0 and not pilot.flight.on_ground:
+            self._held = (now_s + self._habits.hold_s, mode)
+            self._say((*words, *self._habits.hold_words))
+            pilot.set_mode(pilot.flavour.modes.for_reposition, now_s)
+        else:
+            self._held = None
+            self._take_over(mode, words, now_s)
+
+    def _take_over(self, mode: Mode, words: tuple[Text, ...], now_s: float) -> None:
+        """Enter the mode; on the ground, stop the motors instead.
+
+        ArduCopter tells the mode some milliseconds before the words, which wait in line; PX4
+        says the words first, and tells the mode with its next heartbeat.
+        """
+        pilot = self._pilot
+        words_first = bool(self._habits.words)
+        if words_first:
+            self._say((*words, *self._habits.words))
         on_ground = pilot.flight.on_ground
         if not on_ground and not pilot.set_mode(mode, now_s):
             pilot.set_mode(Mode.LAND, now_s)
-        for severity, text in texts:
-            pilot.outbox.text(severity, text)
+        if not words_first:
+            self._say(words)
         if on_ground:
             pilot.disarm(now_s, forced=False)
+
+    def _say(self, words: tuple[Text, ...]) -> None:
+        for text in words:
+            self._pilot.outbox.text(text.severity, text.template)

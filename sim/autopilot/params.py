@@ -36,7 +36,6 @@ class Setting(Enum):
     DISARM_DELAY_S = "disarm delay"
     DISARM_LANDED_S = "disarm delay after landing"
     TAKE_OFF_HEIGHT_M = "take-off height"
-    FENCE_RADIUS_M = "fence radius"
 
 
 _FOLLOWED = {Setting.TAKE_OFF_M_S: Setting.CLIMB_M_S}
@@ -44,7 +43,6 @@ _FOLLOWED = {Setting.TAKE_OFF_M_S: Setting.CLIMB_M_S}
 _DEFAULTS_SI = {
     Setting.DISARM_LANDED_S: 0.0,
     Setting.TAKE_OFF_HEIGHT_M: 0.0,
-    Setting.FENCE_RADIUS_M: 0.0,  # no fence
 }
 """Values of settings where the firmware has no parameter for them."""
 
@@ -59,6 +57,8 @@ class ParameterHabits:
     """Whether the bytes of an integer travel in the float field, instead of its value."""
     index_by_name: bool
     """Whether an answer to a request by name tells the index."""
+    tells_changes: bool = False
+    """Whether a value that was changed is told once more than the answer does."""
     unanswered: frozenset[str] = frozenset()
     """Unknown parameters that are answered by nothing all the same."""
     told_at_boot: tuple[str, ...] = ()
@@ -191,7 +191,10 @@ class ParameterServer:
         elif parameter.read_only:
             self._refuse(message, mavlink.MAV_PARAM_ERROR_READ_ONLY, sender)
         else:
-            self._tell(self._table.write(parameter.name, value))
+            changed = self._table.write(parameter.name, value)
+            self._tell(changed)
+            if self._habits.tells_changes and changed != parameter:
+                self._tell(changed)
 
     def _refuse(self, message: mavlink.MAVLink_message, error: int, sender: Sender) -> None:
         if self._habits.reports_errors and message.param_id not in self._habits.unanswered:

@@ -144,8 +144,7 @@ class Pilot:
 
     def _say_obstacle(self, at_s: float) -> None:
         self._prearm_text_s = at_s + _PREARM_TEXT_S
-        obstacle = self.readiness.obstacle(self.mode)
-        if obstacle is not None and not self.armed:
+        for obstacle in () if self.armed else self.obstacles:
             self.narrator.tell(Occasion.NOT_READY, obstacle=obstacle)
 
     def _advance_flight(self, at_s: float) -> None:
@@ -287,9 +286,12 @@ class Pilot:
         """Start the motors; False, with a text, while the vehicle isn't ready."""
         if self.armed:
             return True
-        obstacle = self._arming_obstacle(forced=forced)
-        if obstacle is not None:
+        obstacles = self._arming_obstacles(forced=forced)
+        if obstacles and self.flavour.numbers_texts:
+            obstacles = obstacles[:1]  # its text names none
+        for obstacle in obstacles:
             self.narrator.tell(Occasion.ARMING_REFUSED, obstacle=obstacle)
+        if obstacles:
             return False
         self.armed = True
         self.battery.start(now_s)
@@ -304,14 +306,20 @@ class Pilot:
             self._fly(self.mode, now_s)
         return True
 
-    def _arming_obstacle(self, *, forced: bool) -> str | None:
-        if not self.flight.on_ground:
-            return "Falling"
+    @property
+    def obstacles(self) -> tuple[str, ...]:
+        """Why the vehicle can't be armed in its mode, in its words; empty when it can."""
         obstacle = self.readiness.obstacle(self.mode)
-        if obstacle is None and self.mode in self.flavour.modes.unarmable:
-            obstacle = f"{self.flavour.mode_name(self.mode)} mode not armable"
+        return self.failsafes.obstacles if obstacle is None else (obstacle,)
+
+    def _arming_obstacles(self, *, forced: bool) -> tuple[str, ...]:
+        if not self.flight.on_ground:
+            return ("Falling",)
+        obstacles = self.obstacles
+        if not obstacles and self.mode in self.flavour.modes.unarmable:
+            obstacles = (f"{self.flavour.mode_name(self.mode)} mode not armable",)
         # Force overcomes checks, but starts no motors of a computer that is still booting.
-        return None if forced and self.readiness.booted else obstacle
+        return () if forced and self.readiness.booted else obstacles
 
     def disarm(self, now_s: float, *, forced: bool) -> bool:
         """Stop the motors; False in the air, unless forced."""
@@ -332,6 +340,7 @@ class Pilot:
             return
         self.armed = False
         self.battery.stop(now_s)
+        self.failsafes.disarmed()
         self._auto_armed = False
         self.run.reset()
         self.flight.fall(now_s)
@@ -400,7 +409,7 @@ class Pilot:
 
     def within_fence(self, target_enu_m: Point) -> bool:
         """Whether a target lies inside the vehicle's own fence around home."""
-        radius_m = self.parameters.value_si(Setting.FENCE_RADIUS_M)
+        radius_m = self.flavour.fence_radius_m(self.parameters)
         return not 0.0 < radius_m < math.dist(target_enu_m[:2], self.flight.home_enu_m[:2])
 
     def fly_guided(self, target_enu_m: Point, now_s: float, speed_m_s: float | None = None) -> None:
@@ -462,6 +471,8 @@ class Pilot:
         self.narrator.tell(Occasion.MISSION_RECEIVED)
         self._mission_checked_s = now_s + self.flavour.missions.check_s
         self.parameter_server.announce("MIS_TOTAL", float(len(self.store.items)))
+        if self.flavour.missions.upload_rewinds and old != self.store.items:
+            self.task_done = False
         if self.run.mission_changed(old, now_s):
             restarted = self.run.state is RunState.RUNNING
             self.narrator.tell(

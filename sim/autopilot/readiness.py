@@ -5,6 +5,7 @@ Leaves out: saying it (sim.autopilot.pilot, sim.autopilot.telemetry).
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 
 from sim.autopilot.config import Delays
@@ -68,6 +69,12 @@ class Readiness:
     def has_position(self) -> bool:
         """Whether the position estimate is good enough to navigate by."""
         return Stage.POSITION in self._passed and not self.gps_lost
+
+    def lost_s(self, now_s: float) -> float:
+        """How long there has been no position [s]; 0 while there is, inf if there never was."""
+        if Stage.POSITION not in self._passed:
+            return math.inf
+        return now_s - self._gps_lost_s if self.gps_lost else 0.0
 
     def lose_gps(self, last_fix_enu_m: Point, now_s: float) -> None:
         """See no satellites from now on; stages that need them wait."""

@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sim.autopilot.battery import ChargeLevel
 from sim.autopilot.flavours.base import MissionView
 from sim.autopilot.flight import Activity
 from sim.autopilot.geo import place_wgs84_e7
@@ -36,7 +37,11 @@ _EKF_WITH_POSITION = (
     | mavlink.EKF_PRED_POS_HORIZ_ABS
 )
 
+_EKF_COASTING = mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_VERT | mavlink.EKF_POS_VERT_ABS
+
 _GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+_BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+_FENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 _UTC_AT_BOOT_US = 1_735_689_600_000_000
 """Simulated GPS time at boot: 2025-01-01 UTC. The core knows no wall clock."""
 _INT16_MAX = 32767
@@ -113,6 +118,19 @@ class Telemetry:
     def _boot_ms(self, now_s: float) -> int:
         return int(self._boot_s(now_s) * 1e3) & 0xFFFFFFFF
 
+    def _state(self) -> int:
+        """MAV_STATE."""
+        pilot = self._pilot
+        booted = pilot.readiness.booted
+        if booted and pilot.failsafes.acts:
+            return int(mavlink.MAV_STATE_CRITICAL)
+        return pilot.flavour.system_status(
+            armed=pilot.armed,
+            on_ground=pilot.flight.on_ground,
+            booted=booted,
+            ready=not pilot.obstacles,
+        )
+
     def _heartbeat(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s
         pilot = self._pilot
@@ -125,7 +143,7 @@ class Telemetry:
                 pilot.mode, armed=pilot.armed, on_ground=on_ground, booted=booted
             ),
             pilot.flavour.custom_mode(pilot.mode),
-            pilot.flavour.system_status(armed=pilot.armed, on_ground=on_ground, booted=booted),
+            self._state(),
             3,
         )
 
@@ -134,12 +152,14 @@ class Telemetry:
         sensors = pilot.flavour.sensors(
             pilot.mode,
             has_origin=pilot.readiness.has_origin,
-            can_arm=pilot.readiness.obstacle(pilot.mode) is None,
+            can_arm=not pilot.obstacles,
         )
         lost = _GPS if pilot.readiness.gps_lost else 0
+        lost |= _BATTERY if pilot.battery.level > ChargeLevel.FINE else 0
+        fenced = _FENCE if pilot.parameters.value("FENCE_ENABLE") else 0
         return mavlink.MAVLink_sys_status_message(
             sensors.present,
-            sensors.enabled,
+            sensors.enabled | fenced,
             sensors.health & ~lost,
             0,
             self._battery_mv(now_s),
@@ -273,7 +293,7 @@ class Telemetry:
             items=max(0, len(pilot.store.items) - pilot.flavour.missions.first_item),
             present=run.present,
             running=run.state is RunState.RUNNING,
-            stopped=run.state is RunState.STOPPED,
+            stopped=run.state is RunState.STOPPED and run.begun,
             over=run.state is RunState.COMPLETE,
             task_done=pilot.task_done,
         )
@@ -296,22 +316,25 @@ class Telemetry:
         )
 
     def _ekf_status(self, now_s: float) -> mavlink.MAVLink_message:
-        del now_s
         ratios = (0.0, 0.0, 0.0, 0.0, 0.0)
-        return mavlink.MAVLink_ekf_status_report_message(self._estimator_flags(), *ratios)
+        return mavlink.MAVLink_ekf_status_report_message(self._estimator_flags(now_s), *ratios)
 
     def _estimator_status(self, now_s: float) -> mavlink.MAVLink_message:
         ratios_and_accuracies = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0)
-        flags = self._estimator_flags() & ~mavlink.EKF_UNINITIALIZED
+        flags = self._estimator_flags(now_s) & ~mavlink.EKF_UNINITIALIZED
         boot_us = int(self._boot_s(now_s) * 1e6)
         return mavlink.MAVLink_estimator_status_message(boot_us, flags, *ratios_and_accuracies)
 
-    def _estimator_flags(self) -> int:
-        readiness = self._pilot.readiness
+    def _estimator_flags(self, now_s: float) -> int:
+        readiness, flavour = self._pilot.readiness, self._pilot.flavour
         if not readiness.booted:
             return int(mavlink.EKF_UNINITIALIZED)
-        flags = _EKF_WITH_POSITION if readiness.has_position else _EKF_WITHOUT_POSITION
-        if self._pilot.flavour.constant_position_at_rest and self._pilot.flight.on_ground:
+        flags = _EKF_WITHOUT_POSITION
+        if readiness.has_position:
+            flags = _EKF_WITH_POSITION
+        elif readiness.lost_s(now_s) <= flavour.coasting_s:
+            flags = _EKF_COASTING
+        if flavour.constant_position_at_rest and self._pilot.flight.on_ground:
             flags |= mavlink.EKF_CONST_POS_MODE
         return int(flags)
 

@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.flavours.base import (
+    FailsafeHabits,
     GroundLost,
     MissionHabits,
     MissionView,
@@ -31,6 +32,8 @@ __all__ = ["ArduCopter"]
 
 _GROUND_LOST_LANDS = (5.0, 7.0)
 """Values of FS_GCS_ENABLE."""
+_FENCE_CIRCLE = 2
+"""Bit of FENCE_TYPE."""
 _REAL = mavlink.MAV_PARAM_TYPE_REAL32
 _INT8 = mavlink.MAV_PARAM_TYPE_INT8
 _INT16 = mavlink.MAV_PARAM_TYPE_INT16
@@ -122,6 +125,23 @@ class ArduCopter:
         reposition_without_flag=mavlink.MAV_RESULT_DENIED,
         no_such_stream=mavlink.MAV_RESULT_DENIED,
         no_such_message=mavlink.MAV_RESULT_FAILED,
+        outside_fence=mavlink.MAV_RESULT_FAILED,
+    )
+    failsafe_habits: FailsafeHabits = FailsafeHabits(
+        hold_s=0.0,
+        words=(),
+        hold_words=(),
+        battery_words=(
+            Text(_WARNING, "Battery 1 is {level} {volts:.2f}V used {used_mah:.0f} mAh"),
+            Text(_WARNING, "Battery Failsafe"),
+        ),
+        position_words=(
+            Text(_CRITICAL, "EKF variance: position lost"),
+            Text(_CRITICAL, "EKF Failsafe: changed to Land Mode"),
+        ),
+        ground_regained=Text(_WARNING, "GCS Failsafe Cleared"),
+        critical_when_disarmed=True,
+        deaf_after_s=math.inf,
     )
 
     take_off_above_home: bool = True
@@ -132,6 +152,7 @@ class ArduCopter:
     pauses_anywhere: bool = False
     tells_origin_when_armed: bool = True
     constant_position_at_rest: bool = False
+    coasting_s: float = 7.0
 
     unasked_streams: Mapping[int, float] = MappingProxyType({})
     fixed_streams: frozenset[int] = frozenset()
@@ -190,6 +211,10 @@ class ArduCopter:
             Parameter("FS_GCS_ENABLE", 0.0, _INT8),
             Parameter("FS_GCS_TIMEOUT", 5.0, _REAL, least=2.0),
             Parameter("BATT_FS_LOW_ACT", 0.0, _INT8),
+            Parameter("BATT_LOW_VOLT", 10.5, _REAL, least=0.0),
+            Parameter("FENCE_ENABLE", 0.0, _INT8),
+            Parameter("FENCE_TYPE", 7.0, _INT8),
+            Parameter("FENCE_RADIUS", 300.0, _REAL, least=30.0),
             Parameter("AUTO_OPTIONS", 0.0, _INT32),
             Parameter("MIS_TOTAL", 0.0, _INT16, read_only=True),
             Parameter("MIS_RESTART", 0.0, _INT8),
@@ -241,6 +266,12 @@ class ArduCopter:
         mode = Mode.LAND if action in _GROUND_LOST_LANDS else Mode.RTL
         return GroundLost(mode, parameters.value("FS_GCS_TIMEOUT"), range(lowest, highest + 1))
 
+    def fence_radius_m(self, parameters: ParameterTable) -> float:
+        """Where it is on, and a circle."""
+        circle = int(parameters.value("FENCE_TYPE")) & _FENCE_CIRCLE
+        on = parameters.value("FENCE_ENABLE") and circle
+        return parameters.value("FENCE_RADIUS") if on else 0.0
+
     def disarm_delay(self, mode: Mode) -> Setting | None:
         """At once where the mode was to land; otherwise as after arming."""
         return None if mode in (Mode.RTL, Mode.LAND) else Setting.DISARM_DELAY_S
@@ -276,9 +307,9 @@ class ArduCopter:
             bits |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
         return bits
 
-    def system_status(self, *, armed: bool, on_ground: bool, booted: bool) -> int:
+    def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
         """MAV_STATE of a heartbeat: active in the air only."""
-        del armed
+        del armed, ready
         if not booted:
             return int(mavlink.MAV_STATE_BOOT)
         return int(mavlink.MAV_STATE_STANDBY if on_ground else mavlink.MAV_STATE_ACTIVE)

@@ -15,7 +15,16 @@ from sim.autopilot.occasions import Occasion, OwnCommand, Text
 from sim.autopilot.params import Parameter, ParameterHabits, ParameterTable, Setting
 from sim.autopilot.readiness import Stage
 
-__all__ = ["Flavour", "MissionHabits", "MissionView", "ModeHabits", "Refusals", "Sensors"]
+__all__ = [
+    "FailsafeHabits",
+    "Flavour",
+    "GroundLost",
+    "MissionHabits",
+    "MissionView",
+    "ModeHabits",
+    "Refusals",
+    "Sensors",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +40,8 @@ class Refusals:
     """SET_MESSAGE_INTERVAL of a message it doesn't stream."""
     no_such_message: int
     """REQUEST_MESSAGE of a message it doesn't have."""
+    outside_fence: int
+    """DO_REPOSITION to a place beyond the vehicle's own fence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +127,29 @@ class Sensors:
 
 
 @dataclass(frozen=True, slots=True)
+class FailsafeHabits:
+    """How failsafes act, and what is said of them."""
+
+    hold_s: float
+    """It warns for so long, holding its place, before it returns [s]."""
+    words: tuple[Text, ...]
+    """Said whatever the cause, just before the mode changes; none: each cause has its own."""
+    hold_words: tuple[Text, ...]
+    """Said when it begins to hold."""
+    battery_words: tuple[Text, ...]
+    """Said of a low battery [level, volts, used_mah]."""
+    position_words: tuple[Text, ...]
+    """Said of a lost position."""
+    ground_regained: Text
+    """Said when a ground station is heard again."""
+    critical_when_disarmed: bool
+    """Whether the heartbeat says CRITICAL as long as there is a cause, motors or not; otherwise
+    from then until the motors stand, cause or not."""
+    deaf_after_s: float
+    """To who has not been heard for so long it says no texts any more [s]."""
+
+
+@dataclass(frozen=True, slots=True)
 class GroundLost:
     """What the firmware does when it hears no ground station any more."""
 
@@ -142,6 +176,7 @@ class Flavour(Protocol):
     modes: ModeHabits
     missions: MissionHabits
     refusals: Refusals
+    failsafe_habits: FailsafeHabits
     parameter_habits: ParameterHabits
 
     take_off_above_home: bool
@@ -159,6 +194,8 @@ class Flavour(Protocol):
     constant_position_at_rest: bool
     """Whether the estimator says EKF_CONST_POS_MODE wherever the vehicle stands still, rather
     than only where it has no position."""
+    coasting_s: float
+    """How long after a loss the estimator goes on without calling its position constant [s]."""
 
     unasked_streams: Mapping[int, float]
     """Messages and intervals [s] streamed on a new channel; heartbeats go without saying."""
@@ -208,8 +245,19 @@ class Flavour(Protocol):
         """MAV_MODE_FLAG bits of a heartbeat."""
         ...
 
-    def system_status(self, *, armed: bool, on_ground: bool, booted: bool) -> int:
-        """MAV_STATE of a heartbeat."""
+    def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
+        """MAV_STATE of a heartbeat while no failsafe acts.
+
+        Args:
+            armed: the motors run.
+            on_ground: it stands.
+            booted: the autopilot is initialised.
+            ready: nothing keeps it from arming.
+        """
+        ...
+
+    def fence_radius_m(self, parameters: ParameterTable) -> float:
+        """Radius of the vehicle's own fence around home [m]; 0: it has none."""
         ...
 
     def sensors(self, mode: Mode, *, has_origin: bool, can_arm: bool) -> Sensors:

@@ -18,6 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.flavours.base import (
+    FailsafeHabits,
     GroundLost,
     MissionHabits,
     MissionView,
@@ -62,8 +63,12 @@ _GROUND_LOST_MODES = {2: Mode.RTL, 3: Mode.LAND}
 """By NAV_DLL_ACT; it holds, and falls, in other ways than are simulated."""
 _GROUND_LOST_SPARED = {1: Mode.AUTO, 2: Mode.LOITER}
 """By bit of COM_DLL_EXCEPT."""
-_GROUND_LOST_WARNING_S = 5.0
+_FAILSAFE_HOLD_S = 5.0
 """COM_FAIL_ACT_T."""
+_HEARTBEAT_MISSED_S = 2.5
+"""Without a heartbeat for so long a ground station is not connected any more."""
+_TEXTS_KEPT_S = 5.0
+"""Texts wait so long for a ground station that is connected; nobody hears them otherwise."""
 _UNKNOWN_TOTAL = 65535
 _MISSION_MODE_ACTIVE = 1
 _MISSION_MODE_SUSPENDED = 2
@@ -118,11 +123,27 @@ class Px4:
         reposition_without_flag=mavlink.MAV_RESULT_UNSUPPORTED,
         no_such_stream=mavlink.MAV_RESULT_FAILED,
         no_such_message=mavlink.MAV_RESULT_DENIED,
+        outside_fence=mavlink.MAV_RESULT_ACCEPTED,
+    )
+    failsafe_habits: FailsafeHabits = FailsafeHabits(
+        hold_s=_FAILSAFE_HOLD_S,
+        words=(Text(_CRITICAL, "Failsafe activated"),),
+        hold_words=(
+            Text(
+                _CRITICAL, f"Failsafe activated: entering Hold for {_FAILSAFE_HOLD_S:.0f} seconds"
+            ),
+        ),
+        battery_words=(Text(_CRITICAL, "Critical battery"),),
+        position_words=(),
+        ground_regained=Text(_INFO, "GCS connection regained"),
+        critical_when_disarmed=False,
+        deaf_after_s=_HEARTBEAT_MISSED_S + _TEXTS_KEPT_S,
     )
     parameter_habits: ParameterHabits = ParameterHabits(
         reports_errors=False,
         integers_bytewise=True,
         index_by_name=True,
+        tells_changes=True,
         told_at_boot=(
             "COM_DL_LOSS_T",
             "COM_OBC_LOSS_T",
@@ -139,6 +160,7 @@ class Px4:
     pauses_anywhere: bool = True
     tells_origin_when_armed: bool = False
     constant_position_at_rest: bool = True
+    coasting_s: float = math.inf
 
     unasked_streams: Mapping[int, float] = MappingProxyType(
         {
@@ -187,6 +209,7 @@ class Px4:
             ),
             Occasion.MISSION_OVER: Text(_INFO, "Mission finished, loitering"),
             Occasion.MISSION_OVER_ON_GROUND: Text(_INFO, "Mission finished, landed"),
+            Occasion.RETURN_ORDERED: Text(_INFO, "Returning to launch"),
             Occasion.RETURN_BEGUN: Text(
                 _INFO,
                 "RTL: start return at {altitude_m:.0f} m ({above_home_m:.0f} m above destination)",
@@ -216,13 +239,13 @@ class Px4:
             Parameter("COM_DISARM_PRFLT", 10.0, _REAL, Setting.DISARM_DELAY_S),
             Parameter("COM_DLL_EXCEPT", 0.0, _INT32, least=0.0),
             Parameter("COM_DL_LOSS_T", 30.0, _INT32, least=5.0),
-            Parameter("COM_LOW_BAT_ACT", 0.0, _INT32, least=0.0),
+            Parameter("COM_LOW_BAT_ACT", 3.0, _INT32, least=0.0),
             Parameter("COM_OBC_LOSS_T", 15.0, _REAL, least=0.0),
             Parameter("COM_OF_LOSS_T", 3.0, _REAL, least=0.0),
             Parameter("COM_RC_IN_MODE", 1.0, _INT32, least=0.0),
             Parameter("COM_RC_LOSS_T", 3.0, _REAL, least=0.0),
             Parameter("GF_ACTION", 2.0, _INT32, least=0.0),
-            Parameter("GF_MAX_HOR_DIST", 0.0, _REAL, Setting.FENCE_RADIUS_M, least=0.0),
+            Parameter("GF_MAX_HOR_DIST", 0.0, _REAL, least=0.0),
             Parameter("MAV_SYS_ID", float(config.system_id), _INT32, read_only=True),
             Parameter("MAV_TYPE", float(mavlink.MAV_TYPE_QUADROTOR), _INT32, read_only=True),
             Parameter("MIS_TAKEOFF_ALT", 2.5, _REAL, Setting.TAKE_OFF_HEIGHT_M, least=0.0),
@@ -242,14 +265,18 @@ class Px4:
         )
 
     def ground_lost(self, parameters: ParameterTable) -> GroundLost | None:
-        """Returns, or lands, after it has warned for a while; any ground station will do."""
+        """Returns, or lands; any ground station will do."""
         mode = _GROUND_LOST_MODES.get(int(parameters.value("NAV_DLL_ACT")))
         if mode is None:
             return None
-        after_s = parameters.value("COM_DL_LOSS_T") + _GROUND_LOST_WARNING_S
+        after_s = _HEARTBEAT_MISSED_S + parameters.value("COM_DL_LOSS_T")
         excepted = int(parameters.value("COM_DLL_EXCEPT"))
         spared = {each for bit, each in _GROUND_LOST_SPARED.items() if excepted & bit}
         return GroundLost(mode, after_s, range(1, 256), frozenset(spared))
+
+    def fence_radius_m(self, parameters: ParameterTable) -> float:
+        """A circle, unless it is 0."""
+        return parameters.value("GF_MAX_HOR_DIST")
 
     def disarm_delay(self, mode: Mode) -> Setting | None:
         """The same after every landing."""
@@ -293,12 +320,16 @@ class Px4:
             bits |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
         return bits
 
-    def system_status(self, *, armed: bool, on_ground: bool, booted: bool) -> int:
-        """MAV_STATE of a heartbeat: active as soon as the motors run."""
+    def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
+        """MAV_STATE of a heartbeat: active once the motors run, uninitialised before they may.
+
+        What it checks before it arms it takes for part of its initialisation.
+        """
         del on_ground
-        if not booted:
-            return int(mavlink.MAV_STATE_UNINIT)
-        return int(mavlink.MAV_STATE_ACTIVE if armed else mavlink.MAV_STATE_STANDBY)
+        if armed:
+            return int(mavlink.MAV_STATE_ACTIVE)
+        ready = ready and booted
+        return int(mavlink.MAV_STATE_STANDBY if ready else mavlink.MAV_STATE_UNINIT)
 
     def sensors(self, mode: Mode, *, has_origin: bool, can_arm: bool) -> Sensors:
         """Bits of SYS_STATUS, as recorded."""

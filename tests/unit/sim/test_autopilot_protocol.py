@@ -214,7 +214,7 @@ def test_older_firmware_has_older_names_and_keeps_silent_about_unknown_ones() ->
         ),
         (
             Px4(),
-            {"NAV_DLL_ACT": 0, "COM_DLL_EXCEPT": 0, "COM_DL_LOSS_T": 30, "COM_LOW_BAT_ACT": 0},
+            {"NAV_DLL_ACT": 0, "COM_DLL_EXCEPT": 0, "COM_DL_LOSS_T": 30, "COM_LOW_BAT_ACT": 3},
         ),
     ],
 )

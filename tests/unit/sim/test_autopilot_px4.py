@@ -483,9 +483,10 @@ def test_integer_parameters_travel_by_their_bytes() -> None:
     answer = set_parameter(
         ground, b"NAV_DLL_ACT", struct.unpack("<f", struct.pack("<i", 2))[0], int32
     )
-    value = the(answer, "PARAM_VALUE")
+    values = [each.param_value for each in only(answer, "PARAM_VALUE")]
 
-    assert struct.unpack("<i", struct.pack("<f", value.param_value)) == (2,)
+    # As an answer, and as news to everybody.
+    assert [struct.unpack("<i", struct.pack("<f", each)) for each in values] == [(2,), (2,)]
     parameter = ground.vehicle.pilot.parameters.get("NAV_DLL_ACT")
     assert parameter is not None
     assert parameter.value == 2.0

@@ -63,6 +63,10 @@ def test_failsafes_change_the_mode_with_the_same_words(
     assert mode(ground) == HOLD
     ground.wait(2.5)
 
+    if reaction == RETURN:
+        assert mode(ground) == HOLD
+        assert ground.texts()[-1] == "Failsafe activated: entering Hold for 5 seconds\t"
+        ground.wait(5.0)
     assert mode(ground) == reaction
     assert "Failsafe activated\t" in ground.texts()
     ground.wait(60.0)
