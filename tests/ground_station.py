@@ -29,6 +29,7 @@ class GroundStation:
         channel: int = 0,
         now_s: float = 0.0,
         faults: tuple[VehicleFault, ...] = (),
+        component_id: int = 190,
     ) -> None:
         self.vehicle = vehicle
         self._machine = FaultyVehicle(vehicle, faults, now_s) if faults else vehicle
@@ -38,9 +39,9 @@ class GroundStation:
         self.heard_s: list[float] = []
         """When each was heard."""
         self._channel = channel
-        self._outgoing = ChannelCodec(255, 190, datagrams=False)
+        self._outgoing = ChannelCodec(255, component_id, datagrams=False)
         self._to_vehicle = ChannelCodec(vehicle.config.system_id, 1, datagrams=False)
-        self._to_ground = ChannelCodec(255, 190, datagrams=False)
+        self._to_ground = ChannelCodec(255, component_id, datagrams=False)
         self.step(Connected(channel))
 
     def step(self, event: Event) -> list[Any]:
