@@ -36,6 +36,8 @@ _CLIMB_PROGRESS_M = 0.2
 _CLIMB_TOLERANCE_FRAC = 0.05
 _CLIMB_TOLERANCE_M = 1.0
 """Autopilots end a takeoff that much too low, and go on from there."""
+_STATE_UNINIT = 0
+"""MAV_STATE."""
 _PREARM_TEXT_AGE_S = 35.0
 """ArduPilot repeats what fails before arming every 30 s."""
 _CAME_DOWN = (
@@ -176,7 +178,7 @@ class Preparation:
         if self.done or self.failure is not None:
             return []
         if not flavour.has_booted(heartbeat):
-            return self._wait("the autopilot is booting")
+            return self._wait(self._booting(vehicle, heartbeat, now_s))
         self._consent.on_heartbeat(heartbeat)
         if self._mission is not None and self._mission_begun:
             return self._follow_mission(self._mission, heartbeat)
@@ -222,6 +224,20 @@ class Preparation:
         self._climbing = False
         return out + self._settle(vehicle, now_s)
 
+    def _booting(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> str:
+        """Why it is not ready to be told anything.
+
+        PX4 is "uninitialised" whenever its checks fail while it is disarmed, and they say why.
+        """
+        unready = self._flavour.unready(vehicle)
+        if heartbeat.system_status != _STATE_UNINIT or not vehicle.prearm_heard or unready is None:
+            return "the autopilot is booting"
+        return self._with_warning(unready, vehicle, now_s)
+
+    def _with_warning(self, reason: str, vehicle: VehicleState, now_s: float) -> str:
+        text = vehicle.recent_warning(now_s, _PREARM_TEXT_AGE_S)
+        return f"{reason} ({text})" if text else reason
+
     def _left_by_others(self) -> str | None:
         """Why it does not start by itself: somebody may be walking up to it."""
         if self._flown_by_pilot:
@@ -237,8 +253,7 @@ class Preparation:
         if unready is None and (grounds := self._guards.grounds(vehicle, now_s)):
             return self._wait(grounds)
         if unready is not None:
-            text = vehicle.recent_warning(now_s, _PREARM_TEXT_AGE_S)
-            return self._wait(f"{unready} ({text})" if text else unready)
+            return self._wait(self._with_warning(unready, vehicle, now_s))
         if vehicle.position is not None and (fault := self._misplaced(vehicle.position)):
             return self._fail(fault)
         if objection := self._failsafes.objection:

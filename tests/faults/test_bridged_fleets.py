@@ -81,7 +81,11 @@ def test_low_batteries_go_home_and_failsafes_are_left_to_themselves(
 
     fleet.assert_all_done(without=("u0", "u2"))
     assert_sent_home(fleet, "u0", "battery at 10%, below the reserve of 20%")
-    assert_let_go(fleet, "u2", "a failsafe switched it to ")
+    if (flavour, style) == (FlavourName.PX4, CommandStyle.REPOSITION):
+        # It warns for some seconds in the mode in which it obeys, and is sent home meanwhile.
+        assert_sent_home(fleet, "u2", "the autopilot reports a failsafe")
+    else:
+        assert_let_go(fleet, "u2", "a failsafe switched it to ")
     assert not fleet.vehicles["u2"].pilot(LONG_S).armed, "the failsafe has brought it home"
 
 
