@@ -15,7 +15,7 @@ import pytest
 
 from sim.launch import process
 from sim.launch.process import Child, ChildFailedError
-from tests.process.mission import alive
+from tests.process.mission import alive, wait_until
 
 pytestmark = pytest.mark.process
 
@@ -231,7 +231,8 @@ def test_what_a_child_has_started_itself_ends_with_it(
         begin_s = asyncio.get_running_loop().time()
         await child.stop()
         assert asyncio.get_running_loop().time() - begin_s < 20.0
-        assert not alive(int(child.log[0]))
+        orphan = int(child.log[0])
+        await asyncio.to_thread(wait_until, lambda: not alive(orphan), 10.0, "the end of the child")
 
     play(scenario)
 
