@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, make_dataclass
 from functools import cache
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -32,12 +32,18 @@ from swarm.wire.keys import Keys
 from swarm.wire.messages import (
     Board,
     Body,
+    Brief,
+    Choice,
+    Claim,
     Command,
+    Epoch,
     Message,
     Outcome,
+    SignedRoster,
     Snapshot,
     Stamp,
     StartWithout,
+    Status,
     TaskOrder,
 )
 
@@ -57,8 +63,21 @@ __all__ = [
 FORMAT: Final = "1"
 """Version of all schemas here; grows when what was written before cannot be read any more."""
 
-_BODIES: Final[dict[str, type[Body]]] = {body.__name__: body for body in get_args(Body)}
-"""By the second part of their schemas' names."""
+_BODIES: Final[dict[str, type[Body]]] = {
+    "Brief": Brief,
+    "Epoch": Epoch,
+    "Board": Board,
+    "Claim": Claim,
+    "Outcome": Outcome,
+    "Status": Status,
+    "Choice": Choice,
+    "Command": Command,
+    "TaskOrder": TaskOrder,
+    "StartWithout": StartWithout,
+    "SignedRoster": SignedRoster,
+}
+"""By the second part of their schemas' names, which files keep whatever the classes are called."""
+_NAMES: Final = {body: name for name, body in _BODIES.items()}
 _CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
 
 
@@ -264,7 +283,7 @@ def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) 
     """
     match what:
         case Heard(message):
-            name = type(message.body).__name__
+            name = _NAMES[type(message.body)]
             said = _SAID[name](
                 message.mission,
                 message.writer,
@@ -322,7 +341,7 @@ def _answer(snapshot: Snapshot) -> Any:
             message.body,
         )
         for message in snapshot.messages
-        if (name := type(message.body).__name__)
+        if (name := _NAMES[type(message.body)])
     )
     return _Answer(
         snapshot.mission, snapshot.writer, snapshot.incarnation, snapshot.mission_s, messages
