@@ -126,7 +126,7 @@ soak: $(VENV)/.installed
 	$(BIN)/swarm soak --seeds $(SEEDS)
 
 chaos: $(VENV)/.installed
-	$(BIN)/python -m sim.chaos --jobs 2
+	$(BIN)/python -m sim.fleet.faults --jobs 2
 
 STEPS ?= 1000000
 SEED ?= 1

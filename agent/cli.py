@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from agent.mavlink.config import CommandStyle
-from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
-from swarm.log import LogFormat, LogLevel
-from swarm.options import (
+from agent.vehicle.config import CommandStyle
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.runtime.log import LogFormat, LogLevel
+from swarm.runtime.options import (
     CheckOption,
     LifelineOption,
     LogFormatOption,
@@ -23,7 +23,7 @@ from swarm.options import (
 __all__ = ["agent"]
 
 
-@seated
+@with_connection_options
 def agent(
     mission: MissionOption,
     uav: Annotated[str, typer.Option("--uav", metavar="ID", help="UAV this agent flies.")],
@@ -173,7 +173,7 @@ def agent(
             "taken over by its pilot.",
         ),
     ] = False,
-    seat: Seat = DEFAULT_SEAT,
+    seat: ConnectionOptions = DEFAULT_CONNECTION,
     speedup: SpeedupOption = 1.0,
     check: CheckOption = False,
     lifeline: LifelineOption = False,
@@ -195,21 +195,19 @@ def agent(
     import gc
     from collections.abc import Callable
 
-    from agent.core import AgentCore
-    from agent.mavlink.config import BridgeConfig
-    from agent.mavlink.link_address import parse_forward, parse_link
-    from agent.mavlink.signing_key import load_signing_key
-    from agent.mavlink.vehicle import MavlinkVehicle
+    from agent.core.agent_core import AgentCore
+    from agent.core.interface import VehicleReport
+    from agent.links.mavlink_vehicle import MavlinkVehicle
     from agent.runner import Vehicle, pause_between_lives, run_agent, seat_or_stop
-    from agent.vehicle import Report
+    from agent.vehicle.config import BridgeConfig, parse_forward, parse_link
+    from agent.vehicle.signing import load_signing_key
     from swarm.bus.zenoh_bus import open_zenoh_bus
-    from swarm.clock import ScaledClock, incarnation
     from swarm.identity import Role
-    from swarm.log import configure_logging, get_logger
     from swarm.model import Origin
-    from swarm.process import stop_requests
-    from swarm.store import Store
-    from swarm.watchdog import SERVICE
+    from swarm.runtime.clock import ScaledClock, incarnation
+    from swarm.runtime.log import configure_logging, get_logger
+    from swarm.runtime.process import SERVICE_NOTIFIER, stop_requests
+    from swarm.runtime.store import Store
 
     # A life begins with its process: of two agents of one UAV the one started last counts.
     life = incarnation()
@@ -232,12 +230,12 @@ def agent(
 
     def no_seat_yet(reason: str) -> None:
         log.warning("no bus yet", reason=reason)
-        SERVICE.waiting(f"{uav}: no bus yet: {reason}")
+        SERVICE_NOTIFIER.waiting(f"{uav}: no bus yet: {reason}")
 
     async def run() -> int:
         clock = ScaledClock(speedup)
 
-        def vehicle(origin: Origin, report: Callable[[Report], None]) -> Vehicle:
+        def vehicle(origin: Origin, report: Callable[[VehicleReport], None]) -> Vehicle:
             settings = BridgeConfig(
                 system_id=system_id,
                 origin=origin,
@@ -255,11 +253,11 @@ def agent(
             return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
 
         async with stop_requests(lifeline=lifeline) as stop:
-            SERVICE.waiting(f"{uav}: looks for the bus")
+            SERVICE_NOTIFIER.waiting(f"{uav}: looks for the bus")
             place = await seat_or_stop(lambda: open_zenoh_bus(config), stop, no_seat_yet)
             if place is None:
                 return stop.exit_status or 0
-            SERVICE.ready(f"{uav}: on the bus, in mission {mission}")
+            SERVICE_NOTIFIER.ready(f"{uav}: on the bus, in mission {mission}")
             # Only now: waiting for a seat may have taken long.
             memory = None if store is None else store.load(place.seal)
             core = AgentCore(
@@ -302,8 +300,8 @@ def agent(
 
 def _ground_ids(text: str) -> tuple[int, int]:
     """Our own system and component id."""
-    from agent.mavlink.config import ONBOARD_COMPUTER
-    from swarm.errors import Fault, InputError
+    from agent.vehicle.config import ONBOARD_COMPUTER
+    from swarm.runtime.errors import Fault, InputError
 
     system, marked, component = text.partition(":")
     parts = [system, component if marked else str(ONBOARD_COMPUTER)]
@@ -315,8 +313,8 @@ def _ground_ids(text: str) -> tuple[int, int]:
 
 
 def _check_ids(mission: str, uav: str) -> None:
-    from swarm.errors import Fault, InputError
     from swarm.model.ids import ID_RULE, RESERVED, valid_id
+    from swarm.runtime.errors import Fault, InputError
 
     faults = [
         Fault(option, "", f"{text!r} is no id", f"give {ID_RULE}")

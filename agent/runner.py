@@ -3,7 +3,7 @@
 Publishes ``uav/<id>/claim``, ``…/outcome/<task>``, ``…/status`` and ``…/choice``, holds
 ``alive/<id>`` and answers on ``state/<id>``; subscribes to ``brief``, ``plan``,
 ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and ``operator/*`` and watches
-``alive/*``. Leaves out: every decision (agent.core) and flying (agent.mavlink).
+``alive/*``. Leaves out: every decision (agent.core.agent_core) and flying (agent.vehicle).
 """
 
 from __future__ import annotations
@@ -14,21 +14,29 @@ from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Protocol
 
-from agent.core import AgentCore
-from agent.events import Action, Event, Order
-from agent.vehicle import Home, Orders, Report, Return, ReturnBegun
+from agent.core.agent_core import AgentCore
+from agent.core.interface import (
+    Action,
+    Event,
+    Home,
+    OrderVehicle,
+    Return,
+    ReturnBegun,
+    VehicleOrder,
+    VehicleReport,
+)
 from swarm.bus.port import Bus
-from swarm.clock import Clock
-from swarm.config import PRESETS, Link
-from swarm.errors import BusError
-from swarm.events import Stop
 from swarm.model import Origin
-from swarm.process import StopRequest
-from swarm.shell import Shell, take_seat
-from swarm.watchdog import SERVICE, Service
-from swarm.wire.messages import Snapshot
+from swarm.protocol.events import Stop
+from swarm.protocol.messages import Snapshot
+from swarm.protocol.timing import PRESETS, LinkKind
+from swarm.runtime.clock import Clock
+from swarm.runtime.errors import BusError
+from swarm.runtime.process import SERVICE_NOTIFIER, ServiceNotifier, StopRequest
+from swarm.runtime.shell import Shell, join_mission
 
 __all__ = ["Vehicle", "pause_between_lives", "run_agent", "seat_or_stop"]
+
 
 RETRY_S = 0.5
 """Wall time between a failed try for a seat on the bus and the next."""
@@ -51,7 +59,7 @@ class Vehicle(Protocol):
         """Open the link."""
         ...
 
-    def order(self, order: Orders) -> None:
+    def order(self, order: VehicleOrder) -> None:
         """Command it."""
         ...
 
@@ -107,7 +115,9 @@ async def seat_or_stop(
         await asyncio.gather(trying, stopped, return_exceptions=True)
 
 
-async def pause_between_lives(stop: StopRequest, manager: Service = SERVICE) -> None:
+async def pause_between_lives(
+    stop: StopRequest, manager: ServiceNotifier = SERVICE_NOTIFIER
+) -> None:
     """Wait a little before leaving where a service manager starts this process again at once.
 
     A coordinator stays until all agents have left: one that comes back every second
@@ -135,11 +145,11 @@ async def run_agent(
     mission: str,
     bus: Bus,
     clock: Clock,
-    make_vehicle: Callable[[Origin, Callable[[Report], None]], Vehicle],
+    make_vehicle: Callable[[Origin, Callable[[VehicleReport], None]], Vehicle],
     stop: StopRequest,
     *,
     save: Callable[[Snapshot], None] | None = None,
-    answer_s: float = PRESETS[Link.NORMAL].answer_s,
+    answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
 ) -> int:
     """Fly one UAV until the mission has ended and the vehicle is home.
 
@@ -164,7 +174,7 @@ async def run_agent(
 
     def execute(action: Action) -> None:
         nonlocal vehicle, starting
-        if not isinstance(action, Order):
+        if not isinstance(action, OrderVehicle):
             return
         brief, order = core.replica.brief, action.order
         if not isinstance(order, Return):
@@ -180,7 +190,7 @@ async def run_agent(
         elif isinstance(order, Return):
             loop.call_soon(report, Home())
 
-    def report(news: Report) -> None:
+    def report(news: VehicleReport) -> None:
         if isinstance(news, ReturnBegun):
             returns.set()
         shell.step(news)
@@ -222,7 +232,7 @@ async def run_agent(
         answer_s=answer_s,
     )
     core.dropped = _Dropped(shell)
-    take_seat(bus, mission, core.uav, status=False)
+    join_mission(bus, mission, core.uav, status=False)
     flying, leaving = loop.create_task(shell.run()), loop.create_task(farewell())
     try:
         await asyncio.wait((flying, leaving), return_when=asyncio.FIRST_COMPLETED)

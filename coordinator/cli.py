@@ -1,6 +1,6 @@
 """Commands of the coordinator.
 
-Leaves out: what they do (coordinator.planner, coordinator.plan_report, coordinator.plot).
+Leaves out: what they do (coordinator.planner, coordinator.planner.plan_report, coordinator.plot).
 """
 
 from __future__ import annotations
@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coordinator.planner.methods import METHODS, ONLINE_METHODS
-from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
-from swarm.complete import among
-from swarm.config import Timing
-from swarm.errors import Fault, InputError
-from swarm.log import LogFormat, LogLevel
-from swarm.options import (
+from coordinator.planner.options import METHODS, ONLINE_METHODS
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.protocol.timing import Timing
+from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.log import LogFormat, LogLevel
+from swarm.runtime.options import (
     CheckOption,
     JsonOption,
     LifelineOption,
@@ -33,16 +32,18 @@ from swarm.options import (
     SpeedupOption,
     StateOption,
     TimeLimitOption,
+    complete_among,
 )
 
 if TYPE_CHECKING:
     from rich.status import Status
 
-    from coordinator.planner.stop import ShouldStop
+    from coordinator.planner.options import ShouldStop
     from swarm.model import Mission, Plan
-    from swarm.wire.messages import Snapshot
+    from swarm.protocol.messages import Snapshot
 
 __all__ = ["coordinator", "plan"]
+
 
 _BOUND_S, _BOUND_FRAC = 3.0, 0.25
 """Time `plan` spends on an upper bound [s], and the most of its limit that it keeps for that."""
@@ -54,7 +55,7 @@ def plan(
         str,
         typer.Option(
             metavar="METHOD",
-            autocompletion=among(*METHODS),
+            autocompletion=complete_among(*METHODS),
             help="greedy or lookahead: how UAVs decide; guided: optimised lists; exact: the proven "
             "best lists.",
         ),
@@ -102,20 +103,20 @@ def plan(
         swarm plan valley-survey --method guided --export plans
         swarm plan table-1 --method exact --json
     """
-    from swarm.clock import SystemClock
+    from swarm.runtime.clock import SystemClock
 
     clock = SystemClock()
     begin_s = clock.now_s()
 
     from json import dumps
 
-    from coordinator.briefing import FlightLayers, height_warning
+    from coordinator.core.publication import FlightLayers, height_warning
     from coordinator.export import require_origin
-    from coordinator.plan_report import plan_as_json, plan_table
     from coordinator.planner.exact import ProblemTooLargeError
+    from coordinator.planner.options import after_time, first_of
     from coordinator.planner.plan import make_plan
-    from coordinator.planner.stop import after_time, first_of
-    from swarm.process import EXIT_INTERRUPTED
+    from coordinator.planner.plan_report import plan_as_json, plan_table
+    from swarm.runtime.process import EXIT_INTERRUPTED
     from swarm.scenario import load_scenario
 
     _check_plan_options(method, plot, firmware)
@@ -163,10 +164,10 @@ def plan(
 
 def _export(folder: Path, mission: Mission, made: Plan, firmware: str) -> None:
     """Write the lists as plans, and say which."""
-    from coordinator.export import Firmware, write_plans
+    from coordinator.export import ExportFirmware, write_plans
 
     try:
-        written = write_plans(folder, mission, made, Firmware(firmware))
+        written = write_plans(folder, mission, made, ExportFirmware(firmware))
     except OSError as error:
         problem = f"cannot write into {folder}: {error.strerror or error}"
         raise InputError(Fault("--export", "", problem, "name a folder that can be")) from error
@@ -213,7 +214,7 @@ def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float
         signal.signal(signal.SIGINT, before)
 
 
-@seated
+@with_connection_options
 def coordinator(
     scenario: ScenarioArgument,
     method: Annotated[
@@ -222,7 +223,7 @@ def coordinator(
             "--method",
             metavar="METHOD",
             help="Decision rule: greedy, lookahead or guided.",
-            autocompletion=among(*ONLINE_METHODS),
+            autocompletion=complete_among(*ONLINE_METHODS),
         ),
     ] = "guided",
     seed: SeedOption = 0,
@@ -272,7 +273,7 @@ def coordinator(
             help="Watch the coordinator that is there, and take its place when it is lost.",
         ),
     ] = False,
-    seat: Seat = DEFAULT_SEAT,
+    seat: ConnectionOptions = DEFAULT_CONNECTION,
     speedup: SpeedupOption = 1.0,
     dashboard: Annotated[
         str | None,
@@ -306,23 +307,22 @@ def coordinator(
     import asyncio
     from json import dumps
 
-    from coordinator.briefing import FlightLayers, height_warning
-    from coordinator.core import CoordinatorCore
-    from coordinator.dashboard.keeper import page_beside
-    from coordinator.dashboard.place import parse_place
-    from coordinator.plan_report import plan_as_json
+    from coordinator.core.active import CoordinatorCore
+    from coordinator.core.publication import FlightLayers, height_warning
+    from coordinator.daemon import CoordinatorProcess
+    from coordinator.dashboard.access import parse_serve_address
+    from coordinator.dashboard.supervisor import supervised_dashboard
     from coordinator.planner.plan import check_online_method, make_plan
-    from coordinator.service import Service
+    from coordinator.planner.plan_report import plan_as_json
     from swarm.bus.zenoh_bus import open_zenoh_bus
-    from swarm.clock import ScaledClock, SystemClock, incarnation
     from swarm.identity import Role
-    from swarm.log import configure_logging, get_logger, identify
     from swarm.model.ids import COORDINATOR
-    from swarm.process import run_until_stopped
+    from swarm.protocol.seal import seal_of
+    from swarm.runtime.clock import ScaledClock, SystemClock, incarnation
+    from swarm.runtime.log import configure_logging, get_logger, identify
+    from swarm.runtime.process import SERVICE_NOTIFIER, run_until_stopped
+    from swarm.runtime.store import Store
     from swarm.scenario import load_scenario
-    from swarm.sealing import seal_of
-    from swarm.store import Store
-    from swarm.watchdog import SERVICE
 
     configure_logging(log_level, log_format)
     check_online_method(method)
@@ -358,14 +358,14 @@ def coordinator(
             memory_age_s=memory_age_s,
         )
 
-    place = None if dashboard is None else parse_place(dashboard, must_be_free=False)
-    page = page_beside(place, mission.name, seat, speedup=speedup)
+    place = None if dashboard is None else parse_serve_address(dashboard, must_be_free=False)
+    page = supervised_dashboard(place, mission.name, seat, speedup=speedup)
     if check:
         return 0
     for line in () if place is None else place.lines:
         print(line, file=sys.stderr)
     store = None if state is None else Store(state, mission.name, COORDINATOR, speedup=speedup)
-    service = Service(
+    service = CoordinatorProcess(
         mission=mission,
         make_core=core,
         make_plan=planner,
@@ -389,7 +389,7 @@ def coordinator(
         async with page:
             status = await coordinate()
         # Whoever supervises it must not take a mission's end for a failure, and fly it again.
-        return 0 if SERVICE.supervised else status
+        return 0 if SERVICE_NOTIFIER.supervised else status
 
     try:
         return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
@@ -400,21 +400,21 @@ def coordinator(
 
 def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     """Refuse what cannot be done before any work is done."""
-    from coordinator.export import Firmware
+    from coordinator.export import ExportFirmware
     from coordinator.plot import PLOT_SUFFIXES
-    from swarm.suggest import instead
+    from swarm.runtime.errors import remedy_for_name
 
     faults = []
     if method not in METHODS:
-        remedy = instead(method, METHODS)
+        remedy = remedy_for_name(method, METHODS)
         faults.append(Fault("--method", method, "no such method", remedy))
     if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
         remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
         faults.append(Fault("--plot", str(plot), problem, remedy))
-    firmwares = [known.value for known in Firmware]
+    firmwares = [known.value for known in ExportFirmware]
     if firmware not in firmwares:
-        remedy = instead(firmware, firmwares)
+        remedy = remedy_for_name(firmware, firmwares)
         faults.append(Fault("--firmware", firmware, "no such firmware", remedy))
     if faults:
         raise InputError(*faults)

@@ -1,23 +1,25 @@
-"""The coordinator's process: its core on a bus, plans made beside it.
+"""The coordinator's process: its core on a bus, and plans that are made beside it.
 
-Publishes ``brief``, ``plan`` and ``board/<task>``, holds ``alive/coordinator`` and
-answers on ``state/coordinator``; while it stands by, none of that. Subscribes to
-``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and
-``operator/*`` and watches ``alive/*``. Leaves out: every decision (coordinator.core,
-coordinator.standby).
+Publishes ``brief``, ``plan`` and ``board/<task>``, holds ``alive/coordinator`` and answers on
+``state/coordinator``; while it stands by, none of that. Subscribes to ``brief``, ``plan``,
+``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and ``operator/*`` and watches ``alive/*``.
+One that stands by takes a seat as an observer; when it takes over it keeps that seat. When it has
+to stand down, it leaves it and watches from a new one: a token cannot be taken back. Leaves out:
+every decision (coordinator.core).
 """
 
 from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from dataclasses import dataclass
 from typing import TypeVar
 
-from coordinator.core import CoordinatorCore
-from coordinator.events import (
-    Action,
-    Event,
+from coordinator.core.active import CoordinatorCore
+from coordinator.core.events import (
+    CoordinatorAction,
+    CoordinatorEvent,
     MakePlan,
     PlanFailed,
     PlanMade,
@@ -26,22 +28,27 @@ from coordinator.events import (
     StopPlanning,
     TakeSeat,
 )
-from coordinator.planner.live import NewPlan, replan
-from coordinator.planner.stop import ShouldStop, after_time, first_of
-from coordinator.standby import StandbyCore
+from coordinator.core.standby import MakeCoordinator, StandbyCore
+from coordinator.planner.online import ReplanResult, replan
+from coordinator.planner.options import ShouldStop, after_time, first_of
 from swarm.bus.port import Bus
-from swarm.clock import Clock, SystemClock
-from swarm.config import PRESETS, Link
+from swarm.bus.zenoh_bus import ZenohBus
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
-from swarm.process import call_in_background
-from swarm.shell import Shell, take_seat
-from swarm.wire.keys import Keys
-from swarm.wire.messages import Snapshot
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import Snapshot
+from swarm.protocol.seal import Seal
+from swarm.protocol.timing import PRESETS, LinkKind, Timing
+from swarm.runtime.clock import Clock, SystemClock
+from swarm.runtime.process import SERVICE_NOTIFIER, call_in_background
+from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.store import Store
 
-__all__ = ["run_coordinator"]
+__all__ = ["CoordinatorProcess", "run_coordinator"]
+
 
 T = TypeVar("T")
+
 
 REPLAN_S = 2.0
 """Wall time that a running mission waits for a better plan, valuing it included."""
@@ -55,7 +62,7 @@ async def run_coordinator(
     make_plan: Callable[[Mission, str, int, ShouldStop], Plan],
     *,
     save: Callable[[Snapshot], None] | None = None,
-    answer_s: float = PRESETS[Link.NORMAL].answer_s,
+    answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
 ) -> int:
     """Coordinate ``mission``, or stand by for it, until it has ended and all agents have left.
 
@@ -73,7 +80,7 @@ async def run_coordinator(
         down for another coordinator.
     """
     planning: set[asyncio.Task[None]] = set()
-    keys = Keys(mission.name)
+    keys = KeySpace(mission.name)
 
     async def plan(request: MakePlan) -> None:
         def call(unwanted: ShouldStop) -> Plan:
@@ -87,7 +94,7 @@ async def run_coordinator(
             shell.step(PlanMade(request.request, made))
 
     async def plan_anew(request: Replan) -> None:
-        def call(unwanted: ShouldStop) -> NewPlan:
+        def call(unwanted: ShouldStop) -> ReplanResult:
             return replan(
                 request.situation,
                 request.course,
@@ -112,7 +119,7 @@ async def run_coordinator(
         planning.add(task)
         task.add_done_callback(planned)
 
-    def execute(action: Action) -> None:
+    def execute(action: CoordinatorAction) -> None:
         match action:
             case MakePlan():
                 begin(plan(action))
@@ -136,10 +143,10 @@ async def run_coordinator(
         epoch = core.replica.epoch
         return {} if epoch is None else {"epoch": epoch.number}
 
-    def as_event(fact: Event) -> Event:
+    def as_event(fact: CoordinatorEvent) -> CoordinatorEvent:
         return fact
 
-    shell: Shell[Event, Action] = Shell(
+    shell: Shell[CoordinatorEvent, CoordinatorAction] = Shell(
         core,
         bus,
         clock,
@@ -155,7 +162,7 @@ async def run_coordinator(
         context=context,
     )
     watches = isinstance(core, StandbyCore)
-    take_seat(bus, mission.name, None if watches else COORDINATOR, status=False)
+    join_mission(bus, mission.name, None if watches else COORDINATOR, status=False)
     try:
         return await shell.run()
     finally:
@@ -171,3 +178,61 @@ async def _planned_beside(call: Callable[[ShouldStop], T], name: str) -> T:
         )
     finally:
         unwanted.set()
+
+
+@dataclass(frozen=True, slots=True)
+class CoordinatorProcess:
+    """What one coordinator's process needs."""
+
+    mission: Mission
+    make_core: MakeCoordinator
+    make_plan: Callable[[Mission, str, int, ShouldStop], Plan]
+    open_bus: Callable[[], Awaitable[ZenohBus]]
+    clock: Clock
+    timing: Timing
+    """In the seconds of ``clock``."""
+    answer_s: float
+    """How long a question waits for the slowest answer [wall s]."""
+    store: Store | None
+    """Where it keeps what its next life needs."""
+    seal: Seal | None
+    """Tells whose word of what it kept still counts; None without keys."""
+
+    async def coordinate(self) -> tuple[int, str | None]:
+        """Coordinate the mission; exit status, and why it stood down if it did."""
+        memory = self._recall()
+        core = self.make_core(*memory)
+        return await self._serve(core), core.stood_down
+
+    async def stand_by(self) -> int:
+        """Watch the coordinator, and take its place whenever it is lost; exit status."""
+        memory, age_s = self._recall()
+        while True:
+            core = StandbyCore(self.mission, self.make_core, self.timing, memory, age_s)
+            status = await self._serve(core)
+            if core.stood_down is None:
+                return status
+            memory, age_s = core.memory(self.clock.now_s()), 0.0
+
+    def _recall(self) -> tuple[Snapshot | None, float]:
+        found = None if self.store is None else self.store.load(self.seal)
+        return (None, 0.0) if found is None else (found.snapshot, found.age_s)
+
+    async def _serve(self, core: CoordinatorCore | StandbyCore) -> int:
+        seat = await self.open_bus()
+        stands_by = isinstance(core, StandbyCore)
+        SERVICE_NOTIFIER.ready(
+            f"{'stands by for' if stands_by else 'coordinates'} {self.mission.name}"
+        )
+        try:
+            return await run_coordinator(
+                core,
+                self.mission,
+                seat,
+                self.clock,
+                self.make_plan,
+                save=None if self.store is None else self.store.save,
+                answer_s=self.answer_s,
+            )
+        finally:
+            seat.close()

@@ -15,14 +15,15 @@ from collections.abc import Iterator, Sequence
 from enum import Enum
 from pathlib import Path
 
-from coordinator.core import FlightLayers
-from swarm.errors import Fault, InputError
+from coordinator.core.publication import FlightLayers
 from swarm.model import Mission, Origin, Plan, Task, Uav
 from swarm.model.frames import wgs84_from_enu
-from swarm.scenario.task_files.mission_items import Command, Frame
+from swarm.runtime.errors import Fault, InputError
+from swarm.scenario.task_files.mission_items import MavCommand, MavFrame
 from swarm.scenario.task_files.plan_file import LAYER_KEY
 
-__all__ = ["Firmware", "require_origin", "uav_plan", "write_plans"]
+__all__ = ["ExportFirmware", "require_origin", "uav_plan", "write_plans"]
+
 
 _QUADROTOR = 2
 _RELATIVE = 1
@@ -30,14 +31,14 @@ _GROUND_SPEED = 1
 _THROTTLE_AS_IT_IS = -1
 
 
-class Firmware(Enum):
+class ExportFirmware(Enum):
     """Firmware that a plan is made for; QGroundControl warns of a plan for another."""
 
     ARDUPILOT = "ardupilot"
     PX4 = "px4"
 
 
-_AUTOPILOT = {Firmware.ARDUPILOT: 3, Firmware.PX4: 12}
+_AUTOPILOT = {ExportFirmware.ARDUPILOT: 3, ExportFirmware.PX4: 12}
 """MAV_AUTOPILOT."""
 
 
@@ -53,7 +54,7 @@ def require_origin(mission: Mission, source: str) -> Origin:
     return mission.origin
 
 
-def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: Firmware) -> list[Path]:
+def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: ExportFirmware) -> list[Path]:
     """Write ``<mission>.<uav>.plan`` into ``folder`` for every UAV that has tasks.
 
     A UAV without tasks gets none, and loses the one of an earlier plan.
@@ -80,7 +81,7 @@ def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: Firmware) 
 
 
 def uav_plan(
-    uav: Uav, route: Sequence[Task], origin: Origin, layer_m: float, firmware: Firmware
+    uav: Uav, route: Sequence[Task], origin: Origin, layer_m: float, firmware: ExportFirmware
 ) -> dict[str, object]:
     """The plan of one UAV, ready for `json.dumps`.
 
@@ -130,22 +131,26 @@ def _items(
         height_m = point_enu_m[2] - uav.position_enu_m[2] + layer_m
         return *_lat_lon_deg(origin, point_enu_m), height_m
 
-    yield _at(Command.TAKEOFF, 0.0, place(uav.position_enu_m))
+    yield _at(MavCommand.TAKEOFF, 0.0, place(uav.position_enu_m))
     speed = [_GROUND_SPEED, uav.speed_m_s, _THROTTLE_AS_IT_IS, 0, 0, 0, 0]
-    yield {"command": int(Command.CHANGE_SPEED), "frame": int(Frame.MISSION), "params": speed}
+    yield {"command": int(MavCommand.CHANGE_SPEED), "frame": int(MavFrame.MISSION), "params": speed}
     for task in route:
-        yield _at(Command.WAYPOINT, task.service_s, place(task.position_enu_m))
+        yield _at(MavCommand.WAYPOINT, task.service_s, place(task.position_enu_m))
     home: list[float] = [0] * 7
-    yield {"command": int(Command.RETURN_TO_LAUNCH), "frame": int(Frame.MISSION), "params": home}
+    yield {
+        "command": int(MavCommand.RETURN_TO_LAUNCH),
+        "frame": int(MavFrame.MISSION),
+        "params": home,
+    }
 
 
-def _at(command: Command, first: float, place: tuple[float, float, float]) -> dict[str, object]:
+def _at(command: MavCommand, first: float, place: tuple[float, float, float]) -> dict[str, object]:
     """An item at a place; no heading, so the vehicle keeps to its own setting."""
     return {
         "AMSLAltAboveTerrain": None,
         "Altitude": place[2],
         "AltitudeMode": _RELATIVE,
         "command": int(command),
-        "frame": int(Frame.GLOBAL_RELATIVE),
+        "frame": int(MavFrame.GLOBAL_RELATIVE),
         "params": [first, 0, 0, None, *place],
     }

@@ -1,26 +1,86 @@
-"""A place on the bus for who joins a mission to look on or to command, and takes no part.
+"""Join a mission on its bus to observe or to command it, without taking part in it.
 
-Leaves out: what such a process does there (coordinator.status, coordinator.operator).
+Leaves out: what is heard there (coordinator.mission_view.observation) and how it is shown
+(coordinator.terminal).
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import math
 from collections.abc import AsyncIterator, Callable
+from typing import Protocol
 
-from coordinator.status.onlooker import only_mission
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.observation import MissionObserver, deserted
 from swarm.bus.config import BusConfig
-from swarm.bus.port import Bus
+from swarm.bus.port import Bus, TokenSeen
 from swarm.bus.zenoh_bus import open_zenoh_bus
-from swarm.clock import Clock
-from swarm.config import PRESETS, Link
-from swarm.errors import Fault, InputError
-from swarm.events import BusFact, Wish
 from swarm.model.ids import ID_RULE, valid_id
-from swarm.shell import Core, Shell, take_seat
-from swarm.terminal import say
+from swarm.protocol.events import CommonAction, CommonEvent
+from swarm.protocol.key_space import ANY_TOKEN, mission_of_token
+from swarm.protocol.timing import PRESETS, LinkKind, Timing
+from swarm.runtime.clock import Clock, ScaledClock
+from swarm.runtime.console import say
+from swarm.runtime.errors import Fault, InputError, SwarmError
+from swarm.runtime.shell import Core, Shell, join_mission
 
-__all__ = ["check_mission", "joined", "onlooking"]
+__all__ = [
+    "MissionDisplay",
+    "check_mission",
+    "find_missions",
+    "joined",
+    "observer_shell",
+    "only_mission",
+    "watch",
+]
+
+
+SETTLE_S = 0.4
+"""Wall time after the first token of a mission in which those of others come too."""
+
+
+async def find_missions(bus: Bus, patience_s: float | None) -> list[str]:
+    """Names of all missions that somebody on ``bus`` flies, once there is one.
+
+    Args:
+        bus: open; its inbox is read.
+        patience_s: how long to wait for the first [wall s]; None for as long as it takes.
+    """
+    bus.watch_tokens(ANY_TOKEN)
+    found: set[str] = set()
+    wait_s = patience_s
+    try:
+        while True:
+            async with asyncio.timeout(wait_s):
+                await bus.inbox.wait()
+            tokens = [event.key for event in bus.inbox.take() if isinstance(event, TokenSeen)]
+            new = {mission for token in tokens if (mission := mission_of_token(token))} - found
+            found |= new
+            wait_s = SETTLE_S if new else wait_s
+    except TimeoutError:
+        return sorted(found)
+
+
+async def only_mission(bus: Bus, patience_s: float | None) -> str:
+    """The mission that is meant when none is named.
+
+    Args:
+        bus: open; its inbox is read.
+        patience_s: how long to wait for it [wall s]; None for as long as it takes.
+
+    Raises:
+        SwarmError: there is none.
+        InputError: there are several.
+    """
+    missions = await find_missions(bus, patience_s)
+    if not missions:
+        raise SwarmError(f"nobody on the bus flies a mission (looked for {patience_s:g} s)")
+    if len(missions) > 1:
+        problem = f"there are several missions: {', '.join(missions)}"
+        raise InputError(Fault("--mission", "", problem, "name one of them"))
+    return missions[0]
 
 
 def check_mission(name: str | None) -> None:
@@ -56,17 +116,17 @@ async def joined(
         bus.close()
 
 
-def onlooking(
-    core: Core[BusFact, Wish],
+def observer_shell(
+    core: Core[CommonEvent, CommonAction],
     bus: Bus,
     clock: Clock,
     mission: str,
     name: str,
-    answer_s: float = PRESETS[Link.NORMAL].answer_s,
+    answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
     *,
     every_status: bool = False,
     left_out: Callable[[], int] = int,
-) -> Shell[BusFact, Wish]:
+) -> Shell[CommonEvent, CommonAction]:
     """A shell that tells ``core`` all that is said on the bus; it shows no token.
 
     Args:
@@ -76,10 +136,10 @@ def onlooking(
         mission: name of the mission.
         name: of this process, in logs and, where it speaks, as a writer.
         answer_s: how long a question waits for the slowest answer [wall s].
-        every_status: see `take_seat`.
+        every_status: see `join_mission`.
         left_out: see `Shell`.
     """
-    shell: Shell[BusFact, Wish] = Shell(
+    shell: Shell[CommonEvent, CommonAction] = Shell(
         core,
         bus,
         clock,
@@ -91,5 +151,102 @@ def onlooking(
         left_out=left_out,
         answer_s=answer_s,
     )
-    take_seat(bus, mission, None, status=True, every_status=every_status)
+    join_mission(bus, mission, None, status=True, every_status=every_status)
     return shell
+
+
+FRAME_S = 0.2
+"""Wall time between two pictures."""
+
+FOREVER_S = 1e9
+"""As long as it takes."""
+
+
+class MissionDisplay(Protocol):
+    """Who shows what is known; called in the loop's thread."""
+
+    def wait(self, text: str) -> None:
+        """There is nothing to show yet, and ``text`` says what is waited for."""
+        ...
+
+    def update(self, mission_state: MissionState, now_s: float) -> None:
+        """Show what ``mission_state`` knows at ``now_s``."""
+        ...
+
+
+async def watch(
+    mission: str | None,
+    config: BusConfig,
+    timing: Timing,
+    clock: ScaledClock,
+    shows: MissionDisplay,
+    *,
+    patience_s: float | None,
+) -> None:
+    """Show a mission until it is over and nobody is there any more.
+
+    Args:
+        mission: its name; None for that of the keys, or the only one there is.
+        config: how to reach the others.
+        timing: timers, in the seconds of ``clock``.
+        clock: of the observer.
+        shows: what is known, a few times a second.
+        patience_s: how long to wait for the bus, and then for the mission [wall s]; None
+            for as long as it takes.
+
+    Raises:
+        BusError: the bus cannot be reached, or not in that time.
+        SwarmError: there is no mission in that time.
+        InputError: none is named, and there are several.
+    """
+    limit_s = FOREVER_S if patience_s is None else patience_s
+    shows.wait(f"waiting for {config.place}")
+    bus = await open_zenoh_bus(config, timeout_s=limit_s)
+    try:
+        shows.wait(f"waiting for {'a mission' if mission is None else f'mission {mission}'}")
+        name = mission or config.mission or await only_mission(bus, limit_s)
+        await _watch_until_deserted(name, bus, timing, clock, shows, limit_s)
+    finally:
+        bus.close()
+
+
+async def _watch_until_deserted(
+    mission: str,
+    bus: Bus,
+    timing: Timing,
+    clock: ScaledClock,
+    shows: MissionDisplay,
+    limit_s: float,
+) -> None:
+    observer = MissionObserver(mission, timing, None)
+    mission_state = observer.mission_state
+    shell = observer_shell(observer, bus, clock, mission, "status")
+    looking = asyncio.get_running_loop().create_task(shell.run())
+    give_up_at_s = clock.now_s() + limit_s * clock.speedup
+    deserted_at_s = math.inf
+    try:
+        while True:
+            now_s = clock.now_s()
+            if observer.known:
+                shows.update(mission_state, now_s)
+            elif now_s >= give_up_at_s:
+                raise SwarmError(observer.lack)
+            else:
+                shows.wait(f"waiting for mission {mission}: {observer.lack.partition(': ')[2]}")
+            # Tokens may come a little later than what others know.
+            left = deserted(mission_state)
+            deserted_at_s = min(deserted_at_s, now_s) if left else math.inf
+            if now_s - deserted_at_s >= timing.relink_grace_s:
+                return
+            if await _ends(looking, FRAME_S):
+                return
+    finally:
+        looking.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await looking
+
+
+async def _ends(looking: asyncio.Task[int], within_s: float) -> bool:
+    """Whether the shell ends in that time, which it does only by a fault; raises that."""
+    await asyncio.wait({looking}, timeout=within_s)
+    return looking.done() and looking.result() is not None

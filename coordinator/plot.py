@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["PLOT_SUFFIXES", "Look", "draw_plan", "path_looks", "plan_figure"]
+__all__ = ["PLOT_SUFFIXES", "PathStyle", "draw_plan", "path_styles", "plan_figure"]
+
 
 PLOT_SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of picture, named by the file's suffix."""
@@ -44,7 +45,7 @@ _LISTED_TASKS = 24
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class PathStyle:
     """How one UAV's path is drawn."""
 
     colour: str
@@ -77,7 +78,7 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
 
     figure = Figure(figsize=_size_inches(mission), layout="constrained")
     axes = figure.add_subplot()
-    looks = dict(zip(plan.routes, path_looks(len(plan.routes)), strict=True))
+    looks = dict(zip(plan.routes, path_styles(len(plan.routes)), strict=True))
     diameters = _diameters_points(mission)
     _draw_paths(axes, mission, plan, looks, diameters)
     _draw_tasks(axes, mission, plan, looks, diameters)
@@ -95,9 +96,9 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     return figure
 
 
-def path_looks(count: int) -> list[Look]:
+def path_styles(count: int) -> list[PathStyle]:
     """Looks of ``count`` UAVs; 28 differ, as 7 colours and 4 dashes share no factor."""
-    return [Look(_COLOURS[i % len(_COLOURS)], _DASHES[i % len(_DASHES)]) for i in range(count)]
+    return [PathStyle(_COLOURS[i % len(_COLOURS)], _DASHES[i % len(_DASHES)]) for i in range(count)]
 
 
 def _size_inches(mission: Mission) -> tuple[float, float]:
@@ -133,7 +134,7 @@ def _draw_paths(
     axes: Axes,
     mission: Mission,
     plan: Plan,
-    looks: Mapping[UavId, Look],
+    looks: Mapping[UavId, PathStyle],
     diameters: Mapping[TaskId, float],
 ) -> None:
     del diameters
@@ -166,8 +167,8 @@ def _draw_paths(
 
 
 def _paths(
-    mission: Mission, plan: Plan, looks: Mapping[UavId, Look]
-) -> list[tuple[np.ndarray, Look]]:
+    mission: Mission, plan: Plan, looks: Mapping[UavId, PathStyle]
+) -> list[tuple[np.ndarray, PathStyle]]:
     tasks = {task.id: task.position_enu_m[:2] for task in mission.tasks}
     return [
         (
@@ -182,7 +183,7 @@ def _draw_tasks(
     axes: Axes,
     mission: Mission,
     plan: Plan,
-    looks: Mapping[UavId, Look],
+    looks: Mapping[UavId, PathStyle],
     diameters: Mapping[TaskId, float],
 ) -> None:
     owner = {task: uav for uav, route in plan.routes.items() for task in route}
@@ -201,7 +202,7 @@ def _draw_tasks(
         )
 
 
-def _draw_starts(axes: Axes, mission: Mission, looks: Mapping[UavId, Look]) -> None:
+def _draw_starts(axes: Axes, mission: Mission, looks: Mapping[UavId, PathStyle]) -> None:
     for uavs in _start_groups(mission):
         colour = looks[uavs[0].id].colour if len(uavs) == 1 else _SHARED
         axes.plot(
@@ -237,7 +238,9 @@ def _middle_m(uavs: Sequence[Uav]) -> tuple[float, float]:
     return float(east_m), float(north_m)
 
 
-def _draw_legend(figure: Figure, mission: Mission, plan: Plan, looks: Mapping[UavId, Look]) -> None:
+def _draw_legend(
+    figure: Figure, mission: Mission, plan: Plan, looks: Mapping[UavId, PathStyle]
+) -> None:
     from matplotlib.lines import Line2D
 
     handles: list[Line2D] = []

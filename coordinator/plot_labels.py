@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Label", "place_labels"]
 
+
 _DIRECTIONS = tuple(
     (float(np.cos(angle)), float(np.sin(angle)))
     for angle in np.radians([0, 90, 180, 270, 45, 315, 135, 225, 22, 158, 202, 338])

@@ -1,3 +1,3 @@
-"""Shared vocabulary of the runtime: model, wire, state, allocation, bus, clock."""
+"""What all processes share: model, scenarios, allocation, protocol, bus, identity, runtime."""
 
 __version__ = "0.1.0"

@@ -4,7 +4,7 @@ A subcommand is an entry point of the group ``peckorder.commands``: a plain
 function written for typer (annotated parameters, result an exit status or
 None), or a ``typer.Typer`` for a family such as ``swarm task add``. Only the
 one asked for is imported; ``--help`` imports all. Its docstring becomes its
-help (swarm.help).
+help (swarm.runtime.console).
 
 Exit status: 0 done; 1 the mission or check failed, or an error at run time;
 2 wrong usage or input, one line each on standard error; 130 interrupted. An
@@ -24,15 +24,14 @@ from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated, Any
 
-import typer
 import typer.main
 
 import swarm
-from swarm.errors import Fault, InputError, SwarmError
-from swarm.help import Panels, explain_family, help_text
-from swarm.terminal import say
+from swarm.runtime.console import Panels, explain_family, help_text, say
+from swarm.runtime.errors import Fault, InputError, SwarmError
 
 __all__ = ["COMMAND_GROUP", "check", "console_main", "main"]
+
 
 COMMAND_GROUP = "peckorder.commands"
 _CHECK = "--check"
@@ -125,7 +124,7 @@ def console_main() -> int:
         # What is still buffered can reach nobody; the interpreter must not try again at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = _FAILED
-    daemon = sys.modules.get("swarm.process")
+    daemon = sys.modules.get("swarm.runtime.process")
     if daemon is not None:  # loaded by commands that use the bus: one may hang at the exit
         daemon.leave(status)
     return status

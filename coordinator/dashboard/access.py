@@ -1,8 +1,9 @@
-"""Who may look, and who may command: names of this server, other pages, token, and how often.
+"""Where a dashboard is served, and who may look at it or command by it.
 
-A page of another origin that a person has open may send requests here; a browser tells its
-`Origin`. A name that an attacker's DNS turns to this machine makes that page one of ours; the
-`Host` tells. Leaves out: reading requests (coordinator.dashboard.app).
+Address and port, names of this server, other pages, token, and how often a client may ask. A page
+of another origin that a person has open may send requests here; a browser tells its `Origin`. A
+name that an attacker's DNS turns to this machine makes that page one of ours; the `Host` tells.
+Leaves out: reading requests (coordinator.dashboard.app).
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import os
+import re
 import secrets
 import socket
 import stat
@@ -17,18 +19,32 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from swarm.errors import Fault, InputError
+from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["TOKEN_VARIABLE", "Access", "Pace", "access_for", "is_loopback", "read_token"]
+__all__ = [
+    "TOKEN_VARIABLE",
+    "AccessRules",
+    "RateLimit",
+    "ServeAddress",
+    "access_for",
+    "is_loopback",
+    "listen",
+    "parse_serve_address",
+    "read_token",
+    "url_of",
+]
+
 
 TOKEN_VARIABLE = "SWARM_DASHBOARD_TOKEN"  # noqa: S105 - a variable's name
+
 LEAST_TOKEN = 16
 """Characters of a token; fewer could be guessed."""
+
 _LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 
 @dataclass(frozen=True, slots=True)
-class Access:
+class AccessRules:
     """What a request has to show."""
 
     names: frozenset[str]
@@ -60,7 +76,7 @@ class Access:
 
 
 @dataclass(slots=True)
-class Pace:
+class RateLimit:
     """How often each client may ask for something: a burst, and so many a second on average.
 
     Args:
@@ -86,7 +102,7 @@ class Pace:
         return allowed
 
 
-def access_for(host: str, allowed: Sequence[str], token: str | None) -> tuple[Access, bool]:
+def access_for(host: str, allowed: Sequence[str], token: str | None) -> tuple[AccessRules, bool]:
     """What requests to a server at ``host`` have to show, and whether the token is a new one.
 
     Args:
@@ -96,10 +112,10 @@ def access_for(host: str, allowed: Sequence[str], token: str | None) -> tuple[Ac
     """
     names = {_bracketed(name).lower() for name in (*allowed, host)} | _LOOPBACK_NAMES
     if is_loopback(host):
-        return Access(frozenset(names), any_address=False, token=token), False
+        return AccessRules(frozenset(names), any_address=False, token=token), False
     names.add(socket.gethostname().lower())  # by which people are told where to find it
     made = secrets.token_urlsafe(18) if token is None else token
-    return Access(frozenset(names), any_address=True, token=made), token is None
+    return AccessRules(frozenset(names), any_address=True, token=made), token is None
 
 
 def is_loopback(host: str) -> bool:
@@ -161,3 +177,98 @@ def _is_address(name: str) -> bool:
 
 def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host and not host.startswith("[") else host
+
+
+def listen(host: str, port: int, option: str = "--port") -> socket.socket:
+    """A socket that accepts connections at ``host``; any free port for 0.
+
+    Raises:
+        InputError: there is no such host, or the port is taken or may not be had.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host.strip("[]"), port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+    except (OSError, UnicodeError) as error:
+        problem = f"no such host as {host}: {error}"
+        raise InputError(
+            Fault("--host", host, problem, "name an address of this machine")
+        ) from None
+    listening = socket.socket(family, kind, protocol)
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen(100)
+    except OSError as error:
+        listening.close()
+        problem = f"cannot listen at {host}, port {port}: {error.strerror or error}"
+        remedy = "choose another, or 0 for any that is free"
+        raise InputError(Fault(option, "", problem, remedy)) from None
+    return listening
+
+
+def url_of(host: str, port: int) -> str:
+    """Where a browser finds what is served there."""
+    name = host.strip("[]")
+    if name in ("0.0.0.0", "::"):  # noqa: S104 - compared, not bound
+        name = socket.gethostname()
+    return f"http://{f'[{name}]' if ':' in name else name}:{port}/"
+
+
+OPTION = "--dashboard"
+
+_PLACE = re.compile(r"(?:(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/\[\]]+):)?(?P<port>\d{1,5})")
+
+TOKEN_FILE = "dashboard-token"  # noqa: S105 - a file's name
+
+
+@dataclass(frozen=True, slots=True)
+class ServeAddress:
+    """Where a dashboard is served."""
+
+    host: str
+    port: int
+    url: str
+    token: str | None
+    """A new one, which nobody knows yet; None where none is needed, or the operator gave one."""
+
+    def arguments(self, folder: Path) -> list[str]:
+        """Arguments of `swarm dashboard`; a new token is put into a file in ``folder``."""
+        words = ["--host", self.host, "--port", str(self.port)]
+        if self.token is None:
+            return words
+        file = folder / TOKEN_FILE
+        file.touch(mode=0o600)
+        file.write_text(self.token, encoding="ascii")
+        return [*words, "--token-file", str(file)]
+
+    @property
+    def lines(self) -> list[str]:
+        """What a person is told."""
+        token = [] if self.token is None else [f"token: {self.token}"]
+        return [f"dashboard: {self.url}", *token]
+
+
+def parse_serve_address(
+    text: str, environment: Mapping[str, str] = os.environ, *, must_be_free: bool = True
+) -> ServeAddress:
+    """The place that ``[HOST:]PORT`` names; of port 0 any that is free.
+
+    Args:
+        text: what was given.
+        environment: may hold the token.
+        must_be_free: whether a port that is taken is a fault now.
+
+    Raises:
+        InputError: it is no place, or it is taken.
+    """
+    match = _PLACE.fullmatch(text)
+    if match is None or int(match["port"]) > 0xFFFF:
+        problem = f"{text!r} is no place to listen at"
+        raise InputError(Fault(OPTION, "", problem, "give PORT or ADDRESS:PORT; 0 is any port"))
+    host, port = (match["host"] or "127.0.0.1").strip("[]"), int(match["port"])
+    access, made = access_for(host, (), read_token(None, environment))
+    if must_be_free or port == 0:
+        with listen(host, port, OPTION) as taken:
+            port = int(taken.getsockname()[1])
+    return ServeAddress(host, port, url_of(host, port), access.token if made else None)

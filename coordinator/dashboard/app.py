@@ -1,7 +1,7 @@
 """HTTP and websocket of the dashboard: who asks is checked, then answered.
 
 README.md has the words. Leaves out: what is told (coordinator.dashboard.feed), who may ask
-(coordinator.dashboard.access) and what comes of an order (coordinator.dashboard.desk).
+(coordinator.dashboard.access) and what comes of an order (coordinator.dashboard.operator_session).
 """
 
 from __future__ import annotations
@@ -23,21 +23,22 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from coordinator.dashboard.access import Access, Pace
-from coordinator.dashboard.feed import Display, Feed
+from coordinator.dashboard.access import AccessRules, RateLimit
+from coordinator.dashboard.feed import Feed, PageSettings
 from coordinator.dashboard.hub import Hub
 from coordinator.dashboard.metrics import Metrics
-from coordinator.dashboard.said import (
-    CommandSaid,
-    PlayerSaid,
-    TaskSaid,
-    WithdrawalSaid,
+from coordinator.dashboard.page_input import (
+    CommandInput,
+    PlaybackInput,
+    TaskInput,
+    WithdrawalInput,
     fault_of,
 )
-from coordinator.dashboard.source import Refusal, RefusedError, Source
-from swarm.clock import Clock, SystemClock
+from coordinator.dashboard.source import DashboardSource, Refusal, RefusedError
+from swarm.runtime.clock import Clock, SystemClock
 
 __all__ = ["STATIC", "Dashboard", "create_app"]
+
 
 STATIC = Path(__file__).parent / "static"
 MAX_BODY_BYTES = 16 * 1024
@@ -76,14 +77,19 @@ class Dashboard:
     """
 
     def __init__(
-        self, source: Source, access: Access, display: Display, clock: Clock, static: Path
+        self,
+        source: DashboardSource,
+        access: AccessRules,
+        display: PageSettings,
+        clock: Clock,
+        static: Path,
     ) -> None:
         self.hub = Hub(Feed(source, display))
         self._source = source
         self._access = access
         self._clock = clock
         self._static = static
-        self._pace = Pace()
+        self._pace = RateLimit()
         self._strangers = 0
         self._looking: asyncio.Task[None] | None = None
         self._metrics = Metrics(source, self.hub)
@@ -91,10 +97,12 @@ class Dashboard:
             Route("/", self._page),
             Route("/healthz", self._health),
             Route("/metrics", self._measured),
-            Route("/api/command", self._taking(CommandSaid, self._give), methods=["POST"]),
-            Route("/api/task", self._taking(TaskSaid, self._give), methods=["POST"]),
-            Route("/api/task/withdraw", self._taking(WithdrawalSaid, self._give), methods=["POST"]),
-            Route("/api/recording", self._taking(PlayerSaid, self._play), methods=["POST"]),
+            Route("/api/command", self._taking(CommandInput, self._give), methods=["POST"]),
+            Route("/api/task", self._taking(TaskInput, self._give), methods=["POST"]),
+            Route(
+                "/api/task/withdraw", self._taking(WithdrawalInput, self._give), methods=["POST"]
+            ),
+            Route("/api/recording", self._taking(PlaybackInput, self._play), methods=["POST"]),
             WebSocketRoute("/feed", self._feed),
             Mount("/static", StaticFiles(directory=static, check_dir=False)),
         ]
@@ -234,7 +242,7 @@ class Dashboard:
 
         return endpoint
 
-    def _give(self, said: CommandSaid | TaskSaid | WithdrawalSaid, who: str) -> dict[str, int]:
+    def _give(self, said: CommandInput | TaskInput | WithdrawalInput, who: str) -> dict[str, int]:
         if (orders := self._source.orders) is None:
             recorded = self._source.player is not None
             keys = "these keys only look on: start swarm dashboard with an operator's"
@@ -243,7 +251,7 @@ class Dashboard:
         self.hub.nudge()
         return {"n": n}
 
-    def _play(self, said: PlayerSaid, _: str) -> dict[str, int]:
+    def _play(self, said: PlaybackInput, _: str) -> dict[str, int]:
         if (player := self._source.player) is None:
             raise _HttpError(403, "only a recording can be wound")
         player.control(playing=said.playing, speed=said.speed, t_s=said.t_s)
@@ -252,9 +260,9 @@ class Dashboard:
 
 
 def create_app(
-    source: Source,
-    access: Access,
-    display: Display | None = None,
+    source: DashboardSource,
+    access: AccessRules,
+    display: PageSettings | None = None,
     *,
     clock: Clock | None = None,
     static: Path = STATIC,
@@ -268,14 +276,14 @@ def create_app(
         clock: by which the pace of requests is judged; the machine's when None.
         static: folder with the page.
     """
-    shown = display or Display(token=access.token is not None)
+    shown = display or PageSettings(token=access.token is not None)
     return Dashboard(source, access, shown, clock or SystemClock(), static)
 
 
 class _Guard:
     """Turns away who asks for another host or from another page, and marks what is answered."""
 
-    def __init__(self, app: ASGIApp, access: Access, policy: str) -> None:
+    def __init__(self, app: ASGIApp, access: AccessRules, policy: str) -> None:
         self._app = app
         self._access = access
         self._headers = [

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
-from swarm.errors import BusError, Fault, InputError
-from swarm.log import LogFormat, LogLevel
-from swarm.options import (
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.runtime.errors import BusError, Fault, InputError
+from swarm.runtime.log import LogFormat, LogLevel
+from swarm.runtime.options import (
     CheckOption,
     JsonOption,
     LifelineOption,
@@ -24,13 +24,13 @@ from swarm.options import (
 )
 
 if TYPE_CHECKING:
-    from coordinator.dashboard.feed import Display
+    from coordinator.dashboard.feed import PageSettings
     from swarm.bus.port import Bus
 
 __all__ = ["dashboard"]
 
 
-@seated
+@with_connection_options
 def dashboard(
     mission: SomeMissionOption = None,
     host: Annotated[
@@ -85,7 +85,7 @@ def dashboard(
             show_default=False,
         ),
     ] = "",
-    seat: Seat = DEFAULT_SEAT,
+    seat: ConnectionOptions = DEFAULT_CONNECTION,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
     check: CheckOption = False,
@@ -95,7 +95,7 @@ def dashboard(
 ) -> int:
     """Show a mission in a browser, and let an operator step in.
 
-    Joins a mission as an onlooker, or waits for one, and serves a page with map, UAVs, tasks
+    Joins a mission as an observer, or waits for one, and serves a page with map, UAVs, tasks
     and decisions; tasks are added and withdrawn there, and UAVs stopped or brought home, with
     or without a coordinator. Nobody flies any differently while nobody asks for it. It needs
     no internet. With keys it takes orders only if they are an operator's. Ctrl-C ends it, and
@@ -111,19 +111,17 @@ def dashboard(
     import os
     from json import dumps
 
-    from coordinator.dashboard.access import access_for, read_token
+    from coordinator.dashboard.access import access_for, read_token, url_of
+    from coordinator.dashboard.access import listen as take_port
     from coordinator.dashboard.app import create_app
-    from coordinator.dashboard.listening import listen as take_port
-    from coordinator.dashboard.listening import url_of
-    from coordinator.dashboard.live import LiveMission
-    from coordinator.dashboard.serve import serving
+    from coordinator.dashboard.live_mission import LiveMission
+    from coordinator.dashboard.server import serving
     from coordinator.joining import check_mission
     from swarm.bus.zenoh_bus import open_zenoh_bus
-    from swarm.clock import ScaledClock
     from swarm.identity import Role
-    from swarm.log import configure_logging, get_logger
-    from swarm.process import run_until_stopped
-    from swarm.watchdog import SERVICE
+    from swarm.runtime.clock import ScaledClock
+    from swarm.runtime.log import configure_logging, get_logger
+    from swarm.runtime.process import SERVICE_NOTIFIER, run_until_stopped
 
     configure_logging(log_level, log_format)
     network = seat.network
@@ -164,7 +162,7 @@ def dashboard(
     async def work() -> int:
         served = create_app(source, access, display)
         async with serving(served.app, taken):
-            SERVICE.ready(f"shows {mission or 'any mission'} at {url}")
+            SERVICE_NOTIFIER.ready(f"shows {mission or 'any mission'} at {url}")
             try:
                 await served.beside(source.run())
             finally:
@@ -174,15 +172,15 @@ def dashboard(
     return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
 
 
-def _display(token: bool, tiles: str, tiles_credit: str) -> Display:
+def _display(token: bool, tiles: str, tiles_credit: str) -> PageSettings:
     from urllib.parse import urlsplit
 
-    from coordinator.dashboard.feed import Display
+    from coordinator.dashboard.feed import PageSettings
 
     if not tiles:
         if tiles_credit:
             raise InputError(Fault("--tiles-credit", "", "there are no tiles", "give --tiles, too"))
-        return Display(token=token)
+        return PageSettings(token=token)
     try:
         parts = urlsplit(tiles)
         host = parts.hostname or ""
@@ -193,4 +191,4 @@ def _display(token: bool, tiles: str, tiles_credit: str) -> Display:
     if strange or not host or not whole or parts.scheme not in ("http", "https"):
         remedy = "write https://HOST/{z}/{x}/{y}.png"
         raise InputError(Fault("--tiles", "", f"{tiles!r} is no URL of map tiles", remedy))
-    return Display(token, tiles, tiles_credit)
+    return PageSettings(token, tiles, tiles_credit)

@@ -14,21 +14,22 @@ from dataclasses import dataclass
 from itertools import takewhile
 
 import swarm
-from coordinator.dashboard.measure import Measure, measure_of
-from coordinator.dashboard.progress import Progress, progress_of
-from coordinator.dashboard.rows import Growing, RowTable, as_text
-from coordinator.dashboard.source import CommandRow, Source
-from coordinator.observer import Observer
-from coordinator.view.scene import LOST, doing
-from coordinator.view.signs import short_names
-from coordinator.view.story import clean, is_trouble
+from coordinator.dashboard.baseline import Baseline, baseline_of
+from coordinator.dashboard.rows import AppendOnlyTable, RowTable, as_text
+from coordinator.dashboard.source import CommandRow, DashboardSource
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.presentation import clean, is_trouble, short_names
+from coordinator.mission_view.results import Progress, progress_of
+from coordinator.mission_view.scene import LOST, uav_activity
 from swarm.allocation.problem import Problem
 from swarm.model.ids import COORDINATOR
-from swarm.state.board import TaskState
-from swarm.state.commands import aborted, in_force
-from swarm.wire.messages import Brief, Choice, Fleet, StatusPhase
+from swarm.protocol.board import TaskState
+from swarm.protocol.messages import MissionConfig, UavSpec
+from swarm.protocol.operator_commands import abort_command, in_force
+from swarm.protocol.uav_messages import Choice, StatusPhase
 
-__all__ = ["PROTOCOL", "Display", "Feed"]
+__all__ = ["PROTOCOL", "Feed", "PageSettings"]
+
 
 PROTOCOL = 1
 _STORY, _CHOICES, _CURVE, _COMMANDS = 500, 300, 600, 200
@@ -41,7 +42,7 @@ _GONE = (StatusPhase.HOME, StatusPhase.RETURNING, StatusPhase.OUT)
 
 
 @dataclass(frozen=True, slots=True)
-class Display:
+class PageSettings:
     """What the page is told of itself."""
 
     token: bool = False
@@ -59,7 +60,7 @@ class Feed:
         display: what the page is told of itself.
     """
 
-    def __init__(self, source: Source, display: Display) -> None:
+    def __init__(self, source: DashboardSource, display: PageSettings) -> None:
         self._source = source
         self._display = display
         self.seq = 0
@@ -70,20 +71,20 @@ class Feed:
         """As of which look."""
         self._whole_since = 1
         """Who has seen nothing since that look is told everything."""
-        self._observer: Observer | None = None
-        self._brief: Brief | None = None
+        self._mission_state: MissionState | None = None
+        self._brief: MissionConfig | None = None
         self._head: dict[str, object] = {}
         self._uavs, self._tasks, self._lists = RowTable(), RowTable(), RowTable()
-        self._story = Growing(_STORY)
+        self._story = AppendOnlyTable(_STORY)
         self._told = 0
-        self._choices = Growing(_CHOICES)
+        self._choices = AppendOnlyTable(_CHOICES)
         self._chosen = 0
         self._last_choice: object = None
         self._progress: Progress | None = None
         self._progress_version = (-1, -1)
         self._curve_seqs: list[int] = []
         """As of which look each point is there."""
-        self._measures: dict[tuple[str, int], Measure] = {}
+        self._measures: dict[tuple[str, int], Baseline] = {}
         """By mission and run."""
         self._commands = RowTable(_COMMANDS)
         self._frames: dict[int | None, str] = {}
@@ -122,11 +123,11 @@ class Feed:
         return self._progress
 
     @property
-    def measure(self) -> Measure | None:
+    def measure(self) -> Baseline | None:
         """What the mission is measured by; None where nothing is known of its beginning."""
-        if self._observer is None or self._brief is None:
+        if self._mission_state is None or self._brief is None:
             return None
-        return self._measures.get((self._observer.mission.name, self._brief.run))
+        return self._measures.get((self._mission_state.mission.name, self._brief.run))
 
     def _frame(self, since: int | None) -> str:
         after = -1 if since is None else since
@@ -162,15 +163,15 @@ class Feed:
         now_s = self._source.now_s()
         for given in list(self._source.commands)[-_COMMANDS:]:
             self._commands.put(given.n, _command_row(given), self.seq)
-        observer = self._source.observer
-        brief = None if observer is None else observer.replica.brief
-        if observer is not self._observer or brief is not self._brief:
-            self._begin(observer, brief)
-        self._head = self._head_of(observer, now_s)
-        if observer is None:
+        mission_state = self._source.mission_state
+        brief = None if mission_state is None else mission_state.replica.brief
+        if mission_state is not self._mission_state or brief is not self._brief:
+            self._begin(mission_state, brief)
+        self._head = self._head_of(mission_state, now_s)
+        if mission_state is None:
             return
-        news = observer.told_since(self._told)
-        for number, happening in enumerate(news, observer.told - len(news) + 1):
+        news = mission_state.told_since(self._told)
+        for number, happening in enumerate(news, mission_state.told - len(news) + 1):
             row = {
                 "n": number,
                 "mission_s": _rounded(happening.mission_s, 3),
@@ -178,30 +179,30 @@ class Feed:
                 "trouble": is_trouble(happening),
             }
             self._story.add(as_text(row), self.seq)
-        self._told = observer.told
-        self._look_at_choices(observer)
+        self._told = mission_state.told
+        self._look_at_choices(mission_state)
         if brief is not None:
-            self._look_at_uavs(observer, brief, now_s)
+            self._look_at_uavs(mission_state, brief, now_s)
 
-    def _begin(self, observer: Observer | None, brief: Brief | None) -> None:
+    def _begin(self, mission_state: MissionState | None, brief: MissionConfig | None) -> None:
         """Another mission, or the same in other words: everything is told anew."""
-        if observer is not self._observer:
+        if mission_state is not self._mission_state:
             self._story.clear()
             self._choices.clear()
             self._told, self._chosen, self._last_choice = 0, 0, None
-        self._observer, self._brief = observer, brief
+        self._mission_state, self._brief = mission_state, brief
         for table in (self._uavs, self._tasks, self._lists):
             table.clear()
         self._progress, self._progress_version, self._curve_seqs = None, (-1, -1), []
         self._whole_since, self.mission_seq = self.seq, self.seq
         self.mission = None
-        if observer is not None and brief is not None:
-            self.mission = _mission_text(observer.mission.name, brief)
+        if mission_state is not None and brief is not None:
+            self.mission = _mission_text(mission_state.mission.name, brief)
 
-    def _look_at_choices(self, observer: Observer) -> None:
+    def _look_at_choices(self, mission_state: MissionState) -> None:
         """Take in those that have come since: the observer forgets old ones."""
         new = list(
-            takewhile(lambda told: told is not self._last_choice, reversed(observer.choices))
+            takewhile(lambda told: told is not self._last_choice, reversed(mission_state.choices))
         )
         for told in reversed(new):
             self._chosen += 1
@@ -209,20 +210,20 @@ class Feed:
             self._choices.add(as_text(_choice_row(self._chosen, uav, choice)), self.seq)
             self._last_choice = told
 
-    def _head_of(self, observer: Observer | None, now_s: float) -> dict[str, object]:
+    def _head_of(self, mission_state: MissionState | None, now_s: float) -> dict[str, object]:
         head: dict[str, object] = {"mission_s": None, "phase": None, "link": self._source.link}
         epoch = plan = None
         counts = dict.fromkeys(("open", "taken", *list(TaskState)[1:]), 0)
         dropped = Counter[str]()
         present = set[str]()
-        if observer is not None and observer.replica.brief is not None:
-            self._look_at_tasks(observer, observer.replica.brief, counts)
-            epoch = observer.replica.epoch
-            plan = self._look_at_plan(observer)
-            present = observer.present
-            dropped = sum(observer.dropped.values(), dropped)
-            head["mission_s"] = _rounded(observer.mission_s(now_s), 3)
-            head["phase"] = observer.phase
+        if mission_state is not None and mission_state.replica.brief is not None:
+            self._look_at_tasks(mission_state, mission_state.replica.brief, counts)
+            epoch = mission_state.replica.epoch
+            plan = self._look_at_plan(mission_state)
+            present = mission_state.present
+            dropped = sum(mission_state.dropped.values(), dropped)
+            head["mission_s"] = _rounded(mission_state.mission_s(now_s), 3)
+            head["phase"] = mission_state.phase
         fleet = () if self._brief is None else (uav.id for uav in self._brief.uavs)
         player = self._source.player
         return head | {
@@ -236,7 +237,8 @@ class Feed:
                 "bound": None if plan is None else _rounded(plan.bound, 4),
             },
             "coordinator": COORDINATOR in present,
-            "aborted": observer is not None and aborted(observer.replica) is not None,
+            "aborted": mission_state is not None
+            and abort_command(mission_state.replica) is not None,
             "counts": counts,
             "dropped": dict(dropped.most_common()),
             "dropped_here": dict(self._source.dropped),
@@ -250,25 +252,27 @@ class Feed:
             },
         }
 
-    def _look_at_plan(self, observer: Observer) -> Measure | None:
+    def _look_at_plan(self, mission_state: MissionState) -> Baseline | None:
         measure = self.measure
         if measure is None and self._brief is not None:
-            measure = measure_of(observer.replica, observer.mission.name)
+            measure = baseline_of(mission_state.replica, mission_state.mission.name)
             if measure is not None:
-                self._measures[observer.mission.name, self._brief.run] = measure
+                self._measures[mission_state.mission.name, self._brief.run] = measure
                 if len(self._measures) > _MEASURES:
                     self._measures.pop(next(iter(self._measures)))
         return measure
 
-    def _look_at_tasks(self, observer: Observer, brief: Brief, counts: dict[str, int]) -> None:
-        replica, board = observer.replica, observer.board
+    def _look_at_tasks(
+        self, mission_state: MissionState, brief: MissionConfig, counts: dict[str, int]
+    ) -> None:
+        replica, board = mission_state.replica, mission_state.board
         version = replica.board_version, replica.task_version
         problem = board.problem
         if problem is not None and version != self._progress_version:
-            self._look_at_progress(problem, observer)
+            self._look_at_progress(problem, mission_state)
             self._progress_version = version
         completed = {} if self._progress is None else self._progress.completed
-        holders = observer.holders
+        holders = mission_state.holders
         for task, state in board.states.items():
             holder = holders.get(task)
             done = completed.get(task)
@@ -302,22 +306,24 @@ class Feed:
             }
             self._lists.put(uav.id, row, self.seq)
 
-    def _look_at_progress(self, problem: Problem, observer: Observer) -> None:
+    def _look_at_progress(self, problem: Problem, mission_state: MissionState) -> None:
         before = [] if self._progress is None else self._progress.curve
-        self._progress = progress_of(problem, observer.replica.outcomes)
+        self._progress = progress_of(problem, mission_state.replica.outcomes)
         curve = self._progress.curve
         if curve[: len(before)] != before:
             # Somebody has told late of what was done early: the page draws it all again.
             self._whole_since, before = self.seq, []
         self._curve_seqs[len(before) :] = [self.seq] * (len(curve) - len(before))
 
-    def _look_at_uavs(self, observer: Observer, brief: Brief, now_s: float) -> None:
-        commands, dropped = in_force(observer.replica), observer.dropped
-        mission_s = observer.mission_s(now_s)
+    def _look_at_uavs(
+        self, mission_state: MissionState, brief: MissionConfig, now_s: float
+    ) -> None:
+        commands, dropped = in_force(mission_state.replica), mission_state.dropped
+        mission_s = mission_state.mission_s(now_s)
         for uav in brief.uavs:
             command = commands.get(uav.id)
             row = _uav_row(
-                observer,
+                mission_state,
                 uav,
                 None if command is None else command.kind,
                 dropped.get(uav.id, {}),
@@ -330,17 +336,17 @@ class Feed:
 
 
 def _uav_row(
-    observer: Observer,
-    uav: Fleet,
+    mission_state: MissionState,
+    uav: UavSpec,
     command: str | None,
     dropped: Mapping[str, int],
     now_s: float,
     mission_s: float | None,
     speedup: float,
 ) -> dict[str, object]:
-    status, claim = observer.statuses.get(uav.id), observer.replica.claims.get(uav.id)
-    heard_s, present = observer.heard_s.get(uav.id), uav.id in observer.present
-    does, task = doing(observer, uav.id)
+    status, claim = mission_state.statuses.get(uav.id), mission_state.replica.claims.get(uav.id)
+    heard_s, present = mission_state.heard_s.get(uav.id), uav.id in mission_state.present
+    does, task = uav_activity(mission_state, uav.id)
     eta_s = None
     if not (present or does == LOST):
         does, task = (does if does in _GONE else "absent"), None
@@ -364,7 +370,7 @@ def _uav_row(
     }
 
 
-def _mission_text(name: str, brief: Brief) -> str:
+def _mission_text(name: str, brief: MissionConfig) -> str:
     shorts = short_names([uav.id for uav in brief.uavs])
     uavs = [
         {

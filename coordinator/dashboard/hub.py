@@ -11,14 +11,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from coordinator.dashboard.baseline import Baseline
 from coordinator.dashboard.feed import Feed
-from coordinator.dashboard.measure import Measure
-from coordinator.planner.stop import after_time
-from swarm.clock import SystemClock
-from swarm.log import get_logger
-from swarm.process import call_in_background
+from coordinator.planner.options import after_time
+from swarm.runtime.clock import SystemClock
+from swarm.runtime.log import get_logger
+from swarm.runtime.process import call_in_background
 
 __all__ = ["Hub"]
+
 
 LOOK_S = 0.5
 """Wall time between two looks."""
@@ -105,7 +106,7 @@ class Hub:
         measure.sought = True
         self._bounding = asyncio.get_running_loop().create_task(self._bound(measure))
 
-    async def _bound(self, measure: Measure) -> None:
+    async def _bound(self, measure: Baseline) -> None:
         stop = after_time(SystemClock(), BOUND_S)
         # On a thread that does not hold the process up when it is told to end.
         work = call_in_background(lambda: measure.work_out(stop), "bound")

@@ -16,12 +16,12 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
 from coordinator.dashboard.hub import Hub
-from coordinator.dashboard.source import Source
-from coordinator.observer import Observer
-from coordinator.view.scene import LOST, doing
+from coordinator.dashboard.source import DashboardSource
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.scene import LOST, uav_activity
 from swarm.model.ids import COORDINATOR
-from swarm.state.board import TaskState
-from swarm.wire.messages import Brief, EpochPhase
+from swarm.protocol.board import TaskState
+from swarm.protocol.messages import MissionConfig, MissionPhase
 
 __all__ = ["Metrics"]
 
@@ -34,7 +34,7 @@ class Metrics:
         hub: who looks on, and what is made of it.
     """
 
-    def __init__(self, source: Source, hub: Hub) -> None:
+    def __init__(self, source: DashboardSource, hub: Hub) -> None:
         self._registry = CollectorRegistry(auto_describe=False)
         self._registry.register(_Mission(source, hub))
         ProcessCollector(registry=self._registry)
@@ -48,7 +48,7 @@ class Metrics:
 class _Mission(Collector):
     """Reads what is known of the mission when asked."""
 
-    def __init__(self, source: Source, hub: Hub) -> None:
+    def __init__(self, source: DashboardSource, hub: Hub) -> None:
         self._source = source
         self._hub = hub
 
@@ -58,11 +58,11 @@ class _Mission(Collector):
         yield _gauge("link_up", "Whether this process is linked to the bus.", self._source.link)
         yield self._dropped()
         yield self._commands()
-        observer = self._source.observer
-        brief = None if observer is None else observer.replica.brief
-        if observer is not None and brief is not None:
-            yield from self._of_mission(observer)
-            yield from _of_uavs(observer, brief, self._source, self._done())
+        mission_state = self._source.mission_state
+        brief = None if mission_state is None else mission_state.replica.brief
+        if mission_state is not None and brief is not None:
+            yield from self._of_mission(mission_state)
+            yield from _of_uavs(mission_state, brief, self._source, self._done())
 
     def _dropped(self) -> Metric:
         text = "Messages this process has dropped, by reason."
@@ -88,8 +88,8 @@ class _Mission(Collector):
         progress = self._hub.feed.progress
         return {} if progress is None else {uav: len(t) for uav, t in progress.flown.items()}
 
-    def _of_mission(self, observer: Observer) -> Iterator[Metric]:
-        mission, epoch = observer.mission.name, observer.replica.epoch
+    def _of_mission(self, mission_state: MissionState) -> Iterator[Metric]:
+        mission, epoch = mission_state.mission.name, mission_state.replica.epoch
         progress, measure = self._hub.feed.progress, self._hub.feed.measure
 
         def gauge(name: str, text: str, value: float | None) -> Metric:
@@ -98,13 +98,13 @@ class _Mission(Collector):
                 family.add_metric((mission,), value)
             return family
 
-        mission_s = observer.mission_s(self._source.now_s())
+        mission_s = mission_state.mission_s(self._source.now_s())
         yield gauge("mission_time_seconds", "Mission time; from 0 at the start.", mission_s)
         phases = GaugeMetricFamily(
             "peckorder_mission_phase", "1 for the phase it is in.", labels=("mission", "phase")
         )
-        for phase in EpochPhase:
-            phases.add_metric((mission, phase), observer.phase is phase)
+        for phase in MissionPhase:
+            phases.add_metric((mission, phase), mission_state.phase is phase)
         yield phases
         objective = 0.0 if progress is None else progress.objective
         yield gauge("objective_value_seconds", "J of the tasks done so far.", objective)
@@ -115,21 +115,21 @@ class _Mission(Collector):
         yield gauge(
             "epoch", "Number of the epoch in force.", None if epoch is None else epoch.number
         )
-        there = COORDINATOR in observer.present
+        there = COORDINATOR in mission_state.present
         yield gauge("coordinator_present", "Whether there is a coordinator.", there)
         tasks = GaugeMetricFamily(
             "peckorder_tasks", "Tasks on the board, by state.", labels=("mission", "state")
         )
-        states = Counter(observer.board.states.values())
+        states = Counter(mission_state.board.states.values())
         for state in TaskState:
             tasks.add_metric((mission, state), states[state])
         yield tasks
 
 
 def _of_uavs(
-    observer: Observer, brief: Brief, source: Source, done: dict[str, int]
+    mission_state: MissionState, brief: MissionConfig, source: DashboardSource, done: dict[str, int]
 ) -> Iterable[Metric]:
-    mission = observer.mission.name
+    mission = mission_state.mission.name
     labels = ("mission", "uav")
     present = GaugeMetricFamily(
         "peckorder_uav_present", "Whether its agent is there.", labels=labels
@@ -154,19 +154,19 @@ def _of_uavs(
     )
     for uav in brief.uavs:
         names = (mission, uav.id)
-        does, _ = doing(observer, uav.id)
-        there = uav.id in observer.present
+        does, _ = uav_activity(mission_state, uav.id)
+        there = uav.id in mission_state.present
         present.add_metric(names, there)
         lost.add_metric(names, does == LOST)
         if there or does == LOST:
             phase.add_metric((*names, does), 1.0)
-        status, heard_s = observer.statuses.get(uav.id), observer.heard_s.get(uav.id)
+        status, heard_s = mission_state.statuses.get(uav.id), mission_state.heard_s.get(uav.id)
         if status is not None and status.battery_frac is not None:
             battery.add_metric(names, status.battery_frac)
         if heard_s is not None:
             silence.add_metric(names, (source.now_s() - heard_s) / source.speedup)
         tasks.add_metric(names, done.get(uav.id, 0))
-    for name, reasons in sorted(observer.dropped.items()):
+    for name, reasons in sorted(mission_state.dropped.items()):
         for reason, number in sorted(reasons.items()):
             dropped.add_metric((mission, name, reason), number)
     return present, lost, phase, battery, silence, tasks, dropped

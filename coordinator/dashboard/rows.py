@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Hashable, Mapping
 from itertools import takewhile
 
-__all__ = ["Growing", "RowTable", "as_text"]
+__all__ = ["AppendOnlyTable", "RowTable", "as_text"]
 
 
 def as_text(row: Mapping[str, object]) -> str:
@@ -63,7 +63,7 @@ class RowTable:
         self._rows.clear()
 
 
-class Growing:
+class AppendOnlyTable:
     """Rows that are added and never change; the newest are kept.
 
     Args:

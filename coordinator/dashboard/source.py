@@ -1,6 +1,6 @@
 """What a page is fed from: a living mission, or a recording that is played.
 
-Leaves out: the living mission (coordinator.dashboard.live), and how any of it is told to a
+Leaves out: the living mission (coordinator.dashboard.live_mission), and how any of it is told to a
 page (coordinator.dashboard.feed).
 """
 
@@ -11,19 +11,19 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from coordinator.observer import Observer
-from coordinator.operator.errands import OperatorWish
-from swarm.errors import SwarmError
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.operator.requests import OperatorRequest
+from swarm.runtime.errors import SwarmError
 
 __all__ = [
     "CommandRow",
     "CommandState",
-    "Orders",
-    "Player",
-    "PlayerState",
+    "DashboardSource",
+    "PlaybackControl",
+    "PlaybackState",
     "Refusal",
     "RefusedError",
-    "Source",
+    "RequestSink",
 ]
 
 
@@ -65,10 +65,10 @@ class RefusedError(SwarmError):
         self.why = why
 
 
-class Orders(Protocol):
+class RequestSink(Protocol):
     """Takes what an operator wants said."""
 
-    def give(self, wish: OperatorWish, who: str) -> int:
+    def give(self, wish: OperatorRequest, who: str) -> int:
         """Say it on the bus; the number of its `CommandRow`.
 
         Args:
@@ -82,7 +82,7 @@ class Orders(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class PlayerState:
+class PlaybackState:
     """How far a recording is played."""
 
     t_s: float
@@ -92,7 +92,7 @@ class PlayerState:
     """Recorded seconds per wall second."""
 
 
-class Player(Protocol):
+class PlaybackControl(Protocol):
     """Plays a recording."""
 
     @property
@@ -101,7 +101,7 @@ class Player(Protocol):
         ...
 
     @property
-    def state(self) -> PlayerState:
+    def state(self) -> PlaybackState:
         """How far it is."""
         ...
 
@@ -110,11 +110,11 @@ class Player(Protocol):
         ...
 
 
-class Source(Protocol):
+class DashboardSource(Protocol):
     """What a page is fed from."""
 
     @property
-    def observer(self) -> Observer | None:
+    def mission_state(self) -> MissionState | None:
         """What is known; None before there is a mission. Another one when it begins anew, or
         when a recording is wound back."""
         ...
@@ -144,11 +144,11 @@ class Source(Protocol):
         ...
 
     @property
-    def orders(self) -> Orders | None:
+    def orders(self) -> RequestSink | None:
         """Takes orders; None where there is nobody to give them to."""
         ...
 
     @property
-    def player(self) -> Player | None:
+    def player(self) -> PlaybackControl | None:
         """Of a recording; None for a living mission."""
         ...

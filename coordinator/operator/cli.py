@@ -1,6 +1,6 @@
 """The commands `swarm start`, `hold`, `resume`, `return`, `abort` and `task add|withdraw`.
 
-Leaves out: saying so on the bus and seeing what comes of it (coordinator.operator.session).
+Leaves out: saying so on the bus and seeing what comes of it (coordinator.operator.submission).
 """
 
 from __future__ import annotations
@@ -11,23 +11,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coordinator.operator.completing import complete_uav
-from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
-from swarm.errors import Fault, InputError, SwarmError
-from swarm.options import (
-    JsonOption,
-    SomeMissionOption,
-    SpeedupOption,
-)
+from coordinator.operator.completion import complete_uav
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.runtime.errors import Fault, InputError, SwarmError
+from swarm.runtime.options import JsonOption, SomeMissionOption, SpeedupOption
 
 if TYPE_CHECKING:
-    from coordinator.operator.seat import OperatorSeat
-    from coordinator.operator.session import Reach
-    from coordinator.operator.task_orders import NewTask, Wgs84, Withdrawal
-    from coordinator.operator.verdict import Verdict
-    from swarm.wire.bounds import Point
+    from coordinator.operator.commands import RequestVerdict
+    from coordinator.operator.requests import OperatorClient
+    from coordinator.operator.submission import MissionConnection
+    from coordinator.operator.task_edits import NewTask, TaskWithdrawal, Wgs84
+    from swarm.protocol.fields import Point
 
 __all__ = ["abort", "hold", "resume", "return_home", "start", "task"]
+
 
 UavArgument = Annotated[
     str, typer.Argument(metavar="UAV", help="Id of the UAV.", autocompletion=complete_uav)
@@ -54,19 +51,19 @@ TimeoutOption = Annotated[
 def _of_one_uav(kind: str, help_text: str) -> Callable[..., int]:
     """The command that says ``kind`` to one UAV."""
 
-    @seated
+    @with_connection_options
     def command(
         uav: UavArgument,
         reason: ReasonOption = "",
         mission: SomeMissionOption = None,
         timeout_s: TimeoutOption = 10.0,
-        seat: Seat = DEFAULT_SEAT,
+        seat: ConnectionOptions = DEFAULT_CONNECTION,
         speedup: SpeedupOption = 1.0,
         json: JsonOption = False,
     ) -> int:
-        from coordinator.operator.session import Reach
+        from coordinator.operator.submission import MissionConnection
 
-        reach = Reach(mission, timeout_s, seat, speedup)
+        reach = MissionConnection(mission, timeout_s, seat, speedup)
         return _give(kind, uav, reason, reach, json=json)
 
     command.__doc__ = help_text
@@ -114,7 +111,7 @@ return_home = _of_one_uav(
 )
 
 
-@seated
+@with_connection_options
 def start(
     without: Annotated[
         str,
@@ -128,7 +125,7 @@ def start(
     reason: ReasonOption = "",
     mission: SomeMissionOption = None,
     timeout_s: TimeoutOption = 10.0,
-    seat: Seat = DEFAULT_SEAT,
+    seat: ConnectionOptions = DEFAULT_CONNECTION,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
@@ -144,29 +141,33 @@ def start(
     """
     from json import dumps
 
-    from coordinator.operator.session import Reach, check_words, fulfil
-    from coordinator.operator.starting import StartWish
+    from coordinator.operator.commands import StartRequest
+    from coordinator.operator.submission import (
+        MissionConnection,
+        check_reason_and_ids,
+        submit_request,
+    )
 
-    check_words(reason, ("--mission", mission), ("--without", without))
+    check_reason_and_ids(reason, ("--mission", mission), ("--without", without))
 
-    def tell(name: str, core: OperatorSeat, verdict: Verdict) -> None:
+    def tell(name: str, core: OperatorClient, verdict: RequestVerdict) -> None:
         if json:
             told = {"mission": name, "command": "start", "without": without, "reason": reason}
             print(dumps(told | {"obeyed": core.obeyed, "text": verdict.text}))
         elif core.obeyed:
             print(verdict.text)
 
-    reach = Reach(mission, timeout_s, seat, speedup)
-    return fulfil(StartWish(without, reason), reach, source="--without", tell=tell)
+    reach = MissionConnection(mission, timeout_s, seat, speedup)
+    return submit_request(StartRequest(without, reason), reach, source="--without", tell=tell)
 
 
-@seated
+@with_connection_options
 def abort(
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask on a terminal.")] = False,
     reason: ReasonOption = "",
     mission: SomeMissionOption = None,
     timeout_s: TimeoutOption = 10.0,
-    seat: Seat = DEFAULT_SEAT,
+    seat: ConnectionOptions = DEFAULT_CONNECTION,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
@@ -179,10 +180,10 @@ def abort(
         swarm abort
         swarm abort --yes --reason "thunderstorm" --mission valley-survey
     """
-    from coordinator.operator.session import Reach
+    from coordinator.operator.submission import MissionConnection
     from swarm.model.ids import FLEET
 
-    reach = Reach(mission, timeout_s, seat, speedup)
+    reach = MissionConnection(mission, timeout_s, seat, speedup)
     asks = not yes and sys.stdin is not None and sys.stdin.isatty()
     what = "the mission" if mission is None else f"mission {mission}"
     if asks and not typer.confirm(f"Bring every UAV home and end {what}?", err=True):
@@ -243,7 +244,7 @@ AltOption = Annotated[
 
 
 @task.command("add", help=_ADD_HELP, short_help="Add a task.")
-@seated
+@with_connection_options
 def add(
     name: Annotated[
         str | None, typer.Argument(metavar="ID", help="Default: the next free one.")
@@ -287,39 +288,39 @@ def add(
     reason: ReasonOption = "",
     mission: SomeMissionOption = None,
     timeout_s: TimeoutOption = 10.0,
-    seat: Seat = DEFAULT_SEAT,
+    seat: ConnectionOptions = DEFAULT_CONNECTION,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
     """Add a task to a running mission."""
-    from coordinator.operator.session import Reach, check_words
-    from coordinator.operator.task_orders import NewTask
+    from coordinator.operator.submission import MissionConnection, check_reason_and_ids
+    from coordinator.operator.task_edits import NewTask
 
-    check_words(reason, ("--mission", mission), ("ID", name), ("--kind", kind))
+    check_reason_and_ids(reason, ("--mission", mission), ("ID", name), ("--kind", kind))
     place = _place(position, lat_deg, lon_deg, alt_m)
     wish = NewTask(place, name, value, service_s, kind, reason)
-    reach = Reach(mission, timeout_s, seat, speedup)
+    reach = MissionConnection(mission, timeout_s, seat, speedup)
     return _order("add", wish, reach, json=json)
 
 
 @task.command("withdraw", help=_WITHDRAW_HELP, short_help="Take a task off the board.")
-@seated
+@with_connection_options
 def withdraw(
     name: Annotated[str, typer.Argument(metavar="ID", help="Id of the task.")],
     reason: ReasonOption = "",
     mission: SomeMissionOption = None,
     timeout_s: TimeoutOption = 10.0,
-    seat: Seat = DEFAULT_SEAT,
+    seat: ConnectionOptions = DEFAULT_CONNECTION,
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
     """Take a task off the board of a running mission."""
-    from coordinator.operator.session import Reach, check_words
-    from coordinator.operator.task_orders import Withdrawal
+    from coordinator.operator.submission import MissionConnection, check_reason_and_ids
+    from coordinator.operator.task_edits import TaskWithdrawal
 
-    check_words(reason, ("--mission", mission), ("ID", name))
-    reach = Reach(mission, timeout_s, seat, speedup)
-    return _order("withdraw", Withdrawal(name, reason), reach, json=json)
+    check_reason_and_ids(reason, ("--mission", mission), ("ID", name))
+    reach = MissionConnection(mission, timeout_s, seat, speedup)
+    return _order("withdraw", TaskWithdrawal(name, reason), reach, json=json)
 
 
 def _place(
@@ -330,7 +331,7 @@ def _place(
     Raises:
         InputError: they tell of none, or of two.
     """
-    from coordinator.operator.task_orders import FARTHEST_M, Wgs84
+    from coordinator.operator.task_edits import FARTHEST_M, Wgs84
 
     remedy = "give either --position, or --lat-deg and --lon-deg"
     if position is None:
@@ -352,17 +353,17 @@ def _place(
     return metres[0], metres[1], metres[2] if len(metres) == 3 else 0.0
 
 
-def _give(name: str, target: str, reason: str, reach: Reach, *, json: bool) -> int:
+def _give(name: str, target: str, reason: str, reach: MissionConnection, *, json: bool) -> int:
     """Give the command of that name, and say what came of it."""
     from json import dumps
 
-    from coordinator.operator.commanding import CommandWish
-    from coordinator.operator.session import check_words, fulfil
-    from swarm.wire.messages import CommandKind
+    from coordinator.operator.commands import CommandRequest
+    from coordinator.operator.submission import check_reason_and_ids, submit_request
+    from swarm.protocol.messages import CommandKind
 
-    check_words(reason, ("--mission", reach.mission), ("UAV", target))
+    check_reason_and_ids(reason, ("--mission", reach.mission), ("UAV", target))
 
-    def tell(mission: str, seat: OperatorSeat, verdict: Verdict) -> None:
+    def tell(mission: str, seat: OperatorClient, verdict: RequestVerdict) -> None:
         if json:
             told = {
                 "mission": mission,
@@ -377,17 +378,19 @@ def _give(name: str, target: str, reason: str, reach: Reach, *, json: bool) -> i
         elif seat.obeyed:
             print(verdict.text)
 
-    wish = CommandWish(CommandKind(name), target, reason)
-    return fulfil(wish, reach, source="UAV", tell=tell)
+    wish = CommandRequest(CommandKind(name), target, reason)
+    return submit_request(wish, reach, source="UAV", tell=tell)
 
 
-def _order(name: str, wish: NewTask | Withdrawal, reach: Reach, *, json: bool) -> int:
+def _order(
+    name: str, wish: NewTask | TaskWithdrawal, reach: MissionConnection, *, json: bool
+) -> int:
     """Give the order about a task, and say what came of it."""
     from json import dumps
 
-    from coordinator.operator.session import fulfil
+    from coordinator.operator.submission import submit_request
 
-    def tell(mission: str, seat: OperatorSeat, verdict: Verdict) -> None:
+    def tell(mission: str, seat: OperatorClient, verdict: RequestVerdict) -> None:
         if json:
             told = {
                 "mission": mission,
@@ -401,4 +404,4 @@ def _order(name: str, wish: NewTask | Withdrawal, reach: Reach, *, json: bool) -
         elif seat.obeyed:
             print(verdict.text)
 
-    return fulfil(wish, reach, source="ID", tell=tell)
+    return submit_request(wish, reach, source="ID", tell=tell)

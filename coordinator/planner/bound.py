@@ -30,14 +30,15 @@ from functools import partial
 
 import numpy as np
 
-from coordinator.planner.stop import Limit, ShouldStop, never
-from swarm.allocation.guided import route_arrays
+from coordinator.planner.options import Limit, ShouldStop, never
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import FloatArray, IntArray, Problem
+from swarm.allocation.rules import route_arrays
 from swarm.kernels.routes import TeamArrays
 from swarm.kernels.routes_bound import priced_lists, shortest_legs_s
 
 __all__ = ["Pricing", "UpperBound", "lagrangian_bound", "trivial_bound", "upper_bound"]
+
 
 Pricing = Callable[[TeamArrays, FloatArray], tuple[float, IntArray]]
 """Of lists; see `swarm.kernels.routes_bound.priced_lists`."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarm.allocation.problem import Problem
-from swarm.errors import SwarmError
 from swarm.kernels import exact as kernel
+from swarm.runtime.errors import SwarmError
 
 __all__ = [
     "MAX_TASKS",
@@ -26,6 +26,7 @@ __all__ = [
     "optimum_before",
     "worst_value",
 ]
+
 
 MAX_TASKS = kernel.MOST_TASKS
 """With more the subsets are too many, even where every survival probability is 1."""

@@ -1,21 +1,23 @@
 """From a mission to a plan: choose the method, bound the work, prove what can be proven.
 
-Pop-ups (tasks with ``appears_s > 0``) are unknown to a plan. Leaves out: scenario files,
+Plans of the method `guided` are made here: optimised lists and the sequence published with them.
+Pop-ups (tasks with ``appears_s > 0``) are unknown to a plan. Leaves out: searching for sequences
+(coordinator.planner.sequence_search) and for lists (swarm.kernels.routes), scenario files,
 printing and drawing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from coordinator.planner.bound import upper_bound
 from coordinator.planner.exact import Optimum, estimated_s, optimum_before
-from coordinator.planner.methods import METHODS, ONLINE_METHODS
-from coordinator.planner.routes import Progress, guided_plan
-from coordinator.planner.sequence import EXHAUSTIVE_UAVS, SearchLimits, best_sequence
-from coordinator.planner.stop import (
+from coordinator.planner.options import (
+    METHODS,
+    ONLINE_METHODS,
     Limit,
     ShouldStop,
     after_evaluations,
@@ -24,29 +26,143 @@ from coordinator.planner.stop import (
     never,
     part_of,
 )
-from swarm.allocation import Problem, evaluate, rule_by_name
-from swarm.allocation.rules import EXACT_TASKS
-from swarm.clock import Clock
-from swarm.errors import Fault, InputError
+from coordinator.planner.sequence_search import EXHAUSTIVE_UAVS, SearchLimits, best_sequence
+from swarm.allocation import evaluate, rule_by_name
+from swarm.allocation.lower_level import TeamState
+from swarm.allocation.problem import Problem
+from swarm.allocation.rules import route_arrays, team_arrays
+from swarm.kernels.lower_level import EXACT_TASKS
+from swarm.kernels.routes import TeamArrays, optimise_routes
 from swarm.model import Mission, Plan
-from swarm.suggest import instead
+from swarm.runtime.clock import Clock
+from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-__all__ = ["METHODS", "ONLINE_METHODS", "check_online_method", "make_plan"]
+__all__ = ["GuidedPlan", "Progress", "check_online_method", "guided_plan", "make_plan"]
+
+
+Progress = Callable[[int, float], None]
+"""Told the iterations spent and the best J to go so far [value·s]."""
+
+
+_ITERATIONS_PER_TASK = 400
+
+_FEWEST_ITERATIONS = 4_000
+
+_MOST_ITERATIONS = 300_000
+
+
+@dataclass(frozen=True, slots=True)
+class GuidedPlan:
+    """What is published."""
+
+    routes: tuple[tuple[int, ...], ...]
+    """Task indices per UAV in order of execution."""
+    sequence: tuple[int, ...]
+    """UAV indices: who completes its first task earlier comes first, who has none last."""
+    objective: float
+    """Σ of eq. 1 over the lists, from the state on [value·s]."""
+    iterations: int
+    """Removals and re-insertions tried."""
+
+
+def guided_plan(
+    problem: Problem,
+    *,
+    seed: int = 0,
+    stop: ShouldStop | None = None,
+    progress: Progress | None = None,
+    state: TeamState | None = None,
+    lists: Sequence[Sequence[int]] | None = None,
+    threads: int | None = None,
+) -> GuidedPlan:
+    """Optimise lists until stopped.
+
+    With the same seed the same plan comes out, unless a limit in time decides how many iterations
+    are made.
+
+    Args:
+        problem: the mission.
+        seed: >= 0.
+        stop: asked every few milliseconds with the iterations so far. The annealing cools along a
+            `Limit`; under any other function, or none, it ends after a few seconds' worth of
+            iterations.
+        progress: told after each slice of work.
+        state: where the team stands; at its start when None.
+        lists: to begin with, such as those now published.
+        threads: as many as there are processors when None; does not change the result.
+    """
+    state = TeamState.at_start(problem) if state is None else state
+    finite = state.free_s[state.active & np.isfinite(state.free_s)]
+    now_s = float(finite.min()) if len(finite) else 0.0
+    team = team_arrays(route_arrays(problem), state, state.active, now_s)
+    spent = 0
+
+    def count(iterations: int, worth: float) -> None:
+        nonlocal spent
+        spent = iterations
+        if progress is not None:
+            progress(iterations, worth)
+
+    routes, objective = optimise_routes(
+        team,
+        seed=seed,
+        spent_frac=_spent_frac(problem.n_task, stop),
+        lists=lists,
+        progress=count,
+        threads=threads,
+    )
+    return GuidedPlan(
+        routes=tuple(tuple(route) for route in routes),
+        sequence=_sequence(problem, team, routes),
+        objective=objective,
+        iterations=spent,
+    )
+
+
+def _spent_frac(n_task: int, stop: ShouldStop | None) -> Callable[[int], float]:
+    if isinstance(stop, Limit):
+        return stop.spent_frac
+    most = min(_MOST_ITERATIONS, max(_FEWEST_ITERATIONS, _ITERATIONS_PER_TASK * n_task))
+
+    def spent_frac(iterations: int) -> float:
+        return 1.0 if stop is not None and stop(iterations) else iterations / most
+
+    return spent_frac
+
+
+def _sequence(
+    problem: Problem, team: TeamArrays, routes: Sequence[Sequence[int]]
+) -> tuple[int, ...]:
+    free_s, place_enu_m, _, _ = team.arguments()
+    first_s = np.full(problem.n_uav, np.inf)
+    for uav, route in enumerate(routes):
+        if route:
+            travel_s = problem.travel_s(uav, place_enu_m[uav])[route[0]]
+            first_s[uav] = free_s[uav] + travel_s + problem.service_s[route[0]]
+    return tuple(int(uav) for uav in np.argsort(first_s, kind="stable"))
+
 
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""
+
 _PROOF_FRAC = 0.5
 """Of what a limit leaves, the most that such a proof takes."""
+
 _INSTEAD_OF_PROOF = 4_000
 """Iterations of ``guided`` where the proof of ``exact`` was stopped: some 20 ms."""
+
 _EXHAUSTIVE_DECISIONS = 3_000_000
 """Decisions all first rounds together may take to be tried one by one: some seconds."""
+
 _LOCAL_DECISIONS = 600_000
 """The same for the local search: a second or two."""
+
 _MODEST_ROUNDS = 60
 """First rounds of some UAVs that modest planning holds at once: those of small fleets."""
+
 _MODEST_EVALUATIONS = 200
 """Evaluations of a modest local search."""
+
 _LONG_LOOKAHEAD_WORK = 60_000
 """Evaluations × tasks² of lookahead where its tours are long: a few seconds."""
 
@@ -177,7 +293,7 @@ def check_online_method(method: str) -> None:
     """
     if method not in ONLINE_METHODS:
         problem = "has no decision rule to fly by" if method in METHODS else "no such method"
-        remedy = instead(method, ONLINE_METHODS)
+        remedy = remedy_for_name(method, ONLINE_METHODS)
         raise InputError(Fault("--method", method, problem, remedy))
 
 

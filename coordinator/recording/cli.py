@@ -11,13 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
-from swarm.errors import Fault, InputError
-from swarm.options import (
-    JsonOption,
-    SomeMissionOption,
-    SpeedupOption,
-)
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.options import JsonOption, SomeMissionOption, SpeedupOption
 
 if TYPE_CHECKING:
     from coordinator.recording.flight_recorder import FlightRecorder
@@ -25,6 +21,7 @@ if TYPE_CHECKING:
     from coordinator.recording.reader import Recording
 
 __all__ = ["explain", "record", "replay"]
+
 
 NewFileArgument = Annotated[
     Path, typer.Argument(metavar="FILE.mcap", help="File to be made.", show_default=False)
@@ -36,7 +33,7 @@ LEFT_S = 5.0
 """Wall time after which a mission whose UAVs have all left is over."""
 
 
-@seated
+@with_connection_options
 def record(
     file: NewFileArgument,
     mission: SomeMissionOption = None,
@@ -60,12 +57,12 @@ def record(
             help="How long to wait for the bus, and then for a mission; wall seconds.",
         ),
     ] = 60.0,
-    seat: Seat = DEFAULT_SEAT,
+    seat: ConnectionOptions = DEFAULT_CONNECTION,
     speedup: SpeedupOption = 1.0,
 ) -> int:
     """Record a mission that is flown elsewhere.
 
-    Joins as an onlooker, until the mission is over or Ctrl-C; nobody flies any differently for
+    Joins as an observer, until the mission is over or Ctrl-C; nobody flies any differently for
     it. Everything that is said goes into the file, with a map, a scene and curves for Foxglove.
     After every second the file is whole, whatever happens then. Exit status 1: nobody flies a
     mission, or not everything could be written.
@@ -77,14 +74,13 @@ def record(
     """
     import asyncio
 
-    from coordinator.joining import check_mission, joined, onlooking
+    from coordinator.joining import check_mission, joined, observer_shell
     from coordinator.recording.flight_recorder import recording_to, wall_ns
     from coordinator.recording.options import check_new_recording
-    from coordinator.recording.recorder import About
-    from coordinator.recording.watching import Witness
-    from swarm.clock import ScaledClock
-    from swarm.log import LogLevel, configure_logging
-    from swarm.process import EXIT_INTERRUPTED, run_until_stopped
+    from coordinator.recording.recorder import RecordingInfo, RecordingObserver
+    from swarm.runtime.clock import ScaledClock
+    from swarm.runtime.log import LogLevel, configure_logging
+    from swarm.runtime.process import EXIT_INTERRUPTED, run_until_stopped
 
     configure_logging(LogLevel.ERROR)
     check_mission(mission)
@@ -99,18 +95,18 @@ def record(
         nonlocal begun
         async with joined(mission, config, timeout_s) as (name, place):
             clock = ScaledClock(speedup)
-            witness = Witness(
+            witness = RecordingObserver(
                 name,
                 timing,
                 linger_s=LEFT_S * speedup,
                 until_s=None if duration_s is None else duration_s * speedup,
             )
-            about = About(name, timing, speedup)
+            about = RecordingInfo(name, timing, speedup)
             with recording_to(file, about, wall_ns(), _warn) as recorder:
                 begun = recorder
                 print(f"recording {name} in {file}", file=sys.stderr)
-                core = recorder.around(witness, witness.onlooker.observer)
-                shell = onlooking(
+                core = recorder.around(witness, witness.observer.mission_state)
+                shell = observer_shell(
                     core, place, clock, name, "record", network.answer_s, every_status=True
                 )
                 try:
@@ -210,7 +206,7 @@ def explain(
 
     from rich.console import Console
 
-    from coordinator.recording.explain import explain_task, explain_uav
+    from coordinator.recording.explanation import explain_task, explain_uav
 
     match task, uav:
         case str(), None:
@@ -247,11 +243,11 @@ def _print_final(playback: Playback, *, json: bool) -> None:
 
     from rich.console import Console
 
-    from coordinator.status.table import mission_status, status_as_json, status_table
-    from coordinator.view.signs import signs_for
+    from coordinator.mission_view.presentation import signs_for
+    from coordinator.terminal.status_table import mission_status, status_as_json, status_table
 
     playback.seek(playback.duration_s)
-    found = mission_status(playback.observer, playback.now_s)
+    found = mission_status(playback.mission_state, playback.now_s)
     if json:
         print(dumps(status_as_json(found), allow_nan=False))
         return
@@ -265,14 +261,13 @@ def _play(playback: Playback, port: int, *, json: bool, browser: bool) -> int:
     import webbrowser
     from json import dumps
 
-    from coordinator.dashboard.access import access_for
+    from coordinator.dashboard.access import access_for, listen, url_of
     from coordinator.dashboard.app import create_app
-    from coordinator.dashboard.listening import listen, url_of
-    from coordinator.dashboard.serve import serving
-    from coordinator.recording.player import Player
-    from swarm.clock import SystemClock
-    from swarm.log import LogLevel, configure_logging
-    from swarm.process import EXIT_INTERRUPTED, run_until_stopped
+    from coordinator.dashboard.server import serving
+    from coordinator.recording.player import RecordingPlayer
+    from swarm.runtime.clock import SystemClock
+    from swarm.runtime.log import LogLevel, configure_logging
+    from swarm.runtime.process import EXIT_INTERRUPTED, run_until_stopped
 
     configure_logging(LogLevel.WARNING)
     host = "127.0.0.1"
@@ -284,7 +279,7 @@ def _play(playback: Playback, port: int, *, json: bool, browser: bool) -> int:
         webbrowser.open(url)
 
     async def work() -> int:
-        player = Player(playback, SystemClock())
+        player = RecordingPlayer(playback, SystemClock())
         served = create_app(player, access)
         async with serving(served.app, taken):
             try:

@@ -2,7 +2,7 @@
 
 Each step puts one chunk where the file's tail was, and a new tail behind it, in a single
 write. Records are those of the `mcap` package; ours is only how the tail moves.
-Leaves out: writing to a disk (coordinator.recording.recording_file) and what the messages
+Leaves out: writing to a disk (coordinator.recording.flight_recorder) and what the messages
 say (coordinator.recording.recorder).
 
 Format: https://mcap.dev/spec.
@@ -39,6 +39,7 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 __all__ = ["PADDING", "GrowingMcap", "Patch"]
+
 
 PADDING: Final = 0x80
 """Opcode of a record that readers pass over: the first of those that applications may use."""

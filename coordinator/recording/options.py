@@ -10,9 +10,10 @@ from typing import Annotated
 
 import typer
 
-from swarm.errors import Fault, InputError
+from swarm.runtime.errors import Fault, InputError
 
 __all__ = ["RecordOption", "check_new_recording"]
+
 
 RecordOption = Annotated[
     Path | None,

@@ -1,4 +1,4 @@
-"""A recording that is played: the same facts at the same times into a fresh onlooker.
+"""A recording that is played: the same facts at the same times into a fresh observer.
 
 Pure: time passes by `advance`. Going back starts from the nearest of a few pictures that were
 kept on the way. Leaves out: reading files (coordinator.recording.reader), and showing
@@ -12,11 +12,12 @@ import zlib
 from bisect import bisect_right
 from dataclasses import dataclass
 
-from coordinator.observer import Observer
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.observation import MissionObserver
 from coordinator.recording.reader import Recording
-from coordinator.status.onlooker import Onlooker
 
 __all__ = ["MAX_SPEED", "Playback"]
+
 
 MAX_SPEED = 1000.0
 _MOST_KEPT = 24
@@ -29,7 +30,7 @@ _LEAST_APART = 2000
 class _Played:
     """How far a recording has been played."""
 
-    onlooker: Onlooker
+    observer: MissionObserver
     heard: int = 0
     """Entries that have been heard."""
     planned: int = 0
@@ -57,9 +58,9 @@ class Playback:
         self._played = self._fresh()
 
     @property
-    def observer(self) -> Observer:
+    def mission_state(self) -> MissionState:
         """What was known at `now_s`; another one after going back."""
-        return self._played.onlooker.observer
+        return self._played.observer.mission_state
 
     @property
     def now_s(self) -> float:
@@ -112,12 +113,12 @@ class Playback:
         self._now_s = now_s
 
     def _hear(self, until: int) -> None:
-        """Tell the onlooker the entries up to, and without, that one."""
+        """Tell the observer the entries up to, and without, that one."""
         played, recording = self._played, self.recording
         for place in range(played.heard, until):
             entry = recording.entries[place]
             self._plan(entry.now_s)
-            played.onlooker.step(entry.fact, entry.now_s)
+            played.observer.step(entry.fact, entry.now_s)
             played.heard = place + 1
             if played.heard % self._apart == 0:
                 self._keep()
@@ -125,10 +126,10 @@ class Playback:
             self._plan(float("inf"))
 
     def _plan(self, now_s: float) -> None:
-        """Show the onlooker's observer what had been planned by then."""
+        """Show the observer's mission state what had been planned by then."""
         played, plans = self._played, self.recording.plans
         while played.planned < len(plans) and plans[played.planned].now_s <= now_s:
-            played.onlooker.observer.plan = plans[played.planned].plan
+            played.observer.mission_state.plan = plans[played.planned].plan
             played.planned += 1
 
     def _keep(self) -> None:
@@ -154,6 +155,6 @@ class Playback:
 
     def _fresh(self) -> _Played:
         recording = self.recording
-        onlooker = Onlooker(recording.mission, recording.timing, None)
-        onlooker.start(recording.start_s)
-        return _Played(onlooker)
+        observer = MissionObserver(recording.mission, recording.timing, None)
+        observer.start(recording.start_s)
+        return _Played(observer)

@@ -8,18 +8,19 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Mapping
 
-from coordinator.dashboard.source import CommandRow, Orders, PlayerState
-from coordinator.observer import Observer
+from coordinator.dashboard.source import CommandRow, PlaybackState, RequestSink
+from coordinator.mission_view.mission_state import MissionState
 from coordinator.recording.playback import MAX_SPEED, Playback
-from swarm.clock import Clock
+from swarm.runtime.clock import Clock
 
-__all__ = ["Player"]
+__all__ = ["RecordingPlayer"]
+
 
 FRAME_S = 0.1
 """Wall time between two steps of a recording that plays."""
 
 
-class Player:
+class RecordingPlayer:
     """A source that plays a recording, and the recording's controls.
 
     Args:
@@ -41,14 +42,14 @@ class Player:
     # -- what a page is fed from --------------------------------------------------------
 
     @property
-    def observer(self) -> Observer:
+    def mission_state(self) -> MissionState:
         """What was known at the moment that is shown."""
-        return self._playback.observer
+        return self._playback.mission_state
 
     @property
     def link(self) -> bool:
         """Whether the recorder's link was up."""
-        return self.observer.cut_since_s is None
+        return self.mission_state.cut_since_s is None
 
     @property
     def speedup(self) -> float:
@@ -70,12 +71,12 @@ class Player:
         return ()
 
     @property
-    def orders(self) -> Orders | None:
+    def orders(self) -> RequestSink | None:
         """Nobody flies here."""
         return None
 
     @property
-    def player(self) -> Player:
+    def player(self) -> RecordingPlayer:
         """The controls."""
         return self
 
@@ -87,10 +88,10 @@ class Player:
         return self._playback.duration_s
 
     @property
-    def state(self) -> PlayerState:
+    def state(self) -> PlaybackState:
         """How far it is."""
         playback = self._playback
-        return PlayerState(playback.t_s, playback.playing, playback.speed)
+        return PlaybackState(playback.t_s, playback.playing, playback.speed)
 
     def control(self, *, playing: bool | None, speed: float | None, t_s: float | None) -> None:
         """Play or stop, at that speed, from there; None leaves a thing as it is.

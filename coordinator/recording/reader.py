@@ -1,52 +1,204 @@
 """Recordings, read back: the facts that the recording core got, and when.
 
-The same facts at the same times into a fresh `coordinator.status.onlooker.Onlooker` give the
-same picture; see coordinator.recording.playback. Leaves out: what the file holds for other
-tools (coordinator.recording.pictures).
+The same facts at the same times into a fresh `MissionObserver` give the same picture. A file may
+be cut off or torn anywhere: it is read from its beginning, chunk by chunk, each checked by its
+checksum, so that whatever is whole is found. Leaves out: playing them
+(coordinator.recording.playback), and what the file holds for other tools
+(coordinator.recording.foxglove_topics).
+
+Format: https://mcap.dev/spec.
 """
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+import struct
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+import lz4.frame
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import breakup_chunk
+from mcap.writer import MCAP0_MAGIC
 from pydantic import TypeAdapter, ValidationError
 
-from coordinator.recording.file_records import FileRecords, is_mcap
 from coordinator.recording.recorder import METADATA
-from coordinator.recording.records import (
-    FORMAT,
-    SCHEMAS,
-    Begun,
-    UnreadableError,
-    decode,
-)
-from swarm.config import Timing
-from swarm.errors import Fault, InputError
-from swarm.events import BusFact
+from coordinator.recording.records import FORMAT, SCHEMAS, RecordingStarted, UnreadableError, decode
 from swarm.model import Plan
 from swarm.model.ids import valid_id
-from swarm.wire.messages import SCHEMA_VERSION
+from swarm.protocol.events import CommonEvent
+from swarm.protocol.messages import SCHEMA_VERSION
+from swarm.protocol.timing import Timing
+from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["Entry", "PlanEntry", "Recording", "read_recording"]
+__all__ = ["FileRecords", "RecordedFact", "RecordedPlan", "Recording", "is_mcap", "read_recording"]
+
+
+_HEAD: Final = struct.Struct("<BQ")
+
+_FOOTER: Final = struct.Struct("<BQQQI")
+
+_LARGEST_CHUNK: Final = 256 << 20
+"""Bytes of a chunk that is unpacked; ours hold what is heard in about a second."""
+
+_DAMAGES: Final = (
+    McapError,
+    MemoryError,
+    OverflowError,
+    RuntimeError,
+    ValueError,
+    struct.error,
+    zstandard.ZstdError,
+)
+"""What comes of bytes that are no records."""
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class LoggedMessage:
+    """One message, with what its channel says of it."""
+
+    topic: str
+    schema: str
+    data: bytes
+    log_ns: int
+
+
+def is_mcap(data: bytes) -> bool:
+    """Whether a file begins as MCAP files do."""
+    return data.startswith(MCAP0_MAGIC)
+
+
+@dataclass(slots=True)
+class FileRecords:
+    """What a file holds, found by iterating once over `messages`."""
+
+    data: bytes
+    torn_at: int | None = None
+    """Where the file is torn or cut off; None when it is whole."""
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    """By name, as far as it has been come across."""
+    _schemas: dict[int, Schema] = field(default_factory=dict)
+    _channels: dict[int, Channel] = field(default_factory=dict)
+
+    def messages(self) -> Iterator[LoggedMessage]:
+        """All messages, in the order in which they were written."""
+        place = len(MCAP0_MAGIC)
+        while True:
+            if place + _HEAD.size > len(self.data):
+                break
+            opcode, length = _HEAD.unpack_from(self.data, place)
+            end = place + _HEAD.size + length
+            if end > len(self.data):
+                break
+            if opcode == Opcode.DATA_END:
+                if not self._ends_well(end):
+                    break
+                return
+            body = self.data[place + _HEAD.size : end]
+            try:
+                found = self._records(opcode, body)
+            except _DAMAGES:
+                break
+            if found is None:
+                break
+            for record in found:
+                if (logged := self._take(record)) is not None:
+                    yield logged
+            place = end
+        self.torn_at = place
+
+    def _ends_well(self, summary_at: int) -> bool:
+        """Whether all that follows the data is there, too."""
+        footer_at = len(self.data) - len(MCAP0_MAGIC) - _FOOTER.size
+        if footer_at < summary_at or not self.data.endswith(MCAP0_MAGIC):
+            return False
+        opcode, _, summary, _, crc = _FOOTER.unpack_from(self.data, footer_at)
+        if opcode != Opcode.FOOTER or summary not in (0, summary_at):
+            return False
+        checked = self.data[summary_at : footer_at + _FOOTER.size - 4]
+        return bool(summary == 0 or crc == zlib.crc32(checked))
+
+    def _records(self, opcode: int, body: bytes) -> list[McapRecord] | None:
+        """What a record of the data section holds; None for one that cannot be there."""
+        stream = ReadDataStream(io.BytesIO(body))
+        match opcode:
+            case Opcode.CHUNK:
+                return breakup_chunk(_unpacked(Chunk.read(stream)), validate_crc=True)
+            case Opcode.METADATA:
+                return [Metadata.read(stream)]
+            case Opcode.SCHEMA:
+                return [Schema.read(stream)]
+            case Opcode.CHANNEL:
+                return [Channel.read(stream)]
+            case Opcode.MESSAGE:
+                return [Message.read(stream, len(body))]
+            case Opcode.HEADER | Opcode.MESSAGE_INDEX | Opcode.ATTACHMENT:
+                return []
+            case _:
+                return [] if opcode >= 0x80 else None
+
+    def _take(self, record: McapRecord) -> LoggedMessage | None:
+        match record:
+            case Schema():
+                self._schemas[record.id] = record
+            case Channel():
+                self._channels[record.id] = record
+            case Metadata():
+                self.metadata[record.name] = record.metadata
+            case Message():
+                channel = self._channels.get(record.channel_id)
+                schema = None if channel is None else self._schemas.get(channel.schema_id)
+                if channel is not None and schema is not None:
+                    return LoggedMessage(channel.topic, schema.name, record.data, record.log_time)
+            case _:
+                pass
+        return None
+
+
+def _unpacked(chunk: Chunk) -> Chunk:
+    """``chunk`` as it is without compression; it takes no more memory than it says.
+
+    Raises:
+        ValueError: it says too much, or it is longer than it says.
+    """
+    if chunk.uncompressed_size > _LARGEST_CHUNK:
+        raise ValueError(f"{chunk.uncompressed_size} bytes are too many for a chunk")
+    if chunk.compression == "zstd":
+        # By itself the library believes what the data say of their length.
+        reader = zstandard.ZstdDecompressor().stream_reader(chunk.data)
+        data = reader.read(chunk.uncompressed_size + 1)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(
+            chunk.data, max_length=chunk.uncompressed_size + 1
+        )
+    else:
+        data = chunk.data
+    if len(data) != chunk.uncompressed_size:
+        raise ValueError("a chunk is longer or shorter than it says")
+    return replace(chunk, compression="", data=data)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedFact:
     """One fact."""
 
     now_s: float
     """When the recording core got it, by its clock [s]."""
-    fact: BusFact
+    fact: CommonEvent
     """Ticks included, which alone tell when a silence was noticed."""
 
 
 @dataclass(frozen=True, slots=True)
-class PlanEntry:
-    """A plan that the observer was given."""
+class RecordedPlan:
+    """A plan that the mission state was given."""
 
     now_s: float
     plan: Plan
@@ -71,9 +223,9 @@ class Recording:
     """Of the program that recorded."""
     start_s: float
     """When the core began, by its clock [s]."""
-    entries: Sequence[Entry]
+    entries: Sequence[RecordedFact]
     """In the order in which the core got them."""
-    plans: Sequence[PlanEntry]
+    plans: Sequence[RecordedPlan]
     torn: str | None
     """Where the file ends before its time, in a line; None when it is whole."""
 
@@ -98,8 +250,8 @@ def read_recording(path: Path) -> Recording:
         problem = "is empty" if not data else "is no MCAP file"
         raise _fault(path, "", problem, "give a file that swarm ... --record has written")
     records = FileRecords(data)
-    entries: list[Entry] = []
-    plans: list[PlanEntry] = []
+    entries: list[RecordedFact] = []
+    plans: list[RecordedPlan] = []
     start_s: float | None = None
     about: dict[str, Any] | None = None
     known = frozenset(SCHEMAS)
@@ -116,12 +268,12 @@ def read_recording(path: Path) -> Recording:
             remedy = "record again, or read it with the version that wrote it"
             raise _fault(path, place, problem, remedy) from None
         match what:
-            case Begun():
+            case RecordingStarted():
                 start_s = now_s
             case Plan():
-                plans.append(PlanEntry(now_s, what))
+                plans.append(RecordedPlan(now_s, what))
             case _:
-                entries.append(Entry(now_s, what))
+                entries.append(RecordedFact(now_s, what))
     if about is None:
         about = _about(path, records.metadata.get(METADATA))
     if start_s is None:

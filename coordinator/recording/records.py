@@ -2,7 +2,7 @@
 
 Facts are written so that reading gives back the very same: numbers digit by digit, messages
 field by field. A recording is made of *lines*; a line knows its topic, schema and JSON.
-Leaves out: what is drawn from the facts for other tools (coordinator.recording.pictures).
+Leaves out: what is drawn from the facts for other tools (coordinator.recording.foxglove_topics).
 """
 
 from __future__ import annotations
@@ -15,44 +15,41 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from coordinator.plan_report import plan_as_json, plan_from_json
-from swarm.events import (
-    BusFact,
-    Heard,
+from coordinator.planner.plan_report import plan_as_json, plan_from_json
+from swarm.model import Plan
+from swarm.protocol.events import (
+    CommonEvent,
     KeysReplaced,
-    Learned,
     LinkChanged,
+    MessageReceived,
     PeerGone,
     PeerSeen,
+    SnapshotsReceived,
     Tick,
 )
-from swarm.model import Plan
-from swarm.wire.bounds import Count, Flag, Id, Instant
-from swarm.wire.keys import Keys
-from swarm.wire.messages import (
-    Board,
+from swarm.protocol.fields import Count, Flag, Id, Instant
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import (
     Body,
-    Brief,
-    Choice,
-    Claim,
-    Command,
-    Epoch,
     Message,
-    Outcome,
+    MissionConfig,
+    OperatorCommand,
+    PlanEpoch,
     SignedRoster,
     Snapshot,
     Stamp,
     StartWithout,
-    Status,
-    TaskOrder,
+    TaskEdit,
+    TaskEntry,
 )
+from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 
 __all__ = [
     "FORMAT",
     "SCHEMAS",
-    "Begun",
-    "Line",
-    "Recorded",
+    "FileMessage",
+    "RecordableFact",
+    "RecordingStarted",
     "UnreadableError",
     "decode",
     "encode",
@@ -60,19 +57,20 @@ __all__ = [
     "topics_of",
 ]
 
+
 FORMAT: Final = "1"
 """Version of all schemas here; grows when what was written before cannot be read any more."""
 
 _BODIES: Final[dict[str, type[Body]]] = {
-    "Brief": Brief,
-    "Epoch": Epoch,
-    "Board": Board,
+    "Brief": MissionConfig,
+    "Epoch": PlanEpoch,
+    "Board": TaskEntry,
     "Claim": Claim,
     "Outcome": Outcome,
     "Status": Status,
     "Choice": Choice,
-    "Command": Command,
-    "TaskOrder": TaskOrder,
+    "Command": OperatorCommand,
+    "TaskOrder": TaskEdit,
     "StartWithout": StartWithout,
     "SignedRoster": SignedRoster,
 }
@@ -86,16 +84,16 @@ class UnreadableError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Begun:
+class RecordingStarted:
     """The recording core started: the first thing in every recording."""
 
 
-Recorded = BusFact | Begun | Plan
+RecordableFact = CommonEvent | RecordingStarted | Plan
 """What can be written down, each with the core's time."""
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class FileMessage:
     """One message of the file."""
 
     topic: str
@@ -261,7 +259,7 @@ def _adapter(name: str) -> TypeAdapter[Any]:
 
 def topics_of(mission: str) -> Mapping[str, str]:
     """Topics of what is no message, by schema; `Presence` has one per writer below its own."""
-    root = f"/{Keys(mission).root}"
+    root = f"/{KeySpace(mission).root}"
     return {
         "peckorder.Moment": f"{root}/recorder/moment",
         "peckorder.Link": f"{root}/recorder/link",
@@ -272,7 +270,9 @@ def topics_of(mission: str) -> Mapping[str, str]:
     }
 
 
-def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) -> Line | None:
+def encode(
+    what: RecordableFact, mission: str, now_s: float, mission_s: float | None
+) -> FileMessage | None:
     """The line that says ``what``; None for what only the recorder's own process was told.
 
     Args:
@@ -282,7 +282,7 @@ def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) 
         mission_s: mission time, for people [s].
     """
     match what:
-        case Heard(message):
+        case MessageReceived(message):
             name = _NAMES[type(message.body)]
             said = _SAID[name](
                 message.mission,
@@ -294,7 +294,7 @@ def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) 
                 mission_s,
             )
             return _line(_topic(message), f"peckorder.{name}", said)
-        case Learned(snapshots):
+        case SnapshotsReceived(snapshots):
             schema, shape = "peckorder.Answers", _Answers(now_s, tuple(map(_answer, snapshots)))
         case PeerSeen(writer):
             schema, shape = "peckorder.Presence", _Presence(now_s, writer, True)
@@ -306,7 +306,7 @@ def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) 
             schema, shape = "peckorder.Link", _Link(now_s, up)
         case Tick():
             schema, shape = "peckorder.Moment", _Moment(now_s, "tick")
-        case Begun():
+        case RecordingStarted():
             schema, shape = "peckorder.Moment", _Moment(now_s, "begun")
         case Plan():
             plan: dict[str, Any] = plan_as_json(what)
@@ -316,15 +316,15 @@ def encode(what: Recorded, mission: str, now_s: float, mission_s: float | None) 
     return _line(topics_of(mission)[schema], schema, shape)
 
 
-def _line(topic: str, schema: str, shape: Any) -> Line:
-    return Line(topic, schema, _adapter(schema).dump_json(shape))
+def _line(topic: str, schema: str, shape: Any) -> FileMessage:
+    return FileMessage(topic, schema, _adapter(schema).dump_json(shape))
 
 
 def _topic(message: Message) -> str:
     """Its bus key, without the task where there is one: a topic for each would be too many."""
     key = f"/{message.key}"
     match message.body:
-        case Board() | Outcome() | TaskOrder() | Command() | StartWithout():
+        case TaskEntry() | Outcome() | TaskEdit() | OperatorCommand() | StartWithout():
             return key.rpartition("/")[0]
         case _:
             return key
@@ -351,7 +351,7 @@ def _answer(snapshot: Snapshot) -> Any:
 # -- reading -----------------------------------------------------------------------------
 
 
-def decode(schema: str, data: bytes) -> tuple[float, Recorded]:
+def decode(schema: str, data: bytes) -> tuple[float, RecordableFact]:
     """What a line says, and the core's time [s]; inverse of `encode`.
 
     Raises:
@@ -364,10 +364,10 @@ def decode(schema: str, data: bytes) -> tuple[float, Recorded]:
         raise UnreadableError(str(fault)) from None
 
 
-def _meant(schema: str, shape: Any) -> Recorded:
+def _meant(schema: str, shape: Any) -> RecordableFact:
     match schema:
         case "peckorder.Moment":
-            return Begun() if shape.what == "begun" else Tick()
+            return RecordingStarted() if shape.what == "begun" else Tick()
         case "peckorder.Presence":
             return PeerSeen(shape.writer) if shape.there else PeerGone(shape.writer)
         case "peckorder.Keys":
@@ -377,9 +377,9 @@ def _meant(schema: str, shape: Any) -> Recorded:
         case "peckorder.Plan":
             return plan_from_json(asdict(shape.plan))
         case "peckorder.Answers":
-            return Learned(tuple(map(_snapshot, shape.snapshots)))
+            return SnapshotsReceived(tuple(map(_snapshot, shape.snapshots)))
         case _:
-            return Heard(_message(shape))
+            return MessageReceived(_message(shape))
 
 
 def _message(shape: Any) -> Message:

@@ -12,7 +12,8 @@ from enum import IntEnum
 
 from sim.autopilot.config import BatteryFailsafe
 
-__all__ = ["Battery", "ChargeLevel"]
+__all__ = ["BatteryModel", "ChargeLevel"]
+
 
 _FULL_V = 12.6
 _EMPTY_V = 10.5
@@ -28,7 +29,7 @@ class ChargeLevel(IntEnum):
     CRITICAL = 2
 
 
-class Battery:
+class BatteryModel:
     """One battery, full at first.
 
     Args:

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sim.autopilot.flavours import FlavourName
-from swarm.log import LogFormat, LogLevel, configure_logging, get_logger
-from swarm.options import (
+from sim.autopilot.options import FirmwareModelName
+from swarm.runtime.errors import remedy_for_name
+from swarm.runtime.log import LogFormat, LogLevel, configure_logging, get_logger
+from swarm.runtime.options import (
     JsonOption,
     LifelineOption,
     LogFormatOption,
@@ -22,15 +23,15 @@ from swarm.options import (
     SeedOption,
     SpeedupOption,
 )
-from swarm.suggest import instead
 
 if TYPE_CHECKING:
-    from agent.mavlink.signing import SigningKey
-    from sim.autopilot.endpoint import Endpoint
+    from agent.vehicle.signing import SigningKey
+    from sim.autopilot.config import FleetMember
     from sim.autopilot.faults import VehicleFault
-    from sim.autopilot.fleet import FleetMember
+    from sim.autopilot.options import Endpoint
 
 __all__ = ["autopilot"]
+
 
 _FAULT_HELP = """Let something happen to a UAV: UAV:KIND@T or UAV:KIND@T+DURATION, in vehicle
 seconds; T 0 is power-up, any other counts from the first arming. KIND: reboot, gps-lost,
@@ -59,8 +60,9 @@ def autopilot(
         ),
     ] = "tcp:127.0.0.1:0",
     flavour: Annotated[
-        FlavourName, typer.Option("--flavour", help="Whose firmware the vehicles behave like.")
-    ] = FlavourName.ARDUPILOT,
+        FirmwareModelName,
+        typer.Option("--flavour", help="Whose firmware the vehicles behave like."),
+    ] = FirmwareModelName.ARDUPILOT,
     speedup: SpeedupOption = 1.0,
     system_id: Annotated[
         int | None,
@@ -160,14 +162,19 @@ def autopilot(
     import asyncio
     import math
 
-    from agent.mavlink.signing_key import load_signing_key, signing_key_of
-    from sim.autopilot.config import BatteryFailsafe
-    from sim.autopilot.endpoint import ENDPOINT_RULE, parse_endpoint
-    from sim.autopilot.fleet import Physics, fleet_of
-    from sim.autopilot.options import check_wind, faults_by_uav, parse_wind, require_finite
-    from swarm.errors import Fault, InputError
+    from agent.vehicle.signing import load_signing_key, signing_key_of
+    from sim.autopilot.config import BatteryFailsafe, Physics, fleet_of
+    from sim.autopilot.options import (
+        ENDPOINT_RULE,
+        check_wind,
+        faults_by_uav,
+        parse_endpoint,
+        parse_wind,
+        require_finite,
+    )
     from swarm.model import UavId
-    from swarm.process import run_until_stopped
+    from swarm.runtime.errors import Fault, InputError
+    from swarm.runtime.process import run_until_stopped
     from swarm.scenario import load_scenario
 
     mission = load_scenario(scenario)
@@ -175,7 +182,7 @@ def autopilot(
     known = [member.id for member in mission.uavs]
     unknown = [name for name in uav or () if name not in known]
     if unknown:
-        told = ((name, instead(name, known, "the scenario has")) for name in unknown)
+        told = ((name, remedy_for_name(name, known, "the scenario has")) for name in unknown)
         raise InputError(*(Fault("--uav", "", f"no UAV {name!r}", what) for name, what in told))
     try:
         endpoint = parse_endpoint(listen)
@@ -216,7 +223,7 @@ async def _serve(
     fleet: tuple[FleetMember, ...],
     faults: dict[str, tuple[VehicleFault, ...]],
     endpoint: Endpoint,
-    flavour: FlavourName,
+    flavour: FirmwareModelName,
     speedup: float,
     keys: Mapping[str, SigningKey],
     *,
@@ -226,21 +233,23 @@ async def _serve(
     import asyncio
     import json
 
-    from sim.autopilot.faulty_vehicle import FaultyVehicle
-    from sim.autopilot.flavours import flavour_of
-    from sim.autopilot.server import Machine, VehicleServer
-    from sim.autopilot.vehicle import Vehicle
-    from swarm.clock import ScaledClock
-    from swarm.errors import Fault, InputError
+    from sim.autopilot.faulty_vehicle import FaultyAutopilot
+    from sim.autopilot.options import firmware_model
+    from sim.autopilot.server import ServedVehicle, VehicleServer
+    from sim.autopilot.vehicle import SimulatedAutopilot
+    from swarm.runtime.clock import ScaledClock
+    from swarm.runtime.errors import Fault, InputError
 
     clock = ScaledClock(speedup)
     servers: list[VehicleServer] = []
     try:
         for place, member in enumerate(fleet):
             start_s = clock.now_s()
-            sound = Vehicle(member.config, flavour_of(flavour), start_s)
+            sound = SimulatedAutopilot(member.config, firmware_model(flavour), start_s)
             own_faults = faults.get(member.uav)
-            vehicle: Machine = FaultyVehicle(sound, own_faults, start_s) if own_faults else sound
+            vehicle: ServedVehicle = (
+                FaultyAutopilot(sound, own_faults, start_s) if own_faults else sound
+            )
             own = endpoint.shifted(place)
             key = keys.get(member.uav)
             secret = None if key is None else key.secret

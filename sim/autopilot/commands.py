@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.events import Outbox, Sender
-from sim.autopilot.geo import ABOVE_HOME_FRAMES, place_enu_m
-from sim.autopilot.modes import Mode
-from sim.autopilot.occasions import Occasion
+from sim.autopilot.events import FirmwareEvent, Outbox, Sender
+from sim.autopilot.flight import FlightMode
+from sim.autopilot.message_rates import MessageRates
 from sim.autopilot.pilot import Pilot
-from sim.autopilot.streams import Streams
-from sim.autopilot.telemetry import Telemetry
-from sim.kinematics import Point
+from sim.autopilot.positions import ABOVE_HOME_FRAMES, place_enu_m
+from sim.autopilot.telemetry import TelemetryReporter
+from sim.world.motion import Point
 
-__all__ = ["Command", "Commands", "command_from_message"]
+__all__ = ["AutopilotCommand", "CommandExecutor", "command_from_message"]
+
 
 _FORCE_ARM = 21196.0
 _FORCE_REBOOT = 20190226.0
@@ -37,7 +37,7 @@ _LONG_ABOVE_HOME = frozenset({mavlink.MAV_CMD_NAV_TAKEOFF})
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class AutopilotCommand:
     """A command with its place in integer form."""
 
     id: int
@@ -51,22 +51,24 @@ class Command:
     """Parameters 5 to 7 as they came, for commands in which they are no place."""
 
 
-def command_from_message(message: mavlink.MAVLink_message) -> Command:
+def command_from_message(message: mavlink.MAVLink_message) -> AutopilotCommand:
     """The command in a COMMAND_LONG or COMMAND_INT."""
     params = (message.param1, message.param2, message.param3, message.param4)
     if message.get_msgId() == mavlink.MAVLINK_MSG_ID_COMMAND_INT:
         raw = (float(message.x), float(message.y), message.z)
-        return Command(message.command, params, message.frame, message.x, message.y, message.z, raw)
+        return AutopilotCommand(
+            message.command, params, message.frame, message.x, message.y, message.z, raw
+        )
     raw = (message.param5, message.param6, message.param7)
     frame = (
         mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
         if message.command in _LONG_ABOVE_HOME
         else mavlink.MAV_FRAME_GLOBAL
     )
-    return Command(message.command, params, frame, _e7(raw[0]), _e7(raw[1]), raw[2], raw)
+    return AutopilotCommand(message.command, params, frame, _e7(raw[0]), _e7(raw[1]), raw[2], raw)
 
 
-def _is_nowhere(command: Command) -> bool:
+def _is_nowhere(command: AutopilotCommand) -> bool:
     """Whether it names neither place nor height nor heading."""
     return all(math.isnan(value) for value in (command.params[3], *command.raw))
 
@@ -75,11 +77,11 @@ def _e7(degrees: float) -> int | None:
     return round(degrees * 1e7) if math.isfinite(degrees) else None
 
 
-class Commands:
+class CommandExecutor:
     """The commands one vehicle knows."""
 
     def __init__(
-        self, pilot: Pilot, telemetry: Telemetry, streams: Streams, outbox: Outbox
+        self, pilot: Pilot, telemetry: TelemetryReporter, streams: MessageRates, outbox: Outbox
     ) -> None:
         self._pilot = pilot
         self._telemetry = telemetry
@@ -87,7 +89,7 @@ class Commands:
         self._outbox = outbox
         self.reboot_asked = False
         """Set by a reboot command, for the vehicle to carry out after the answer."""
-        self._handlers: dict[int, Callable[[Command, Sender, float], int]] = {
+        self._handlers: dict[int, Callable[[AutopilotCommand, Sender, float], int]] = {
             mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_NAV_TAKEOFF: self._take_off,
@@ -106,7 +108,7 @@ class Commands:
             mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
         }
 
-    def handle(self, command: Command, sender: Sender, now_s: float) -> None:
+    def handle(self, command: AutopilotCommand, sender: Sender, now_s: float) -> None:
         """Carry ``command`` out and acknowledge it."""
         handler = self._handlers.get(command.id)
         times = 1
@@ -141,7 +143,7 @@ class Commands:
         """Change to a mode by its number; the MAV_RESULT."""
         mode = None if custom_mode is None else self._pilot.flavour.mode_of(custom_mode)
         if mode is None:
-            self._pilot.narrator.tell(Occasion.NO_SUCH_MODE, number=custom_mode)
+            self._pilot.narrator.tell(FirmwareEvent.NO_SUCH_MODE, number=custom_mode)
             return self._pilot.flavour.refusals.no_such_mode
         return self._result(self._pilot.set_mode(mode, now_s))
 
@@ -149,7 +151,7 @@ class Commands:
         """MAV_RESULT of something the vehicle may be unable to do now."""
         return _ACCEPTED if done else self._pilot.flavour.refusals.not_now
 
-    def _set_mode(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _set_mode(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del sender
         flags = command.params[0]
         if not math.isfinite(flags) or not int(flags) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
@@ -157,7 +159,7 @@ class Commands:
         custom_mode = self._pilot.flavour.mode_commanded(command.params[1], command.params[2])
         return self._set_custom_mode(custom_mode, now_s)
 
-    def _arm_disarm(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _arm_disarm(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del sender
         forced = command.params[1] == _FORCE_ARM
         if command.params[0] == 1.0:
@@ -166,7 +168,7 @@ class Commands:
             return self._result(self._pilot.disarm(now_s, forced=forced))
         return _UNSUPPORTED
 
-    def _take_off(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _take_off(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del sender
         pilot = self._pilot
         up_m: float | None = None
@@ -178,40 +180,40 @@ class Commands:
             up_m = command.height_m - pilot.config.origin.alt_m
         return self._result(pilot.take_off(up_m, now_s))
 
-    def _land(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _land(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del command, sender
-        return self._result(self._pilot.set_mode(Mode.LAND, now_s))
+        return self._result(self._pilot.set_mode(FlightMode.LAND, now_s))
 
-    def _return_to_launch(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _return_to_launch(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del command, sender
-        self._pilot.narrator.tell(Occasion.RETURN_ORDERED)
-        return self._result(self._pilot.set_mode(Mode.RTL, now_s))
+        self._pilot.narrator.tell(FirmwareEvent.RETURN_ORDERED)
+        return self._result(self._pilot.set_mode(FlightMode.RTL, now_s))
 
-    def _reposition(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _reposition(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del sender
         pilot = self._pilot
         speed_m_s, flags = command.params[:2]
-        habits = pilot.flavour.modes
+        behaviour = pilot.flavour.modes
         change_mode = math.isfinite(flags) and bool(
             int(flags) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         )
-        needs_flag = habits.reposition_needs_flag or not pilot.takes_targets
+        needs_flag = behaviour.reposition_needs_flag or not pilot.takes_targets
         if needs_flag and not change_mode:
             return pilot.flavour.refusals.reposition_without_flag
         pause = pilot.flavour.pauses_anywhere and _is_nowhere(command)
         target_enu_m = pilot.position_enu_m(now_s) if pause else self._place(command)
         if target_enu_m is None:
             return _DENIED
-        if not pilot.takes_targets and not pilot.set_mode(habits.for_reposition, now_s):
+        if not pilot.takes_targets and not pilot.set_mode(behaviour.for_reposition, now_s):
             return pilot.flavour.refusals.not_now
         if not (pause or pilot.within_fence(target_enu_m)):
-            pilot.narrator.tell(Occasion.TARGET_OUTSIDE_FENCE)
+            pilot.narrator.tell(FirmwareEvent.TARGET_OUTSIDE_FENCE)
             return pilot.flavour.refusals.outside_fence
         own_speed = pilot.flavour.obeys_leg_speed and 0.0 < speed_m_s < math.inf
         pilot.fly_guided(target_enu_m, now_s, speed_m_s if own_speed else None)
         return _ACCEPTED
 
-    def _place(self, command: Command) -> Point | None:
+    def _place(self, command: AutopilotCommand) -> Point | None:
         if command.lat_e7 is None or command.lon_e7 is None:
             return None
         frame = command.frame if self._pilot.flavour.reads_frames else mavlink.MAV_FRAME_GLOBAL
@@ -224,7 +226,7 @@ class Commands:
             self._pilot.flight.home_enu_m[2],
         )
 
-    def _change_speed(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _change_speed(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del sender
         kind, speed_m_s = command.params[:2]
         if kind not in (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED):
@@ -233,13 +235,13 @@ class Commands:
             return _FAILED
         return self._result(self._pilot.change_speed(speed_m_s, now_s))
 
-    def _mission_start(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _mission_start(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del sender
         if command.params[0] != 0.0 or command.params[1] != 0.0:
             return _DENIED  # flying a part of the mission is not supported
         return self._result(self._pilot.start_mission(now_s))
 
-    def _set_mission_current(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _set_mission_current(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         seq = command.params[0]
         if not math.isfinite(seq) or seq < 0.0:
             return _DENIED
@@ -252,7 +254,7 @@ class Commands:
         self._send(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, sender, now_s)
         return True
 
-    def _set_home(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _set_home(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del sender
         if command.params[0] == 1.0:
             home_enu_m: Point | None = self._pilot.position_enu_m(now_s)
@@ -267,15 +269,15 @@ class Commands:
         self._pilot.set_home(home_enu_m, now_s, lock=True)
         return _ACCEPTED
 
-    def _get_home(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _get_home(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del command
         return self._send(mavlink.MAVLINK_MSG_ID_HOME_POSITION, sender, now_s)
 
-    def _capabilities(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _capabilities(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del command
         return self._send(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sender, now_s)
 
-    def _request_message(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _request_message(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         message_id = command.params[0]
         if not math.isfinite(message_id):
             return _DENIED
@@ -288,7 +290,7 @@ class Commands:
         self._outbox.reply(sender, message)
         return _ACCEPTED
 
-    def _set_message_interval(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _set_message_interval(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         message_id, interval_us = command.params[:2]
         changeable = self._telemetry.known - self._pilot.flavour.fixed_streams
         if not math.isfinite(message_id) or int(message_id) not in changeable:
@@ -303,7 +305,7 @@ class Commands:
         self._streams.set_interval(sender.channel, int(message_id), interval_s, now_s)
         return _ACCEPTED
 
-    def _get_message_interval(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _get_message_interval(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del now_s
         message_id = command.params[0]
         if not math.isfinite(message_id) or not 0 <= int(message_id) <= 0xFFFF:
@@ -318,7 +320,7 @@ class Commands:
         )
         return _ACCEPTED
 
-    def _reboot(self, command: Command, sender: Sender, now_s: float) -> int:
+    def _reboot(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         del sender, now_s
         if command.params[0] not in (1.0, 3.0):
             return _UNSUPPORTED

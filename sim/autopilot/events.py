@@ -1,25 +1,30 @@
-"""What a simulated vehicle hears, and how it collects what it says.
+"""What a simulated vehicle hears, what its firmware says unasked, and how it collects all it says.
 
-A *channel* is one link to a ground station (a TCP connection, a UDP peer); the
-shell numbers them. Leaves out: bytes (sim.autopilot.codec) and sockets.
+Leaves out: which firmware says what (sim.autopilot.firmware).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum, auto
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 __all__ = [
     "Connected",
     "Disconnected",
-    "Event",
+    "FirmwareEvent",
+    "MavlinkReceived",
+    "Narrator",
     "Outbox",
+    "OutgoingMessage",
+    "OwnCommand",
     "Reboot",
-    "Received",
-    "Send",
     "Sender",
-    "Tick",
+    "TextTemplate",
+    "TimeAdvanced",
+    "VehicleEvent",
 ]
 
 
@@ -42,7 +47,7 @@ class Disconnected:
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
+class MavlinkReceived:
     """A well-formed message arrived."""
 
     channel: int
@@ -50,7 +55,7 @@ class Received:
 
 
 @dataclass(frozen=True, slots=True)
-class Tick:
+class TimeAdvanced:
     """Time has passed."""
 
 
@@ -59,11 +64,11 @@ class Reboot:
     """The autopilot loses power for a moment; in the air, the vehicle falls."""
 
 
-Event = Connected | Disconnected | Received | Tick | Reboot
+VehicleEvent = Connected | Disconnected | MavlinkReceived | TimeAdvanced | Reboot
 
 
 @dataclass(frozen=True, slots=True)
-class Send:
+class OutgoingMessage:
     """A message to put on one channel, or on all of them."""
 
     message: mavlink.MAVLink_message
@@ -86,7 +91,7 @@ class Outbox:
     """Messages in the order in which they are to be sent."""
 
     def __init__(self, *, numbers_texts: bool = False) -> None:
-        self._sends: list[Send] = []
+        self._sends: list[OutgoingMessage] = []
         self._numbers_texts = numbers_texts
         """Texts end in a tab, are numbered, and are sent in pieces if they are long."""
         self._text_number = 0
@@ -95,15 +100,15 @@ class Outbox:
 
     def broadcast(self, message: mavlink.MAVLink_message) -> None:
         """Say something to every ground station."""
-        self._sends.append(Send(message))
+        self._sends.append(OutgoingMessage(message))
 
     def reply(self, to: Sender, message: mavlink.MAVLink_message) -> None:
         """Say something on the channel of one ground station."""
-        self._sends.append(Send(message, to.channel))
+        self._sends.append(OutgoingMessage(message, to.channel))
 
     def on_channel(self, channel: int, message: mavlink.MAVLink_message) -> None:
         """Say something on one channel."""
-        self._sends.append(Send(message, channel))
+        self._sends.append(OutgoingMessage(message, channel))
 
     def text(self, severity: int, text: str) -> None:
         """Say a line to people (STATUSTEXT), cut at 50 characters unless texts are numbered."""
@@ -120,11 +125,111 @@ class Outbox:
             )
         self._text_number = self._text_number % 0xFFFF + 1
 
-    def put(self, sends: list[Send]) -> None:
+    def put(self, sends: list[OutgoingMessage]) -> None:
         """Say what was taken before."""
         self._sends += sends
 
-    def take(self) -> list[Send]:
+    def take(self) -> list[OutgoingMessage]:
         """All that was said since the last call."""
         sends, self._sends = self._sends, []
         return sends
+
+
+class FirmwareEvent(Enum):
+    """Something a firmware may speak of; in brackets the fields its text may name."""
+
+    ARMED = auto()
+    ARMING_REFUSED = auto()
+    """[obstacle]"""
+    NOT_READY = auto()
+    """Now and then, while arming would be refused [obstacle]."""
+    DISARMED = auto()
+    """By a command."""
+    DISARMED_UNUSED = auto()
+    """By itself, long after arming, on the ground."""
+    DISARMED_LANDED = auto()
+    """By itself, after landing."""
+    DISARMING_REFUSED = auto()
+    LIFTED_OFF = auto()
+    LANDED = auto()
+    TAKE_OFF_RAISED = auto()
+    """The height asked for was too low [height_m]."""
+    NO_SUCH_MODE = auto()
+    """[number]"""
+    MODE_REFUSED = auto()
+    """[mode, reason]"""
+    TARGET_OUTSIDE_FENCE = auto()
+    MISSION_RECEIVED = auto()
+    MISSION_REPLACED = auto()
+    """While it is flown, and the vehicle takes up the new one."""
+    MISSION_REPLACED_IN_VAIN = auto()
+    """While it is flown, and there is nothing left to fly."""
+    MISSION_BEGUN = auto()
+    MISSION_CLIMB = auto()
+    """Straight up, before the first item [height_m]."""
+    MISSION_UNAVAILABLE = auto()
+    """The mission mode was acknowledged and isn't entered; in the air."""
+    MISSION_UNAVAILABLE_ON_GROUND = auto()
+    MISSION_WITHOUT_TAKE_OFF = auto()
+    ITEM_BEGUN = auto()
+    """[seq, name]"""
+    WAYPOINT_REACHED = auto()
+    """[seq]"""
+    MISSION_OVER = auto()
+    """In the air."""
+    MISSION_OVER_ON_GROUND = auto()
+    RETURN_ORDERED = auto()
+    """By a command, from the ground or in a mission."""
+    RETURN_BEGUN = auto()
+    """[altitude_m, above_home_m]"""
+    RETURN_LANDING = auto()
+    """Above home."""
+    RETURN_LANDED = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class TextTemplate:
+    """A line for people."""
+
+    severity: int
+    """MAV_SEVERITY."""
+    template: str
+    """For `str.format`, with the fields of its occasion."""
+
+
+@dataclass(frozen=True, slots=True)
+class OwnCommand:
+    """A command to gimbals and cameras, which every ground station hears too."""
+
+    command: int
+    """MAV_CMD."""
+    params: tuple[float, float, float, float, float, float, float]
+
+
+class Narrator:
+    """Says what the firmware says on an occasion; mostly nothing."""
+
+    def __init__(
+        self,
+        outbox: Outbox,
+        texts: Mapping[FirmwareEvent, TextTemplate],
+        own_commands: Mapping[FirmwareEvent, OwnCommand],
+        system_id: int,
+    ) -> None:
+        self._outbox = outbox
+        self._texts = texts
+        self._own_commands = own_commands
+        self._system_id = system_id
+
+    def tell(self, occasion: FirmwareEvent, **fields: object) -> None:
+        """Speak of an occasion, with the fields that its text may name."""
+        text = self._texts.get(occasion)
+        if text is not None:
+            self._outbox.text(text.severity, text.template.format(**fields))
+        own = self._own_commands.get(occasion)
+        if own is not None:
+            self._outbox.broadcast(
+                mavlink.MAVLink_command_long_message(
+                    self._system_id, 0, own.command, 0, *own.params
+                )
+            )

@@ -14,21 +14,20 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.battery import Battery, ChargeLevel
+from sim.autopilot.battery import BatteryModel, ChargeLevel
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.events import Outbox
-from sim.autopilot.flavours.base import Flavour
-from sim.autopilot.flight import Flight
-from sim.autopilot.modes import Mode
-from sim.autopilot.occasions import Text
-from sim.autopilot.params import ParameterTable
+from sim.autopilot.events import Outbox, TextTemplate
+from sim.autopilot.firmware.model import FirmwareModel
+from sim.autopilot.flight import FlightMode, FlightStateMachine
+from sim.autopilot.parameters import ParameterTable
 from sim.autopilot.readiness import Readiness
-from sim.kinematics import Point
+from sim.world.motion import Point
 
-__all__ = ["FailSafePilot", "FailSafes"]
+__all__ = ["FailsafeMonitor", "FailsafePilot"]
 
-_RADIO = (Text(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe"),)
-_GROUND = (Text(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe"),)
+
+_RADIO = (TextTemplate(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe"),)
+_GROUND = (TextTemplate(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe"),)
 
 
 class _Cause(Enum):
@@ -40,23 +39,23 @@ class _Cause(Enum):
     RADIO = auto()
 
 
-class FailSafePilot(Protocol):
+class FailsafePilot(Protocol):
     """What failsafes ask of the autopilot."""
 
     config: VehicleConfig
-    flavour: Flavour
+    flavour: FirmwareModel
     outbox: Outbox
     readiness: Readiness
-    flight: Flight
+    flight: FlightStateMachine
     parameters: ParameterTable
-    mode: Mode
+    mode: FlightMode
     armed: bool
 
     def position_enu_m(self, now_s: float) -> Point:
         """Where the vehicle is [m]."""
         ...
 
-    def set_mode(self, mode: Mode, now_s: float) -> bool:
+    def set_mode(self, mode: FlightMode, now_s: float) -> bool:
         """Change the mode; False where that is refused."""
         ...
 
@@ -65,7 +64,7 @@ class FailSafePilot(Protocol):
         ...
 
 
-class FailSafes:
+class FailsafeMonitor:
     """The failsafes of one autopilot, from power-up on.
 
     Args:
@@ -73,10 +72,10 @@ class FailSafes:
         battery: what it flies on; outlasts a reboot.
     """
 
-    def __init__(self, pilot: FailSafePilot, battery: Battery) -> None:
+    def __init__(self, pilot: FailsafePilot, battery: BatteryModel) -> None:
         self._pilot = pilot
         self._battery = battery
-        self._habits = pilot.flavour.failsafe_habits
+        self._behaviour = pilot.flavour.failsafe_behaviour
         self._position_s: float | None = None
         self._ground_s: dict[int, float] = {}
         """When the heartbeat of each ground station was heard last, by system id."""
@@ -86,7 +85,7 @@ class FailSafes:
         """What the firmware has acted upon, and is not over."""
         self._latched = False
         """It goes on saying so until the motors stand, whatever the cause comes to."""
-        self._held: tuple[float, Mode] | None = None
+        self._held: tuple[float, FlightMode] | None = None
         """When it does more than hold its place, and what."""
         pilot.outbox.muted = False
 
@@ -101,13 +100,13 @@ class FailSafes:
         if _Cause.BATTERY in self._causes:
             return ("Battery 1 low voltage failsafe", "Battery failsafe")
         # PX4's health report goes by its failsafes; ArduCopter checks other things on the ground.
-        return ("Failsafe",) if self._causes and self._habits.words else ()
+        return ("Failsafe",) if self._causes and self._behaviour.words else ()
 
     def disarmed(self) -> None:
         """The motors stand."""
         self._held = None
         self._latched = False
-        if not self._habits.critical_when_disarmed:
+        if not self._behaviour.critical_when_disarmed:
             self._causes.clear()
         self._causes.discard(_Cause.RADIO)
 
@@ -135,7 +134,7 @@ class FailSafes:
         elif self._position_s is not None and self._position_s <= at_s:
             self._position_s = None
             if self._pilot.mode.needs_position:
-                self._act(_Cause.POSITION, Mode.LAND, self._habits.position_words, at_s)
+                self._act(_Cause.POSITION, FlightMode.LAND, self._behaviour.position_words, at_s)
         elif ground_s is not None and ground_s <= at_s:
             self._lose_ground(at_s)
         else:
@@ -145,13 +144,13 @@ class FailSafes:
         """A ground station is there."""
         self._ground_s[system_id] = now_s
         self._pilot.outbox.muted = False
-        deaf_s = now_s + self._habits.deaf_after_s
+        deaf_s = now_s + self._behaviour.deaf_after_s
         self._deaf_s = deaf_s if deaf_s < math.inf else None
         if _Cause.GROUND in self._causes and self._ground_lost_s() is not None:
             self._causes.discard(_Cause.GROUND)
             if not self._causes:
                 self._held = None
-            regained = self._habits.ground_regained
+            regained = self._behaviour.ground_regained
             self._pilot.outbox.text(regained.severity, regained.template)
 
     def _ground_lost_s(self) -> float | None:
@@ -184,7 +183,7 @@ class FailSafes:
 
     def lose_radio(self, now_s: float) -> None:
         """Return, as when the remote control is not heard any more."""
-        self._act(_Cause.RADIO, Mode.RTL, _RADIO, now_s)
+        self._act(_Cause.RADIO, FlightMode.RTL, _RADIO, now_s)
 
     def _protect_battery(self, at_s: float) -> None:
         level = self._battery.advance(at_s)
@@ -195,48 +194,50 @@ class FailSafes:
             "used_mah": used_mah,
         }
         words = tuple(
-            Text(text.severity, text.template.format(**fields))
-            for text in self._habits.battery_words
+            TextTemplate(text.severity, text.template.format(**fields))
+            for text in self._behaviour.battery_words
         )
-        mode = Mode.RTL if level is ChargeLevel.LOW else Mode.LAND
+        mode = FlightMode.RTL if level is ChargeLevel.LOW else FlightMode.LAND
         self._act(_Cause.BATTERY, mode, words, at_s)
 
-    def _act(self, cause: _Cause, mode: Mode, words: tuple[Text, ...], now_s: float) -> None:
+    def _act(
+        self, cause: _Cause, mode: FlightMode, words: tuple[TextTemplate, ...], now_s: float
+    ) -> None:
         """Do what the parameters say, at once or after a hold; only what returns is put off."""
         pilot = self._pilot
         if not pilot.armed:
             return
         self._causes.add(cause)
-        self._latched = not self._habits.critical_when_disarmed
-        own = bool(self._habits.words)
+        self._latched = not self._behaviour.critical_when_disarmed
+        own = bool(self._behaviour.words)
         if own and cause is not _Cause.BATTERY:
             words = ()
-        if mode is Mode.RTL and self._habits.hold_s > 0.0 and not pilot.flight.on_ground:
-            self._held = (now_s + self._habits.hold_s, mode)
-            self._say((*words, *self._habits.hold_words))
+        if mode is FlightMode.RTL and self._behaviour.hold_s > 0.0 and not pilot.flight.on_ground:
+            self._held = (now_s + self._behaviour.hold_s, mode)
+            self._say((*words, *self._behaviour.hold_words))
             pilot.set_mode(pilot.flavour.modes.for_reposition, now_s)
         else:
             self._held = None
             self._take_over(mode, words, now_s)
 
-    def _take_over(self, mode: Mode, words: tuple[Text, ...], now_s: float) -> None:
+    def _take_over(self, mode: FlightMode, words: tuple[TextTemplate, ...], now_s: float) -> None:
         """Enter the mode; on the ground, stop the motors instead.
 
         ArduCopter tells the mode some milliseconds before the words, which wait in line; PX4
         says the words first, and tells the mode with its next heartbeat.
         """
         pilot = self._pilot
-        words_first = bool(self._habits.words)
+        words_first = bool(self._behaviour.words)
         if words_first:
-            self._say((*words, *self._habits.words))
+            self._say((*words, *self._behaviour.words))
         on_ground = pilot.flight.on_ground
         if not on_ground and not pilot.set_mode(mode, now_s):
-            pilot.set_mode(Mode.LAND, now_s)
+            pilot.set_mode(FlightMode.LAND, now_s)
         if not words_first:
             self._say(words)
         if on_ground:
             pilot.disarm(now_s, forced=False)
 
-    def _say(self, words: tuple[Text, ...]) -> None:
+    def _say(self, words: tuple[TextTemplate, ...]) -> None:
         for text in words:
             self._pilot.outbox.text(text.severity, text.template)

@@ -1,7 +1,7 @@
 """A simulated vehicle to which faults happen, each at its own instant.
 
-It takes the place of a `Vehicle` and is driven in the same way. Leaves out: what the faults
-mean in words (sim.autopilot.faults).
+It takes the place of a `SimulatedAutopilot` and is driven in the same way. Leaves out: what the
+faults mean in words (sim.autopilot.faults).
 """
 
 from __future__ import annotations
@@ -12,14 +12,20 @@ from dataclasses import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.events import Event, Reboot, Received, Send, Tick
+from sim.autopilot.events import (
+    MavlinkReceived,
+    OutgoingMessage,
+    Reboot,
+    TimeAdvanced,
+    VehicleEvent,
+)
 from sim.autopilot.faults import FaultKind, VehicleFault
-from sim.autopilot.flight import Activity
-from sim.autopilot.modes import Mode
+from sim.autopilot.flight import FlightMode, MotionPhase
 from sim.autopilot.pilot import Pilot
-from sim.autopilot.vehicle import COMPONENT_ID, Vehicle
+from sim.autopilot.vehicle import COMPONENT_ID, SimulatedAutopilot
 
-__all__ = ["FaultyVehicle"]
+__all__ = ["FaultyAutopilot"]
+
 
 _DEFECT = "Compass not healthy"
 _SYSTEM_IDS = 254
@@ -27,11 +33,11 @@ _PILOT_MODE = {mavlink.MAV_AUTOPILOT_PX4: 3 << 16}
 """Number of the mode a pilot flies in: POSCTL on PX4, LOITER on ArduCopter."""
 _LOITER = 5
 
-_NAVIGATION = frozenset({Activity.NAVIGATING})
-_NEEDS_POSITION = frozenset({Activity.NAVIGATING, Activity.RETURNING})
+_NAVIGATION = frozenset({MotionPhase.NAVIGATING})
+_NEEDS_POSITION = frozenset({MotionPhase.NAVIGATING, MotionPhase.RETURNING})
 
 
-class FaultyVehicle:
+class FaultyAutopilot:
     """A vehicle and its faults.
 
     Args:
@@ -40,7 +46,9 @@ class FaultyVehicle:
         start_s: when it is powered up [s].
     """
 
-    def __init__(self, vehicle: Vehicle, faults: tuple[VehicleFault, ...], start_s: float) -> None:
+    def __init__(
+        self, vehicle: SimulatedAutopilot, faults: tuple[VehicleFault, ...], start_s: float
+    ) -> None:
         self._vehicle = vehicle
         self._unscheduled = [fault for fault in faults if fault.at_s > 0.0]
         """Faults that wait for the first arming."""
@@ -49,7 +57,7 @@ class FaultyVehicle:
         self._active: list[VehicleFault] = []
         self._pilot = vehicle.pilot
         """The one that has been told of the active faults."""
-        self._mode_before: Mode | None = None
+        self._mode_before: FlightMode | None = None
         """What the vehicle flew in when the pilot took over."""
         self._schedule([fault for fault in faults if fault.at_s == 0.0], start_s)
 
@@ -68,18 +76,18 @@ class FaultyVehicle:
         deadline_s = self._vehicle.next_deadline_s()
         return min(deadline_s, self._ahead[0][0]) if self._ahead else deadline_s
 
-    def step(self, event: Event, now_s: float) -> list[Send]:
+    def step(self, event: VehicleEvent, now_s: float) -> list[OutgoingMessage]:
         """Take an event at ``now_s``, after the faults that are due by then.
 
         Returns:
             What is to be sent, in order.
         """
-        said: list[Send] = []
+        said: list[OutgoingMessage] = []
         while self._ahead and self._ahead[0][0] <= now_s:
             at_s, begins, fault = self._ahead.pop(0)
-            said += self._take(Tick(), at_s)
+            said += self._take(TimeAdvanced(), at_s)
             said += self._begin(fault, at_s) if begins else self._end(fault, at_s)
-        if isinstance(event, Received) and self._active:
+        if isinstance(event, MavlinkReceived) and self._active:
             said += self._receive(event, now_s)
         else:
             said += self._take(event, now_s)
@@ -99,7 +107,7 @@ class FaultyVehicle:
     def _is(self, kind: FaultKind) -> bool:
         return any(fault.kind is kind for fault in self._active)
 
-    def _begin(self, fault: VehicleFault, at_s: float) -> list[Send]:
+    def _begin(self, fault: VehicleFault, at_s: float) -> list[OutgoingMessage]:
         pilot = self._vehicle.pilot
         match fault.kind:
             case FaultKind.REBOOT:
@@ -115,20 +123,20 @@ class FaultyVehicle:
             case _:
                 self._active.append(fault)
                 self._apply(at_s)
-        return self._take(Tick(), at_s)
+        return self._take(TimeAdvanced(), at_s)
 
-    def _end(self, fault: VehicleFault, at_s: float) -> list[Send]:
+    def _end(self, fault: VehicleFault, at_s: float) -> list[OutgoingMessage]:
         self._active.remove(fault)
         if fault.kind is FaultKind.PILOT and self._mode_before is not None:
             self._vehicle.pilot.set_mode(self._mode_before, at_s)
         self._apply(at_s)
-        return self._take(Tick(), at_s)
+        return self._take(TimeAdvanced(), at_s)
 
     def _apply(self, now_s: float) -> None:
         """Make the autopilot have the active faults, and no others."""
         pilot = self._pilot = self._vehicle.pilot
         pilot.readiness.defect = _DEFECT if self._is(FaultKind.REFUSE_ARMING) else None
-        hindered: frozenset[Activity] = frozenset()
+        hindered: frozenset[MotionPhase] = frozenset()
         if self._is(FaultKind.STUCK):
             hindered |= _NAVIGATION
         if self._is(FaultKind.GPS_LOST):
@@ -144,15 +152,15 @@ class FaultyVehicle:
             raise ValueError("the firmware has no mode for pilots")
         pilot.set_mode(mode, now_s)
 
-    def _receive(self, event: Received, now_s: float) -> list[Send]:
+    def _receive(self, event: MavlinkReceived, now_s: float) -> list[OutgoingMessage]:
         """Hear a message the way a vehicle with faults does."""
         message = event.message
         target = getattr(message, "target_system", 0)
         own_id = self.config.system_id
         if self._is(FaultKind.SILENT):
-            return self._take(Tick(), now_s)
+            return self._take(TimeAdvanced(), now_s)
         if self._is(FaultKind.WRONG_ID) and target == own_id:
-            return self._take(Tick(), now_s)
+            return self._take(TimeAdvanced(), now_s)
         if (
             self._is(FaultKind.REJECT_MISSION)
             and message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_COUNT
@@ -165,16 +173,19 @@ class FaultyVehicle:
                 mavlink.MAV_MISSION_ERROR,
                 message.mission_type,
             )
-            return [*self._take(Tick(), now_s), *self._altered([Send(refusal, event.channel)])]
+            return [
+                *self._take(TimeAdvanced(), now_s),
+                *self._altered([OutgoingMessage(refusal, event.channel)]),
+            ]
         return self._take(event, now_s)
 
-    def _take(self, event: Event, now_s: float) -> list[Send]:
+    def _take(self, event: VehicleEvent, now_s: float) -> list[OutgoingMessage]:
         said = self._vehicle.step(event, now_s)
         if self._vehicle.pilot is not self._pilot:  # it has begun anew, and knows of no faults
             self._apply(now_s)
         return self._altered(said) if self._active else said
 
-    def _altered(self, said: list[Send]) -> list[Send]:
+    def _altered(self, said: list[OutgoingMessage]) -> list[OutgoingMessage]:
         """What others hear of it."""
         if self._is(FaultKind.SILENT):
             return []

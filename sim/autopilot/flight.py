@@ -1,7 +1,8 @@
-"""The vehicle in the air: what it is doing, and what comes after that by itself.
+"""The vehicle in the air: its flight mode, what it is doing, and what comes after by itself.
 
-Leaves out: modes and permissions (sim.autopilot.pilot), missions
-(sim.autopilot.mission_run) and motion itself (sim.kinematics).
+Leaves out: the numbers of modes (sim.autopilot.firmware), what flying in them means and who may
+choose them (sim.autopilot.pilot), missions (sim.autopilot.mission_run) and motion itself
+(sim.world.motion).
 """
 
 from __future__ import annotations
@@ -9,17 +10,45 @@ from __future__ import annotations
 from enum import Enum
 
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.params import ParameterTable, Setting
-from sim.kinematics import Motion, Point
+from sim.autopilot.parameters import ParameterRole, ParameterTable
+from sim.world.motion import Motion, Point
 
-__all__ = ["Activity", "Flight", "Milestone"]
+__all__ = ["FlightMode", "FlightStateMachine", "Milestone", "MotionPhase"]
+
+
+class FlightMode(Enum):
+    """What the vehicle flies by; the value is the name people see on ArduPilot."""
+
+    MANUAL = "MANUAL"
+    STABILIZE = "STABILIZE"
+    ALT_HOLD = "ALT_HOLD"
+    LOITER = "LOITER"
+    POSHOLD = "POSHOLD"
+    BRAKE = "BRAKE"
+    GUIDED = "GUIDED"
+    TAKEOFF = "TAKEOFF"
+    AUTO = "AUTO"
+    RTL = "RTL"
+    LAND = "LAND"
+
+    @property
+    def needs_position(self) -> bool:
+        """Whether it can be armed, or entered in flight, only with a position estimate."""
+        return self.controls_position and self is not FlightMode.LAND
+
+    @property
+    def controls_position(self) -> bool:
+        """Whether the autopilot itself holds the horizontal position."""
+        return self not in (FlightMode.MANUAL, FlightMode.STABILIZE, FlightMode.ALT_HOLD)
+
 
 _FALL_M_S = 10.0
 """Speed of a vehicle whose motors were stopped in the air [m/s]."""
+
 _LEAST_SPEED_M_S = 0.01
 
 
-class Activity(Enum):
+class MotionPhase(Enum):
     """What the vehicle is doing."""
 
     GROUNDED = "on the ground"
@@ -44,11 +73,11 @@ class Milestone(Enum):
     UNDERWAY = "one activity followed another"
 
 
-class Flight:
+class FlightStateMachine:
     """One activity at a time, each with the instant at which it ends by itself."""
 
     def __init__(self, config: VehicleConfig, parameters: ParameterTable, motion: Motion) -> None:
-        self.activity = Activity.GROUNDED
+        self.activity = MotionPhase.GROUNDED
         self.home_enu_m: Point = config.start_enu_m
         """Where the vehicle returns to and heights are counted from [m]."""
         self.motion = motion
@@ -62,27 +91,30 @@ class Flight:
         self._timer_s: float | None = None
         self._order: tuple[Point, float] = (config.start_enu_m, _LEAST_SPEED_M_S)
         """Place [m] and speed [m/s] of the last leg."""
-        self._hindered: frozenset[Activity] = frozenset()
+        self._hindered: frozenset[MotionPhase] = frozenset()
 
     @property
     def on_ground(self) -> bool:
         """Whether the vehicle knows that it stands on the ground."""
-        return self.activity in (Activity.GROUNDED, Activity.SPOOLING_UP)
+        return self.activity in (MotionPhase.GROUNDED, MotionPhase.SPOOLING_UP)
 
     @property
     def cruise_m_s(self) -> float:
         """Speed of the next leg [m/s]."""
         if self._cruise_override_m_s is not None:
             return self._cruise_override_m_s
-        return max(_LEAST_SPEED_M_S, self._parameters.value_si(Setting.CRUISE_M_S))
+        return max(_LEAST_SPEED_M_S, self._parameters.value_si(ParameterRole.CRUISE_M_S))
 
     def override_cruise(self, speed_m_s: float | None, now_s: float) -> None:
         """Fly on at another speed [m/s], until None gives the parameter its say again."""
         self._cruise_override_m_s = speed_m_s
-        if speed_m_s is not None and self.activity in (Activity.NAVIGATING, Activity.RETURNING):
+        if speed_m_s is not None and self.activity in (
+            MotionPhase.NAVIGATING,
+            MotionPhase.RETURNING,
+        ):
             self._fly(self._order[0], speed_m_s, now_s)
 
-    def hinder(self, activities: frozenset[Activity], now_s: float) -> None:
+    def hinder(self, activities: frozenset[MotionPhase], now_s: float) -> None:
         """Keep the vehicle where it is during these activities, until told otherwise."""
         was_hindered = self.activity in self._hindered
         self._hindered = activities
@@ -96,104 +128,108 @@ class Flight:
     def take_off(self, up_m: float, now_s: float) -> None:
         """Rise straight to a height in the local frame [m], once the motors are up to it."""
         self._take_off_up_m = up_m
-        if self.activity is Activity.GROUNDED:
-            self.activity = Activity.SPOOLING_UP
+        if self.activity is MotionPhase.GROUNDED:
+            self.activity = MotionPhase.SPOOLING_UP
             self._timer_s = now_s + self._spool_up_s
-        elif self.activity is not Activity.SPOOLING_UP:
+        elif self.activity is not MotionPhase.SPOOLING_UP:
             self._lift(now_s)
 
     def navigate(self, target_enu_m: Point, now_s: float, speed_m_s: float | None = None) -> None:
         """Fly straight to a place, in place of whatever was being done."""
         speed_m_s = self.cruise_m_s if speed_m_s is None else speed_m_s
-        self._leave(Activity.NAVIGATING, target_enu_m, speed_m_s, now_s)
+        self._leave(MotionPhase.NAVIGATING, target_enu_m, speed_m_s, now_s)
 
     def hold(self, now_s: float) -> None:
         """Stay in the air where the vehicle is; on the ground, stay there."""
         self.motion.stop(now_s)
         self._timer_s = None
-        if self.on_ground or self.activity is Activity.TOUCHED_DOWN:
-            self.activity = Activity.GROUNDED
+        if self.on_ground or self.activity is MotionPhase.TOUCHED_DOWN:
+            self.activity = MotionPhase.GROUNDED
         else:
-            self.activity = Activity.HOLDING
+            self.activity = MotionPhase.HOLDING
 
     def land(self, now_s: float) -> None:
         """Descend where the vehicle is; nothing to do on the ground."""
         if self.on_ground:
             self.hold(now_s)
-        elif self.activity is not Activity.TOUCHED_DOWN:
-            self._descend(Activity.LANDING, self._speed(Setting.LAND_M_S), now_s)
+        elif self.activity is not MotionPhase.TOUCHED_DOWN:
+            self._descend(MotionPhase.LANDING, self._speed(ParameterRole.LAND_M_S), now_s)
 
     def fall(self, now_s: float) -> None:
         """Drop, because the motors stand still."""
-        if self.on_ground or self.activity is Activity.TOUCHED_DOWN:
+        if self.on_ground or self.activity is MotionPhase.TOUCHED_DOWN:
             self.hold(now_s)
         else:
-            self._descend(Activity.FALLING, _FALL_M_S, now_s)
+            self._descend(MotionPhase.FALLING, _FALL_M_S, now_s)
 
     def return_home(self, now_s: float) -> None:
         """Rise to the return height if below it, fly home, wait, land."""
         if self.on_ground:
             self.hold(now_s)
-        if self.activity in (Activity.GROUNDED, Activity.TOUCHED_DOWN):
+        if self.activity in (MotionPhase.GROUNDED, MotionPhase.TOUCHED_DOWN):
             return
         east_m, north_m, up_m = self._stopped_enu_m(now_s)
-        return_up_m = self.home_enu_m[2] + self._parameters.value_si(Setting.RETURN_HEIGHT_M)
+        return_up_m = self.home_enu_m[2] + self._parameters.value_si(ParameterRole.RETURN_HEIGHT_M)
         target_enu_m = (east_m, north_m, max(up_m, return_up_m))
-        self._leave(Activity.CLIMBING, target_enu_m, self._speed(Setting.CLIMB_M_S), now_s)
+        self._leave(MotionPhase.CLIMBING, target_enu_m, self._speed(ParameterRole.CLIMB_M_S), now_s)
 
     def deadline_s(self) -> float | None:
         """When the activity ends by itself [s]; None if it lasts."""
-        if self.activity in (Activity.GROUNDED, Activity.HOLDING):
+        if self.activity in (MotionPhase.GROUNDED, MotionPhase.HOLDING):
             return None
         return self.motion.arrives_s if self._timer_s is None else self._timer_s
 
     def advance(self, at_s: float) -> Milestone:
         """End the current activity at its deadline ``at_s`` and begin what follows."""
         match self.activity:
-            case Activity.SPOOLING_UP:
+            case MotionPhase.SPOOLING_UP:
                 self._lift(at_s)
-            case Activity.TAKING_OFF:
+            case MotionPhase.TAKING_OFF:
                 self.hold(at_s)
                 return Milestone.TAKEN_OFF
-            case Activity.NAVIGATING:
+            case MotionPhase.NAVIGATING:
                 self.hold(at_s)
                 return Milestone.REACHED
-            case Activity.CLIMBING:
+            case MotionPhase.CLIMBING:
                 _, _, up_m = self.motion.target_enu_m
                 above_home_enu_m = (*self.home_enu_m[:2], up_m)
-                self._leave(Activity.RETURNING, above_home_enu_m, self.cruise_m_s, at_s)
-            case Activity.RETURNING:
+                self._leave(MotionPhase.RETURNING, above_home_enu_m, self.cruise_m_s, at_s)
+            case MotionPhase.RETURNING:
                 self.hold(at_s)
-                self.activity = Activity.WAITING
-                self._timer_s = at_s + max(0.0, self._parameters.value_si(Setting.RETURN_WAIT_S))
-            case Activity.WAITING:
+                self.activity = MotionPhase.WAITING
+                self._timer_s = at_s + max(
+                    0.0, self._parameters.value_si(ParameterRole.RETURN_WAIT_S)
+                )
+            case MotionPhase.WAITING:
                 self.land(at_s)
-            case Activity.LANDING:
+            case MotionPhase.LANDING:
                 self.motion.stop(at_s)
-                self.activity = Activity.TOUCHED_DOWN
+                self.activity = MotionPhase.TOUCHED_DOWN
                 self._timer_s = at_s + self._touchdown_s
-            case Activity.TOUCHED_DOWN | Activity.FALLING:
-                self.activity = Activity.TOUCHED_DOWN
+            case MotionPhase.TOUCHED_DOWN | MotionPhase.FALLING:
+                self.activity = MotionPhase.TOUCHED_DOWN
                 self.hold(at_s)
                 return Milestone.LANDED
-            case Activity.GROUNDED | Activity.HOLDING:
+            case MotionPhase.GROUNDED | MotionPhase.HOLDING:
                 pass
         return Milestone.UNDERWAY
 
     def _lift(self, now_s: float) -> None:
         east_m, north_m, _ = self._stopped_enu_m(now_s)
         target_enu_m = (east_m, north_m, self._take_off_up_m)
-        self._leave(Activity.TAKING_OFF, target_enu_m, self._speed(Setting.TAKE_OFF_M_S), now_s)
+        self._leave(
+            MotionPhase.TAKING_OFF, target_enu_m, self._speed(ParameterRole.TAKE_OFF_M_S), now_s
+        )
 
-    def _speed(self, setting: Setting) -> float:
+    def _speed(self, setting: ParameterRole) -> float:
         return max(_LEAST_SPEED_M_S, self._parameters.value_si(setting))
 
-    def _descend(self, activity: Activity, speed_m_s: float, now_s: float) -> None:
+    def _descend(self, activity: MotionPhase, speed_m_s: float, now_s: float) -> None:
         east_m, north_m, _ = self._stopped_enu_m(now_s)
         self._leave(activity, (east_m, north_m, self._ground_up_m), speed_m_s, now_s)
 
     def _leave(
-        self, activity: Activity, target_enu_m: Point, speed_m_s: float, now_s: float
+        self, activity: MotionPhase, target_enu_m: Point, speed_m_s: float, now_s: float
     ) -> None:
         self.activity = activity
         self._timer_s = None

@@ -10,21 +10,21 @@ from dataclasses import replace
 from typing import Protocol
 
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.flavours.base import Flavour
-from sim.autopilot.flight import Flight, Milestone
-from sim.autopilot.mission_items import MissionItem, item_place_enu_m
-from sim.autopilot.modes import Mode
-from sim.autopilot.occasions import Narrator, Occasion
-from sim.autopilot.params import ParameterTable, Setting
-from sim.kinematics import Point
+from sim.autopilot.events import FirmwareEvent, Narrator
+from sim.autopilot.firmware.model import FirmwareModel
+from sim.autopilot.flight import FlightMode, FlightStateMachine, Milestone
+from sim.autopilot.mission_store import StoredMissionItem, item_place_enu_m
+from sim.autopilot.parameters import ParameterRole, ParameterTable
+from sim.world.motion import Point
 
-__all__ = ["Helm", "MissionFlight"]
+__all__ = ["FlightControls", "MissionFlight"]
+
 
 _CLIMB_LEAST_M = 0.8
 """Less than this is not climbed before the first item [m]."""
 
 
-class Helm(Protocol):
+class FlightControls(Protocol):
     """What flying a mission asks of the pilot."""
 
     narrator: Narrator
@@ -33,7 +33,7 @@ class Helm(Protocol):
         """Where the vehicle is [m]."""
         ...
 
-    def enter(self, mode: Mode, now_s: float) -> None:
+    def enter(self, mode: FlightMode, now_s: float) -> None:
         """Be in a mode from now on."""
         ...
 
@@ -59,10 +59,10 @@ class MissionFlight:
 
     def __init__(
         self,
-        helm: Helm,
+        helm: FlightControls,
         config: VehicleConfig,
-        flavour: Flavour,
-        flight: Flight,
+        flavour: FirmwareModel,
+        flight: FlightStateMachine,
         parameters: ParameterTable,
     ) -> None:
         self.climb_due = False
@@ -72,7 +72,7 @@ class MissionFlight:
         self._flavour = flavour
         self._flight = flight
         self._parameters = parameters
-        self._after_climb: MissionItem | None = None
+        self._after_climb: StoredMissionItem | None = None
         self._speed_m_s: float | None = None
         """What the mission asked for, if it did."""
 
@@ -89,13 +89,13 @@ class MissionFlight:
         self._flight.navigate(self._place(item, at_s), at_s)
         return True
 
-    def mission_take_off(self, item: MissionItem, now_s: float) -> None:
+    def mission_take_off(self, item: StoredMissionItem, now_s: float) -> None:
         """Rise to the height of the item, at least to where the vehicle is."""
         self.climb_due = False
         place = self._place(replace(item, lat_e7=0, lon_e7=0), now_s)
         self._helm.lift(max(place[2], self._helm.position_enu_m(now_s)[2]), now_s)
 
-    def mission_navigate(self, item: MissionItem, now_s: float) -> None:
+    def mission_navigate(self, item: StoredMissionItem, now_s: float) -> None:
         """Fly to the place of the item; from the ground only where it is risen to first."""
         self._after_climb = None
         if self._speed_m_s is not None:
@@ -106,11 +106,11 @@ class MissionFlight:
             self.climb_due = False
             self._after_climb = item
             height_m = place[2] - self._flight.home_enu_m[2]
-            self._helm.narrator.tell(Occasion.MISSION_CLIMB, height_m=height_m)
+            self._helm.narrator.tell(FirmwareEvent.MISSION_CLIMB, height_m=height_m)
             if self._flight.on_ground:
                 self._helm.lift(place[2], now_s)
             else:
-                climb_m_s = self._parameters.value_si(Setting.CLIMB_M_S)
+                climb_m_s = self._parameters.value_si(ParameterRole.CLIMB_M_S)
                 self._flight.navigate((east_m, north_m, place[2]), now_s, climb_m_s)
         elif self._flight.on_ground:
             self._helm.stay_on_ground(now_s)
@@ -131,8 +131,8 @@ class MissionFlight:
     def mission_return(self, now_s: float) -> None:
         """Return home and land, in the mode for it where the mission ends so."""
         if self._flavour.missions.forgets_mode:
-            self._helm.narrator.tell(Occasion.RETURN_ORDERED)
-            self._helm.enter(Mode.RTL, now_s)
+            self._helm.narrator.tell(FirmwareEvent.RETURN_ORDERED)
+            self._helm.enter(FlightMode.RTL, now_s)
         else:
             self._flight.return_home(now_s)
 
@@ -145,16 +145,16 @@ class MissionFlight:
         """Stay where the last item ended: in the air, or on the ground with motors stopped."""
         on_ground = self._flight.on_ground
         self._helm.narrator.tell(
-            Occasion.MISSION_OVER_ON_GROUND if on_ground else Occasion.MISSION_OVER
+            FirmwareEvent.MISSION_OVER_ON_GROUND if on_ground else FirmwareEvent.MISSION_OVER
         )
-        motors_stop = on_ground and self._flavour.disarm_delay(Mode.LAND) is None
+        motors_stop = on_ground and self._flavour.disarm_delay(FlightMode.LAND) is None
         self._helm.finish_task(now_s, motors_stop=motors_stop)
         if not on_ground and self._flavour.missions.forgets_mode:
             self._helm.enter(self._flavour.modes.for_reposition, now_s)
         elif not on_ground:
             self._flight.hold(now_s)
 
-    def _place(self, item: MissionItem, now_s: float) -> Point:
+    def _place(self, item: StoredMissionItem, now_s: float) -> Point:
         return item_place_enu_m(
             item,
             self._config.origin,

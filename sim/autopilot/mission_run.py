@@ -11,20 +11,20 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.events import Outbox
-from sim.autopilot.flavours.base import MissionHabits
+from sim.autopilot.events import FirmwareEvent, Narrator, Outbox
+from sim.autopilot.firmware.model import MissionBehaviour
 from sim.autopilot.flight import Milestone
-from sim.autopilot.mission_items import MissionItem, MissionStore
-from sim.autopilot.occasions import Narrator, Occasion
+from sim.autopilot.mission_store import MissionStore, StoredMissionItem
 
-__all__ = ["MissionPilot", "MissionRun", "RunState"]
+__all__ = ["MissionPilot", "MissionRun", "MissionRunState"]
+
 
 _ITEMS_COMPARED = 3
 """Navigation items, from the current one, whose change makes the autopilot start it anew."""
 _REPEAT_S = 1.0
 
 
-class RunState(Enum):
+class MissionRunState(Enum):
     """How far the mission has come."""
 
     NOT_STARTED = "not started"
@@ -36,11 +36,11 @@ class RunState(Enum):
 class MissionPilot(Protocol):
     """What a mission asks of the vehicle."""
 
-    def mission_take_off(self, item: MissionItem, now_s: float) -> None:
+    def mission_take_off(self, item: StoredMissionItem, now_s: float) -> None:
         """Rise to the height of the item."""
         ...
 
-    def mission_navigate(self, item: MissionItem, now_s: float) -> None:
+    def mission_navigate(self, item: StoredMissionItem, now_s: float) -> None:
         """Fly to the place of the item."""
         ...
 
@@ -74,9 +74,9 @@ class MissionRun:
         pilot: MissionPilot,
         outbox: Outbox,
         narrator: Narrator,
-        habits: MissionHabits,
+        behaviour: MissionBehaviour,
     ) -> None:
-        self.state = RunState.NOT_STARTED
+        self.state = MissionRunState.NOT_STARTED
         self.current: int | None = None
         """Number of the item being flown, or to be flown on resuming."""
         self.told = 0
@@ -85,8 +85,8 @@ class MissionRun:
         self._pilot = pilot
         self._outbox = outbox
         self._narrator = narrator
-        self._habits = habits
-        self._first_seq = habits.first_item
+        self._behaviour = behaviour
+        self._first_seq = behaviour.first_item
         self._repeat_s: float | None = None
         self._repeats_left = 0
         self._reached_seq = 0
@@ -110,7 +110,7 @@ class MissionRun:
         """Whether the mission runs, and lets targets be told."""
         item = self._current_item()
         gives_way = item is not None and item.command == mavlink.MAV_CMD_NAV_GUIDED_ENABLE
-        return self.state is RunState.RUNNING and gives_way
+        return self.state is MissionRunState.RUNNING and gives_way
 
     @property
     def starts_with_take_off(self) -> bool:
@@ -122,17 +122,17 @@ class MissionRun:
     def start_or_resume(self, now_s: float) -> None:
         """Go on with the current item; from the beginning if there is none."""
         self._limit_s = 0.0
-        if self.state is RunState.STOPPED and self.current is not None:
-            self.state = RunState.RUNNING
+        if self.state is MissionRunState.STOPPED and self.current is not None:
+            self.state = MissionRunState.RUNNING
             self._begin_from(self.current if self._set_seq is None else self._set_seq, now_s)
             return
-        self.state = RunState.RUNNING
+        self.state = MissionRunState.RUNNING
         self._begin_from(self._first_seq, now_s)
 
     def stop(self) -> None:
         """Leave the mission where it is; `start_or_resume` flies the current item again."""
-        if self.state is RunState.RUNNING:
-            self.state = RunState.STOPPED
+        if self.state is MissionRunState.RUNNING:
+            self.state = MissionRunState.STOPPED
         self._hold_until_s = None
         self._repeat_s = None
 
@@ -140,14 +140,14 @@ class MissionRun:
         """Forget the place in the mission, as disarming does."""
         self.stop()
         self.current = self._set_seq = None
-        if self.state is RunState.COMPLETE and not self._habits.restarts:
-            self.state = RunState.NOT_STARTED
-        if not self._habits.keeps_number:
+        if self.state is MissionRunState.COMPLETE and not self._behaviour.restarts:
+            self.state = MissionRunState.NOT_STARTED
+        if not self._behaviour.keeps_number:
             self.told = 0
 
     def clear(self) -> bool:
         """Delete the mission; False while it is being flown."""
-        if self.state is RunState.RUNNING:
+        if self.state is MissionRunState.RUNNING:
             return False
         self._store.replace(())
         self._rewind()
@@ -158,23 +158,23 @@ class MissionRun:
         first = self._store.next_navigation(max(seq, self._first_seq))
         if seq >= len(self._store.items) or first is None:
             return False
-        if self.state is RunState.RUNNING:
+        if self.state is MissionRunState.RUNNING:
             self._begin_from(max(seq, self._first_seq), now_s)
         else:
-            self._go_to(seq if self._habits.upload_rewinds else first)
+            self._go_to(seq if self._behaviour.upload_rewinds else first)
             self._set_seq = max(seq, self._first_seq)
-            self.state = RunState.STOPPED
+            self.state = MissionRunState.STOPPED
         return True
 
-    def mission_changed(self, old: tuple[MissionItem, ...], now_s: float) -> bool:
+    def mission_changed(self, old: tuple[StoredMissionItem, ...], now_s: float) -> bool:
         """Take up a mission that replaced ``old`` while this one ran; True if it made a change.
 
         The current item is begun anew if it or one of the next two differs and it gives
         no way to targets, as ArduCopter does, or the whole mission if anything differs, where
         the firmware goes back to the first item; otherwise the vehicle flies on.
         """
-        rewinds = self._habits.upload_rewinds and old != self._store.items
-        if self.state is not RunState.RUNNING:
+        rewinds = self._behaviour.upload_rewinds and old != self._store.items
+        if self.state is not MissionRunState.RUNNING:
             if not self._store.items or rewinds:
                 self._rewind()
             return False
@@ -210,7 +210,11 @@ class MissionRun:
     def on_milestone(self, milestone: Milestone, at_s: float) -> None:
         """Hear what the flight came to while the mission runs."""
         item = self._current_item()
-        if self.state is not RunState.RUNNING or item is None or self._hold_until_s is not None:
+        if (
+            self.state is not MissionRunState.RUNNING
+            or item is None
+            or self._hold_until_s is not None
+        ):
             return
         match item.command, milestone:
             case mavlink.MAV_CMD_NAV_TAKEOFF, Milestone.TAKEN_OFF:
@@ -228,14 +232,14 @@ class MissionRun:
             ):
                 self._complete_current(at_s)
 
-    def _current_item(self) -> MissionItem | None:
+    def _current_item(self) -> StoredMissionItem | None:
         return None if self.current is None else self._store.item(self.current)
 
-    def _gave_way(self, items: tuple[MissionItem, ...]) -> bool:
+    def _gave_way(self, items: tuple[StoredMissionItem, ...]) -> bool:
         current = self.current or 0
         return current < len(items) and items[current].command == mavlink.MAV_CMD_NAV_GUIDED_ENABLE
 
-    def _upcoming(self, items: tuple[MissionItem, ...]) -> list[MissionItem]:
+    def _upcoming(self, items: tuple[StoredMissionItem, ...]) -> list[StoredMissionItem]:
         upcoming = [item for item in items[self.current or 0 :] if item.is_navigation]
         return upcoming[:_ITEMS_COMPARED]
 
@@ -246,7 +250,7 @@ class MissionRun:
         self.begun = True
         done: list[int] = []
         while (item := self._store.item(seq)) is not None:
-            self._narrator.tell(Occasion.ITEM_BEGUN, seq=seq, name=item.name)
+            self._narrator.tell(FirmwareEvent.ITEM_BEGUN, seq=seq, name=item.name)
             if item.is_navigation:
                 break
             if item.command == mavlink.MAV_CMD_DO_GUIDED_LIMITS:
@@ -262,11 +266,11 @@ class MissionRun:
             self._go_to(seq)
             self._begin(item, now_s)
             return
-        self.state = RunState.COMPLETE
+        self.state = MissionRunState.COMPLETE
         self._repeat_s = None
         self._pilot.mission_finished(now_s)
 
-    def _begin(self, item: MissionItem, now_s: float) -> None:
+    def _begin(self, item: StoredMissionItem, now_s: float) -> None:
         match item.command:
             case mavlink.MAV_CMD_NAV_TAKEOFF:
                 self._pilot.mission_take_off(item, now_s)
@@ -275,7 +279,7 @@ class MissionRun:
             case mavlink.MAV_CMD_NAV_GUIDED_ENABLE:
                 self._pilot.mission_give_way(now_s)
                 self._hold_until_s = now_s + self._limit_s if self._limit_s > 0.0 else None
-            case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH if self._habits.forgets_mode:
+            case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH if self._behaviour.forgets_mode:
                 self._leave_by_returning(now_s)
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
                 self._pilot.mission_return(now_s)
@@ -299,7 +303,7 @@ class MissionRun:
         self.current = self.told = seq
 
     def _rewind(self) -> None:
-        self.state = RunState.NOT_STARTED
+        self.state = MissionRunState.NOT_STARTED
         self.current = self._set_seq = None
         self.begun = False
         self.told = 0
@@ -308,7 +312,7 @@ class MissionRun:
     def _reached(self, seq: int, at_s: float) -> None:
         self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
         self._reached_seq = seq
-        self._repeats_left = self._habits.repeats_reached
+        self._repeats_left = self._behaviour.repeats_reached
         self._repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
 
     def _land(self, now_s: float) -> None:
@@ -330,8 +334,8 @@ class MissionRun:
             following is not None and following.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
         )
         # Where returning leaves the mission, that is done at once too, and alone is told.
-        if not (returns and self._habits.forgets_mode):
+        if not (returns and self._behaviour.forgets_mode):
             self._reached(seq, at_s)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
-            self._narrator.tell(Occasion.WAYPOINT_REACHED, seq=seq)
+            self._narrator.tell(FirmwareEvent.WAYPOINT_REACHED, seq=seq)
         self._begin_from(seq + 1, at_s)

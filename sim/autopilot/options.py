@@ -1,4 +1,4 @@
-"""Reads what is said to `swarm autopilot` about physics and faults.
+"""Reads what is said to `swarm autopilot` about firmware, addresses, physics and faults.
 
 Leaves out: the options themselves (sim.autopilot.cli).
 """
@@ -7,13 +7,97 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
 
+from sim.autopilot.config import FleetMember
 from sim.autopilot.faults import FAULT_RULE, VehicleFault, parse_fault
-from sim.autopilot.fleet import FleetMember
-from swarm.errors import Fault, InputError
-from swarm.suggest import instead
+from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-__all__ = ["check_wind", "faults_by_uav", "parse_wind", "require_finite"]
+if TYPE_CHECKING:
+    from sim.autopilot.firmware.model import FirmwareModel
+
+__all__ = [
+    "ENDPOINT_RULE",
+    "Endpoint",
+    "FirmwareModelName",
+    "Transport",
+    "check_wind",
+    "faults_by_uav",
+    "firmware_model",
+    "parse_endpoint",
+    "parse_wind",
+    "require_finite",
+]
+
+
+class FirmwareModelName(StrEnum):
+    """Firmwares as people name them."""
+
+    ARDUPILOT = "ardupilot"
+    PX4 = "px4"
+
+
+def firmware_model(name: FirmwareModelName) -> FirmwareModel:
+    """The firmware of that name, in its newest version."""
+    # Imported late: the command line knows the names without the dialect.
+    from sim.autopilot.firmware.ardupilot import ArduCopterModel
+    from sim.autopilot.firmware.px4 import Px4Model
+
+    return Px4Model() if name == FirmwareModelName.PX4 else ArduCopterModel()
+
+
+ENDPOINT_RULE = "write tcp:HOST:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
+
+
+class Transport(StrEnum):
+    """How a vehicle can be reached."""
+
+    TCP = "tcp"
+    """Accepts connections."""
+    UDP_IN = "udpin"
+    """Waits for datagrams and answers whoever sent one."""
+    UDP_OUT = "udpout"
+    """Sends to a fixed address first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """Where a vehicle is offered."""
+
+    transport: Transport
+    host: str
+    port: int
+    """0 takes any free port."""
+
+    def shifted(self, by: int) -> Endpoint:
+        """The endpoint of the vehicle ``by`` places later.
+
+        Free ports stay free ports, and a ground station that is sent to stays the same.
+        """
+        if self.port == 0 or self.transport is Transport.UDP_OUT:
+            return self
+        return replace(self, port=self.port + by)
+
+
+def parse_endpoint(text: str) -> Endpoint:
+    """The endpoint written as ``tcp:``, ``udpin:`` or ``udpout:`` and ``HOST:PORT``.
+
+    Raises:
+        ValueError: it is not written so.
+    """
+    name, _, address = text.partition(":")
+    host, _, port_text = address.rpartition(":")
+    host = host.removeprefix("[").removesuffix("]")
+    if name not in set(Transport) or not host or not port_text.isascii():
+        raise ValueError(f"{text!r} is no endpoint; {ENDPOINT_RULE}")
+    transport = Transport(name)
+    least = 1 if transport is Transport.UDP_OUT else 0
+    if not port_text.isdigit() or not least <= int(port_text) <= 65535:
+        raise ValueError(f"{text!r} has no port within {least}..65535; {ENDPOINT_RULE}")
+    return Endpoint(transport, host, int(port_text))
+
 
 _WIND_RULE = "write EAST,NORTH in m/s of where it blows to, such as 3,-1.5"
 
@@ -91,7 +175,7 @@ def faults_by_uav(
             faults.append(Fault("--fault", text, str(error), FAULT_RULE))
             continue
         if uav not in known:
-            remedy = instead(uav, known, "the scenario has")
+            remedy = remedy_for_name(uav, known, "the scenario has")
             faults.append(Fault("--fault", text, f"no UAV {uav!r}", remedy))
             continue
         found[uav] = (*found.get(uav, ()), fault)

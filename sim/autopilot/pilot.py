@@ -10,27 +10,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from sim.autopilot.battery import Battery
+from sim.autopilot.battery import BatteryModel
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.events import Outbox
-from sim.autopilot.failsafes import FailSafes
-from sim.autopilot.flavours.base import Flavour
-from sim.autopilot.flight import Activity, Flight, Milestone
-from sim.autopilot.messages import home_position, origin_position
+from sim.autopilot.events import FirmwareEvent, Narrator, Outbox
+from sim.autopilot.failsafes import FailsafeMonitor
+from sim.autopilot.firmware.model import FirmwareModel
+from sim.autopilot.flight import FlightMode, FlightStateMachine, Milestone, MotionPhase
 from sim.autopilot.mission_flight import MissionFlight
-from sim.autopilot.mission_items import MissionItem, MissionStore, home_item
-from sim.autopilot.mission_run import MissionRun, RunState
-from sim.autopilot.modes import Mode
-from sim.autopilot.occasions import Narrator, Occasion
-from sim.autopilot.params import ParameterServer, ParameterTable, Setting
-from sim.autopilot.readiness import Readiness, Stage
-from sim.kinematics import Point
+from sim.autopilot.mission_run import MissionRun, MissionRunState
+from sim.autopilot.mission_store import MissionStore, StoredMissionItem, home_item
+from sim.autopilot.parameters import ParameterRole, ParameterServer, ParameterTable
+from sim.autopilot.positions import home_position, origin_position
+from sim.autopilot.readiness import PowerUpStage, Readiness
+from sim.world.motion import Point
 
 __all__ = ["Pilot"]
 
+
 _PREARM_TEXT_S = 30.0
 """How often a vehicle that can't be armed says why [s]."""
-_TASKS = frozenset({Mode.TAKEOFF, Mode.AUTO, Mode.LAND})
+_TASKS = frozenset({FlightMode.TAKEOFF, FlightMode.AUTO, FlightMode.LAND})
 """Modes that are entered for something that comes to an end."""
 
 
@@ -51,11 +50,11 @@ class Pilot:
     def __init__(
         self,
         config: VehicleConfig,
-        flavour: Flavour,
+        flavour: FirmwareModel,
         parameters: ParameterTable,
         store: MissionStore,
         outbox: Outbox,
-        battery: Battery,
+        battery: BatteryModel,
         boot_s: float,
         mode_changed: Callable[[float], None],
     ) -> None:
@@ -70,7 +69,7 @@ class Pilot:
         )
         self.narrator = Narrator(outbox, flavour.texts, flavour.own_commands, config.system_id)
         self.readiness = Readiness(config.delays, boot_s)
-        self.flight = Flight(config, self.parameters, config.motion())
+        self.flight = FlightStateMachine(config, self.parameters, config.motion())
         self.store = store
         self._mission = MissionFlight(self, config, flavour, self.flight, self.parameters)
         self.run = MissionRun(self.store, self._mission, outbox, self.narrator, flavour.missions)
@@ -85,14 +84,14 @@ class Pilot:
         self._position_control = False
         """A place was flown to since GUIDED was entered or the vehicle took off."""
         self._disarm_s: float | None = None
-        self._disarm_occasion = Occasion.DISARMED_UNUSED
+        self._disarm_occasion = FirmwareEvent.DISARMED_UNUSED
         self._take_off_up_m: float | None = None
         """Height that was asked for [m], until the take-off begins; None: the usual one."""
         self._mission_checked_s = boot_s
         """From when on the mission on the vehicle can be begun [s]."""
         self._prearm_text_s = boot_s + _PREARM_TEXT_S
         self.battery = battery
-        self.failsafes = FailSafes(self, battery)
+        self.failsafes = FailsafeMonitor(self, battery)
 
     # --- Time -------------------------------------------------------------------
 
@@ -127,16 +126,16 @@ class Pilot:
     def _pass_stage(self, at_s: float) -> None:
         stage = self.readiness.advance()
         match stage:
-            case Stage.BOOTED:
+            case PowerUpStage.BOOTED:
                 # A mode that was set meanwhile was acknowledged, and is lost here.
                 self.mode = self.flavour.modes.at_boot
                 self._mode_changed(at_s)
                 self.parameter_server.tell_at_boot()
-            case Stage.ORIGIN:
+            case PowerUpStage.ORIGIN:
                 self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(at_s)))
                 self.set_home(self.position_enu_m(at_s), at_s, lock=False)
                 self.parameter_server.announce("MIS_TOTAL", float(max(1, len(self.store.items))))
-            case Stage.SENSORS | Stage.POSITION:
+            case PowerUpStage.SENSORS | PowerUpStage.POSITION:
                 pass
         text = self.flavour.stage_texts.get(stage)
         if text is not None:
@@ -145,41 +144,45 @@ class Pilot:
     def _say_obstacle(self, at_s: float) -> None:
         self._prearm_text_s = at_s + _PREARM_TEXT_S
         for obstacle in () if self.armed else self.obstacles:
-            self.narrator.tell(Occasion.NOT_READY, obstacle=obstacle)
+            self.narrator.tell(FirmwareEvent.NOT_READY, obstacle=obstacle)
 
     def _advance_flight(self, at_s: float) -> None:
-        stood, landing = self.flight.on_ground, self.flight.activity is Activity.LANDING
+        stood, landing = self.flight.on_ground, self.flight.activity is MotionPhase.LANDING
         milestone = self.flight.advance(at_s)
         if stood and not self.flight.on_ground:
-            self.narrator.tell(Occasion.LIFTED_OFF)
-        if self.mode is Mode.RTL and not landing and self.flight.activity is Activity.LANDING:
-            self.narrator.tell(Occasion.RETURN_LANDING)
+            self.narrator.tell(FirmwareEvent.LIFTED_OFF)
+        if (
+            self.mode is FlightMode.RTL
+            and not landing
+            and self.flight.activity is MotionPhase.LANDING
+        ):
+            self.narrator.tell(FirmwareEvent.RETURN_LANDING)
         if milestone is Milestone.LANDED:
             self._landed(at_s)
         elif milestone is Milestone.TAKEN_OFF and self.mode is self.flavour.modes.for_take_off:
             self._taken_off(at_s)
-        elif self.mode is Mode.AUTO and self._mission.continues(milestone, at_s):
+        elif self.mode is FlightMode.AUTO and self._mission.continues(milestone, at_s):
             return
-        if self.mode is Mode.AUTO:
+        if self.mode is FlightMode.AUTO:
             self.run.on_milestone(milestone, at_s)
 
     def finish_task(self, now_s: float, *, motors_stop: bool = False) -> None:
         """Be done with what the mode was for."""
         self.task_done = True
         if motors_stop:
-            self._disarm(now_s, Occasion.DISARMED_LANDED)
+            self._disarm(now_s, FirmwareEvent.DISARMED_LANDED)
 
     def _landed(self, at_s: float) -> None:
-        self.narrator.tell(Occasion.LANDED)
-        if self.mode is Mode.RTL:
-            self.narrator.tell(Occasion.RETURN_LANDED)
-        if self.mode is not Mode.AUTO:
+        self.narrator.tell(FirmwareEvent.LANDED)
+        if self.mode is FlightMode.RTL:
+            self.narrator.tell(FirmwareEvent.RETURN_LANDED)
+        if self.mode is not FlightMode.AUTO:
             self.task_done = True
         delay = self.flavour.disarm_delay(self.mode)
         if delay is None:
-            self._disarm(at_s, Occasion.DISARMED_LANDED)
+            self._disarm(at_s, FirmwareEvent.DISARMED_LANDED)
         elif self.armed:
-            self._disarm_after(delay, at_s, Occasion.DISARMED_LANDED)
+            self._disarm_after(delay, at_s, FirmwareEvent.DISARMED_LANDED)
 
     def _taken_off(self, at_s: float) -> None:
         """Leave the mode that was entered for taking off."""
@@ -198,53 +201,53 @@ class Pilot:
         last_fix_enu_m = self.readiness.last_fix_enu_m
         return place_enu_m if last_fix_enu_m is None else (*last_fix_enu_m[:2], place_enu_m[2])
 
-    def set_mode(self, mode: Mode, now_s: float) -> bool:
+    def set_mode(self, mode: FlightMode, now_s: float) -> bool:
         """Change the mode; False, with a text, where the autopilot refuses."""
         if mode is self.mode:
             return True
-        if mode is Mode.AUTO and self._mission_unavailable(now_s):
+        if mode is FlightMode.AUTO and self._mission_unavailable(now_s):
             on_ground = self.flight.on_ground
             self.narrator.tell(
-                Occasion.MISSION_UNAVAILABLE_ON_GROUND
+                FirmwareEvent.MISSION_UNAVAILABLE_ON_GROUND
                 if on_ground
-                else Occasion.MISSION_UNAVAILABLE
+                else FirmwareEvent.MISSION_UNAVAILABLE
             )
             return True  # acknowledged all the same
         refusal = self._mode_refusal(mode)
         if refusal is not None:
             name = self.flavour.mode_name(mode)
-            self.narrator.tell(Occasion.MODE_REFUSED, mode=name, reason=refusal)
+            self.narrator.tell(FirmwareEvent.MODE_REFUSED, mode=name, reason=refusal)
             return False
         self.enter(mode, now_s)
         return True
 
     def _mission_unavailable(self, now_s: float) -> bool:
-        over = self.run.state is RunState.COMPLETE and not self.flavour.missions.restarts
+        over = self.run.state is MissionRunState.COMPLETE and not self.flavour.missions.restarts
         return self.run.present and (over or now_s < self._mission_checked_s)
 
-    def _mode_refusal(self, mode: Mode) -> str | None:
+    def _mode_refusal(self, mode: FlightMode) -> str | None:
         if not self.readiness.booted:
             return None
         if self.armed and mode.needs_position and not self.readiness.has_position:
             return "requires position"
-        if mode is Mode.AUTO:
+        if mode is FlightMode.AUTO:
             if not self.run.present:
                 return "init failed"
             grounded = self.armed and self.flight.on_ground
             rises = self.flavour.missions.climbs_first or self.run.starts_with_take_off
             if grounded and not rises:
-                self.narrator.tell(Occasion.MISSION_WITHOUT_TAKE_OFF)
+                self.narrator.tell(FirmwareEvent.MISSION_WITHOUT_TAKE_OFF)
                 return "init failed"
         return None
 
-    def enter(self, mode: Mode, now_s: float) -> None:
+    def enter(self, mode: FlightMode, now_s: float) -> None:
         """Be in a mode from now on, and begin to do what it is for."""
-        if self.mode is Mode.AUTO:
+        if self.mode is FlightMode.AUTO:
             self.run.stop()
         self.mode = mode
         if mode in _TASKS:
             self.task_done = False
-        if mode is not Mode.TAKEOFF:
+        if mode is not FlightMode.TAKEOFF:
             self._take_off_up_m = None
         self._mode_changed(now_s)
         self._position_control = False
@@ -253,31 +256,31 @@ class Pilot:
         if self.armed:
             self._fly(mode, now_s)
 
-    def _fly(self, mode: Mode, now_s: float) -> None:
+    def _fly(self, mode: FlightMode, now_s: float) -> None:
         """Begin to do what a mode is for."""
-        if mode is Mode.AUTO:
+        if mode is FlightMode.AUTO:
             if self._auto_armed or not self.flight.on_ground or self._mission.climb_due:
-                self.narrator.tell(Occasion.MISSION_BEGUN)
+                self.narrator.tell(FirmwareEvent.MISSION_BEGUN)
                 self.run.start_or_resume(now_s)
-        elif mode is Mode.TAKEOFF:
+        elif mode is FlightMode.TAKEOFF:
             self._rise(now_s)
             return
-        elif mode is Mode.RTL:
+        elif mode is FlightMode.RTL:
             self._return(now_s)
-        elif mode is Mode.LAND:
+        elif mode is FlightMode.LAND:
             self.flight.land(now_s)
         else:
             # In manual modes too: a pilot who takes over is taken to hold the place.
             self.flight.hold(now_s)
-        if self.flight.on_ground and self.run.state is not RunState.RUNNING:
+        if self.flight.on_ground and self.run.state is not MissionRunState.RUNNING:
             self.stay_on_ground(now_s)
 
     def _return(self, now_s: float) -> None:
         self.flight.return_home(now_s)
-        if self.flight.activity is Activity.CLIMBING:
+        if self.flight.activity is MotionPhase.CLIMBING:
             up_m = self.flight.motion.target_enu_m[2]
             self.narrator.tell(
-                Occasion.RETURN_BEGUN,
+                FirmwareEvent.RETURN_BEGUN,
                 altitude_m=math.ceil(self.config.origin.alt_m + up_m),
                 above_home_m=math.ceil(up_m - self.flight.home_enu_m[2]),
             )
@@ -290,7 +293,7 @@ class Pilot:
         if obstacles and self.flavour.numbers_texts:
             obstacles = obstacles[:1]  # its text names none
         for obstacle in obstacles:
-            self.narrator.tell(Occasion.ARMING_REFUSED, obstacle=obstacle)
+            self.narrator.tell(FirmwareEvent.ARMING_REFUSED, obstacle=obstacle)
         if obstacles:
             return False
         self.armed = True
@@ -301,8 +304,11 @@ class Pilot:
         here_enu_m = self.position_enu_m(now_s)
         if not self._home_locked and self.flight.home_enu_m != here_enu_m:
             self.set_home(here_enu_m, now_s, lock=False)
-        self.narrator.tell(Occasion.ARMED)
-        if self.flavour.modes.flies_when_armed and self.mode in (Mode.TAKEOFF, Mode.AUTO):
+        self.narrator.tell(FirmwareEvent.ARMED)
+        if self.flavour.modes.flies_when_armed and self.mode in (
+            FlightMode.TAKEOFF,
+            FlightMode.AUTO,
+        ):
             self._fly(self.mode, now_s)
         return True
 
@@ -326,15 +332,15 @@ class Pilot:
         if not self.armed:
             return True
         if not forced and not self.flight.on_ground:
-            self.narrator.tell(Occasion.DISARMING_REFUSED)
+            self.narrator.tell(FirmwareEvent.DISARMING_REFUSED)
             return False
-        self._disarm(now_s, Occasion.DISARMED)
+        self._disarm(now_s, FirmwareEvent.DISARMED)
         return True
 
     def _disarm_by_itself(self, at_s: float) -> None:
         self._disarm(at_s, self._disarm_occasion)
 
-    def _disarm(self, now_s: float, occasion: Occasion) -> None:
+    def _disarm(self, now_s: float, occasion: FirmwareEvent) -> None:
         self._disarm_s = None
         if not self.armed:
             return
@@ -346,7 +352,7 @@ class Pilot:
         self.flight.fall(now_s)
         self.narrator.tell(occasion)
         after = self.flavour.modes.after_flight
-        if after is not None and (self.mode in _TASKS or self.mode is Mode.RTL):
+        if after is not None and (self.mode in _TASKS or self.mode is FlightMode.RTL):
             self.mode = after
             self._mode_changed(now_s)
 
@@ -357,9 +363,9 @@ class Pilot:
             self._disarm_unused(now_s)
 
     def _disarm_unused(self, now_s: float) -> None:
-        self._disarm_after(Setting.DISARM_DELAY_S, now_s, Occasion.DISARMED_UNUSED)
+        self._disarm_after(ParameterRole.DISARM_DELAY_S, now_s, FirmwareEvent.DISARMED_UNUSED)
 
-    def _disarm_after(self, setting: Setting, now_s: float, occasion: Occasion) -> None:
+    def _disarm_after(self, setting: ParameterRole, now_s: float, occasion: FirmwareEvent) -> None:
         """Stop the motors after some time on the ground; 0 or less leaves them on."""
         delay_s = self.parameters.value_si(setting)
         self._disarm_s = now_s + delay_s if delay_s > 0.0 else None
@@ -377,7 +383,7 @@ class Pilot:
             if not accepted:
                 self._take_off_up_m = None
             return accepted
-        ready = self.armed and self.mode is Mode.GUIDED and self.flight.on_ground
+        ready = self.armed and self.mode is FlightMode.GUIDED and self.flight.on_ground
         if not ready or not self.readiness.has_position or up_m is None:
             return False
         if up_m <= self.position_enu_m(now_s)[2]:
@@ -388,12 +394,12 @@ class Pilot:
     def _rise(self, now_s: float) -> None:
         """Take off in the mode for it, as high as was asked, but not lower than usual."""
         home_up_m = self.flight.home_enu_m[2]
-        least_up_m = home_up_m + self.parameters.value_si(Setting.TAKE_OFF_HEIGHT_M)
+        least_up_m = home_up_m + self.parameters.value_si(ParameterRole.TAKE_OFF_HEIGHT_M)
         up_m, self._take_off_up_m = self._take_off_up_m, None
         if up_m is None or up_m < least_up_m:
             if up_m is not None:
                 height_m = self.config.origin.alt_m + least_up_m
-                self.narrator.tell(Occasion.TAKE_OFF_RAISED, height_m=height_m)
+                self.narrator.tell(FirmwareEvent.TAKE_OFF_RAISED, height_m=height_m)
             up_m = least_up_m
         if up_m > self.position_enu_m(now_s)[2]:
             self.lift(up_m, now_s)
@@ -433,7 +439,7 @@ class Pilot:
     def takes_targets(self) -> bool:
         """Whether targets are flown to in the present mode."""
         return self.mode is self.flavour.modes.for_reposition or (
-            self.mode is Mode.AUTO and self.run.gives_way
+            self.mode is FlightMode.AUTO and self.run.gives_way
         )
 
     def let_targets(self, now_s: float) -> None:
@@ -450,13 +456,13 @@ class Pilot:
 
     def start_mission(self, now_s: float) -> bool:
         """Fly the mission, from the ground too; False where AUTO is refused."""
-        if not self.set_mode(Mode.AUTO, now_s) or self.mode is not Mode.AUTO:
+        if not self.set_mode(FlightMode.AUTO, now_s) or self.mode is not FlightMode.AUTO:
             return False
         if self.flavour.modes.flies_when_armed:
             return self.arm(now_s, forced=False)
         if self.armed:
             self._auto_armed = True
-            if self.run.state is not RunState.RUNNING:
+            if self.run.state is not MissionRunState.RUNNING:
                 self.run.start_or_resume(now_s)
         return True
 
@@ -466,20 +472,22 @@ class Pilot:
         self._home_locked = self._home_locked or lock
         self.outbox.broadcast(home_position(self.config.origin, home_enu_m, self._boot_us(now_s)))
 
-    def mission_uploaded(self, old: tuple[MissionItem, ...], now_s: float) -> None:
+    def mission_uploaded(self, old: tuple[StoredMissionItem, ...], now_s: float) -> None:
         """Hear that another mission has taken the place of ``old``."""
-        self.narrator.tell(Occasion.MISSION_RECEIVED)
+        self.narrator.tell(FirmwareEvent.MISSION_RECEIVED)
         self._mission_checked_s = now_s + self.flavour.missions.check_s
         self.parameter_server.announce("MIS_TOTAL", float(len(self.store.items)))
         if self.flavour.missions.upload_rewinds and old != self.store.items:
             self.task_done = False
         if self.run.mission_changed(old, now_s):
-            restarted = self.run.state is RunState.RUNNING
+            restarted = self.run.state is MissionRunState.RUNNING
             self.narrator.tell(
-                Occasion.MISSION_REPLACED if restarted else Occasion.MISSION_REPLACED_IN_VAIN
+                FirmwareEvent.MISSION_REPLACED
+                if restarted
+                else FirmwareEvent.MISSION_REPLACED_IN_VAIN
             )
 
-    def home_item(self) -> MissionItem:
+    def home_item(self) -> StoredMissionItem:
         """Home as item 0 of a mission."""
         return home_item(self.config.origin, self.flight.home_enu_m)
 

@@ -9,13 +9,13 @@ import math
 from enum import Enum
 
 from sim.autopilot.config import Delays
-from sim.autopilot.modes import Mode
-from sim.kinematics import Point
+from sim.autopilot.flight import FlightMode
+from sim.world.motion import Point
 
-__all__ = ["Readiness", "Stage"]
+__all__ = ["PowerUpStage", "Readiness"]
 
 
-class Stage(Enum):
+class PowerUpStage(Enum):
     """Something that has just become ready."""
 
     BOOTED = "booted"
@@ -24,7 +24,7 @@ class Stage(Enum):
     POSITION = "position"
 
 
-_BY_GPS = frozenset({Stage.ORIGIN, Stage.POSITION})
+_BY_GPS = frozenset({PowerUpStage.ORIGIN, PowerUpStage.POSITION})
 
 
 class Readiness:
@@ -37,13 +37,13 @@ class Readiness:
     def __init__(self, delays: Delays, boot_s: float) -> None:
         self.boot_s = boot_s
         """When power came on [s]."""
-        self._ahead: list[tuple[float, Stage]] = [
-            (boot_s + delays.boot_s, Stage.BOOTED),
-            (boot_s + delays.sensors_s, Stage.SENSORS),
-            (boot_s + delays.origin_s, Stage.ORIGIN),
-            (boot_s + delays.position_s, Stage.POSITION),
+        self._ahead: list[tuple[float, PowerUpStage]] = [
+            (boot_s + delays.boot_s, PowerUpStage.BOOTED),
+            (boot_s + delays.sensors_s, PowerUpStage.SENSORS),
+            (boot_s + delays.origin_s, PowerUpStage.ORIGIN),
+            (boot_s + delays.position_s, PowerUpStage.POSITION),
         ]
-        self._passed: set[Stage] = set()
+        self._passed: set[PowerUpStage] = set()
         self.last_fix_enu_m: Point | None = None
         """Where the receiver lost the satellites [m]; None while it sees them."""
         self._gps_lost_s = boot_s
@@ -58,21 +58,21 @@ class Readiness:
     @property
     def booted(self) -> bool:
         """Whether the autopilot is initialised."""
-        return Stage.BOOTED in self._passed
+        return PowerUpStage.BOOTED in self._passed
 
     @property
     def has_origin(self) -> bool:
         """Whether GPS has a fix, so that the vehicle tells where it is."""
-        return Stage.ORIGIN in self._passed
+        return PowerUpStage.ORIGIN in self._passed
 
     @property
     def has_position(self) -> bool:
         """Whether the position estimate is good enough to navigate by."""
-        return Stage.POSITION in self._passed and not self.gps_lost
+        return PowerUpStage.POSITION in self._passed and not self.gps_lost
 
     def lost_s(self, now_s: float) -> float:
         """How long there has been no position [s]; 0 while there is, inf if there never was."""
-        if Stage.POSITION not in self._passed:
+        if PowerUpStage.POSITION not in self._passed:
             return math.inf
         return now_s - self._gps_lost_s if self.gps_lost else 0.0
 
@@ -97,7 +97,7 @@ class Readiness:
             return None
         return self._ahead[0][0]
 
-    def advance(self) -> Stage:
+    def advance(self) -> PowerUpStage:
         """Pass the next stage.
 
         Raises:
@@ -109,11 +109,11 @@ class Readiness:
         self._passed.add(stage)
         return stage
 
-    def obstacle(self, mode: Mode) -> str | None:
+    def obstacle(self, mode: FlightMode) -> str | None:
         """Why ``mode`` can't be armed, in the autopilot's words; None when it can."""
         if not self.booted:
             return "System not initialised"
-        if Stage.SENSORS not in self._passed:
+        if PowerUpStage.SENSORS not in self._passed:
             return "Accels inconsistent"
         if mode.needs_position and not self.has_position:
             return "Need Position Estimate"

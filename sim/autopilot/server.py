@@ -15,12 +15,20 @@ from typing import Any, Protocol, cast
 
 from sim.autopilot.codec import ChannelCodec, ChannelSigning
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.endpoint import Endpoint, Transport
-from sim.autopilot.events import Connected, Disconnected, Event, Received, Send, Tick
+from sim.autopilot.events import (
+    Connected,
+    Disconnected,
+    MavlinkReceived,
+    OutgoingMessage,
+    TimeAdvanced,
+    VehicleEvent,
+)
+from sim.autopilot.options import Endpoint, Transport
 from sim.autopilot.vehicle import COMPONENT_ID
-from swarm.clock import Clock, unix_s
+from swarm.runtime.clock import Clock, unix_s
 
-__all__ = ["Machine", "VehicleServer"]
+__all__ = ["ServedVehicle", "VehicleServer"]
+
 
 _Address = tuple[Any, ...]
 
@@ -32,7 +40,7 @@ _MAX_UNSENT_BYTES = 1 << 20
 _LEAST_SLEEP_WALL_S = 0.001
 
 
-class Machine(Protocol):
+class ServedVehicle(Protocol):
     """A vehicle, whether faults happen to it or not."""
 
     @property
@@ -40,7 +48,7 @@ class Machine(Protocol):
         """What it is."""
         ...
 
-    def step(self, event: Event, now_s: float) -> list[Send]:
+    def step(self, event: VehicleEvent, now_s: float) -> list[OutgoingMessage]:
         """Take an event; what is to be sent, in order."""
         ...
 
@@ -61,7 +69,7 @@ class VehicleServer:
 
     def __init__(
         self,
-        vehicle: Machine,
+        vehicle: ServedVehicle,
         endpoint: Endpoint,
         clock: Clock,
         *,
@@ -112,7 +120,7 @@ class VehicleServer:
                 lambda: _UdpSocket(self, fixed=True), remote_addr=(host, port)
             )
             self._url = f"udpin:{_bracketed(host)}:{port}"
-        self.handle(Tick())
+        self.handle(TimeAdvanced())
 
     async def close(self) -> None:
         """Hang up on everybody and free the port; closing twice is fine."""
@@ -145,9 +153,9 @@ class VehicleServer:
         """Hand bytes of a ground station to the vehicle."""
         if (channel := self._channels.get(number)) is not None:
             for message in channel.codec.decode(data):
-                self.handle(Received(number, message))
+                self.handle(MavlinkReceived(number, message))
 
-    def handle(self, event: Event) -> None:
+    def handle(self, event: VehicleEvent) -> None:
         """Let the vehicle take a step, and send what it says."""
         frames: dict[int, list[bytes]] = {}
         for send in self.vehicle.step(event, self._clock.now_s()):
@@ -194,7 +202,7 @@ class VehicleServer:
 
     def _on_timer(self) -> None:
         self._timer = None
-        self.handle(Tick())
+        self.handle(TimeAdvanced())
 
 
 class _Channel:

@@ -1,7 +1,7 @@
 """What a vehicle reports about itself, message by message.
 
 Source: https://mavlink.io/en/messages/common.html. Leaves out: what firmwares say
-differently (sim.autopilot.flavours), attitude other than heading, raw sensors,
+differently (sim.autopilot.options), attitude other than heading, raw sensors,
 RC channels.
 """
 
@@ -13,14 +13,14 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.battery import ChargeLevel
-from sim.autopilot.flavours.base import MissionView
-from sim.autopilot.flight import Activity
-from sim.autopilot.geo import place_wgs84_e7
-from sim.autopilot.messages import home_position, origin_position
-from sim.autopilot.mission_run import RunState
+from sim.autopilot.firmware.model import MissionProgress
+from sim.autopilot.flight import MotionPhase
+from sim.autopilot.mission_run import MissionRunState
 from sim.autopilot.pilot import Pilot
+from sim.autopilot.positions import home_position, origin_position, place_wgs84_e7
 
-__all__ = ["DATA_STREAMS", "Telemetry"]
+__all__ = ["DATA_STREAMS", "TelemetryReporter"]
+
 
 _EKF_ALIGNED = (
     mavlink.EKF_ATTITUDE
@@ -68,7 +68,7 @@ DATA_STREAMS: dict[int, tuple[int, ...]] = {
 """The older way to ask for streams, MAV_DATA_STREAM -> message ids."""
 
 
-class Telemetry:
+class TelemetryReporter:
     """Builds reports from the state of one pilot."""
 
     def __init__(self, pilot: Pilot) -> None:
@@ -287,14 +287,14 @@ class Telemetry:
         del now_s
         pilot = self._pilot
         run = pilot.run
-        view = MissionView(
+        view = MissionProgress(
             mode=pilot.mode,
             current=run.current,
             items=max(0, len(pilot.store.items) - pilot.flavour.missions.first_item),
             present=run.present,
-            running=run.state is RunState.RUNNING,
-            stopped=run.state is RunState.STOPPED and run.begun,
-            over=run.state is RunState.COMPLETE,
+            running=run.state is MissionRunState.RUNNING,
+            stopped=run.state is MissionRunState.STOPPED and run.begun,
+            over=run.state is MissionRunState.COMPLETE,
             task_done=pilot.task_done,
         )
         return mavlink.MAVLink_mission_current_message(
@@ -341,11 +341,11 @@ class Telemetry:
     def _extended_state(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s
         landed = {
-            Activity.GROUNDED: mavlink.MAV_LANDED_STATE_ON_GROUND,
-            Activity.SPOOLING_UP: mavlink.MAV_LANDED_STATE_ON_GROUND,
-            Activity.TAKING_OFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
-            Activity.LANDING: mavlink.MAV_LANDED_STATE_LANDING,
-            Activity.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
+            MotionPhase.GROUNDED: mavlink.MAV_LANDED_STATE_ON_GROUND,
+            MotionPhase.SPOOLING_UP: mavlink.MAV_LANDED_STATE_ON_GROUND,
+            MotionPhase.TAKING_OFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
+            MotionPhase.LANDING: mavlink.MAV_LANDED_STATE_LANDING,
+            MotionPhase.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
         }
         return mavlink.MAVLink_extended_sys_state_message(
             self._pilot.flavour.vtol_state,

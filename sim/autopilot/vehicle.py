@@ -1,7 +1,7 @@
 """One simulated vehicle: MAVLink messages in, MAVLink messages out, no I/O.
 
-`Vehicle.step` takes an event and the time and returns what is to be sent, in
-order; `Vehicle.next_deadline_s` says when to call again with a `Tick`. Messages
+`SimulatedAutopilot.step` takes an event and the time and returns what is to be sent, in
+order; `SimulatedAutopilot.next_deadline_s` says when to call again with `TimeAdvanced`. Messages
 understood: HEARTBEAT, COMMAND_LONG, COMMAND_INT, SET_MODE,
 SET_POSITION_TARGET_GLOBAL_INT, REQUEST_DATA_STREAM, the PARAM and MISSION families,
 TIMESYNC, PING. Leaves out: bytes (sim.autopilot.codec), sockets
@@ -15,35 +15,35 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.battery import Battery
-from sim.autopilot.commands import Commands, command_from_message
+from sim.autopilot.battery import BatteryModel
+from sim.autopilot.commands import CommandExecutor, command_from_message
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import (
     Connected,
     Disconnected,
-    Event,
+    MavlinkReceived,
     Outbox,
+    OutgoingMessage,
     Reboot,
-    Received,
-    Send,
     Sender,
-    Tick,
+    TimeAdvanced,
+    VehicleEvent,
 )
-from sim.autopilot.flavours.base import Flavour
-from sim.autopilot.geo import place_enu_m
-from sim.autopilot.mission_items import MissionStore
-from sim.autopilot.mission_transfer import MissionTransfer
-from sim.autopilot.modes import Mode
-from sim.autopilot.params import Parameter, ParameterTable
+from sim.autopilot.firmware.model import FirmwareModel
+from sim.autopilot.flight import FlightMode
+from sim.autopilot.message_rates import MessageRates
+from sim.autopilot.mission_store import MissionServer, MissionStore
+from sim.autopilot.parameters import ParameterEntry, ParameterTable
 from sim.autopilot.pilot import Pilot
-from sim.autopilot.streams import Streams
-from sim.autopilot.telemetry import DATA_STREAMS, Telemetry
+from sim.autopilot.positions import place_enu_m
+from sim.autopilot.telemetry import DATA_STREAMS, TelemetryReporter
 
-__all__ = ["COMPONENT_ID", "Vehicle"]
+__all__ = ["COMPONENT_ID", "SimulatedAutopilot"]
+
 
 COMPONENT_ID = 1
 _HEARTBEAT_S = 1.0
-_SIMULATED = Parameter("SWARM_SIMULATED", 1.0, mavlink.MAV_PARAM_TYPE_REAL32, read_only=True)
+_SIMULATED = ParameterEntry("SWARM_SIMULATED", 1.0, mavlink.MAV_PARAM_TYPE_REAL32, read_only=True)
 """By which an agent knows that nothing falls from the sky if this vehicle does: it flies it
 whatever its failsafes are. No firmware has such a parameter."""
 _POSITION_IGNORED = 0b111
@@ -53,7 +53,7 @@ _NANO = 1e9
 _Handler = Callable[[mavlink.MAVLink_message, Sender, float], None]
 
 
-class Vehicle:
+class SimulatedAutopilot:
     """The machine of one vehicle.
 
     Args:
@@ -62,7 +62,7 @@ class Vehicle:
         start_s: when it is powered up [s].
     """
 
-    def __init__(self, config: VehicleConfig, flavour: Flavour, start_s: float) -> None:
+    def __init__(self, config: VehicleConfig, flavour: FirmwareModel, start_s: float) -> None:
         self.config = config
         self.foreign = 0
         """Messages dropped because they were for somebody else."""
@@ -70,10 +70,10 @@ class Vehicle:
         """Messages dropped because this vehicle doesn't know them."""
         self._flavour = flavour
         self._outbox = Outbox(numbers_texts=flavour.numbers_texts)
-        self._streams = Streams()
+        self._streams = MessageRates()
         self._parameters = ParameterTable((*flavour.parameters(config), _SIMULATED))
         self._store = MissionStore()
-        self._battery = Battery(config.endurance_s, config.battery_failsafe)
+        self._battery = BatteryModel(config.endurance_s, config.battery_failsafe)
         self._now_s = start_s
         self._power_up(config, start_s)
 
@@ -88,12 +88,12 @@ class Vehicle:
             now_s,
             mode_changed=self._on_mode_changed,
         )
-        self._telemetry = Telemetry(self._pilot)
-        self._commands = Commands(self._pilot, self._telemetry, self._streams, self._outbox)
-        self._transfer = MissionTransfer(
+        self._telemetry = TelemetryReporter(self._pilot)
+        self._commands = CommandExecutor(self._pilot, self._telemetry, self._streams, self._outbox)
+        self._transfer = MissionServer(
             self._store,
             self._outbox,
-            habits=self._flavour.missions,
+            behaviour=self._flavour.missions,
             current=lambda: self._pilot.run.told,
             home_item=self._pilot.home_item if self._flavour.missions.first_item > 0 else None,
             uploaded=self._pilot.mission_uploaded,
@@ -133,7 +133,7 @@ class Vehicle:
         """The autopilot inside, to look at."""
         return self._pilot
 
-    def step(self, event: Event, now_s: float) -> list[Send]:
+    def step(self, event: VehicleEvent, now_s: float) -> list[OutgoingMessage]:
         """Take an event at ``now_s``; time going back is taken as standing still.
 
         Returns:
@@ -142,7 +142,7 @@ class Vehicle:
         now_s = self._now_s = max(now_s, self._now_s)
         self._advance(now_s)
         match event:
-            case Received(channel, message):
+            case MavlinkReceived(channel, message):
                 self._receive(channel, message, now_s)
             case Connected(channel):
                 self._streams.open(channel, self._flavour.unasked_streams, now_s)
@@ -153,9 +153,9 @@ class Vehicle:
                 self._transfer.forget(channel)
             case Reboot():
                 self._reboot(now_s)
-            case Tick():
+            case TimeAdvanced():
                 pass
-        if not isinstance(event, Tick):  # which has brought about nothing more that is due
+        if not isinstance(event, TimeAdvanced):  # which has brought about nothing more that is due
             self._advance(now_s)
         self._report(now_s)
         return self._outbox.take()
@@ -241,7 +241,7 @@ class Vehicle:
         self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
     ) -> None:
         del sender
-        if self._pilot.mode is not Mode.GUIDED or message.type_mask & _POSITION_IGNORED:
+        if self._pilot.mode is not FlightMode.GUIDED or message.type_mask & _POSITION_IGNORED:
             return
         target_enu_m = place_enu_m(
             self.config.origin,

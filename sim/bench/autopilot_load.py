@@ -24,26 +24,27 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from agent.mavlink.config import BridgeConfig
-from agent.mavlink.flavours.ardupilot import ArduCopter
-from sim.bench.machine import Machine, cpu_s, this_machine
-from sim.bench.trouble import survey
-from sim.launch.process import Child
-from swarm.clock import Clock, SystemClock
+from agent.vehicle.config import BridgeConfig
+from agent.vehicle.firmware.ardupilot import ArduCopter
+from sim.bench.links import survey_mission
+from sim.bench.machine import MachineInfo, cpu_s, this_machine
+from sim.fleet.child_process import ChildProcess
 from swarm.model import Mission, Origin
 from swarm.model.frames import DEFAULT_ORIGIN
+from swarm.runtime.clock import Clock, SystemClock
 from swarm.scenario.write import format_scenario
 
 __all__ = [
     "AutopilotLoad",
     "FrameCounter",
     "StreamRate",
-    "load_as_json",
-    "load_as_rich",
-    "measure_load",
+    "autopilot_load_as_json",
+    "autopilot_load_as_rich",
+    "measure_autopilot",
     "rates_asked_hz",
     "stream_rates",
 ]
+
 
 POSITION_HZ = 10.0
 READY_S = 4.0
@@ -77,7 +78,7 @@ class StreamRate:
 class AutopilotLoad:
     """What was measured."""
 
-    machine: Machine
+    machine: MachineInfo
     vehicles: int
     seconds: float
     """Length of the measurement [s]."""
@@ -209,7 +210,7 @@ class _Client(asyncio.Protocol):
             self._mav.seq = (self._mav.seq + 1) % 256
 
 
-async def measure_load(
+async def measure_autopilot(
     vehicles: int, seconds: float, seed: int, on_progress: Callable[[str], None] | None = None
 ) -> AutopilotLoad:
     """Fly ``vehicles`` in one process, and measure for ``seconds``.
@@ -220,7 +221,7 @@ async def measure_load(
     """
     tell = on_progress or (lambda _: None)
     machine, clock = this_machine(), SystemClock()
-    mission = survey(vehicles, 1, seed)
+    mission = survey_mission(vehicles, 1, seed)
     origin = mission.origin or DEFAULT_ORIGIN
     asked_hz = rates_asked_hz(origin)
     # Vehicles of a fleet are not asked in step.
@@ -273,7 +274,7 @@ async def _served(
     loop = asyncio.get_running_loop()
     async with contextlib.AsyncExitStack() as stack:
         scenario = stack.enter_context(_file(format_scenario(mission)))
-        child = Child("autopilots", ["autopilot", str(scenario), "--json"])
+        child = ChildProcess("autopilots", ["autopilot", str(scenario), "--json"])
         stack.push_async_callback(child.stop)
         await child.start()
         clients = []
@@ -303,7 +304,7 @@ async def _time_answers(client: _Client, pause_s: float) -> None:
         await asyncio.sleep(1.0)
 
 
-def load_as_rich(load: AutopilotLoad) -> RenderableType:
+def autopilot_load_as_rich(load: AutopilotLoad) -> RenderableType:
     """Everything for a terminal."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("message", no_wrap=True)
@@ -333,7 +334,7 @@ def load_as_rich(load: AutopilotLoad) -> RenderableType:
     )
 
 
-def load_as_json(load: AutopilotLoad) -> dict[str, object]:
+def autopilot_load_as_json(load: AutopilotLoad) -> dict[str, object]:
     """Everything for programs, ready for `json.dumps`."""
     return asdict(load)
 

@@ -1,12 +1,4 @@
-"""The commands of the family `swarm bench`.
-
-Leaves out: the commands about fleets that fly (`sim.bench.trouble_commands`,
-`sim.bench.turnaround_command`, `sim.bench.legs_command`, `sim.bench.missions_command`), about
-simulated vehicles (`sim.bench.autopilot_commands`), about the dashboard
-(`sim.bench.dashboard_command`) and about keys (`sim.bench.secure_command`), what the others do
-(`sim.bench.plan_bench`, `sim.bench.decide`) and how it is shown (`sim.bench.plan_report`,
-`sim.bench.plan_plot`).
-"""
+"""The commands of the family `swarm bench`; those about plans and decisions are here."""
 
 from __future__ import annotations
 
@@ -16,23 +8,35 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sim.bench.autopilot_commands import AUTOPILOT_HELP, autopilot
-from sim.bench.dashboard_command import DASHBOARD_HELP, dashboard
-from sim.bench.legs_command import LEGS_HELP, legs
-from sim.bench.missions_command import MISSIONS_HELP, missions
-from sim.bench.secure_command import SECURE_HELP, secure
-from sim.bench.trouble_commands import FAILOVER_HELP, FLOOD_HELP, failover, flood
-from sim.bench.turnaround_command import TURNAROUND_HELP, turnaround
-from sim.bench.words import each, size_of
-from swarm.errors import Fault, InputError
-from swarm.options import JsonOption, SeedOption
-from swarm.scenario.shipped import resolve_scenario
-from swarm.suggest import instead
+from sim.bench.command_line import each, size_of
+from sim.bench.legs import LEGS_HELP, legs
+from sim.bench.performance_commands import (
+    AUTOPILOT_HELP,
+    DASHBOARD_HELP,
+    MISSIONS_HELP,
+    TURNAROUND_HELP,
+    autopilot,
+    dashboard,
+    missions,
+    turnaround,
+)
+from sim.bench.robustness_commands import (
+    FAILOVER_HELP,
+    FLOOD_HELP,
+    SECURE_HELP,
+    failover,
+    flood,
+    secure,
+)
+from swarm.runtime.errors import Fault, InputError, remedy_for_name
+from swarm.runtime.options import JsonOption, SeedOption
+from swarm.scenario.files import resolve_scenario
 
 if TYPE_CHECKING:
-    from sim.bench.worker import Source
+    from sim.bench.solvers import MissionSource
 
 __all__ = ["bench"]
+
 
 _DEFAULT_SIZES = "10x50,50x500"
 _SCALING_SIZES = "10x50,10x500,50x500,50x2000,100x1000,200x2000,200x5000"
@@ -149,15 +153,9 @@ def plan(
 
     from rich.console import Console
 
-    from sim.bench.methods import METHODS
-    from sim.bench.plan_bench import measure
-    from sim.bench.plan_report import (
-        as_json,
-        as_markdown,
-        as_rich,
-        comparison_grids,
-        scaling_grid,
-    )
+    from sim.bench.plan_report import as_json, as_markdown, as_rich, comparison_grids, scaling_grid
+    from sim.bench.plans import measure_plans
+    from sim.bench.solvers import METHODS
 
     limits_s = each("--time-limit-s", time_limit_s, _limit_s)
     all_seeds = each("--seeds", seeds, _seed)
@@ -175,7 +173,7 @@ def plan(
 
     console = Console(stderr=True)
     with console.status("", spinner_style="dim") as status:
-        done = measure(
+        done = measure_plans(
             sources,
             names,
             limits_s,
@@ -185,7 +183,7 @@ def plan(
         )
     grids = [scaling_grid(done)] if scaling else comparison_grids(done)
     if plot is not None:
-        from sim.bench.plan_plot import comparison_figure, scaling_figure, write_figure
+        from sim.bench.plan_report import comparison_figure, scaling_figure, write_figure
 
         figure = scaling_figure(done) if scaling else comparison_figure(done)
         _write("--plot", plot, lambda path: write_figure(figure, path))
@@ -212,8 +210,8 @@ def decide(
 
     from rich.console import Console
 
-    from sim.bench.decide import decide_as_json, decide_as_rich, measure_decisions
-    from swarm.clock import SystemClock
+    from sim.bench.decisions import decide_as_json, decide_as_rich, measure_decisions
+    from swarm.runtime.clock import SystemClock
 
     n_uav, n_task = size_of("--size", size)
     done = measure_decisions(n_uav, n_task, seed, SystemClock())
@@ -244,18 +242,20 @@ bench.command(
 bench.command("legs", help=LEGS_HELP, short_help="Time of legs flown, beyond length / speed.")(legs)
 
 
-def _sources(scenario: Path | None, sizes: str | None, default: str) -> list[tuple[str, Source]]:
+def _sources(
+    scenario: Path | None, sizes: str | None, default: str
+) -> list[tuple[str, MissionSource]]:
     """Cases by name, the scenario first."""
-    from sim.bench.worker import Source
+    from sim.bench.solvers import MissionSource
     from swarm.scenario import load_scenario
 
-    found: list[tuple[str, Source]] = []
+    found: list[tuple[str, MissionSource]] = []
     if scenario is not None:
         name = load_scenario(scenario).name
-        found.append((name, Source(scenario=str(scenario.resolve()))))
+        found.append((name, MissionSource(scenario=str(scenario.resolve()))))
     if scenario is None or sizes is not None:
         for n_uav, n_task in each("--sizes", sizes or default, size_of):
-            found.append((f"{n_uav}×{n_task}", Source(n_uav=n_uav, n_task=n_task)))
+            found.append((f"{n_uav}×{n_task}", MissionSource(n_uav=n_uav, n_task=n_task)))
     return found
 
 
@@ -277,10 +277,10 @@ def _seed(flag: str, word: str) -> int:
 
 
 def _method(flag: str, word: str) -> str:
-    from sim.bench.methods import METHODS
+    from sim.bench.solvers import METHODS
 
     if word not in METHODS:
-        remedy = instead(word, METHODS, "choose among")
+        remedy = remedy_for_name(word, METHODS, "choose among")
         raise InputError(Fault(flag, word, "no such method", remedy))
     return word
 

@@ -19,15 +19,22 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from sim.bench.acted_mission import MARK, ActedMission
-from sim.bench.machine import Machine, cpu_s, memory_bytes, this_machine
-from sim.bench.trouble import survey
-from sim.launch.process import Child, ChildFailedError
+from sim.bench.links import survey_mission
+from sim.bench.machine import MachineInfo, cpu_s, memory_bytes, this_machine
+from sim.bench.scripted_mission import MARK, ScriptedMission
+from sim.fleet.child_process import ChildFailedError, ChildProcess
 from swarm.bus.config import BusConfig, ClientTopology
 from swarm.bus.zenoh_bus import open_zenoh_bus
-from swarm.clock import Clock, SystemClock
+from swarm.runtime.clock import Clock, SystemClock
 
-__all__ = ["DashboardLoad", "Following", "load_as_json", "load_as_rich", "measure_dashboard"]
+__all__ = [
+    "DashboardLoad",
+    "FollowerLoad",
+    "dashboard_load_as_json",
+    "dashboard_load_as_rich",
+    "measure_dashboard",
+]
+
 
 SETTLE_S = 5.0
 """Wall time before a measurement: those who have just come are told everything."""
@@ -39,7 +46,7 @@ _MARK = re.compile(rf'"{MARK}(\d+)"')
 
 
 @dataclass(frozen=True, slots=True)
-class Following:
+class FollowerLoad:
     """What it takes to be followed by so many pages."""
 
     clients: int
@@ -59,7 +66,7 @@ class Following:
 class DashboardLoad:
     """What was measured."""
 
-    machine: Machine
+    machine: MachineInfo
     uavs: int
     tasks: int
     rate_hz: float
@@ -71,7 +78,7 @@ class DashboardLoad:
     """Said on the bus by all together."""
     whole_bytes: int
     """Of the first frame to a page."""
-    followings: tuple[Following, ...]
+    followings: tuple[FollowerLoad, ...]
 
 
 @dataclass(slots=True)
@@ -121,11 +128,11 @@ async def measure_dashboard(
     """
     tell = on_progress or (lambda _: None)
     machine, clock = this_machine(), SystemClock()
-    mission = survey(uavs, tasks, seed)
+    mission = survey_mission(uavs, tasks, seed)
     async with _served(mission.name) as (endpoint, dashboard, url):
         bus = await open_zenoh_bus(BusConfig(ClientTopology((endpoint,))))
         try:
-            acted = ActedMission(mission, bus, clock, rate_hz, seed)
+            acted = ScriptedMission(mission, bus, clock, rate_hz, seed)
             tell(f"acting {uavs} UAVs and {tasks} tasks")
             acted.appear()
             whole_bytes = await _until_known(acted, url, clock, tasks)
@@ -160,22 +167,22 @@ async def measure_dashboard(
 
 
 @contextlib.asynccontextmanager
-async def _served(mission: str) -> AsyncIterator[tuple[str, Child, str]]:
+async def _served(mission: str) -> AsyncIterator[tuple[str, ChildProcess, str]]:
     """A router's endpoint, the dashboard's process and its feed."""
     async with contextlib.AsyncExitStack() as stack:
-        router = Child("router", ["router", "--json", "--listen", "tcp/127.0.0.1:0"])
+        router = ChildProcess("router", ["router", "--json", "--listen", "tcp/127.0.0.1:0"])
         stack.push_async_callback(router.stop)
         await router.start()
         endpoint = str((await router.ready())[0]["endpoints"][0])
         words = ["dashboard", "--json", "--port", "0", "--mission", mission]
-        dashboard = Child("dashboard", [*words, "--connect", endpoint])
+        dashboard = ChildProcess("dashboard", [*words, "--connect", endpoint])
         stack.push_async_callback(dashboard.stop)
         await dashboard.start()
         url = str((await dashboard.ready())[0]["url"])
         yield endpoint, dashboard, url.replace("http", "ws", 1) + "feed"
 
 
-async def _until_known(acted: ActedMission, url: str, clock: Clock, tasks: int) -> int:
+async def _until_known(acted: ScriptedMission, url: str, clock: Clock, tasks: int) -> int:
     """Tell the mission until a page shows it; bytes of a whole frame."""
     try:
         async with asyncio.timeout(KNOWN_WITHIN_S):
@@ -198,8 +205,8 @@ async def _glimpse(url: str, clock: Clock) -> _Page:
 
 
 async def _follow(
-    count: int, url: str, pid: int, acted: ActedMission, clock: Clock, seconds: float
-) -> Following:
+    count: int, url: str, pid: int, acted: ScriptedMission, clock: Clock, seconds: float
+) -> FollowerLoad:
     pages = [_Page(clock) for _ in range(count)]
     loop = asyncio.get_running_loop()
     reading = [loop.create_task(page.follow(url)) for page in pages]
@@ -226,7 +233,7 @@ async def _follow(
         if mark >= first
     ]
     some = max(1, count)
-    return Following(
+    return FollowerLoad(
         clients=count,
         cores=spent_s / passed_s,
         memory_bytes=memory,
@@ -237,7 +244,7 @@ async def _follow(
     )
 
 
-def load_as_rich(load: DashboardLoad) -> RenderableType:
+def dashboard_load_as_rich(load: DashboardLoad) -> RenderableType:
     """Everything for a terminal."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for name in ("pages", "cores", "RAM", "to each page", "frames", "latency p50", "p99"):
@@ -264,7 +271,7 @@ def load_as_rich(load: DashboardLoad) -> RenderableType:
     )
 
 
-def load_as_json(load: DashboardLoad) -> dict[str, object]:
+def dashboard_load_as_json(load: DashboardLoad) -> dict[str, object]:
     """Everything for programs, ready for `json.dumps`."""
     return asdict(load)
 

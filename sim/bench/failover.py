@@ -1,6 +1,6 @@
 """`swarm bench failover`: everything measured about fleets in trouble, and its tables.
 
-Leaves out: how each is measured (sim.bench.takeover, sim.bench.trouble, sim.bench.latency).
+Leaves out: how each is measured (sim.bench.takeover, sim.bench.links, sim.bench.latency).
 """
 
 from __future__ import annotations
@@ -14,28 +14,36 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.table import Table
 
-from sim.bench.latency import Latencies, measure_latencies
-from sim.bench.machine import Machine, this_machine
-from sim.bench.takeover import Blow, Takeovers, measure_takeovers
-from sim.bench.trouble import (
+from sim.bench.latency import DecisionLatencies, measure_latencies
+from sim.bench.links import (
     BAD_LINKS,
     BadLink,
     FalseLosses,
-    Partition,
+    PartitionResult,
     Traffic,
     measure_false_losses,
     measure_partition,
     measure_traffic,
 )
-from sim.launch.fleet import BusKind
-from swarm.config import Link, preset
+from sim.bench.machine import MachineInfo, this_machine
+from sim.bench.takeover import FailureMode, Takeovers, measure_takeovers
+from sim.fleet.layout import BusKind
+from swarm.protocol.timing import LinkKind, preset
 
-__all__ = ["Failover", "Settings", "What", "failover_as_json", "failover_as_rich", "measure"]
+__all__ = [
+    "FailoverMeasure",
+    "FailoverResults",
+    "FailoverSettings",
+    "failover_as_json",
+    "failover_as_rich",
+    "measure_failover",
+]
+
 
 KILL_TARGET_S = 1.0
 
 
-class What(StrEnum):
+class FailoverMeasure(StrEnum):
     """What can be measured."""
 
     KILL = "kill"
@@ -49,12 +57,12 @@ class What(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class FailoverSettings:
     """How much is measured, and on what."""
 
     trials: int = 100
     """Blows of each kind."""
-    link: Link = Link.NORMAL
+    link: LinkKind = LinkKind.NORMAL
     """Preset of the fleets that are struck."""
     bus: BusKind = BusKind.ROUTER
     """How the processes of those reach each other."""
@@ -73,23 +81,23 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Failover:
+class FailoverResults:
     """All that was measured."""
 
-    machine: Machine
-    settings: Settings
+    machine: MachineInfo
+    settings: FailoverSettings
     takeovers: tuple[Takeovers, ...]
     losses: tuple[FalseLosses, ...]
-    partitions: tuple[Partition, ...]
+    partitions: tuple[PartitionResult, ...]
     traffic: tuple[Traffic, ...]
-    latencies: tuple[Latencies, ...]
+    latencies: tuple[DecisionLatencies, ...]
 
 
-def measure(
-    what: Sequence[What],
-    settings: Settings,
+def measure_failover(
+    what: Sequence[FailoverMeasure],
+    settings: FailoverSettings,
     on_progress: Callable[[str], None] | None = None,
-) -> Failover:
+) -> FailoverResults:
     """Measure ``what``, one after the other.
 
     Raises:
@@ -98,18 +106,22 @@ def measure(
     """
     tell = on_progress or (lambda _: None)
     machine = this_machine()
-    return Failover(
+    return FailoverResults(
         machine,
         settings,
-        tuple(_struck(blow, settings, tell) for blow in Blow if What(blow) in what),
-        tuple(_on_bad_link(b, settings, tell) for b in BAD_LINKS if What.LOSS in what),
-        tuple(_parted(settings, tell)) if What.PARTITION in what else (),
-        tuple(_said(settings, tell)) if What.TRAFFIC in what else (),
-        tuple(_decided(settings, tell)) if What.LATENCY in what else (),
+        tuple(
+            _struck(blow, settings, tell) for blow in FailureMode if FailoverMeasure(blow) in what
+        ),
+        tuple(_on_bad_link(b, settings, tell) for b in BAD_LINKS if FailoverMeasure.LOSS in what),
+        tuple(_parted(settings, tell)) if FailoverMeasure.PARTITION in what else (),
+        tuple(_said(settings, tell)) if FailoverMeasure.TRAFFIC in what else (),
+        tuple(_decided(settings, tell)) if FailoverMeasure.LATENCY in what else (),
     )
 
 
-def _struck(blow: Blow, settings: Settings, tell: Callable[[str], None]) -> Takeovers:
+def _struck(
+    blow: FailureMode, settings: FailoverSettings, tell: Callable[[str], None]
+) -> Takeovers:
     return asyncio.run(
         measure_takeovers(
             blow,
@@ -122,32 +134,36 @@ def _struck(blow: Blow, settings: Settings, tell: Callable[[str], None]) -> Take
     )
 
 
-def _on_bad_link(bad: BadLink, settings: Settings, tell: Callable[[str], None]) -> FalseLosses:
+def _on_bad_link(
+    bad: BadLink, settings: FailoverSettings, tell: Callable[[str], None]
+) -> FalseLosses:
     tell(f"loss: {bad.quality.loss_frac:.0%}, {1e3 * bad.quality.delay_s:.0f} ms")
     return measure_false_losses(bad, settings.watch_s, seed=settings.seed, relay=settings.relay)
 
 
-def _parted(settings: Settings, tell: Callable[[str], None]) -> Iterator[Partition]:
+def _parted(settings: FailoverSettings, tell: Callable[[str], None]) -> Iterator[PartitionResult]:
     for number in range(settings.partitions):
         tell(f"partition: {number} of {settings.partitions}")
         seed = settings.seed + number
         yield asyncio.run(measure_partition(settings.parted_s, seed=seed, on_progress=tell))
 
 
-def _said(settings: Settings, tell: Callable[[str], None]) -> Iterator[Traffic]:
+def _said(settings: FailoverSettings, tell: Callable[[str], None]) -> Iterator[Traffic]:
     for size in settings.sizes:
         tell(f"traffic: {size} UAVs")
         yield asyncio.run(measure_traffic(size, settings.traffic_s, seed=settings.seed))
 
 
-def _decided(settings: Settings, tell: Callable[[str], None]) -> Iterator[Latencies]:
+def _decided(
+    settings: FailoverSettings, tell: Callable[[str], None]
+) -> Iterator[DecisionLatencies]:
     for method in settings.methods:
         yield asyncio.run(measure_latencies(method, seed=settings.seed, on_progress=tell))
 
 
-def bound_s(blow: Blow, link: Link) -> float:
+def bound_s(blow: FailureMode, link: LinkKind) -> float:
     """Within which time another is to hold the task."""
-    if blow is Blow.KILL:
+    if blow is FailureMode.KILL:
         return KILL_TARGET_S
     chosen = preset(link)
     return chosen.lease_s + chosen.timing.silence_s
@@ -156,7 +172,7 @@ def bound_s(blow: Blow, link: Link) -> float:
 # -- for programs -------------------------------------------------------------------------
 
 
-def failover_as_json(done: Failover) -> dict[str, Any]:
+def failover_as_json(done: FailoverResults) -> dict[str, Any]:
     """Everything, ready for `json.dumps`."""
     return {
         "machine": asdict(done.machine),
@@ -218,7 +234,7 @@ def failover_as_json(done: Failover) -> dict[str, Any]:
 # -- for people ---------------------------------------------------------------------------
 
 
-def failover_as_rich(done: Failover) -> RenderableType:
+def failover_as_rich(done: FailoverResults) -> RenderableType:
     """Everything, in the width of a terminal of 80 columns."""
     parts: list[RenderableType] = [str(done.machine), f"seed {done.settings.seed}"]
     if done.takeovers:
@@ -274,7 +290,7 @@ def _losses(rows: Sequence[FalseLosses]) -> Table:
     return table
 
 
-def _partitions(rows: Sequence[Partition]) -> Table:
+def _partitions(rows: Sequence[PartitionResult]) -> Table:
     table = _table(
         "A fleet in two halves",
         [],
@@ -311,7 +327,7 @@ def _traffic(rows: Sequence[Traffic]) -> Table:
     return table
 
 
-def _latencies(rows: Sequence[Latencies]) -> Table:
+def _latencies(rows: Sequence[DecisionLatencies]) -> Table:
     table = _table(
         "From the report of an arrival to the next command [ms]",
         ["rule"],

@@ -1,41 +1,51 @@
-"""How long a UAV takes from seeing its arrival to commanding the next task.
+"""How long an agent takes from an arrival to its next command, and a claim through a router.
 
-A tap on the MAVLink connection of every agent notes when a position report passes, and
-when the command to fly somewhere else does. Tasks need no service, so a new target is the
-answer to the report in which the vehicle has arrived, and reports are too far apart to be
-mistaken for each other. Both the way in and the way out through the agent's sockets are
-part of it. Leaves out: the vehicle's and the radio's own delays.
+A tap on the MAVLink connection of every agent notes when a position report passes, and when the
+command to fly somewhere else does. Tasks need no service, so a new target is the answer to the
+report in which the vehicle has arrived, and reports are too far apart to be mistaken for each
+other. A claim is made into bytes, signed if there are keys, carried over a router in a process of
+its own, checked and made into a message again.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sim.bench.links import survey_mission
 from sim.bench.takeover import options_for
-from sim.bench.trouble import survey
-from sim.launch.fleet import BusKind, Layout
-from sim.launch.process import Child
-from swarm.clock import Clock, SystemClock
-from swarm.config import Link
+from sim.fleet.child_process import ChildProcess
+from sim.fleet.layout import BusKind, LaunchOptions, Layout
+from swarm.bus.zenoh_bus import open_zenoh_bus
+from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
+from swarm.protocol.events import CommonAction, CommonEvent, MessageReceived, Publish
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import Message, Stamp
+from swarm.protocol.timing import LinkKind
+from swarm.protocol.uav_messages import Claim, ClaimPhase
+from swarm.runtime.clock import Clock, SystemClock
+from swarm.runtime.shell import Shell
 
-__all__ = ["Latencies", "Tap", "measure_latencies"]
+__all__ = ["SPEAKER", "DecisionLatencies", "MavlinkTap", "measure_hops", "measure_latencies"]
+
 
 REPORT_HZ = 10.0
 """Rate of position reports; 100 ms apart, ten times what a decision may take."""
+
 NOT_BY_ARRIVAL = 2
 """The way to its start and the first task follow from take-off and the mission's beginning."""
+
 LIMIT_S = 300.0
 
 
 @dataclass(frozen=True, slots=True)
-class Latencies:
+class DecisionLatencies:
     """Times from the report of an arrival to the next command."""
 
     method: str
@@ -50,7 +60,7 @@ class Latencies:
         return float(np.quantile(self.times_s, share, method="inverted_cdf"))
 
 
-class Tap:
+class MavlinkTap:
     """Listens to both directions of one MAVLink connection, and times targets by reports."""
 
     def __init__(self, clock: Clock) -> None:
@@ -93,7 +103,7 @@ async def measure_latencies(
     seed: int = 0,
     speedup: float = 1.0,
     on_progress: Callable[[str], None] | None = None,
-) -> Latencies:
+) -> DecisionLatencies:
     """Fly a survey and time every decision but the first of each UAV, in wall seconds.
 
     Raises:
@@ -101,10 +111,10 @@ async def measure_latencies(
         TimeoutError: the mission took too long.
     """
     tell = on_progress or (lambda _: None)
-    mission = survey(uavs, tasks, seed, service_s=0.0)
+    mission = survey_mission(uavs, tasks, seed, service_s=0.0)
     clock = SystemClock()
-    taps: list[Tap] = []
-    with options_for(mission, link=Link.NORMAL, bus=BusKind.ROUTER, method=method) as options:
+    taps: list[MavlinkTap] = []
+    with options_for(mission, link=LinkKind.NORMAL, bus=BusKind.ROUTER, method=method) as options:
         layout = Layout(
             replace(options, position_rate_hz=REPORT_HZ, speedup=speedup),
             mission,
@@ -118,7 +128,7 @@ async def measure_latencies(
             await _started(stack, COORDINATOR, layout.coordinator())
             agents = []
             for said in await vehicles.ready(len(ids)):
-                tap = Tap(clock)
+                tap = MavlinkTap(clock)
                 taps.append(tap)
                 url = await stack.enter_async_context(_tapped(str(said["url"]), tap))
                 arguments = layout.agent(said["uav"], url, int(said["system_id"]))
@@ -126,11 +136,13 @@ async def measure_latencies(
             tell(f"{method}: flying {tasks} tasks with {uavs} UAVs")
             async with asyncio.timeout(LIMIT_S):
                 await asyncio.gather(*(agent.ended() for agent in agents))
-    return Latencies(method, uavs, tasks, tuple(time_s for tap in taps for time_s in tap.times_s))
+    return DecisionLatencies(
+        method, uavs, tasks, tuple(time_s for tap in taps for time_s in tap.times_s)
+    )
 
 
 @contextlib.asynccontextmanager
-async def _tapped(url: str, tap: Tap) -> AsyncIterator[str]:
+async def _tapped(url: str, tap: MavlinkTap) -> AsyncIterator[str]:
     """Where to reach the TCP server ``url`` through ``tap``."""
     _, host, port = url.split(":")
     connections: set[asyncio.Task[None]] = set()
@@ -172,8 +184,10 @@ async def _pass_on(
             await writer.drain()
 
 
-async def _started(stack: contextlib.AsyncExitStack, name: str, arguments: list[str]) -> Child:
-    child = Child(name, arguments)
+async def _started(
+    stack: contextlib.AsyncExitStack, name: str, arguments: list[str]
+) -> ChildProcess:
+    child = ChildProcess(name, arguments)
     stack.push_async_callback(child.stop)
     await child.start()
     return child
@@ -183,3 +197,128 @@ def _parser() -> mavlink.MAVLink:
     parser = mavlink.MAVLink(None)
     parser.robust_parsing = True
     return parser
+
+
+SPEAKER = "speaker"
+"""Who says the claims; with keys they have to be those of a UAV of that name."""
+
+_HEARER = "hearer"
+
+_RATE_HZ = 20.0
+"""Claims a second: in between, processors that have nothing else to do have gone to sleep."""
+
+_WARM = 20
+"""Claims before those that are timed."""
+
+_LATE_S = 0.5
+"""What has not come by then counts as lost."""
+
+
+async def measure_hops(mission: Mission, options: LaunchOptions, claims: int) -> tuple[float, ...]:
+    """Wall times that so many claims took [s]; of one that was lost, none.
+
+    Args:
+        mission: whose bus it is; nobody flies it.
+        options: of a bus with a router.
+        claims: how many are timed.
+
+    Raises:
+        ChildFailedError: the router did not start.
+    """
+    layout = Layout(options, mission, np.random.default_rng())
+    (name, *_) = layout.routers
+    router = ChildProcess(name, layout.router(name))
+    clock = SystemClock()
+    said, heard = _Speaker(mission.name, clock), _Hearer(clock)
+    await router.start()
+    try:
+        await router.ready()
+        async with (
+            _seated(said, layout, mission, SPEAKER, clock) as speaking,
+            _seated(heard, layout, mission, _HEARER, clock),
+        ):
+            for _ in range(_WARM + claims):
+                await asyncio.sleep(1.0 / _RATE_HZ)
+                speaking.step(MessageReceived(said.claim()))
+            await asyncio.sleep(_LATE_S)
+    finally:
+        await router.stop()
+    timed = [number for number in heard.at_s if number > _WARM]
+    return tuple(heard.at_s[number] - said.at_s[number] for number in timed)
+
+
+class _Silent:
+    """What both cores have in common: they want nothing of their own accord."""
+
+    def start(self, now_s: float) -> Sequence[CommonAction]:
+        del now_s
+        return []
+
+    def next_deadline_s(self) -> float | None:
+        return None
+
+
+class _Speaker(_Silent):
+    """Says what it is told as its own, and notes when."""
+
+    def __init__(self, mission: str, clock: Clock) -> None:
+        self.at_s: dict[int, float] = {}
+        self._mission = mission
+        self._clock = clock
+
+    def claim(self) -> Message:
+        """The next one to say."""
+        stamp = Stamp(1, len(self.at_s) + 1)
+        body = Claim(ClaimPhase.HELD, "t1", 1.0, 0, 2.0)
+        return Message(self._mission, SPEAKER, stamp, body)
+
+    def step(self, event: CommonEvent, now_s: float) -> Sequence[CommonAction]:
+        del now_s
+        if isinstance(event, MessageReceived) and isinstance(event.message.body, Claim):
+            self.at_s[event.message.stamp.counter] = self._clock.now_s()
+            return [Publish(event.message)]
+        return []
+
+
+class _Hearer(_Silent):
+    """Notes when it hears each claim."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.at_s: dict[int, float] = {}
+        self._clock = clock
+
+    def step(self, event: CommonEvent, now_s: float) -> Sequence[CommonAction]:
+        del now_s
+        if isinstance(event, MessageReceived) and isinstance(event.message.body, Claim):
+            self.at_s.setdefault(event.message.stamp.counter, self._clock.now_s())
+        return []
+
+
+@contextlib.asynccontextmanager
+async def _seated(
+    core: _Speaker | _Hearer, layout: Layout, mission: Mission, name: str, clock: Clock
+) -> AsyncIterator[Shell[CommonEvent, CommonAction]]:
+    """A shell around ``core`` on the bus, for as long as the context lasts."""
+    bus = await open_zenoh_bus(layout.observer_seat(name))
+    try:
+        if name != SPEAKER:
+            bus.subscribe(KeySpace(mission.name).claim("*"))
+        shell: Shell[CommonEvent, CommonAction] = Shell(
+            core,
+            bus,
+            clock,
+            mission=mission.name,
+            name=name,
+            from_bus=lambda fact: fact,
+            execute=lambda _: None,
+            snapshot=None,
+        )
+        running = asyncio.get_running_loop().create_task(shell.run())
+        try:
+            yield shell
+        finally:
+            running.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await running
+    finally:
+        bus.close()

@@ -17,14 +17,15 @@ import numpy as np
 
 import swarm
 
-__all__ = ["Machine", "cpu_s", "memory_bytes", "peak_memory_bytes", "this_machine"]
+__all__ = ["MachineInfo", "cpu_s", "memory_bytes", "peak_memory_bytes", "this_machine"]
+
 
 _CPU_INFO = Path("/proc/cpuinfo")
 _STATUS = Path("/proc/self/status")
 
 
 @dataclass(frozen=True, slots=True)
-class Machine:
+class MachineInfo:
     """A computer and the versions on it."""
 
     cpu: str
@@ -46,13 +47,13 @@ class Machine:
         return f"{self.cpu}, {self.cores} cores{memory}; {self.system}; {versions}{load}"
 
 
-def this_machine() -> Machine:
+def this_machine() -> MachineInfo:
     """Describe the machine this process runs on."""
     versions = {"Python": platform.python_version(), "peckorder": swarm.__version__}
     versions["NumPy"] = np.__version__
     with suppress(PackageNotFoundError):
         versions["OR-Tools"] = version("ortools")
-    return Machine(
+    return MachineInfo(
         cpu=_cpu_model(),
         cores=len(os.sched_getaffinity(0))
         if hasattr(os, "sched_getaffinity")

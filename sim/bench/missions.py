@@ -19,26 +19,32 @@ from rich.table import Table
 from rich.text import Text
 
 from coordinator.planner.plan import make_plan
-from sim.bench.machine import Machine, this_machine
-from sim.study.flight import score
+from sim.bench.machine import MachineInfo, this_machine
 from sim.study.generator import mission_of, random_mission
 from sim.study.policies.agents import GREEDY
-from sim.study.policy import Planner
-from sim.uncertainty import Uncertainty
-from swarm.clock import Clock, SystemClock
+from sim.study.policies.roster import Planner
+from sim.world.outcome import score
+from sim.world.uncertainty import Uncertainty
 from swarm.model import Plan
+from swarm.runtime.clock import Clock, SystemClock
 
 __all__ = [
-    "Flown", "Missions", "MissionsBench", "fly_block", "measure_missions", "missions_as_json",
+    "BatchResult",
+    "MissionBatch",
+    "MissionsBench",
+    "fly_block",
+    "measure_missions",
+    "missions_as_json",
     "missions_as_rich",
-]  # fmt: skip
+]
+
 
 _BLOCK = 10
 """Missions a process flies between two reports."""
 
 
 @dataclass(frozen=True, slots=True)
-class Missions:
+class MissionBatch:
     """Which missions to fly."""
 
     n_uav: int
@@ -49,7 +55,7 @@ class Missions:
 
 
 @dataclass(frozen=True, slots=True)
-class Flown:
+class BatchResult:
     """What some missions took, and came to."""
 
     plan_cpu_s: float
@@ -66,7 +72,7 @@ class Flown:
 class MissionsBench:
     """Everything measured in one run."""
 
-    machine: Machine
+    machine: MachineInfo
     n_uav: int
     n_task: int
     missions: int
@@ -89,7 +95,7 @@ class MissionsBench:
 
 
 def measure_missions(
-    which: Missions, jobs: int, clock: Clock, progress: Callable[[int], None] = lambda _: None
+    which: MissionBatch, jobs: int, clock: Clock, progress: Callable[[int], None] = lambda _: None
 ) -> MissionsBench:
     """Fly missions in several processes.
 
@@ -100,7 +106,7 @@ def measure_missions(
         progress: told the number of missions flown since it was last told.
     """
     machine, begin_s = this_machine(), clock.now_s()
-    flown: list[Flown] = []
+    flown: list[BatchResult] = []
     for block, done in _flown(which, jobs):
         flown.append(done)
         progress(len(block))
@@ -123,7 +129,7 @@ def measure_missions(
     )
 
 
-def fly_block(which: Missions) -> Flown:
+def fly_block(which: MissionBatch) -> BatchResult:
     """Plan and fly missions one after the other in this process."""
     clock = SystemClock()
     plan_cpu_s = fly_cpu_s = 0.0
@@ -141,7 +147,7 @@ def fly_block(which: Missions) -> Flown:
         scored = score(fate, flight)
         done += scored.done
         lost += scored.lost_uavs
-    return Flown(plan_cpu_s, fly_cpu_s, done, lost)
+    return BatchResult(plan_cpu_s, fly_cpu_s, done, lost)
 
 
 def missions_as_rich(bench: MissionsBench) -> RenderableType:
@@ -182,9 +188,9 @@ def missions_as_json(bench: MissionsBench) -> dict[str, object]:
     return asdict(bench)
 
 
-def _flown(which: Missions, jobs: int) -> Iterator[tuple[range, Flown]]:
+def _flown(which: MissionBatch, jobs: int) -> Iterator[tuple[range, BatchResult]]:
     blocks = [which.seeds[at : at + _BLOCK] for at in range(0, len(which.seeds), _BLOCK)]
-    parts = [Missions(which.n_uav, which.n_task, b, which.uncertainty) for b in blocks]
+    parts = [MissionBatch(which.n_uav, which.n_task, b, which.uncertainty) for b in blocks]
     if jobs == 1:
         yield from zip(blocks, map(fly_block, parts), strict=True)
         return

@@ -1,37 +1,59 @@
-"""What `swarm bench plan` shows: tables for terminals, Markdown for documents, JSON for programs.
+"""What `swarm bench plan` shows: tables, Markdown, JSON, and plots.
 
-Leaves out: measuring (`sim.bench.plan_bench`) and plots (`sim.bench.plan_plot`).
+Plots are of value against the time limit or the size, and of time and memory by size.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from sim.bench.methods import METHODS
-from sim.bench.plan_bench import LONG_RUN, PlanBench, Summary, summaries
-from sim.bench.worker import HORIZON_SHARE
+from sim.bench.plans import LONG_RUN, MethodSummary, PlanBench, PlanMeasurement, summaries
+from sim.bench.solvers import HORIZON_SHARE, METHODS
 from sim.study.baselines.ortools_routing import SHORTFALL
 
-__all__ = ["Grid", "as_json", "as_markdown", "as_rich", "comparison_grids", "scaling_grid"]
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "PlanTable",
+    "as_json",
+    "as_markdown",
+    "as_rich",
+    "comparison_figure",
+    "comparison_grids",
+    "scaling_figure",
+    "scaling_grid",
+    "write_figure",
+]
+
 
 _MIB = 2.0**20
+
 _RANDOM = (
     "Random missions: UAVs and tasks uniform over a square (5 km for 500 tasks, its area in "
     "proportion to their number), speeds 8–15 m/s, p 0.6–1, values 1–10, service 0–20 s, "
     f"D = {HORIZON_SHARE:g} × the makespan of value-per-time."
 )
+
 _MEASURED = (
     "Each method runs alone, in a process of its own, one after another, with the same limit in "
     "wall time; imports are not counted, and OR-Tools' building of its model comes on top of its "
     "limit. MiB: peak memory of the whole process, interpreter and mission included. late: tasks "
     "completed after D. guided and greedy use every core, the others one."
 )
+
 _SCALING_TITLE = "Time and memory by size"
+
 _SCALING = (
     "first plan: when the method can first tell how good its best lists are, from the problem's "
     "arrays on; its J and that of half the time over the J at the end."
@@ -39,7 +61,7 @@ _SCALING = (
 
 
 @dataclass(frozen=True, slots=True)
-class Grid:
+class PlanTable:
     """A table as text."""
 
     title: str
@@ -48,11 +70,11 @@ class Grid:
     rows: tuple[tuple[str, ...], ...]
 
 
-def comparison_grids(bench: PlanBench) -> list[Grid]:
+def comparison_grids(bench: PlanBench) -> list[PlanTable]:
     """One table per case and limit; the long run is told in each of its case."""
     found = summaries(bench)
     long_runs = {s.case: s for s in found if s.method == LONG_RUN}
-    groups: dict[tuple[str, float], list[Summary]] = {}
+    groups: dict[tuple[str, float], list[MethodSummary]] = {}
     for summary in found:
         if summary.method != LONG_RUN:
             groups.setdefault((summary.case, summary.limit_s), []).append(summary)
@@ -64,7 +86,7 @@ def comparison_grids(bench: PlanBench) -> list[Grid]:
         headings += ["J / long run"] if long_run is not None else []
         headings += ["time [s]", "CPU [s]", "MiB", "late", "notes"]
         grids.append(
-            Grid(
+            PlanTable(
                 f"{case}, {limit_s:g} s",
                 tuple(headings),
                 tuple(_comparison_row(row, long_run is not None) for row in rows),
@@ -73,7 +95,7 @@ def comparison_grids(bench: PlanBench) -> list[Grid]:
     return grids
 
 
-def scaling_grid(bench: PlanBench) -> Grid:
+def scaling_grid(bench: PlanBench) -> PlanTable:
     """Time to a first plan, growth of J and memory by size."""
     rows = []
     for row in bench.measured:
@@ -99,10 +121,10 @@ def scaling_grid(bench: PlanBench) -> Grid:
         "size", "method", "first plan [s]", "its J / last", "half time's", "J / best", "time [s]",
         "MiB", "notes",
     )  # fmt: skip
-    return Grid(_SCALING_TITLE, headings, tuple(rows))
+    return PlanTable(_SCALING_TITLE, headings, tuple(rows))
 
 
-def as_rich(bench: PlanBench, grids: Sequence[Grid]) -> RenderableType:
+def as_rich(bench: PlanBench, grids: Sequence[PlanTable]) -> RenderableType:
     """Everything for a terminal."""
     parts: list[RenderableType] = [Text(str(bench.machine)), Text(_seeds(bench))]
     for grid in grids:
@@ -125,7 +147,7 @@ def as_rich(bench: PlanBench, grids: Sequence[Grid]) -> RenderableType:
     return Group(*parts)
 
 
-def as_markdown(bench: PlanBench, grids: Sequence[Grid]) -> str:
+def as_markdown(bench: PlanBench, grids: Sequence[PlanTable]) -> str:
     """Everything for a document."""
     lines = [f"Measured on {bench.machine}. {_seeds(bench)}", ""]
     for grid in grids:
@@ -151,7 +173,7 @@ def as_json(bench: PlanBench) -> dict[str, object]:
     }
 
 
-def _comparison_row(summary: Summary, with_long_run: bool) -> tuple[str, ...]:
+def _comparison_row(summary: MethodSummary, with_long_run: bool) -> tuple[str, ...]:
     if not summary.runs:
         blanks = 7 if with_long_run else 6
         return (summary.method, *("–",) * blanks, summary.note)
@@ -170,7 +192,7 @@ def _comparison_row(summary: Summary, with_long_run: bool) -> tuple[str, ...]:
     return tuple(cells)
 
 
-def _notes(bench: PlanBench, grids: Sequence[Grid]) -> list[str]:
+def _notes(bench: PlanBench, grids: Sequence[PlanTable]) -> list[str]:
     """What the figures mean, as far as it concerns methods and cases that are there."""
     methods = list(dict.fromkeys(row.method for row in bench.measured))
     told = [f"{name}: {METHODS[name].what}" for name in methods if name in METHODS]
@@ -212,3 +234,124 @@ def _share(worth: float | None, last: float) -> str:
 
 def _markdown_row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#777777")
+
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
+_STEP = 0.05
+"""The axis of ratios begins at a multiple of this."""
+
+
+def write_figure(figure: Figure, path: Path) -> None:
+    """Write the picture; its suffix says which kind.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    kind = path.suffix.lower().lstrip(".")
+    figure.savefig(path, format=kind, dpi=160)
+
+
+def comparison_figure(bench: PlanBench) -> Figure:
+    """J relative to the best: against the limit, a panel per case, where there are several limits;
+    else against the case."""
+    from matplotlib.figure import Figure
+
+    found = [s for s in summaries(bench) if s.method != LONG_RUN and s.ratio is not None]
+    cases = list(dict.fromkeys(s.case for s in found))
+    limits_s = sorted({s.limit_s for s in found})
+    against_time = len(limits_s) > 1
+    panels = cases if against_time else ["all"]
+    figure = Figure(figsize=(2.0 + 4.2 * max(1, len(panels)), 4.4), layout="constrained")
+    for i, panel in enumerate(panels):
+        axes = figure.add_subplot(1, len(panels), i + 1)
+        if against_time:
+            shown = [s for s in found if s.case == panel]
+            _lines(axes, shown, [f"{limit_s:g}" for limit_s in limits_s], by_case=False)
+            axes.set_title(panel, loc="left")
+            axes.set_xlabel("time limit [s]")
+        else:
+            _lines(axes, found, cases, by_case=True)
+            limit = f"{limits_s[0]:g} s" if limits_s else "no limit"
+            axes.set_title(f"Plans after {limit}", loc="left")
+            axes.set_xlabel("UAVs × tasks")
+        axes.set_ylabel("J / best of the run (0: that or less)")
+        axes.set_ylim(_lowest(found), 1.01)
+        axes.grid(visible=True, color="#e4e4e4", linewidth=0.6)
+    _legend(figure)
+    return figure
+
+
+def scaling_figure(bench: PlanBench) -> Figure:
+    """Time to a first plan and peak memory by size, in the order measured."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.4, 4.4), layout="constrained")
+    names = list(dict.fromkeys(row.method for row in bench.measured))
+    cases = list(dict.fromkeys(row.case for row in bench.measured))
+    for i, (title, of) in enumerate((("first plan [s]", _first_s), ("peak memory [MiB]", _mib))):
+        axes = figure.add_subplot(1, 2, i + 1)
+        for name in names:
+            rows = [r for r in bench.measured if r.method == name and r.objective is not None]
+            points = [(cases.index(row.case), of(row)) for row in rows]
+            if points:
+                xs, ys = zip(*points, strict=True)
+                axes.plot(xs, ys, label=name, color=_colour(name), marker=_marker(name))
+        axes.set_xticks(range(len(cases)), cases, rotation=30)
+        axes.set_yscale("log")
+        axes.set_xlabel("UAVs × tasks")
+        axes.set_title(title, loc="left")
+        axes.grid(visible=True, which="both", color="#e4e4e4", linewidth=0.6)
+    _legend(figure)
+    return figure
+
+
+def _lines(
+    axes: Axes, shown: Sequence[MethodSummary], ticks: Sequence[str], *, by_case: bool
+) -> None:
+    for name in dict.fromkeys(s.method for s in shown):
+        points = [
+            (ticks.index(s.case if by_case else f"{s.limit_s:g}"), max(s.ratio or 0.0, 0.0))
+            for s in shown
+            if s.method == name
+        ]
+        xs, ys = zip(*sorted(points), strict=True)
+        axes.plot(xs, ys, label=name, clip_on=False, color=_colour(name), marker=_marker(name))
+    axes.set_xticks(range(len(ticks)), ticks)
+
+
+def _lowest(found: Sequence[MethodSummary]) -> float:
+    worst = min((s.ratio for s in found if s.ratio is not None), default=0.0)
+    return max(0.0, math.floor(min(worst, 0.9) / _STEP) * _STEP)
+
+
+def _colour(name: str) -> str:
+    return _COLOURS[_index(name) % len(_COLOURS)]
+
+
+def _marker(name: str) -> str:
+    return _MARKERS[_index(name) % len(_MARKERS)]
+
+
+def _index(name: str) -> int:
+    return list(METHODS).index(name)
+
+
+def _legend(figure: Figure) -> None:
+    """One for all panels, since they show the same methods."""
+    entries: dict[str, Artist] = {}
+    for axes in figure.axes:
+        handles, labels = axes.get_legend_handles_labels()
+        entries.update(zip(labels, handles, strict=True))
+    if entries:
+        figure.legend(list(entries.values()), list(entries), loc="outside right upper")
+
+
+def _first_s(row: PlanMeasurement) -> float:
+    return max(1e-4, row.trace[0][0] if row.trace else row.elapsed_s)
+
+
+def _mib(row: PlanMeasurement) -> float:
+    return row.peak_bytes / 2.0**20

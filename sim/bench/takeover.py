@@ -3,7 +3,7 @@
 Three UAVs, two tasks so far away that none is ever reached: two fly, one is idle. Whoever
 flies is struck; the idle one takes over, the struck one comes back, and one of them is
 idle again. Times are taken by a recorder that hears the bus directly. Leaves out: other
-measurements of a fleet in trouble (sim.bench.trouble).
+measurements of a fleet in trouble (sim.bench.links).
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.chaos.flight import ChaosFlight, open_chaos_flight
-from sim.launch.fleet import BusKind, LaunchOptions, default_position_rate_hz
-from swarm.clock import SystemClock
-from swarm.config import Link
+from sim.fleet.faults.flight import ChaosFlight, open_chaos_flight
+from sim.fleet.layout import BusKind, LaunchOptions, default_position_rate_hz
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.protocol.messages import Message
+from swarm.protocol.timing import LinkKind
+from swarm.protocol.uav_messages import Claim, ClaimPhase
+from swarm.runtime.clock import SystemClock
 from swarm.scenario.write import format_scenario
-from swarm.wire.messages import Claim, ClaimPhase, Message
 
 __all__ = [
-    "Blow",
+    "FailureMode",
     "Takeovers",
     "far_mission",
     "flying",
@@ -37,6 +38,7 @@ __all__ = [
     "options_for",
     "stuck_on_demand",
 ]
+
 
 FAR_M = 10_000.0
 SPEED_M_S = 1.0
@@ -72,7 +74,7 @@ signal.signal(signal.SIGUSR2, go_on)
 connections, live on: what a deadlock or an endless loop does."""
 
 
-class Blow(StrEnum):
+class FailureMode(StrEnum):
     """What happens to an agent."""
 
     KILL = "kill"
@@ -89,8 +91,8 @@ class Blow(StrEnum):
 class Takeovers:
     """Times of one kind of blow."""
 
-    blow: Blow
-    link: Link
+    blow: FailureMode
+    link: LinkKind
     bus: BusKind
     times_s: tuple[float, ...]
     """From each blow to another's held claim on the task, as heard on the bus [s]."""
@@ -107,10 +109,10 @@ class Takeovers:
 
 
 async def measure_takeovers(
-    blow: Blow,
+    blow: FailureMode,
     trials: int,
     *,
-    link: Link = Link.NORMAL,
+    link: LinkKind = LinkKind.NORMAL,
     bus: BusKind = BusKind.ROUTER,
     seed: int = 0,
     on_progress: Callable[[str], None] | None = None,
@@ -134,8 +136,8 @@ async def measure_takeovers(
     times_s: list[float] = []
     missed = 0
     mission = far_mission(n_uav=3, n_task=2)
-    with stuck_on_demand() if blow is Blow.DEADLOCK else contextlib.nullcontext():
-        async with flying(mission, link=link, bus=bus, relayed=blow is Blow.CUT) as flight:
+    with stuck_on_demand() if blow is FailureMode.DEADLOCK else contextlib.nullcontext():
+        async with flying(mission, link=link, bus=bus, relayed=blow is FailureMode.CUT) as flight:
             for trial in range(trials):
                 tell(f"{blow}: {trial} of {trials}")
                 busy = await _calm(flight, mission, CALM_S * (1.0 + rng.random()))
@@ -173,7 +175,7 @@ def far_mission(n_uav: int, n_task: int) -> Mission:
 def options_for(
     mission: Mission,
     *,
-    link: Link,
+    link: LinkKind,
     bus: BusKind,
     method: str = "greedy",
     address: str = "127.0.0.1",
@@ -200,7 +202,7 @@ def options_for(
 async def flying(
     mission: Mission,
     *,
-    link: Link,
+    link: LinkKind,
     bus: BusKind,
     relayed: bool = False,
     method: str = "greedy",
@@ -218,23 +220,23 @@ async def _calm(flight: ChaosFlight, mission: Mission, calm_s: float) -> dict[st
     Returns:
         Task by UAV that holds it.
     """
-    observer, clock = flight.run.observer, SystemClock()
+    mission_state, clock = flight.run.mission_state, SystemClock()
     fleet = {uav.id for uav in mission.uavs}
-    limit_s = SETTLE_S if observer.replica.claims else START_S
+    limit_s = SETTLE_S if mission_state.replica.claims else START_S
     begin_s = since_s = clock.now_s()
     before: dict[str, str] = {}
     while True:
-        claims = observer.replica.claims
+        claims = mission_state.replica.claims
         held = {u: c.task for u, c in claims.items() if c.task and c.phase is ClaimPhase.HELD}
         idle = {uav for uav, claim in claims.items() if claim.phase is ClaimPhase.IDLE}
-        complete = fleet <= observer.present and len(held) == 2 and len(idle) == 1
+        complete = fleet <= mission_state.present and len(held) == 2 and len(idle) == 1
         now_s = clock.now_s()
         if not complete or held != before or len(set(held.values())) < 2:
             since_s, before = now_s, held
         elif now_s - since_s >= calm_s:
             return held
         if now_s - begin_s > limit_s:
-            story = "; ".join(each.text for each in observer.story[-5:])
+            story = "; ".join(each.text for each in mission_state.story[-5:])
             raise TimeoutError(f"the fleet was not complete within {limit_s:g} s: {story}")
         await asyncio.sleep(LOOK_S)
 
@@ -253,27 +255,27 @@ async def _held_by_another(flight: ChaosFlight, begin: int, victim: str, task: s
     return None
 
 
-async def _strike(flight: ChaosFlight, blow: Blow, victim: str) -> None:
+async def _strike(flight: ChaosFlight, blow: FailureMode, victim: str) -> None:
     match blow:
-        case Blow.KILL:
+        case FailureMode.KILL:
             await flight.kill(victim)
-        case Blow.HANG:
+        case FailureMode.HANG:
             flight.pause(victim)
-        case Blow.CUT:
+        case FailureMode.CUT:
             flight.isolate({victim})
-        case Blow.DEADLOCK:
+        case FailureMode.DEADLOCK:
             os.kill(flight.run.launch.child(victim).pid, signal.SIGUSR1)
 
 
-async def _revive(flight: ChaosFlight, blow: Blow, victim: str) -> None:
+async def _revive(flight: ChaosFlight, blow: FailureMode, victim: str) -> None:
     match blow:
-        case Blow.KILL:
+        case FailureMode.KILL:
             await flight.restart(victim)
-        case Blow.HANG:
+        case FailureMode.HANG:
             flight.resume(victim)
-        case Blow.CUT:
+        case FailureMode.CUT:
             flight.heal()
-        case Blow.DEADLOCK:
+        case FailureMode.DEADLOCK:
             os.kill(flight.run.launch.child(victim).pid, signal.SIGUSR2)
 
 

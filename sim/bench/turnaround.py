@@ -1,7 +1,7 @@
 """How long UAVs wait for their next target, and how well real processes keep to the plan.
 
 Flies a scenario with real processes and lets every agent tell how long each of its
-turnarounds took (agent.mavlink.turnaround). The makespan is set beside the plan's: vehicles
+turnarounds took (agent.vehicle.turnaround). The makespan is set beside the plan's: vehicles
 are ideal, so what it is longer by is arrivals seen late, decisions and the way to the
 vehicle. Leaves out: the time bytes wait in sockets, which `sim.bench.latency` includes.
 """
@@ -19,22 +19,23 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 
-from agent.mavlink.vehicle import TURNAROUNDS
-from sim.bench.machine import Machine
-from sim.launch.fleet import LaunchOptions
-from sim.launch.run import fly
+from agent.links.mavlink_vehicle import TURNAROUNDS
+from sim.bench.machine import MachineInfo
+from sim.fleet.layout import LaunchOptions
+from sim.fleet.run import fly
 from swarm.model import Mission
 
 __all__ = [
     "TARGET_MS",
     "TARGET_RATIO",
-    "Round",
+    "TurnaroundFlight",
     "Turnarounds",
-    "listen",
     "measure_turnarounds",
+    "told_turnarounds",
     "turnarounds_as_json",
     "turnarounds_as_rich",
 ]
+
 
 TARGET_MS = 20.0
 """What 99 of 100 turnarounds shall not exceed."""
@@ -44,7 +45,7 @@ SHARES = {"p50": 0.5, "p90": 0.9, "p99": 0.99, "max": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
-class Round:
+class TurnaroundFlight:
     """One flight."""
 
     target_ms: tuple[float, ...]
@@ -75,7 +76,7 @@ class Turnarounds:
     uavs: int
     speedup: float
     position_rate_hz: float
-    rounds: tuple[Round, ...]
+    rounds: tuple[TurnaroundFlight, ...]
 
     @property
     def ok(self) -> bool:
@@ -110,15 +111,15 @@ def measure_turnarounds(
     )
 
 
-async def _fly(mission: Mission, options: LaunchOptions) -> Round:
+async def _fly(mission: Mission, options: LaunchOptions) -> TurnaroundFlight:
     told: list[dict[str, Any]] = []
 
     def on_log(_name: str, line: str) -> None:
-        told.extend(listen(line))
+        told.extend(told_turnarounds(line))
 
     flight = await fly(mission, options, on_frame=lambda *_: None, on_log=on_log)
     plan, result = flight.plan, flight.result
-    return Round(
+    return TurnaroundFlight(
         target_ms=tuple(time_ms for each in told for time_ms in each["target_ms"]),
         in_force_ms=tuple(time_ms for each in told for time_ms in each["in_force_ms"]),
         idled=sum(each["idled"] for each in told),
@@ -130,7 +131,7 @@ async def _fly(mission: Mission, options: LaunchOptions) -> Round:
     )
 
 
-def listen(line: str) -> Iterable[dict[str, Any]]:
+def told_turnarounds(line: str) -> Iterable[dict[str, Any]]:
     """What a line of an agent's log, in JSON, tells of its turnarounds: one thing or nothing."""
     if TURNAROUNDS not in line:
         return
@@ -153,7 +154,7 @@ def quantiles_ms(times_ms: Iterable[float]) -> dict[str, float | None]:
     }
 
 
-def turnarounds_as_json(machine: Machine, seed: int, done: Turnarounds) -> dict[str, Any]:
+def turnarounds_as_json(machine: MachineInfo, seed: int, done: Turnarounds) -> dict[str, Any]:
     """Everything, ready for `json.dumps`."""
     return {
         "machine": asdict(machine),
@@ -181,20 +182,20 @@ def turnarounds_as_json(machine: Machine, seed: int, done: Turnarounds) -> dict[
     }
 
 
-_KINDS: dict[str, Callable[[Round], tuple[float, ...]]] = {
+_KINDS: dict[str, Callable[[TurnaroundFlight], tuple[float, ...]]] = {
     "sent_ms": lambda each: each.target_ms,
     "in_force_ms": lambda each: each.in_force_ms,
 }
 
 
 def _summary(
-    getter: Callable[[Round], tuple[float, ...]], rounds: Iterable[Round]
+    getter: Callable[[TurnaroundFlight], tuple[float, ...]], rounds: Iterable[TurnaroundFlight]
 ) -> dict[str, float | None]:
     times_ms = [time_ms for each in rounds for time_ms in getter(each)]
     return {"count": len(times_ms), **quantiles_ms(times_ms)}
 
 
-def turnarounds_as_rich(machine: Machine, seed: int, done: Turnarounds) -> RenderableType:
+def turnarounds_as_rich(machine: MachineInfo, seed: int, done: Turnarounds) -> RenderableType:
     """Everything, for people."""
     times = Table(box=None, pad_edge=False, header_style="dim")
     times.add_column("arrival or end of service until")

@@ -1,7 +1,7 @@
 """One flight with faults: a fleet drawn from a seed or a scenario, and a schedule; played.
 
 Leaves out: how schedules are made up (sim.faults.generator) and made smaller
-(sim.faults.shrink).
+(sim.faults.soak).
 """
 
 from __future__ import annotations
@@ -15,35 +15,36 @@ from typing import Final
 
 import numpy as np
 
-from sim.event_queue import EventQueue
-from sim.faults.bugs import BUGS
-from sim.faults.director import Director
-from sim.faults.judge import Judge
-from sim.faults.schedule import Disturbance, Kind, format_schedule, parse_schedule
-from sim.faults.transcript import Broken
-from sim.processes import LocalClock
-from sim.rough_network import Conditions, RoughNetwork, Topology
-from sim.streams import stream
-from sim.world import ONLOOKER, OPERATOR_PATIENCE_S, STANDBY, Planner, Setting, World
+from sim.faults.injector import FaultInjector
+from sim.faults.invariants import InvariantChecker
+from sim.faults.message_log import Violation
+from sim.faults.planted_bugs import BUGS
+from sim.faults.schedule import Disturbance, DisturbanceKind, format_schedule, parse_schedule
+from sim.world.engine import EventQueue, LocalClock, stream
+from sim.world.network import NetworkConditions, Topology
+from sim.world.rough_network import RoughNetwork
+from sim.world.settings import Planner, WorldSettings
+from sim.world.virtual_world import ONLOOKER, OPERATOR_PATIENCE_S, STANDBY, World
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
-from swarm.config import Timing
-from swarm.errors import Fault as InputFault
-from swarm.errors import InputError
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
+from swarm.protocol.timing import Timing
+from swarm.runtime.errors import Fault as InputFault
+from swarm.runtime.errors import InputError
 
 __all__ = [
     "MOST_TASKS",
     "MOST_UAVS",
     "TIMING",
     "Case",
-    "Verdict",
+    "CaseResult",
     "format_case",
     "limit_s",
     "parse_case",
     "play",
     "quick_plan",
 ]
+
 
 MOST_UAVS: Final = 6
 MOST_TASKS: Final = 15
@@ -73,7 +74,7 @@ class Case:
     standby: bool = False
     """Whether a second coordinator stands by."""
     bug: str = ""
-    """A protocol bug put in on purpose; see `sim.faults.bugs`."""
+    """A protocol bug put in on purpose; see `sim.faults.planted_bugs`."""
     schedule: tuple[Disturbance, ...] = ()
     mission: Mission | None = None
     """Flown instead of one drawn from the seed."""
@@ -98,11 +99,11 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class CaseResult:
     """What came of a case."""
 
     case: Case
-    broken: Broken | None
+    broken: Violation | None
     """The first invariant that did not hold."""
     steps: int
     world: World
@@ -136,8 +137,8 @@ def quick_plan(mission: Mission, method: str, seed: int) -> Plan:
 def play(
     case: Case,
     make_plan: Planner = quick_plan,
-    join: Callable[[EventQueue, Conditions, int], RoughNetwork] = RoughNetwork,
-) -> Verdict:
+    join: Callable[[EventQueue, NetworkConditions, int], RoughNetwork] = RoughNetwork,
+) -> CaseResult:
     """Fly ``case`` to its end, or until an invariant breaks.
 
     Args:
@@ -148,10 +149,10 @@ def play(
     network: list[RoughNetwork] = []
 
     def make_network(queue: EventQueue) -> RoughNetwork:
-        network.append(join(queue, Conditions(case.topology), case.seed))
+        network.append(join(queue, NetworkConditions(case.topology), case.seed))
         return network[0]
 
-    mission, judge = case.flown(), Judge()
+    mission, judge = case.flown(), InvariantChecker()
     bug: AbstractContextManager[None] = BUGS[case.bug]() if case.bug else nullcontext()
     with bug:
         world = World(
@@ -160,21 +161,23 @@ def play(
             method=case.method,
             seed=case.seed,
             timing=TIMING,
-            setting=Setting(
+            setting=WorldSettings(
                 network=make_network,
                 clocks=_clocks(case),
                 standby=case.standby,
-                kept={each.names[0] for each in case.schedule if each.kind is Kind.CRASH},
+                kept={
+                    each.names[0] for each in case.schedule if each.kind is DisturbanceKind.CRASH
+                },
                 plan_s=0.05,
                 telemetry_gap_s=0.2,
             ),
             watch=judge,
         )
-        director = Director(world, network[0], case.schedule)
-        judge.attend(world, network[0], director)
+        injector = FaultInjector(world, network[0], case.schedule)
+        judge.attend(world, network[0], injector)
         world.run(limit_s(case))
         judge.conclude()
-    return Verdict(case, judge.broken, world.steps, world)
+    return CaseResult(case, judge.broken, world.steps, world)
 
 
 def limit_s(case: Case) -> float:
@@ -185,15 +188,17 @@ def limit_s(case: Case) -> float:
     """
     mission = case.flown()
     last_s = max((each.ends_s for each in case.schedule), default=0.0)
-    slow = min((e.amount or 1.0 for e in case.schedule if e.kind is Kind.SLOW), default=1.0)
+    slow = min(
+        (e.amount or 1.0 for e in case.schedule if e.kind is DisturbanceKind.SLOW), default=1.0
+    )
     starts = [uav.position_enu_m for uav in mission.uavs]
     places = np.array([*starts, *(task.position_enu_m for task in mission.tasks)])
     across_m = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
     speed_m_s = slow * min(uav.speed_m_s for uav in mission.uavs)
     appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
     work_s = sum(task.service_s + across_m / speed_m_s for task in mission.tasks)
-    work_s += sum(each.kind is Kind.ADD for each in case.schedule) * across_m / speed_m_s
-    if any(each.kind is Kind.HOLD for each in case.schedule):
+    work_s += sum(each.kind is DisturbanceKind.ADD for each in case.schedule) * across_m / speed_m_s
+    if any(each.kind is DisturbanceKind.HOLD for each in case.schedule):
         last_s += OPERATOR_PATIENCE_S
     waits_s = TIMING.abandon_s + TIMING.stalemate_s + 2.0 * TIMING.reconsider_s + 60.0
     return max(last_s, appears_s) + work_s + waits_s

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.errors import Fault, InputError
-from swarm.options import JsonOption
+from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.options import JsonOption
 
 if TYPE_CHECKING:
     from sim.faults.soak import Breach
@@ -73,12 +73,12 @@ def soak(
     import sys
     from json import dumps
 
-    from sim.faults.bugs import BUGS
     from sim.faults.case import format_case
     from sim.faults.generator import kinds_of
+    from sim.faults.planted_bugs import BUGS
     from sim.faults.soak import shrunk
     from sim.faults.soak import soak as play_all
-    from swarm.clock import SystemClock
+    from swarm.runtime.clock import SystemClock
 
     if replay is not None:
         return _replay(replay, json=json)
@@ -116,7 +116,7 @@ def _replay(path: Path, *, json: bool) -> int:
     from json import dumps
 
     from sim.faults.case import format_case, parse_case, play
-    from sim.faults.replay import read_lines
+    from sim.faults.generator import read_lines
 
     case = parse_case(read_lines(path), str(path))
     verdict = play(case)
@@ -124,7 +124,7 @@ def _replay(path: Path, *, json: bool) -> int:
     if json:
         print(dumps({"case": format_case(case).splitlines(), "broken": broken}))
     else:
-        for line in verdict.world.observer.story:
+        for line in verdict.world.mission_state.story:
             when = "" if line.mission_s is None else f"{line.mission_s:.3f}"
             print(f"{when:>9}  {line.text}")
         print(broken or "no invariant broken")

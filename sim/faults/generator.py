@@ -1,50 +1,58 @@
-"""Cases made up from a seed: how large the fleet is, and what goes wrong when.
+"""Cases made up from a seed, and scenarios flown with faults that are drawn or read from a file.
 
-Leaves out: the mission itself, which a case draws from its seed (sim.faults.case).
+Leaves out: the mission of a made-up case, which it draws from its seed (sim.faults.case), what
+faults do (sim.faults.injector), and how the flight is shown (sim.world.cli).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from sim.faults.case import MOST_TASKS, MOST_UAVS, Case
-from sim.faults.schedule import Disturbance, Kind, shape_of
-from sim.rough_network import Topology
-from sim.streams import stream
-from sim.world import ONLOOKER, STANDBY, Recall
-from swarm.errors import Fault as InputFault
-from swarm.errors import InputError
-from swarm.model import Mission
+from coordinator.planner.plan import make_plan
+from sim.faults.case import MOST_TASKS, MOST_UAVS, Case, CaseResult, play
+from sim.faults.schedule import Disturbance, DisturbanceKind, parse_schedule, shape_of
+from sim.world.engine import stream
+from sim.world.network import Topology
+from sim.world.settings import RestartMemory
+from sim.world.uncertainty import Uncertainty
+from sim.world.virtual_world import ONLOOKER, STANDBY
+from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
-from swarm.suggest import instead
+from swarm.runtime.clock import SystemClock
+from swarm.runtime.errors import Fault, InputError, remedy_for_name
+from swarm.runtime.errors import Fault as InputFault
 
-__all__ = ["kinds_of", "random_case", "random_schedule"]
+__all__ = ["fly_with_faults", "kinds_of", "random_case", "random_schedule", "read_lines"]
+
 
 SPAN_S = 40.0
 """Faults of random fleets begin within this time, which most of their missions take."""
 
 
-def kinds_of(text: str, source: str) -> tuple[Kind, ...]:
+def kinds_of(text: str, source: str) -> tuple[DisturbanceKind, ...]:
     """``all``, or kinds with commas between.
 
     Raises:
         InputError: there is no such kind.
     """
     if text == "all":
-        return tuple(Kind)
+        return tuple(DisturbanceKind)
     kinds = []
     for word in text.split(","):
-        if word not in list(Kind):
-            remedy = instead(word, Kind, "write all, a file, or some of")
+        if word not in list(DisturbanceKind):
+            remedy = remedy_for_name(word, DisturbanceKind, "write all, a file, or some of")
             raise InputError(InputFault(source, word, "no kind of fault", remedy))
-        kinds.append(Kind(word))
+        kinds.append(DisturbanceKind(word))
     return tuple(kinds)
 
 
-def random_case(seed: int, kinds: Collection[Kind] = tuple(Kind), bug: str = "") -> Case:
+def random_case(
+    seed: int, kinds: Collection[DisturbanceKind] = tuple(DisturbanceKind), bug: str = ""
+) -> Case:
     """A fleet of 2 to 6 UAVs with 3 to 15 tasks, and 1 to 6 things that go wrong."""
     rng = stream(seed, "case")
     tasks = int(rng.integers(3, MOST_TASKS + 1))
@@ -64,7 +72,7 @@ def random_case(seed: int, kinds: Collection[Kind] = tuple(Kind), bug: str = "")
 
 def random_schedule(
     seed: int,
-    kinds: Collection[Kind],
+    kinds: Collection[DisturbanceKind],
     mission: Mission,
     span_s: float,
     *,
@@ -83,7 +91,7 @@ def random_schedule(
 
 def _draw(
     rng: np.random.Generator,
-    kind: Kind,
+    kind: DisturbanceKind,
     mission: Mission,
     coordinators: Sequence[str],
     span_s: float,
@@ -95,7 +103,7 @@ def _draw(
         lasts_s = round(float(np.exp(rng.uniform(np.log(0.1), np.log(0.5 * span_s)))), 2)
     memory = None
     if shape.memory and lasts_s is not None:
-        memory = Recall(str(rng.choice([each.value for each in Recall])))
+        memory = RestartMemory(str(rng.choice([each.value for each in RestartMemory])))
     return Disturbance(
         at_s=round(float(rng.uniform(0.0, span_s)), 2),
         kind=kind,
@@ -106,8 +114,10 @@ def _draw(
     )
 
 
-def _amount(rng: np.random.Generator, kind: Kind) -> float:
-    low, high = {Kind.WEATHER: (0.02, 0.5), Kind.SKEW: (0.05, 1.0)}.get(kind, (0.4, 1.0))
+def _amount(rng: np.random.Generator, kind: DisturbanceKind) -> float:
+    low, high = {DisturbanceKind.WEATHER: (0.02, 0.5), DisturbanceKind.SKEW: (0.05, 1.0)}.get(
+        kind, (0.4, 1.0)
+    )
     return round(float(rng.uniform(low, high)), 2)
 
 
@@ -141,3 +151,60 @@ def _names(
             return tuple(inside) if 0 < len(inside) < len(everyone) else (one(everyone),)
         case _:
             return ()
+
+
+def fly_with_faults(
+    mission: Mission, *, method: str, seed: int, uncertainty: Uncertainty, faults: str
+) -> CaseResult:
+    """Fly ``mission`` in virtual time on a network on which things go wrong.
+
+    Args:
+        mission: the scenario, pop-ups included.
+        method: planning method whose rule the agents use.
+        seed: of the planner and of all that is uncertain.
+        uncertainty: losses and pop-ups beside the faults.
+        faults: kinds of fault, ``all``, or the name of a file with a schedule.
+
+    Raises:
+        InputError: ``faults`` names neither kinds nor a schedule that can be read.
+    """
+
+    def plan(what: Mission, how: str, with_seed: int) -> Plan:
+        return make_plan(what.known_at_start(), how, clock=SystemClock(), seed=with_seed)
+
+    span_s = max(plan(mission, method, seed).completion_s.values(), default=0.0)
+    fate = uncertainty.draw(mission, span_s, seed)
+    lost = tuple(
+        Disturbance(at_s, DisturbanceKind.LOSE, (str(uav),)) for uav, at_s in fate.lost_at_s.items()
+    )
+    case = Case(
+        seed=seed,
+        uavs=len(mission.uavs),
+        tasks=len(mission.tasks),
+        method=method,
+        schedule=(*lost, *_schedule(faults, seed, fate.mission, span_s)),
+        mission=fate.mission,
+    )
+    return play(case, plan)
+
+
+def read_lines(path: Path) -> list[str]:
+    """The lines of a text file.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        problem = str(getattr(error, "strerror", None) or error)
+        fault = Fault(str(path), "", f"cannot be read: {problem}", "name a readable file")
+        raise InputError(fault) from None
+
+
+def _schedule(faults: str, seed: int, mission: Mission, span_s: float) -> tuple[Disturbance, ...]:
+    path = Path(faults)
+    if not path.is_file():
+        return random_schedule(seed, kinds_of(faults, "--faults"), mission, span_s)
+    processes = (COORDINATOR, ONLOOKER, *(uav.id for uav in mission.uavs))
+    return parse_schedule(read_lines(path), faults, processes, [task.id for task in mission.tasks])

@@ -2,7 +2,7 @@
 
 One line is one fault: ``TIME KIND NAME… by AMOUNT for SECONDS with MEMORY``, such as
 ``12.5 crash u1 for 3.2 with disk``; without ``for`` it stays. Times are virtual seconds since
-all processes began. Leaves out: what a fault does (sim.faults.director).
+all processes began. Leaves out: what a fault does (sim.faults.injector).
 """
 
 from __future__ import annotations
@@ -13,16 +13,24 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, TypeVar
 
-from sim.world import Recall
-from swarm.errors import Fault as InputFault
-from swarm.errors import InputError
+from sim.world.settings import RestartMemory
+from swarm.runtime.errors import Fault as InputFault
+from swarm.runtime.errors import InputError
 
-__all__ = ["Disturbance", "Kind", "Shape", "format_schedule", "parse_schedule", "shape_of"]
+__all__ = [
+    "Disturbance",
+    "DisturbanceKind",
+    "DisturbanceShape",
+    "format_schedule",
+    "parse_schedule",
+    "shape_of",
+]
+
 
 E = TypeVar("E", bound=StrEnum)
 
 
-class Kind(StrEnum):
+class DisturbanceKind(StrEnum):
     """What may go wrong."""
 
     LOSE = "lose"
@@ -66,7 +74,7 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class DisturbanceShape:
     """What a kind of disturbance must be told.
 
     ``names`` says of what: "" of nothing, "process", "uav", "pair" (of processes), "group",
@@ -82,30 +90,30 @@ class Shape:
 
 
 _SHAPES: Final = {
-    Kind.LOSE: Shape("process"),
-    Kind.CRASH: Shape("process", lasts=True, memory=True),
-    Kind.HANG: Shape("process", lasts=True),
-    Kind.DEADLOCK: Shape("process", lasts=True),
-    Kind.CUT: Shape("group", lasts=True, must_end=True),
-    Kind.UNPLUG: Shape("process", lasts=True, must_end=True),
-    Kind.MUTE: Shape("pair", lasts=True, must_end=True),
-    Kind.ROUTERS: Shape("", lasts=True, must_end=True),
-    Kind.BLINK: Shape(""),
-    Kind.WEATHER: Shape("", amount=True, lasts=True, must_end=True),
-    Kind.SKEW: Shape("process", amount=True),
-    Kind.SLOW: Shape("uav", amount=True),
-    Kind.REFUSE: Shape("uav task", lasts=True),
-    Kind.WITHDRAW: Shape("task"),
-    Kind.ADD: Shape("", amount=True),
-    Kind.RETRACT: Shape("task"),
-    Kind.HOLD: Shape("uav", lasts=True, must_end=True),
-    Kind.RETURN: Shape("uav"),
-    Kind.ABORT: Shape(""),
+    DisturbanceKind.LOSE: DisturbanceShape("process"),
+    DisturbanceKind.CRASH: DisturbanceShape("process", lasts=True, memory=True),
+    DisturbanceKind.HANG: DisturbanceShape("process", lasts=True),
+    DisturbanceKind.DEADLOCK: DisturbanceShape("process", lasts=True),
+    DisturbanceKind.CUT: DisturbanceShape("group", lasts=True, must_end=True),
+    DisturbanceKind.UNPLUG: DisturbanceShape("process", lasts=True, must_end=True),
+    DisturbanceKind.MUTE: DisturbanceShape("pair", lasts=True, must_end=True),
+    DisturbanceKind.ROUTERS: DisturbanceShape("", lasts=True, must_end=True),
+    DisturbanceKind.BLINK: DisturbanceShape(""),
+    DisturbanceKind.WEATHER: DisturbanceShape("", amount=True, lasts=True, must_end=True),
+    DisturbanceKind.SKEW: DisturbanceShape("process", amount=True),
+    DisturbanceKind.SLOW: DisturbanceShape("uav", amount=True),
+    DisturbanceKind.REFUSE: DisturbanceShape("uav task", lasts=True),
+    DisturbanceKind.WITHDRAW: DisturbanceShape("task"),
+    DisturbanceKind.ADD: DisturbanceShape("", amount=True),
+    DisturbanceKind.RETRACT: DisturbanceShape("task"),
+    DisturbanceKind.HOLD: DisturbanceShape("uav", lasts=True, must_end=True),
+    DisturbanceKind.RETURN: DisturbanceShape("uav"),
+    DisturbanceKind.ABORT: DisturbanceShape(""),
 }
 _COUNTS: Final = {"": 0, "process": 1, "uav": 1, "pair": 2, "task": 1, "uav task": 2}
 
 
-def shape_of(kind: Kind) -> Shape:
+def shape_of(kind: DisturbanceKind) -> DisturbanceShape:
     """What a disturbance of that kind must be told."""
     return _SHAPES[kind]
 
@@ -120,13 +128,13 @@ class Disturbance:
 
     at_s: float
     """When it begins [s]."""
-    kind: Kind
+    kind: DisturbanceKind
     names: tuple[str, ...] = ()
     """Of processes or tasks, as the kind wants them."""
     lasts_s: float | None = None
     """How long [s]; None for good, or for an instant."""
     amount: float | None = None
-    memory: Recall | None = None
+    memory: RestartMemory | None = None
     """What a process that starts anew finds."""
 
     def __post_init__(self) -> None:
@@ -212,11 +220,11 @@ def _parse(words: Sequence[str]) -> Disturbance:
             names.append(word)
     return Disturbance(
         at_s=_number(words[0]),
-        kind=_one_of(Kind, words[1]),
+        kind=_one_of(DisturbanceKind, words[1]),
         names=tuple(names),
         lasts_s=_number(options["for"]) if "for" in options else None,
         amount=_number(options["by"]) if "by" in options else None,
-        memory=_one_of(Recall, options["with"]) if "with" in options else None,
+        memory=_one_of(RestartMemory, options["with"]) if "with" in options else None,
     )
 
 

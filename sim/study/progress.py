@@ -8,13 +8,14 @@ from __future__ import annotations
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from swarm.clock import Clock
+from swarm.runtime.clock import Clock
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
 __all__ = ["StudyProgress", "duration_text"]
+
 
 _LINE_EVERY_S = 30.0
 """Between lines where there is no terminal; the last one comes in any case."""

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 __all__ = ["Estimate", "difference_of", "mean_of", "ratio_of", "share_of"]
 
+
 _CONFIDENCE = 0.95
 _TAIL = 0.5 + 0.5 * _CONFIDENCE
 

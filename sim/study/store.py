@@ -1,46 +1,171 @@
 """Where the rows of a study are kept while it runs, and from one run to the next.
 
 A folder holds ``study.toml`` and ``trials.csv``, to which the rows of each job are added when it
-is done. So a study that was interrupted, at whatever moment, goes on where it stopped. Leaves
-out: tables and plots made of the rows.
+is done. So a study that was interrupted, at whatever moment, goes on where it stopped. Rows can
+be written as Parquet, too.
 """
 
 from __future__ import annotations
 
+import csv
 import fcntl
+import io
+import os
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
-from sim.study.config import SameMission, Study
-from sim.study.policies import Roster
-from sim.study.row_files import read_rows, replace_text, row_line, table_text
-from sim.study.rows import Row
-from sim.study.study_file import load_study
-from sim.study.study_text import format_study
-from sim.study.trial import Job, rows_due
-from swarm.errors import Fault, InputError
+from sim.study.design import SameMission, Study
+from sim.study.policies.roster import PolicyRoster
+from sim.study.study_file import format_study, load_study
+from sim.study.trial import COLUMNS, TrialJob, TrialRow, rows_due
+from swarm.runtime.errors import Fault, InputError
 from swarm.scenario import format_scenario
 
-__all__ = ["ROWS_FILE", "STUDY_FILE", "FolderStore", "MemoryStore", "Store"]
+__all__ = [
+    "ROWS_FILE",
+    "STUDY_FILE",
+    "FolderStore",
+    "MemoryStore",
+    "RowStore",
+    "read_rows",
+    "replace_text",
+    "require_parquet",
+    "row_line",
+    "table_text",
+    "write_parquet",
+]
+
+
+_PARQUET_FILE = "trials.parquet"
+
+
+def row_line(row: TrialRow) -> str:
+    """A row as a line of CSV: numbers with all their digits, nothing for None."""
+    buffer = io.StringIO()
+    cells = ("" if value is None else value for value in (getattr(row, c) for c in COLUMNS))
+    csv.writer(buffer, lineterminator="\n").writerow(
+        [repr(float(cell)) if isinstance(cell, float) else cell for cell in cells]
+    )
+    return buffer.getvalue()
+
+
+def table_text(rows: Iterable[TrialRow]) -> str:
+    """A whole file of rows."""
+    return ",".join(COLUMNS) + "\n" + "".join(row_line(row) for row in rows)
+
+
+def read_rows(path: Path) -> list[TrialRow]:
+    """The rows of a file; a last line that is not ended was being written, and is left out.
+
+    Raises:
+        InputError: it is no file of rows.
+    """
+    text = path.read_text(encoding="utf-8", errors="replace")  # which is then no row
+    lines = text.splitlines(keepends=True)
+    if lines and not lines[-1].endswith("\n"):
+        del lines[-1]
+    rows: list[TrialRow] = []
+    for number, cells in enumerate(csv.reader(lines), start=1):
+        try:
+            if number == 1:
+                if tuple(cells) != COLUMNS:
+                    raise ValueError("has not the columns of a study")
+            else:
+                rows.append(_row(cells))
+        except ValueError as error:
+            problem = f"is no row of a study: {error}" if number > 1 else str(error)
+            remedy = "name another folder, or remove this one"
+            raise InputError(Fault(str(path), f"line {number}", problem, remedy)) from error
+    return rows
+
+
+def write_parquet(folder: Path, rows: Sequence[TrialRow]) -> Path:
+    """Write all rows as Parquet; ask `require_parquet` before.
+
+    Returns:
+        The file.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    kinds = {"s": pa.string(), "i": pa.int64(), "f": pa.float64()}
+    schema = pa.schema([(item.name, kinds[str(item.type)[0]]) for item in fields(TrialRow)])
+    columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
+    path = folder / _PARQUET_FILE
+    draft = path.with_suffix(".next")
+    pq.write_table(pa.table(columns, schema=schema), draft)
+    draft.replace(path)
+    return path
+
+
+def require_parquet() -> None:
+    """Refuse before anything is flown where Parquet files cannot be written.
+
+    Raises:
+        InputError: pyarrow is not installed.
+    """
+    try:
+        import pyarrow.parquet  # noqa: F401 - whether there is one is the question
+    except ImportError as error:
+        remedy = "install it with: pip install 'peckorder[study]'"
+        raise InputError(Fault("--format", "parquet", "needs pyarrow", remedy)) from error
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write a file whole: after a crash there is the old one or the new one."""
+    draft = path.with_suffix(".next")
+    with draft.open("w", encoding="utf-8", newline="") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    draft.replace(path)
+
+
+def _row(cells: Sequence[str]) -> TrialRow:
+    values: dict[str, Any] = {
+        name: _PARSERS[name](cell) for name, cell in zip(COLUMNS, cells, strict=True)
+    }
+    return TrialRow(**values)
+
+
+def _integer(cell: str) -> int | None:
+    return int(cell) if cell else None
+
+
+def _float(cell: str) -> float | None:
+    return float(cell) if cell else None
+
+
+_PARSERS = {
+    item.name: str if item.type == "str" else _integer if "int" in str(item.type) else _float
+    for item in fields(TrialRow)
+}
+
 
 STUDY_FILE, SCENARIO_FILE = "study.toml", "scenario.toml"
+
 ROWS_FILE = "trials.csv"
+
 _ANOTHER = "name another folder, or remove this one"
 
 
-class Store(Protocol):
+class RowStore(Protocol):
     """Keeps rows."""
 
-    def missing(self) -> list[Job]:
+    def missing(self) -> list[TrialJob]:
         """The jobs whose rows are not all there."""
         ...
 
-    def add(self, rows: Sequence[Row]) -> None:
+    def add(self, rows: Sequence[TrialRow]) -> None:
         """Keep the rows of one job."""
         ...
 
-    def finish(self) -> list[Row]:
+    def finish(self) -> list[TrialRow]:
         """All rows, sorted by point, trial and policy."""
         ...
 
@@ -50,17 +175,17 @@ class MemoryStore:
 
     def __init__(self, study: Study) -> None:
         self._study = study
-        self._rows: list[Row] = []
+        self._rows: list[TrialRow] = []
 
-    def missing(self) -> list[Job]:
+    def missing(self) -> list[TrialJob]:
         """The jobs whose rows are not all there."""
         return _missing(self._study, self._rows)
 
-    def add(self, rows: Sequence[Row]) -> None:
+    def add(self, rows: Sequence[TrialRow]) -> None:
         """Keep the rows of one job."""
         self._rows += rows
 
-    def finish(self) -> list[Row]:
+    def finish(self) -> list[TrialRow]:
         """All rows, sorted by point, trial and policy."""
         return sorted(self._rows, key=lambda row: row.key)
 
@@ -77,7 +202,7 @@ class FolderStore:
         InputError: the folder cannot be written, is in use, or holds another study.
     """
 
-    def __init__(self, folder: Path, study: Study, roster: Roster) -> None:
+    def __init__(self, folder: Path, study: Study, roster: PolicyRoster) -> None:
         self._folder = folder
         self._study = study
         self._rows_path = folder / ROWS_FILE
@@ -98,17 +223,17 @@ class FolderStore:
             self._lock.close()
             raise
 
-    def missing(self) -> list[Job]:
+    def missing(self) -> list[TrialJob]:
         """The jobs whose rows are not all there."""
         return _missing(self._study, self._rows)
 
-    def add(self, rows: Sequence[Row]) -> None:
+    def add(self, rows: Sequence[TrialRow]) -> None:
         """Append the rows of one job; they are with the operating system when this returns."""
         self._file.write("".join(row_line(row) for row in rows))
         self._file.flush()
         self._rows += rows
 
-    def finish(self) -> list[Row]:
+    def finish(self) -> list[TrialRow]:
         """All rows, sorted by point, trial and policy, as the file has them then."""
         self._rows.sort(key=lambda row: row.key)
         self._file.close()
@@ -123,7 +248,7 @@ class FolderStore:
 
     # -- opening ----------------------------------------------------------------------------
 
-    def _take(self, roster: Roster) -> None:
+    def _take(self, roster: PolicyRoster) -> None:
         """Make the folder this study's, unless it is another's."""
         source = str(self._folder)
         try:
@@ -144,7 +269,7 @@ class FolderStore:
             replace_text(self._folder / SCENARIO_FILE, text)
         replace_text(path, format_study(self._study, SCENARIO_FILE))
 
-    def _kept_rows(self) -> list[Row]:
+    def _kept_rows(self) -> list[TrialRow]:
         """The rows of all jobs that are complete; what is left of others is flown again."""
         if not self._rows_path.exists():
             return []
@@ -157,7 +282,7 @@ class FolderStore:
         ]
 
 
-def _missing(study: Study, rows: Iterable[Row]) -> list[Job]:
+def _missing(study: Study, rows: Iterable[TrialRow]) -> list[TrialJob]:
     there = {row.key for row in rows}
     return [job for job, keys in rows_due(study).items() if not keys <= there]
 

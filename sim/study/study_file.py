@@ -1,7 +1,6 @@
-"""Study files: TOML in, a study out, every fault at once.
+"""Study files: TOML in, a study out, every fault at once; and the way back.
 
-Leaves out: what a study means (sim.study.config), what the command line says besides
-(sim.study.overrides), and the way back (sim.study.study_text).
+Leaves out: what a study means (sim.study.design), and comments.
 """
 
 from __future__ import annotations
@@ -10,24 +9,24 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sim.study.config import (
+from sim.study.design import (
     LISTED,
     NUMBERS,
     SWITCHES,
+    Factor,
     RandomMissions,
     SameMission,
     Study,
-    Varied,
     right_number,
     unlisted,
     wrong_number,
     wrong_values,
 )
-from sim.study.policies import Roster
-from sim.study.tables import (
-    Kind,
+from sim.study.policies.roster import PolicyRoster
+from sim.study.table_reader import (
     TableReader,
-    WrongError,
+    ValueType,
+    WrongValueError,
     array,
     as_switch,
     as_table,
@@ -36,13 +35,14 @@ from sim.study.tables import (
     integer,
     one_of,
 )
-from sim.uncertainty import Uncertainty
-from swarm.errors import InputError
+from sim.world.uncertainty import Uncertainty
 from swarm.model.ids import ID_RULE, valid_id
+from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario, resolve_scenario
 from swarm.scenario.files import read_bytes
 from swarm.scenario.findings import Document, close_match, faults_of, number_of, printable, shown
 from swarm.scenario.read import parse_toml
+from swarm.scenario.write import toml_float, toml_string
 
 __all__ = [
     "DEFAULT_TRIALS",
@@ -51,17 +51,25 @@ __all__ = [
     "MOST_TRIALS",
     "MOST_UAVS",
     "SCHEMA",
+    "format_study",
     "load_study",
     "parse_study",
 ]
 
+
 SCHEMA = 1
 """The version of the format that is read and written."""
+
 DEFAULT_TRIALS = 50
+
 MOST_TRIALS = 1_000_000
+
 MOST_SEED = 2**63 - 1
+
 MOST_UAVS, MOST_TASKS = 1000, 10_000
+
 _WHAT = "study file"
+
 
 _KEYS: Mapping[str, Sequence[str]] = {
     "": (
@@ -75,7 +83,7 @@ _KEYS: Mapping[str, Sequence[str]] = {
 }
 
 
-def load_study(path: Path, roster: Roster) -> Study:
+def load_study(path: Path, roster: PolicyRoster) -> Study:
     """The study in the file ``path``.
 
     Raises:
@@ -84,7 +92,7 @@ def load_study(path: Path, roster: Roster) -> Study:
     return parse_study(read_bytes(path, _WHAT), printable(str(path)), roster, path.parent)
 
 
-def parse_study(data: bytes, source: str, roster: Roster, folder: Path = Path()) -> Study:
+def parse_study(data: bytes, source: str, roster: PolicyRoster, folder: Path = Path()) -> Study:
     """The study that ``data`` describes.
 
     Args:
@@ -107,7 +115,7 @@ def parse_study(data: bytes, source: str, roster: Roster, folder: Path = Path())
 class _Reader(TableReader):
     """Reads one document and gathers what is wrong with it."""
 
-    def __init__(self, roster: Roster, folder: Path) -> None:
+    def __init__(self, roster: PolicyRoster, folder: Path) -> None:
         super().__init__()
         self._roster = roster
         self._folder = folder
@@ -204,7 +212,7 @@ class _Reader(TableReader):
         reattempt = given.pop("reattempt", None)
         return Uncertainty(**given) if len(self.findings) == before else Uncertainty(), reattempt
 
-    def _varied(self, top: Document) -> Iterator[Varied]:
+    def _varied(self, top: Document) -> Iterator[Factor]:
         seen: set[str] = set()
         tables: list[object] = self.optional(top, (), "vary", _VARY, [])
         for index, table in enumerate(tables):
@@ -223,50 +231,111 @@ class _Reader(TableReader):
             seen.add(what)
             for at, problem, remedy in wrong_values(what, values):
                 self.add((*place, "values", at), problem, remedy)
-            yield Varied(what, tuple(number_of(value) or 0.0 for value in values), trials)
+            yield Factor(what, tuple(number_of(value) or 0.0 for value in values), trials)
 
 
-def _kind_of(key: str) -> Kind[Any]:
+def _kind_of(key: str) -> ValueType[Any]:
     """What a key of ``[uncertainty]`` may be."""
     if key in NUMBERS:
-        return Kind(right_number(key), lambda value: _number(key, value))
+        return ValueType(right_number(key), lambda value: _number(key, value))
     return _TIMES if key in LISTED else _SWITCH
 
 
 def _number(name: str, value: object) -> float:
     if problem := wrong_number(name, value):
-        raise WrongError(problem)
+        raise WrongValueError(problem)
     return number_of(value) or 0.0
 
 
 def _schema(value: object) -> int:
     if isinstance(value, bool) or value != SCHEMA:
-        raise WrongError(f"version {shown(value)} of the format is not known")
+        raise WrongValueError(f"version {shown(value)} of the format is not known")
     return SCHEMA
 
 
 def _id(value: object) -> str:
     if not isinstance(value, str) or not valid_id(value):
-        raise WrongError(f"{shown(value)} is not an id")
+        raise WrongValueError(f"{shown(value)} is not an id")
     return value
 
 
 def _times(value: object) -> dict[str, float]:
     if not isinstance(value, Mapping):
-        raise WrongError(f"{shown(value)} is not a table")
+        raise WrongValueError(f"{shown(value)} is not a table")
     for name, moment in value.items():
         number = number_of(moment)
         if number is None or number < 0.0:
-            raise WrongError(f"{shown(moment)} of {name} is no mission time")
+            raise WrongValueError(f"{shown(moment)} of {name} is no mission time")
     return {name: float(moment) for name, moment in value.items()}
 
 
-_SCHEMA = Kind(f"schema = {SCHEMA}", _schema)
-_NAME = Kind(f'an id of {ID_RULE}, such as name = "robustness"', _id)
-_SWITCH = Kind("true or false", as_switch)
-_SCENARIO = Kind('a shipped scenario or a file, such as scenario = "valley-survey"', as_word)
-_MISSION = Kind('[mission] with scenario = "…" or random = { uavs = 10, tasks = 50 }', as_table)
-_RANDOM = Kind("random = { uavs = 10, tasks = 50 }", as_table)
-_UNCERTAINTY = Kind("a table [uncertainty]", as_table)
-_VARY = Kind("a table [[vary]] for each number that is varied", as_tables)
-_TIMES = Kind("a table of ids with a mission time >= 0 each [s]", _times)
+_SCHEMA = ValueType(f"schema = {SCHEMA}", _schema)
+
+_NAME = ValueType(f'an id of {ID_RULE}, such as name = "robustness"', _id)
+
+_SWITCH = ValueType("true or false", as_switch)
+
+_SCENARIO = ValueType('a shipped scenario or a file, such as scenario = "valley-survey"', as_word)
+
+_MISSION = ValueType(
+    '[mission] with scenario = "…" or random = { uavs = 10, tasks = 50 }', as_table
+)
+
+_RANDOM = ValueType("random = { uavs = 10, tasks = 50 }", as_table)
+
+_UNCERTAINTY = ValueType("a table [uncertainty]", as_table)
+
+_VARY = ValueType("a table [[vary]] for each number that is varied", as_tables)
+
+_TIMES = ValueType("a table of ids with a mission time >= 0 each [s]", _times)
+
+
+def format_study(study: Study, scenario: str) -> str:
+    """The text of a study file for ``study``, with nothing left to defaults.
+
+    Args:
+        study: what to write.
+        scenario: file beside it that holds the mission, where every trial flies the same.
+    """
+    head = [
+        f"schema = {SCHEMA}",
+        f"name = {toml_string(study.name)}",
+        f"trials = {study.trials}",
+        f"seed = {study.seed}",
+        "policies = [",
+        *(f"    {toml_string(name)}," for name in study.policies),
+        "]",
+        f"bound = {_truth(study.bound)}",
+    ]
+    if study.reference is not None:
+        head.insert(-1, f"reference = {toml_string(study.reference)}")
+    match study.missions:
+        case RandomMissions(uavs, tasks):
+            mission = f"random = {{ uavs = {uavs}, tasks = {tasks} }}"
+        case SameMission():
+            mission = f"scenario = {toml_string(scenario)}"
+    blocks = [head, ["[mission]", mission], ["[uncertainty]", *_uncertainty_lines(study)]]
+    for varied in study.varied:
+        values = ", ".join(toml_float(value) for value in varied.values)
+        block = ["[[vary]]", f"what = {toml_string(varied.what)}", f"values = [{values}]"]
+        if varied.trials is not None:
+            block.append(f"trials = {varied.trials}")
+        blocks.append(block)
+    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def _uncertainty_lines(study: Study) -> Iterator[str]:
+    for key in NUMBERS:
+        yield f"{key} = {toml_float(getattr(study.uncertainty, key))}"
+    for key in SWITCHES:
+        yield f"{key} = {_truth(getattr(study.uncertainty, key))}"
+    for key in LISTED:
+        times: Mapping[str, float] = getattr(study.uncertainty, key)
+        inner = ", ".join(f"{toml_string(name)} = {toml_float(at)}" for name, at in times.items())
+        yield f"{key} = {{ {inner} }}" if inner else f"{key} = {{}}"
+    if study.reattempt is not None:
+        yield f"reattempt = {_truth(study.reattempt)}"
+
+
+def _truth(value: bool) -> str:
+    return "true" if value else "false"

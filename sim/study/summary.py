@@ -1,9 +1,9 @@
 """From the rows of a study to what they say together, per setting and policy.
 
 Every figure stands on whole trials, which are independent of each other. Comparisons use the
-trials that both sides have flown, pair by pair, since these met the same fate. Leaves out:
-the statistics themselves (sim.study.statistics), tables (sim.study.summary_tables) and plots
-(sim.study.study_plot).
+trials that both sides have flown, pair by pair, since these met the same realization. Leaves out:
+the statistics themselves (sim.study.statistics), tables (sim.study.tables) and plots
+(sim.study.plots).
 """
 
 from __future__ import annotations
@@ -13,16 +13,24 @@ from dataclasses import asdict, dataclass, field
 from statistics import median
 from typing import TYPE_CHECKING
 
-from sim.study.rows import BOUND, Row
 from sim.study.statistics import Estimate, difference_of, mean_of, ratio_of, share_of
-from sim.uncertainty import Uncertainty
+from sim.study.trial import BOUND, TrialRow
+from sim.world.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-__all__ = ["About", "Measured", "Setting", "Summary", "Wall", "summarise"]
+__all__ = [
+    "PointSummary",
+    "PolicyResult",
+    "StudyDescription",
+    "StudySummary",
+    "WallTimes",
+    "summarise",
+]
 
-Flights = Mapping[int, Row]
+
+Flights = Mapping[int, TrialRow]
 """Rows of one setting and policy by trial."""
 
 _COUNTED = (
@@ -44,7 +52,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class About:
+class StudyDescription:
     """What a study is of; whatever is left out is not told."""
 
     missions: str = ""
@@ -61,7 +69,7 @@ class About:
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class WallTimes:
     """Wall times of one policy's decisions on the machine of the study [s]."""
 
     median_s: float
@@ -73,7 +81,7 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class PolicyResult:
     """One policy in one setting; what it does not have is None."""
 
     policy: str
@@ -91,7 +99,7 @@ class Measured:
     """Share of trials in which no task was failed or missed."""
     means: Mapping[str, Estimate]
     """Means over the trials of the row's columns, and of moved + released as ``churn``."""
-    wall: Wall | None
+    wall: WallTimes | None
 
     @property
     def trials(self) -> int:
@@ -119,38 +127,38 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class PointSummary:
     """All policies in one setting of the uncertainty."""
 
     point: int
     vary: str
-    """See sim.study.rows.Row."""
+    """See sim.study.trial.TrialRow."""
     at: float | None
     trials: int
     """In which anything was flown."""
-    policies: Mapping[str, Measured]
+    policies: Mapping[str, PolicyResult]
     """The bound among them, under its name."""
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class StudySummary:
     """What a study says."""
 
     reference: str
     """The policy to which the others are compared."""
-    settings: tuple[Setting, ...]
+    settings: tuple[PointSummary, ...]
     """By point."""
-    about: About = field(default_factory=About)
+    about: StudyDescription = field(default_factory=StudyDescription)
 
     @property
-    def own(self) -> Setting | None:
+    def own(self) -> PointSummary | None:
         """The study's own setting, if it was flown."""
         return next((each for each in self.settings if each.at is None), None)
 
     @property
-    def varied(self) -> dict[str, list[Setting]]:
+    def varied(self) -> dict[str, list[PointSummary]]:
         """Settings by the quantity that is varied to them, each list by its value."""
-        found: dict[str, list[Setting]] = {}
+        found: dict[str, list[PointSummary]] = {}
         for each in self.settings:
             if each.at is not None:
                 found.setdefault(each.vary, []).append(each)
@@ -170,13 +178,13 @@ class Summary:
 
     def markdown(self, *, every_setting: bool = False) -> str:
         """Tables for a document; those of ``every_setting`` beside the study's own on request."""
-        from sim.study.summary_tables import as_markdown
+        from sim.study.tables import as_markdown
 
         return as_markdown(self, every_setting=every_setting)
 
     def table(self) -> RenderableType:
         """Tables for a terminal."""
-        from sim.study.summary_tables import TerminalTables
+        from sim.study.tables import TerminalTables
 
         return TerminalTables(self)
 
@@ -217,7 +225,9 @@ class Summary:
         }
 
 
-def summarise(rows: Iterable[Row], reference: str, about: About | None = None) -> Summary:
+def summarise(
+    rows: Iterable[TrialRow], reference: str, about: StudyDescription | None = None
+) -> StudySummary:
     """What ``rows`` say together, in whatever order they are, also while some are missing.
 
     Args:
@@ -225,12 +235,12 @@ def summarise(rows: Iterable[Row], reference: str, about: About | None = None) -
         reference: the policy to which the others are compared.
         about: what is told beside the figures.
     """
-    flown: dict[tuple[int, str, float | None], dict[str, dict[int, Row]]] = {}
+    flown: dict[tuple[int, str, float | None], dict[str, dict[int, TrialRow]]] = {}
     for row in rows:
         setting = flown.setdefault((row.point, row.vary, row.at), {})
         setting.setdefault(row.policy, {})[row.trial] = row
     settings = [
-        Setting(
+        PointSummary(
             point=point,
             vary=vary,
             at=at,
@@ -243,14 +253,14 @@ def summarise(rows: Iterable[Row], reference: str, about: About | None = None) -
         for (point, vary, at), policies in flown.items()
     ]
     ordered = tuple(sorted(settings, key=lambda each: each.point))
-    return Summary(reference, ordered, about or About())
+    return StudySummary(reference, ordered, about or StudyDescription())
 
 
-def _measured(policy: str, flights: Flights, reference: Flights, bound: Flights) -> Measured:
+def _measured(policy: str, flights: Flights, reference: Flights, bound: Flights) -> PolicyResult:
     rows = [flights[trial] for trial in sorted(flights)]
     ours, theirs = _paired(flights, reference)
     under, above = _paired(flights, bound)
-    return Measured(
+    return PolicyResult(
         policy=policy,
         value=mean_of([row.value for row in rows]),
         ratio=ratio_of(ours, theirs) if ours else None,
@@ -274,32 +284,32 @@ def _paired(flights: Flights, others: Flights) -> tuple[list[float], list[float]
     return [flights[trial].value for trial in both], [others[trial].value for trial in both]
 
 
-def _means(rows: Sequence[Row]) -> dict[str, Estimate]:
+def _means(rows: Sequence[TrialRow]) -> dict[str, Estimate]:
     columns = {name: _column(rows, name) for name in _COUNTED}
     columns["churn"] = _sums(rows, "moved", "released")
     return {name: mean_of(values) for name, values in columns.items() if values}
 
 
-def _complete(rows: Sequence[Row]) -> Estimate | None:
+def _complete(rows: Sequence[TrialRow]) -> Estimate | None:
     undone = _sums(rows, "failed", "missed")
     return share_of(undone.count(0.0), len(undone)) if undone else None
 
 
-def _wall(rows: Sequence[Row]) -> Wall | None:
+def _wall(rows: Sequence[TrialRow]) -> WallTimes | None:
     medians_s = _column(rows, "decision_median_wall_s")
     p99s_s = _column(rows, "decision_p99_wall_s")
     longest_s = _column(rows, "decision_max_wall_s")
     if not medians_s or not p99s_s or not longest_s:
         return None
-    return Wall(median(medians_s), median(p99s_s), max(longest_s))
+    return WallTimes(median(medians_s), median(p99s_s), max(longest_s))
 
 
-def _column(rows: Sequence[Row], name: str) -> list[float]:
+def _column(rows: Sequence[TrialRow], name: str) -> list[float]:
     """What the rows have in it."""
     return [float(value) for row in rows if (value := getattr(row, name)) is not None]
 
 
-def _sums(rows: Sequence[Row], one: str, other: str) -> list[float]:
+def _sums(rows: Sequence[TrialRow], one: str, other: str) -> list[float]:
     """Sum of two columns, of rows that have both or neither."""
     return [a + b for a, b in zip(_column(rows, one), _column(rows, other), strict=True)]
 

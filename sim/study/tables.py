@@ -1,148 +1,321 @@
-"""Read tables of a TOML document key by key, and gather everything that is wrong with them.
+"""The tables of a study: Markdown for documents, rich ones for terminals of any width.
 
-Leaves out: which keys there are.
+They can stand between two comments of a Markdown file, ``<!-- study NAME -->`` and
+``<!-- end of study -->``, where one command renews them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from pathlib import Path
 
-from swarm.scenario.findings import Document, Finding, Path, absent, close_match, shown
+from rich.console import Console, ConsoleOptions, JustifyMethod, RenderResult
+from rich.table import Table
+from rich.text import Text
 
-__all__ = [
-    "Kind",
-    "TableReader",
-    "WrongError",
-    "array",
-    "as_switch",
-    "as_table",
-    "as_tables",
-    "as_word",
-    "integer",
-    "one_of",
-]
+from sim.study.statistics import Estimate
+from sim.study.style import (
+    IDEAL,
+    NONE,
+    QUANTITIES,
+    interval_text,
+    number_text,
+    policy_label,
+    spread_text,
+    trials_text,
+    uncertainty_words,
+)
+from sim.study.summary import PointSummary, PolicyResult, StudySummary, WallTimes
+from sim.study.trial import BOUND
+from swarm.runtime.errors import Fault, InputError
+from swarm.scenario.files import decode, read_bytes
+from swarm.scenario.findings import printable
 
-T = TypeVar("T")
-D = TypeVar("D")
+__all__ = ["MarkedFile", "TerminalTables", "as_markdown"]
+
+
+_GAP = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Kind(Generic[T]):
-    """What the value of a key may be."""
+class StudyTable:
+    """A table as text; the first column names policies, the others are numbers."""
 
-    right: str
-    """In words."""
-    check: Callable[[object], T]
-    """The value; raises `WrongError` otherwise."""
-
-
-class WrongError(Exception):
-    """The message says what is wrong with a value."""
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
 
 
-class TableReader:
-    """Takes values out of tables; what is wrong is found in `findings`."""
+def as_markdown(summary: StudySummary, *, every_setting: bool = False) -> str:
+    """Tables for a document, with what they are of above them."""
+    parts = ["\n".join(_about(summary))]
+    for grid in _grids(summary, every_setting=every_setting):
+        rows = [grid.headings, ("---", *("---:",) * (len(grid.headings) - 1)), *grid.rows]
+        cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+        parts.append(f"**{grid.title}**")
+        parts.append("\n".join(f"| {' | '.join(row)} |" for row in cells))
+        parts += [grid.note] if grid.note else []
+    what = summary.about.what
+    said = [f"- `{name}`: {what[name]}" for name in summary.policies if name in what]
+    parts += ["\n".join(said)] if said else []
+    return "\n\n".join(parts) + "\n"
 
-    def __init__(self) -> None:
-        self.findings: list[Finding] = []
 
-    def required(self, table: Document, place: Path, key: str, kind: Kind[T]) -> T | None:
-        """The value of ``key``; None, and a finding, if it is missing or wrong."""
-        if key not in table:
-            self.findings.append(absent((*place, key), f"give {kind.right}"))
-            return None
-        return self.optional(table, place, key, kind, None)
+@dataclass(frozen=True, slots=True)
+class TerminalTables:
+    """The study's own setting and what is varied, in parts as wide as the terminal is."""
 
-    def optional(self, table: Document, place: Path, key: str, kind: Kind[T], default: D) -> T | D:
-        """The value of ``key``; ``default`` without it or, with a finding, if it is wrong."""
-        if key not in table:
-            return default
+    summary: StudySummary
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """As rich asks."""
+        for line in _about(self.summary):
+            yield Text(line.replace("`", ""))
+        for grid in _grids(self.summary, every_setting=False):
+            for part in _fitting(grid, options.max_width):
+                table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+                for place, heading in enumerate(part.headings):
+                    justify: JustifyMethod = "right" if place else "left"
+                    table.add_column(Text(heading), justify=justify, no_wrap=True)
+                for row in part.rows:
+                    table.add_row(*(Text(cell) for cell in row))
+                yield Text()
+                yield Text(part.title, style="bold")
+                yield table
+            if grid.note:
+                yield Text(grid.note)
+
+
+# -- tables -----------------------------------------------------------------------------
+
+
+def _grids(summary: StudySummary, *, every_setting: bool) -> Iterator[StudyTable]:
+    own = summary.own
+    if own is not None:
+        yield from _of_setting(summary, own)
+        times = _times(summary, own)
+        if times is not None:
+            yield times
+    for vary, settings in summary.varied.items():
+        yield _against(summary, vary, settings)
+    if every_setting:
+        for each in summary.settings:
+            if each is not own:
+                yield from _of_setting(summary, each)
+
+
+def _of_setting(summary: StudySummary, setting: PointSummary) -> Iterator[StudyTable]:
+    """Two tables: values, and what happened."""
+    where = _where(summary, setting)
+    found = [setting.policies[name] for name in summary.policies if name in setting.policies]
+    reference = summary.reference
+    columns: list[tuple[str, Callable[[PolicyResult], str]]] = [
+        ("J [value·s]", lambda each: number_text(each.value.value)),
+        (f"J / {reference}'s", lambda each: _ratio(summary, each)),
+        ("better in", lambda each: _share(None if each.policy == reference else each.better)),
+        ("J / bound", lambda each: "1" if each.policy == BOUND else interval_text(each.of_bound)),
+        ("all done in", lambda each: _share(each.complete)),
+    ]
+    if BOUND not in setting.policies:
+        del columns[3]
+    if any(each.trials != setting.trials for each in found):
+        columns.append(("trials", lambda each: str(each.trials)))
+    yield _grid(summary, f"Value{where} ({trials_text([setting])})", found, columns)
+    yield _grid(
+        summary,
+        f"Per mission{where}",
+        [each for each in found if each.means],
+        [
+            ("done", _mean("done")),
+            ("failed", _mean("failed")),
+            ("missed", _mean("missed")),
+            ("done twice", _mean("duplicate_visits")),
+            ("moved", _mean("moved")),
+            ("released", _mean("released")),
+            ("epochs", _mean("epochs")),
+            ("messages", _mean("messages")),
+            ("makespan [s]", _mean("makespan_s")),
+        ],
+    )
+
+
+def _times(summary: StudySummary, setting: PointSummary) -> StudyTable | None:
+    found = [setting.policies[name] for name in summary.policies if name in setting.policies]
+    timed = [each for each in found if each.wall is not None]
+    if not timed:
+        return None
+    on = f", on {summary.about.machine}" if summary.about.machine else ""
+    return _grid(
+        summary,
+        f"Wall time of a decision or plan{_where(summary, setting)}",
+        timed,
+        [
+            ("per mission", _mean("decisions")),
+            ("median [ms]", _wall_ms(lambda wall: wall.median_s)),
+            ("p99 [ms]", _wall_ms(lambda wall: wall.p99_s)),
+            ("longest [ms]", _wall_ms(lambda wall: wall.max_s)),
+        ],
+        f"Median and p99: the median over trials of each trial's{on}.",
+    )
+
+
+def _against(summary: StudySummary, vary: str, settings: Sequence[PointSummary]) -> StudyTable:
+    """Ratios against the values of one quantity."""
+    quantity = QUANTITIES[vary]
+    rows = [
+        (
+            policy_label(summary, name),
+            *(_spread(summary, each.policies.get(name)) for each in settings),
+        )
+        for name in summary.policies
+    ]
+    reference = [each.policies.get(summary.reference) for each in settings]
+    values = [NONE if each is None else number_text(each.value.value) for each in reference]
+    return StudyTable(
+        title=f"J / {summary.reference}'s against {quantity.name} ({trials_text(settings)})",
+        headings=("policy", *(quantity.text(each.at or 0.0) for each in settings)),
+        rows=(*rows, (f"J of {summary.reference} [value·s]", *values)),
+    )
+
+
+def _grid(
+    summary: StudySummary,
+    title: str,
+    found: Sequence[PolicyResult],
+    columns: Sequence[tuple[str, Callable[[PolicyResult], str]]],
+    note: str = "",
+) -> StudyTable:
+    return StudyTable(
+        title=title,
+        headings=("policy", *(heading for heading, _ in columns)),
+        rows=tuple((policy_label(summary, m.policy), *(of(m) for _, of in columns)) for m in found),
+        note=note,
+    )
+
+
+def _fitting(grid: StudyTable, width: int) -> Iterator[StudyTable]:
+    """The same in as few parts as fit, each with the policies, and about as wide as each other."""
+    table = [grid.headings, *grid.rows]
+    name, *widths = (max(map(len, column)) + _GAP for column in zip(*table, strict=True))
+    room = max(0, width - name + _GAP)
+    fewest = len(_filled(widths, room))
+    parts = next(p for most in range(room + 1) if len(p := _filled(widths, most)) == fewest)
+    for part in parts:
+        cut = [(row[0], *(row[1 + place] for place in part)) for row in table]
+        title = grid.title if part is parts[0] else f"{grid.title}, continued"
+        yield StudyTable(title, cut[0], tuple(cut[1:]))
+
+
+def _filled(widths: Sequence[int], room: int) -> list[list[int]]:
+    """Places in order, in parts whose widths together are at most ``room`` or that have one."""
+    parts: list[list[int]] = []
+    left = 0
+    for place, width in enumerate(widths):
+        if parts and width <= left:
+            parts[-1].append(place)
+        else:
+            parts.append([place])
+            left = room
+        left -= width
+    return parts
+
+
+# -- words ------------------------------------------------------------------------------
+
+
+def _where(summary: StudySummary, setting: PointSummary) -> str:
+    """Which setting it is, for a title."""
+    if setting.at is None:
+        return ", the study's own setting" if summary.varied else ""
+    quantity = QUANTITIES[setting.vary]
+    return f", {quantity.name}: {quantity.text(setting.at)}"
+
+
+def _about(summary: StudySummary) -> list[str]:
+    about = summary.about
+    told = [about.missions] if about.missions else []
+    told += [uncertainty_words(about.uncertainty)] if about.uncertainty is not None else []
+    run = [trials_text(summary.settings)] if summary.settings else ["no trials yet"]
+    run += [f"seed {about.seed}"] if about.seed is not None else []
+    text = f"{'; '.join([*told, ', '.join(run)])}."
+    compared = (
+        f"Ratios are of mean J to `{summary.reference}`'s, over the trials that both flew, with "
+        "their paired 95 % interval (Fieller's)."
+    )
+    lines = [text[0].upper() + text[1:], compared]
+    if about.ideal:
+        lines.append(f"{IDEAL} modelled with ideal communication only.")
+    return lines
+
+
+def _ratio(summary: StudySummary, each: PolicyResult) -> str:
+    return "1" if each.policy == summary.reference else interval_text(each.ratio)
+
+
+def _spread(summary: StudySummary, each: PolicyResult | None) -> str:
+    if each is None or each.policy != summary.reference:
+        return spread_text(None if each is None else each.ratio)
+    return "1"
+
+
+def _share(estimate: Estimate | None) -> str:
+    return NONE if estimate is None else f"{100.0 * estimate.value:.0f} %"
+
+
+def _mean(name: str) -> Callable[[PolicyResult], str]:
+    return lambda each: number_text(each.means[name].value) if name in each.means else NONE
+
+
+def _wall_ms(of: Callable[[WallTimes], float]) -> Callable[[PolicyResult], str]:
+    return lambda each: NONE if each.wall is None else number_text(1e3 * of(each.wall), decimals=6)
+
+
+_WHAT = "Markdown file"
+
+_END = "<!-- end of study -->"
+
+
+class MarkedFile:
+    """A Markdown file with the markers of one study.
+
+    Args:
+        path: the file; read at once, so that it is refused before anything is flown.
+        name: of the study.
+
+    Raises:
+        InputError: the file cannot be read, or the markers are not there.
+    """
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._path = path
+        self._begin = f"<!-- study {name} -->"
+        self._parts()
+
+    def replace(self, text: str) -> None:
+        """Put ``text`` between the markers; everything else stays.
+
+        Raises:
+            InputError: the file cannot be written, or the markers have gone.
+        """
+        before, after = self._parts()
         try:
-            return kind.check(table[key])
-        except WrongError as error:
-            self.add((*place, key), str(error), f"give {kind.right}")
-            return default
+            with self._path.open("w", encoding="utf-8", newline="") as file:
+                file.write(f"{before}{self._begin}\n\n{text.strip()}\n\n{_END}{after}")
+        except OSError as error:
+            problem = f"cannot be written: {error.strerror or error}"
+            raise InputError(self._fault(problem, "give a file that can be written")) from error
 
-    def unknown_keys(self, table: Document, place: Path, keys: Sequence[str]) -> None:
-        """Find all keys of ``table`` that are none of ``keys``."""
-        for key in table:
-            if key in keys:
-                continue
-            meant = close_match(key, [known for known in keys if known not in table])
-            if meant is not None:
-                remedy = f"did you mean {meant!r}?"
-                found = Finding((*place, key), "unknown key", remedy, meant=(*place, meant))
-                self.findings.append(found)
-            else:
-                self.add((*place, key), "unknown key", f"the keys here are {', '.join(keys)}")
+    def _parts(self) -> tuple[str, str]:
+        """What stands before and after the markers."""
+        text = decode(read_bytes(self._path, _WHAT), printable(str(self._path)), _WHAT)
+        before, begin, rest = text.partition(self._begin)
+        _, end, after = rest.partition(_END)
+        if not begin or not end:
+            problem = f"has no lines {self._begin} and {_END}"
+            raise InputError(self._fault(problem, "put them where the table is to stand"))
+        return before, after
 
-    def add(self, place: Path, problem: str, remedy: str) -> None:
-        """Find something wrong."""
-        self.findings.append(Finding(place, problem, remedy))
-
-
-def integer(low: int, high: int) -> Kind[int]:
-    """An integer within that range."""
-
-    def check(value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise WrongError(f"{shown(value)} is not an integer")
-        if not low <= value <= high:
-            raise WrongError(f"{shown(value)} is out of range")
-        return value
-
-    return Kind(f"an integer within {low}..{high}", check)
-
-
-def one_of(names: Sequence[str]) -> Kind[str]:
-    """One of ``names``."""
-
-    def check(value: object) -> str:
-        if not isinstance(value, str) or value not in names:
-            raise WrongError(f"{shown(value)} is not one of them")
-        return value
-
-    return Kind(f"one of {', '.join(names)}", check)
-
-
-def array(example: str) -> Kind[list[object]]:
-    """An array with something in it."""
-
-    def check(value: object) -> list[object]:
-        if not isinstance(value, list):
-            raise WrongError(f"{shown(value)} is not an array")
-        if not value:
-            raise WrongError("is empty")
-        return value
-
-    return Kind(f"at least one in an array, such as {example}", check)
-
-
-def as_table(value: object) -> Document:
-    """A table; for a `Kind`."""
-    if not isinstance(value, Mapping):
-        raise WrongError(f"{shown(value)} is not a table")
-    return value
-
-
-def as_tables(value: object) -> list[object]:
-    """An array, such as one of tables; for a `Kind`."""
-    if not isinstance(value, list):
-        raise WrongError(f"{shown(value)} is not an array of tables")
-    return value
-
-
-def as_word(value: object) -> str:
-    """A string with something in it; for a `Kind`."""
-    if not isinstance(value, str) or not value:
-        raise WrongError(f"{shown(value)} is not a name in quotes")
-    return value
-
-
-def as_switch(value: object) -> bool:
-    """True or false; for a `Kind`."""
-    if not isinstance(value, bool):
-        raise WrongError(f"{shown(value)} is not true or false")
-    return value
+    def _fault(self, problem: str, remedy: str) -> Fault:
+        return Fault("--update", printable(str(self._path)), problem, remedy)

@@ -1,30 +1,130 @@
-"""One trial: every policy of a study on the same drawn future.
+"""One trial: every policy of a study on the same drawn future, and the rows that come of it.
 
 Rows depend on the study alone, wall times apart, whoever flies the trial and in whatever order.
-Leaves out: which trials there are to fly, and where (sim.study.runner).
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from coordinator.planner.plan import make_plan
-from sim.study.config import Study, fate_seed, span_s
-from sim.study.flight import score
-from sim.study.policies import Roster
-from sim.study.rows import BOUND, Row, row_of
-from swarm.clock import Clock
+from sim.study.design import DesignPoint, Study, fate_seed, span_s
+from sim.study.policies.roster import PolicyRoster
+from sim.world.outcome import FlightOutcome, Score, score
 from swarm.model import Mission, Plan
+from swarm.runtime.clock import Clock
 
-__all__ = ["Briefing", "Job", "TrialRunner", "jobs_of", "rows_due"]
+__all__ = [
+    "BOUND",
+    "COLUMNS",
+    "WALL_COLUMNS",
+    "TrialContext",
+    "TrialJob",
+    "TrialRow",
+    "TrialRunner",
+    "jobs_of",
+    "row_of",
+    "rows_due",
+    "without_wall_times",
+]
+
+
+BOUND = "clairvoyant"
+"""In place of a policy's name in rows of the bound, which have a value and nothing else."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrialRow:
+    """What one policy made of one realization. What a bound does not have is None."""
+
+    point: int
+    """Which setting of the uncertainty: 0 for the study's own, then those that it varies to."""
+    vary: str
+    """The number that is varied there, such as ``loss``; empty for the study's own setting."""
+    at: float | None
+    """And its value; None for the study's own setting."""
+    trial: int
+    """From 0. Rows of one point and trial met the same realization."""
+    policy: str
+    value: float
+    """See sim.world.outcome.value_of [value·s]."""
+    done: int | None = None
+    failed: int | None = None
+    missed: int | None = None
+    duplicate_visits: int | None = None
+    makespan_s: float | None = None
+    """Latest end of a visit [s mission time]."""
+    lost_uavs: int | None = None
+    epochs: int | None = None
+    moved: int | None = None
+    """Tasks that re-planning moved from one UAV's list to another's, summed over all plans."""
+    released: int | None = None
+    """Tasks given up by a living UAV that was on its way there."""
+    messages: int | None = None
+    decisions: int | None = None
+    """How many were made and timed."""
+    decision_median_wall_s: float | None = None
+    """None where nothing was decided; the wall times alone differ from run to run [s]."""
+    decision_p99_wall_s: float | None = None
+    decision_max_wall_s: float | None = None
+
+    @property
+    def key(self) -> tuple[int, int, str]:
+        """Which row of a study it is."""
+        return self.point, self.trial, self.policy
+
+
+COLUMNS = tuple(field.name for field in fields(TrialRow))
+
+WALL_COLUMNS = tuple(name for name in COLUMNS if name.endswith("_wall_s"))
+"""Differ from run to run; all others are the same for the same seed."""
+
+
+def row_of(
+    point: DesignPoint, trial: int, policy: str, scored: Score, flight: FlightOutcome
+) -> TrialRow:
+    """The row of a flight."""
+    wall_s = np.asarray(flight.decision_s, dtype=float)
+    some = wall_s.size > 0
+    return TrialRow(
+        point=point.index,
+        vary=point.vary,
+        at=point.at,
+        trial=trial,
+        policy=policy,
+        value=scored.value,
+        done=scored.done,
+        failed=scored.failed,
+        missed=scored.missed,
+        duplicate_visits=scored.duplicate_visits,
+        makespan_s=scored.makespan_s,
+        lost_uavs=scored.lost_uavs,
+        epochs=flight.epochs,
+        moved=flight.moved,
+        released=flight.released,
+        messages=flight.messages,
+        decisions=int(wall_s.size),
+        decision_median_wall_s=float(np.median(wall_s)) if some else None,
+        decision_p99_wall_s=float(np.quantile(wall_s, 0.99)) if some else None,
+        decision_max_wall_s=float(wall_s.max()) if some else None,
+    )
+
+
+def without_wall_times(row: TrialRow) -> TrialRow:
+    """What of ``row`` is the same in every run of the same study."""
+    cleared: dict[str, Any] = dict.fromkeys(WALL_COLUMNS)
+    return replace(row, **cleared)
+
 
 _PLANS_KEPT = 16
 
 
-class Job(NamedTuple):
+class TrialJob(NamedTuple):
     """One drawn future, met by every policy."""
 
     trial: int
@@ -33,29 +133,29 @@ class Job(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Briefing:
+class TrialContext:
     """All that whoever flies trials has to know."""
 
     study: Study
-    roster: Roster
+    roster: PolicyRoster
 
 
-def jobs_of(study: Study) -> list[Job]:
+def jobs_of(study: Study) -> list[TrialJob]:
     """Everything there is to fly, trial by trial, so that all points grow alike."""
     trials: dict[int, int] = {}
     for point in study.points():
         trials[point.world] = max(trials.get(point.world, 0), point.trials)
-    return sorted(Job(k, world) for world, count in trials.items() for k in range(count))
+    return sorted(TrialJob(k, world) for world, count in trials.items() for k in range(count))
 
 
-def rows_due(study: Study) -> dict[Job, set[tuple[int, int, str]]]:
+def rows_due(study: Study) -> dict[TrialJob, set[tuple[int, int, str]]]:
     """Keys of the rows that each job has to bring."""
     names = (*study.policies, BOUND) if study.bound else study.policies
-    due: dict[Job, set[tuple[int, int, str]]] = {job: set() for job in jobs_of(study)}
+    due: dict[TrialJob, set[tuple[int, int, str]]] = {job: set() for job in jobs_of(study)}
     for point in study.points():
         for trial in range(point.trials):
             keys = ((point.index, trial, name) for name in names)
-            due[Job(trial, point.world)].update(keys)
+            due[TrialJob(trial, point.world)].update(keys)
     return due
 
 
@@ -67,7 +167,7 @@ class TrialRunner:
         clock: times decisions.
     """
 
-    def __init__(self, briefing: Briefing, clock: Clock) -> None:
+    def __init__(self, briefing: TrialContext, clock: Clock) -> None:
         study = briefing.study
         self._study = study
         self._clock = clock
@@ -76,23 +176,23 @@ class TrialRunner:
         self._bound = briefing.roster.make_bound() if study.bound else None
         self._plans: deque[tuple[Mission, str, Plan]] = deque(maxlen=_PLANS_KEPT)
 
-    def fly(self, job: Job) -> list[Row]:
+    def fly(self, job: TrialJob) -> list[TrialRow]:
         """The rows of one job, at every point that it stands for."""
         mission = self._study.mission(job.trial)
         world = self._points[job.world]
         seed = fate_seed(self._study.seed, job.trial)
         fate = world.uncertainty.draw(mission, span_s(mission), seed)
-        rows: list[Row] = []
+        rows: list[TrialRow] = []
         for name, policy in self._policies:
             flight = policy.fly(fate, self._plan, self._clock)
             row = row_of(world, job.trial, name, score(fate, flight), flight)
             rows.append(row)
         if self._bound is not None:
             value = self._bound.value(fate, self._plan)
-            rows.append(Row(world.index, world.vary, world.at, job.trial, BOUND, value))
+            rows.append(TrialRow(world.index, world.vary, world.at, job.trial, BOUND, value))
         return list(self._at_all_points(rows, job))
 
-    def _at_all_points(self, rows: Iterable[Row], job: Job) -> Iterable[Row]:
+    def _at_all_points(self, rows: Iterable[TrialRow], job: TrialJob) -> Iterable[TrialRow]:
         points = [p for p in self._points if p.world == job.world and job.trial < p.trials]
         for row in rows:
             for point in points:

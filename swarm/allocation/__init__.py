@@ -3,10 +3,18 @@
 Leaves out: the search for a priority sequence (coordinator.planner) and all I/O.
 """
 
-from swarm.allocation.lower_level import Decision, TeamState, decisions, next_decision, rank_of, run
+from swarm.allocation.lower_level import (
+    Decision,
+    Rule,
+    TeamState,
+    decisions,
+    next_decision,
+    rank_of,
+    run,
+)
 from swarm.allocation.objective import evaluate, executed_objective
 from swarm.allocation.problem import Problem
-from swarm.allocation.rules import RULE_NAMES, Rule, rule_by_name
+from swarm.allocation.rules import RULE_NAMES, rule_by_name
 
 __all__ = [
     "RULE_NAMES",

@@ -12,11 +12,13 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from swarm.kernels.problem import KernelProblem, prepare
+from swarm.kernels._kernels import KernelProblem
+from swarm.kernels.problem import prepare
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.mission import chances
 
 __all__ = ["BoolArray", "FloatArray", "IntArray", "Problem"]
+
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

@@ -1,21 +1,28 @@
 """Decision rules: how a UAV whose turn it is chooses its next task.
 
-Pure functions of the shared state; ties go to the smaller task index. The work is done by
-compiled kernels. Leaves out: whose turn it is (`swarm.allocation.lower_level`) and the
-priority sequence.
+Rules with a fixed formula run in a kernel. The rule `guided` keeps to the published routes
+unless a fortified rollout shows something better.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
-from swarm.allocation.lower_level import Decision, Rule, TeamState
-from swarm.allocation.problem import IntArray, Problem
-from swarm.kernels.lower_level import EXACT_TASKS, GREEDY, LOOKAHEAD, RuleCode, decide, valued
+import numpy as np
 
-__all__ = ["EXACT_TASKS", "RULE_NAMES", "KernelRule", "Rule", "rule_by_name"]
+from swarm.allocation.lower_level import Decision, TeamState
+from swarm.allocation.problem import BoolArray, IntArray, Problem
+from swarm.kernels.lower_level import GREEDY, LOOKAHEAD, RuleCode, decide, valued
+from swarm.kernels.rollout import GuidedChoice, guided_choice
+from swarm.kernels.routes import RouteArrays, Routes, TeamArrays
+
+__all__ = ["RULE_NAMES", "GuidedRule", "KernelRule", "route_arrays", "rule_by_name", "team_arrays"]
+
 
 _CODES: dict[str, RuleCode] = {"greedy": GREEDY, "lookahead": LOOKAHEAD}
+
 RULE_NAMES = tuple(_CODES)
 
 
@@ -55,3 +62,130 @@ def rule_by_name(name: str) -> KernelRule:
     if name not in _CODES:
         raise ValueError(f"rule must be one of {', '.join(RULE_NAMES)}, not {name!r}")
     return KernelRule(name, _CODES[name])
+
+
+_REPAIR_ITERATIONS = 200
+"""Steps of the search after a disturbance; some 3 ms in all at 50 UAVs × 500 tasks."""
+
+
+# With thousands of tasks it takes half a second, and a re-plan needs it at each of its steps.
+_ARRAYS: WeakKeyDictionary[Problem, RouteArrays] = WeakKeyDictionary()
+
+
+class GuidedRule:
+    """Decide by published lists; see the module.
+
+    Args:
+        lists: task ids per UAV id in order; ids that a problem does not know are skipped.
+        repair_iterations: steps of the search after a disturbance; all replicas need the same.
+
+    Arrays derived from the problem last asked about are kept; they change speed, never results.
+    """
+
+    name = "guided"
+
+    def __init__(
+        self,
+        lists: Mapping[str, Sequence[str]],
+        *,
+        repair_iterations: int = _REPAIR_ITERATIONS,
+    ) -> None:
+        self._lists = {uav: tuple(tasks) for uav, tasks in lists.items()}
+        self._repair_iterations = repair_iterations
+        self._problem: Problem | None = None
+        self._arrays: RouteArrays | None = None
+        self._routes: Routes = []
+        self._owner: IntArray = np.zeros(0, dtype=np.int64)
+
+    def decide(
+        self, problem: Problem, state: TeamState, rank: IntArray, uav: int
+    ) -> Decision | None:
+        """The next task of ``uav``; None when nothing open suits it or the team is better off.
+
+        UAVs that have had their turn without taking a task are not counted upon: those free
+        before this decision, or at the same time with a better rank.
+        """
+        if not (state.open & problem.capable[uav]).any():
+            return None
+        choice = self._choice(problem, state, rank, uav)
+        if choice.task is None:
+            return None
+        task, now_s = choice.task, float(state.free_s[uav])
+        travel_s = problem.travel_s(uav, state.place_enu_m[uav])[task]
+        return Decision(
+            uav=uav,
+            task=task,
+            decided_s=now_s,
+            completion_s=float((now_s + travel_s) + problem.service_s[task]),
+            score=choice.worth,
+            second_score=choice.second_worth,
+            certificate=False,
+            exact=False,
+            valued=choice.valued,
+        )
+
+    def worth(self, problem: Problem, state: TeamState, rank: IntArray, uav: int) -> float:
+        """J to go of the whole team when ``uav`` has its turn [value·s]; the score of `decide`."""
+        return self._choice(problem, state, rank, uav).worth
+
+    def _choice(self, problem: Problem, state: TeamState, rank: IntArray, uav: int) -> GuidedChoice:
+        mission = self._arrays_of(problem)
+        now_s = float(state.free_s[uav])
+        active = state.active & ~_has_declined(state, rank, now_s, int(rank[uav]))
+        active[uav] = True
+        team = team_arrays(mission, state, active, now_s)
+        on_a_list = self._owner >= 0
+        kept = on_a_list & active[self._owner]
+        disturbed = bool((problem.capable.any(axis=0) & ~on_a_list).any())
+        disturbed |= bool((state.open & ~kept).any())
+        return guided_choice(
+            team, self._routes, uav, iterations=self._repair_iterations if disturbed else 0
+        )
+
+    def _arrays_of(self, problem: Problem) -> RouteArrays:
+        if self._problem is not problem or self._arrays is None:
+            self._arrays = route_arrays(problem)
+            self._problem = problem
+            index: dict[str, int] = {task: i for i, task in enumerate(problem.task_ids)}
+            self._routes = [
+                [index[task] for task in self._lists.get(uav, ()) if task in index]
+                for uav in problem.uav_ids
+            ]
+            self._owner = np.full(problem.n_task, -1, dtype=np.int64)
+            for uav_index, route in enumerate(self._routes):
+                self._owner[route] = uav_index
+        return self._arrays
+
+
+def route_arrays(problem: Problem) -> RouteArrays:
+    """The problem laid out for route kernels; worked out once for each problem."""
+    arrays = _ARRAYS.get(problem)
+    if arrays is None:
+        arrays = _ARRAYS[problem] = _laid_out(problem)
+    return arrays
+
+
+def _laid_out(problem: Problem) -> RouteArrays:
+    return RouteArrays(
+        problem.task_enu_m,
+        problem.speed_m_s,
+        problem.value,
+        problem.service_s,
+        problem.success,
+        problem.survival,
+        problem.horizon_s,
+    )
+
+
+def team_arrays(
+    mission: RouteArrays, state: TeamState, active: BoolArray, now_s: float
+) -> TeamArrays:
+    """The state for route kernels; UAVs that are free at an unknown time count as free now."""
+    free_s = np.where(np.isfinite(state.free_s), state.free_s, now_s)
+    return TeamArrays(mission, free_s, state.place_enu_m, state.survived, active, state.open)
+
+
+def _has_declined(state: TeamState, rank: IntArray, now_s: float, own_rank: int) -> BoolArray:
+    declined: BoolArray = state.free_s < now_s
+    declined |= (state.free_s == now_s) & (rank < own_rank)
+    return declined

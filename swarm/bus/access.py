@@ -3,7 +3,7 @@
 A pure function of the roster. Routers use it for their clients and for each other, peers of a
 mesh for their neighbours; a client needs none, as only routers' certificates serve. Whoever
 is in no rule says and hears nothing. Leaves out: who is let in at all (TLS and the door,
-swarm.bus.secure), and what is checked again in every process (swarm.wire.seal).
+swarm.bus.tls), and what is checked again in every process (swarm.protocol.seal).
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Final
 
-from swarm.identity.roles import Role
-from swarm.identity.roster import Entry, Roster
+from swarm.identity.roster import Role, Roster, RosterEntry
 from swarm.model.ids import COORDINATOR
-from swarm.wire.codec import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES
-from swarm.wire.keys import Keys
-from swarm.wire.seal import ENVELOPE_BYTES
+from swarm.protocol.encoding import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.seal import ENVELOPE_BYTES
 
 __all__ = ["access_settings"]
+
 
 _LISTEN: Final = (
     "declare_subscriber",
@@ -54,7 +54,7 @@ def access_settings(roster: Roster) -> dict[str, Any]:
     Registers may come in bursts and must not get lost, so how many there are of them is not
     limited here: what Zenoh limits is the time between any two messages under one rule.
     """
-    keys = Keys(roster.mission)
+    keys = KeySpace(roster.mission)
     return {
         "access_control": _control(roster, keys),
         "downsampling": _rates(roster, keys),
@@ -62,7 +62,7 @@ def access_settings(roster: Roster) -> dict[str, Any]:
     }
 
 
-def _control(roster: Roster, keys: Keys) -> dict[str, Any]:
+def _control(roster: Roster, keys: KeySpace) -> dict[str, Any]:
     everyone = [entry.common_name for entry in roster.entries]
     everything = f"{keys.root}/**"
     rules = [
@@ -99,7 +99,7 @@ def _control(roster: Roster, keys: Keys) -> dict[str, Any]:
 
 
 def _writers(
-    entries: Iterable[Entry], keys: Keys
+    entries: Iterable[RosterEntry], keys: KeySpace
 ) -> Iterable[tuple[str, list[str], list[str], str | None]]:
     """Who writes: a word for it, common names, keys to put on, and the name it lives by."""
     entries = tuple(entries)
@@ -116,7 +116,7 @@ def _writers(
         yield "operator", operators, [f"{keys.root}/operator/**", keys.roster], None
 
 
-def _of_role(entries: Iterable[Entry], role: Role) -> list[str]:
+def _of_role(entries: Iterable[RosterEntry], role: Role) -> list[str]:
     return [entry.common_name for entry in entries if entry.role is role]
 
 
@@ -130,7 +130,7 @@ def _rule(name: str, flow: str, messages: Iterable[str], keys: list[str]) -> dic
     }
 
 
-def _rates(roster: Roster, keys: Keys) -> list[dict[str, Any]]:
+def _rates(roster: Roster, keys: KeySpace) -> list[dict[str, Any]]:
     """How often each may say what may get lost.
 
     Zenoh counts by rule and neighbour. Another router is the neighbour by which the words of
@@ -155,7 +155,7 @@ def _limit(name: str, message: str, rates: Iterable[tuple[str, float]]) -> dict[
     }
 
 
-def _sizes(keys: Keys) -> list[dict[str, Any]]:
+def _sizes(keys: KeySpace) -> list[dict[str, Any]]:
     """How long what is said may be; any process would drop what is longer."""
     small = [keys.claim("*"), keys.status("*"), keys.outcome("*", "*"), f"{keys.root}/operator/**"]
     large = [f"{keys.root}/**"]

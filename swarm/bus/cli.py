@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm.bus.config import DEFAULT_ROUTER, DEFAULT_SECURE_ROUTER
-from swarm.config import Link, preset
-from swarm.log import LogFormat, LogLevel
-from swarm.options import (
+from swarm.protocol.timing import LinkKind, preset
+from swarm.runtime.log import LogFormat, LogLevel
+from swarm.runtime.options import (
     CheckOption,
     JsonOption,
     KeysOption,
@@ -61,7 +61,7 @@ def router(
     ] = None,
     keys: KeysOption = None,
     unencrypted: UnencryptedOption = False,
-    link: LinkOption = Link.NORMAL,
+    link: LinkOption = LinkKind.NORMAL,
     lease_s: LeaseOption = None,
     json: JsonOption = False,
     check: CheckOption = False,
@@ -80,9 +80,9 @@ def router(
         swarm router --keys keys/router-2 --listen tls/0.0.0.0:7447 --connect tls/192.168.1.2:7447
     """
     from swarm.bus.config import RouterConfig
-    from swarm.errors import Fault, InputError
-    from swarm.log import configure_logging
-    from swarm.process import run_until_stopped
+    from swarm.runtime.errors import Fault, InputError
+    from swarm.runtime.log import configure_logging
+    from swarm.runtime.process import run_until_stopped
 
     configure_logging(log_level, log_format)
     identity = None
@@ -110,13 +110,13 @@ def router(
 async def _serve(settings: RouterConfig, *, quiet: bool) -> int:
     from swarm import __version__
     from swarm.bus.router import open_router
-    from swarm.log import get_logger
-    from swarm.watchdog import SERVICE
+    from swarm.runtime.log import get_logger
+    from swarm.runtime.process import SERVICE_NOTIFIER
 
     serving = await open_router(settings)
     try:
         print(json_format.dumps({"endpoints": serving.endpoints}), flush=True)
-        SERVICE.ready(f"serves at {', '.join(serving.endpoints)}")
+        SERVICE_NOTIFIER.ready(f"serves at {', '.join(serving.endpoints)}")
         if not quiet:
             ready = f"router ready at {', '.join(serving.endpoints)}"
             get_logger("router").info(ready, release=__version__)

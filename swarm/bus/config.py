@@ -1,20 +1,20 @@
 """How a process reaches the others: settings, checked when made.
 
+Also which endpoints nobody else can listen in on: those on this machine, and encrypted ones.
 Leaves out: what Zenoh is told in the end (swarm.bus.zenoh_session).
 """
 
 from __future__ import annotations
 
+import ipaddress
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm.bus.privacy import is_encrypted, is_loopback
-from swarm.config import PRESETS, Link
-from swarm.errors import Fault, InputError
-from swarm.suggest import instead
+from swarm.protocol.timing import PRESETS, LinkKind
+from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
 if TYPE_CHECKING:
     from swarm.identity import Identity
@@ -30,20 +30,58 @@ __all__ = [
     "RouterConfig",
     "Topology",
     "bus_config",
+    "is_encrypted",
+    "is_loopback",
 ]
 
+
+def is_loopback(endpoint: str) -> bool:
+    """Whether only this machine's own processes are at ``endpoint``, or can reach it.
+
+    A name counts as another machine's, but for ``localhost``: what it means may change. So
+    does the address that stands for all of this machine's.
+
+    Args:
+        endpoint: ``PROTOCOL/HOST:PORT`` or ``unixsock-stream/PATH``.
+    """
+    protocol, _, place = endpoint.partition("/")
+    if protocol == "unixsock-stream":
+        return True
+    host = place.partition("?")[0].partition("#")[0].rpartition(":")[0].strip("[]")
+    if host == "localhost":
+        return True
+    try:
+        address = ipaddress.ip_address(host.partition("%")[0])
+    except ValueError:
+        return False
+    mapped = address.ipv4_mapped if isinstance(address, ipaddress.IPv6Address) else None
+    return (mapped or address).is_loopback
+
+
+def is_encrypted(endpoint: str) -> bool:
+    """Whether what goes by ``endpoint`` is encrypted, and both ends prove who they are."""
+    return endpoint.startswith(("tls/", "quic/"))
+
+
 MIN_LEASE_S = 0.2
+
 MAX_LEASE_S = 60.0
-DEFAULT_LEASE_S = PRESETS[Link.NORMAL].lease_s
+
+DEFAULT_LEASE_S = PRESETS[LinkKind.NORMAL].lease_s
+
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
+
 DEFAULT_SECURE_ROUTER = "tls/127.0.0.1:7447"
 """The one with keys."""
+
 
 # udp is left out: over it, Zenoh's "reliable" does not retransmit.
 ENDPOINT = re.compile(
     r"(?:tcp|tls|quic|ws)/(?:\[[0-9A-Fa-f:.%\w]+\]|[^\s:/?#\[\]]+):(\d{1,5})(?:[?#]\S*)?"
 )
+
 UNIX_ENDPOINT = re.compile(r"unixsock-stream/\S+")
+
 ENDPOINT_REMEDY = "write PROTOCOL/HOST:PORT with tcp, tls, quic or ws, as in tcp/127.0.0.1:7447"
 
 
@@ -201,7 +239,9 @@ def bus_config(
         if listen or connect:
             raise ValueError("--listen and --connect are for --bus mesh or router only")
         if not Path(kind).is_file():
-            remedy = instead(kind, ("mesh", "router"), "give a file that is there, or one of")
+            remedy = remedy_for_name(
+                kind, ("mesh", "router"), "give a file that is there, or one of"
+            )
             problem = f"no such Zenoh configuration file: {kind}"
             raise InputError(Fault("command line", "--bus", problem, remedy))
         return seat(FileTopology(Path(kind)))

@@ -5,7 +5,7 @@ that this user alone can read and write, ``$XDG_RUNTIME_DIR/peckorder`` or ``pec
 temporary files go, and takes the file back when it ends. A file whose process has died is removed
 by who comes next; one of somebody else, or that others could have written, is not read. Keys are
 named there, never told: whoever cannot read their folder has none. Leaves out: which run a command
-means (swarm.bus.seat).
+means (swarm.bus.connection).
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from json import dumps, loads
 from pathlib import Path
 from typing import Any
 
-from swarm.config import Link
+from swarm.protocol.timing import LinkKind
 
 __all__ = ["LocalRun", "announced", "begun", "local_runs"]
+
 
 _LONGEST = 1 << 16
 """Bytes of a file: 1000 endpoints have room."""
@@ -41,7 +42,7 @@ class LocalRun:
     """Whether its processes are peers; else they are clients of routers."""
     endpoints: tuple[str, ...]
     """Of all peers, or of the routers."""
-    link: Link
+    link: LinkKind
     """What kind of link its processes were told they have."""
     viewer_keys: str | None = None
     """The folder of keys of who looks on; None where it has no keys."""
@@ -178,7 +179,7 @@ def _parsed(told: dict[str, Any]) -> LocalRun:
         mission=told["mission"],
         mesh=told["mesh"],
         endpoints=endpoints,
-        link=Link(told["link"]),
+        link=LinkKind(told["link"]),
         viewer_keys=keys[0],
         operator_keys=keys[1],
         unencrypted=told["unencrypted"],

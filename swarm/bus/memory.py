@@ -1,6 +1,6 @@
 """A bus inside one asyncio loop, for tests: what is sent has arrived.
 
-Leaves out: delay, loss and partitions of many (sim.network). It behaves as clients
+Leaves out: delay, loss and partitions of many (sim.world.network). It behaves as clients
 of one router do: a seat has its link as soon as it joins, `MemoryNetwork.cut` takes
 it away. Call everything from the loop's thread; only replies may come from others.
 """
@@ -11,7 +11,7 @@ import asyncio
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from swarm.bus.keyexpr import check_key, check_key_expr, intersects
+from swarm.bus.key_expressions import check_key, check_key_expr, intersects
 from swarm.bus.port import (
     Answer,
     Inbox,
@@ -23,14 +23,14 @@ from swarm.bus.port import (
     TokenSeen,
     check_payload,
 )
-from swarm.errors import BusError
-from swarm.wire.seal import Seal
+from swarm.protocol.seal import Seal
+from swarm.runtime.errors import BusError
 
 __all__ = ["MemoryBus", "MemoryNetwork"]
 
 
 @dataclass(slots=True, eq=False)
-class _Seat:
+class _Node:
     """What the network knows of one who joined."""
 
     inbox: Inbox
@@ -43,18 +43,18 @@ class _Seat:
 
 
 @dataclass(slots=True, eq=False)
-class _Question:
+class _PendingQuery:
     """A query under way."""
 
     loop: asyncio.AbstractEventLoop
-    asker: _Seat
+    asker: _Node
     payload: bytes
-    missing: list[tuple[_Seat, str]] = field(default_factory=list)
+    missing: list[tuple[_Node, str]] = field(default_factory=list)
     """Seats and their served keys that have not answered yet."""
     answers: list[Answer] = field(default_factory=list)
     complete: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def query_to(self, seat: _Seat, key: str) -> Query:
+    def query_to(self, seat: _Node, key: str) -> Query:
         """The event by which ``seat`` is asked; its reply comes back to here."""
 
         def reply(payload: bytes) -> None:
@@ -64,13 +64,13 @@ class _Question:
 
         return Query(key, reply, self.payload)
 
-    def forget(self, seat: _Seat) -> None:
+    def forget(self, seat: _Node) -> None:
         """Wait no longer for a seat that left."""
         self.missing = [(other, key) for other, key in self.missing if other is not seat]
         if not self.missing:
             self.complete.set()
 
-    def _arrive(self, seat: _Seat, key: str, payload: bytes) -> None:
+    def _arrive(self, seat: _Node, key: str, payload: bytes) -> None:
         place = (seat, key)
         if place in self.missing and seat.linked and self.asker.linked:
             self.answers.append(Answer(key, payload, self.loop.time()))
@@ -83,24 +83,24 @@ class _Hub:
     """Where all seats meet."""
 
     def __init__(self) -> None:
-        self._seats: list[_Seat] = []
-        self._questions: list[_Question] = []
+        self._seats: list[_Node] = []
+        self._questions: list[_PendingQuery] = []
 
-    def enter(self, seat: _Seat) -> None:
+    def enter(self, seat: _Node) -> None:
         self._seats.append(seat)
         seat.inbox.offer(LinkUp())
 
-    def leave(self, seat: _Seat) -> None:
+    def leave(self, seat: _Node) -> None:
         self._seats.remove(seat)
         self._lose_sight_of(seat)
 
-    def cut(self, seat: _Seat) -> None:
+    def cut(self, seat: _Node) -> None:
         unseen = self._tokens_of(self._reached_from(seat))
         self._lose_sight_of(seat)
         seat.inbox.offer(LinkDown())
         _tell([seat], TokenGone, unseen)
 
-    def heal(self, seat: _Seat) -> None:
+    def heal(self, seat: _Node) -> None:
         if seat not in self._seats:
             return  # closed meanwhile
         seat.linked = True
@@ -110,7 +110,7 @@ class _Hub:
         _tell([seat], TokenSeen, there)
         _tell(others, TokenSeen, seat.tokens - there)
 
-    def publish(self, seat: _Seat, sample: Sample) -> None:
+    def publish(self, seat: _Node, sample: Sample) -> None:
         for other in self._reached_from(seat):
             lanes = [
                 latest
@@ -120,14 +120,14 @@ class _Hub:
             for latest in lanes:
                 other.inbox.offer(sample, latest)
 
-    def declare_token(self, seat: _Seat, key: str) -> None:
+    def declare_token(self, seat: _Node, key: str) -> None:
         others = self._reached_from(seat)
         is_new = key not in self._tokens_of(others) | seat.tokens
         seat.tokens.add(key)
         if is_new:
             _tell(others, TokenSeen, {key})
 
-    def watch_tokens(self, seat: _Seat, key_expr: str) -> None:
+    def watch_tokens(self, seat: _Node, key_expr: str) -> None:
         there = self._tokens_of(self._reached_from(seat)) - seat.tokens
         seat.watched.add(key_expr)
         for key in sorted(there):
@@ -135,9 +135,9 @@ class _Hub:
                 seat.inbox.offer(TokenSeen(key))
 
     def ask(
-        self, seat: _Seat, key_expr: str, payload: bytes, loop: asyncio.AbstractEventLoop
-    ) -> _Question:
-        question = _Question(loop, seat, payload)
+        self, seat: _Node, key_expr: str, payload: bytes, loop: asyncio.AbstractEventLoop
+    ) -> _PendingQuery:
+        question = _PendingQuery(loop, seat, payload)
         question.missing = [
             (other, key)
             for other in self._reached_from(seat)
@@ -150,27 +150,27 @@ class _Hub:
         question.forget(seat)  # complete at once if there is nobody to ask
         return question
 
-    def drop(self, question: _Question) -> None:
+    def drop(self, question: _PendingQuery) -> None:
         question.missing.clear()
         self._questions.remove(question)
 
-    def _lose_sight_of(self, seat: _Seat) -> None:
+    def _lose_sight_of(self, seat: _Node) -> None:
         others = self._reached_from(seat)
         seat.linked = False
         _tell(others, TokenGone, seat.tokens - self._tokens_of(others))
         for question in self._questions:
             question.forget(seat)
 
-    def _reached_from(self, seat: _Seat) -> list[_Seat]:
+    def _reached_from(self, seat: _Node) -> list[_Node]:
         others = [other for other in self._seats if other is not seat and other.linked]
         return others if seat.linked else []
 
     @staticmethod
-    def _tokens_of(seats: Iterable[_Seat]) -> set[str]:
+    def _tokens_of(seats: Iterable[_Node]) -> set[str]:
         return {key for seat in seats for key in seat.tokens}
 
 
-def _tell(seats: Iterable[_Seat], change: type[TokenSeen | TokenGone], keys: Iterable[str]) -> None:
+def _tell(seats: Iterable[_Node], change: type[TokenSeen | TokenGone], keys: Iterable[str]) -> None:
     for seat in seats:
         for key in sorted(keys):
             if key not in seat.tokens and any(intersects(watch, key) for watch in seat.watched):
@@ -182,14 +182,14 @@ class MemoryNetwork:
 
     def __init__(self) -> None:
         self._hub = _Hub()
-        self._seats: dict[str, _Seat] = {}
+        self._seats: dict[str, _Node] = {}
 
     def join(self, name: str, *, inbox_capacity: int = 4096, seal: Seal | None = None) -> MemoryBus:
         """Take a seat in the running loop, under a ``name`` never used here before."""
         if name in self._seats:
             raise ValueError(f"{name} has a seat already")
         loop = asyncio.get_running_loop()
-        seat = _Seat(Inbox(loop, inbox_capacity))
+        seat = _Node(Inbox(loop, inbox_capacity))
         self._seats[name] = seat
         self._hub.enter(seat)
         return MemoryBus(self._hub, seat, loop, seal)
@@ -209,7 +209,7 @@ class MemoryBus:
     """One seat on a `MemoryNetwork`; see `swarm.bus.port.Bus`."""
 
     def __init__(
-        self, hub: _Hub, seat: _Seat, loop: asyncio.AbstractEventLoop, seal: Seal | None = None
+        self, hub: _Hub, seat: _Node, loop: asyncio.AbstractEventLoop, seal: Seal | None = None
     ) -> None:
         self.seal = seal
         """Of whoever sits here."""

@@ -1,8 +1,8 @@
 """What the runtime asks of a bus, whatever carries it.
 
-Leaves out: what is said (swarm.wire) and how it travels (swarm.bus.memory,
-swarm.bus.zenoh_bus, sim.network). Every implementation passes tests/contract/.
-Keys and key expressions are those of swarm.bus.keyexpr.
+Leaves out: what is said (swarm.protocol) and how it travels (swarm.bus.memory,
+swarm.bus.zenoh_bus, sim.world.network). Every implementation passes tests/contract/.
+Keys and key expressions are those of swarm.bus.key_expressions.
 
 A bus hands everything that happens to one bounded `Inbox`, in order of arrival,
 from whichever thread; nothing of the runtime is ever called on a bus thread.
@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    from swarm.wire.seal import Seal
+    from swarm.protocol.seal import Seal
 
 __all__ = [
     "MAX_PAYLOAD_BYTES",
@@ -34,6 +34,7 @@ __all__ = [
     "TokenSeen",
     "check_payload",
 ]
+
 
 MAX_PAYLOAD_BYTES = 4 << 20
 """Longest payload of a sample or an answer [bytes]."""

@@ -1,10 +1,6 @@
 """A Zenoh router inside this process, for clients that have no mesh.
 
-With keys it lets in who is in the newest roster, and passes on what that lets each say; who
-floods it is shut out. Zenoh cannot change this while a session is open, so the router opens
-another one in its place. Leaves out: the command around it (swarm.bus.cli), and who may say what
-(swarm.bus.access). A Python session in router mode serves clients, so nothing else need be
-installed.
+It lets in whom the newest roster of its folder or of the bus names, less those who flood it.
 """
 
 from __future__ import annotations
@@ -13,27 +9,171 @@ import asyncio
 import contextlib
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import zenoh
 from zenoh.handlers import Callback
 
+from swarm.bus.admission import RateLimiter
 from swarm.bus.config import RouterConfig
-from swarm.bus.rosters import Rosters
-from swarm.bus.zenoh_session import (
-    close_session,
-    open_session,
-    session_config,
-    session_config_file,
-)
-from swarm.errors import BusError
-from swarm.log import get_logger
-from swarm.wire.keys import Keys
+from swarm.bus.zenoh_session import close_session, open_session, session_config, session_config_file
+from swarm.identity import Identity, Role, Roster
+from swarm.identity.folder import ROSTER_FILE
+from swarm.identity.roster import RosterEntry
+from swarm.model.ids import AUTHORITY
+from swarm.protocol.codec import Codec
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import Message, SignedRoster, Stamp
+from swarm.protocol.seal import UnacceptableError, seal_of
+from swarm.runtime.errors import BusError
+from swarm.runtime.log import get_logger
 
-__all__ = ["Router", "open_router"]
+__all__ = ["RosterKeeper", "Router", "open_router"]
+
+
+LOOK_S = 1.0
+"""How often the folder is looked into [wall s]."""
+
+TELL_S = 30.0
+"""How often the roster is repeated on the bus [wall s]."""
+
+FLOOD_HZ, FLOOD_BURST = 500.0, 3000
+"""What a UAV may say, samples and changes of its token together, before it is shut out; an honest
+one says some 10 a second, and up to 1000 at once when a partition heals."""
+
+
+class RosterKeeper:
+    """Keeps the newest roster of one mission, on disk too; a bad one changes nothing.
+
+    Args:
+        identity: whose folder it is, and whose authority counts.
+        look_s: how often the folder is looked into [wall s].
+
+    Raises:
+        OSError: its roster cannot be read any more.
+        ValueError: that has been changed since the identity was loaded.
+    """
+
+    def __init__(self, identity: Identity, look_s: float = LOOK_S) -> None:
+        self.identity = identity
+        self._look_s = look_s
+        seal = seal_of(identity)
+        if seal is None:
+            raise ValueError("there are no keys")
+        self._seal = seal
+        self._codec = Codec(identity.mission, seal)
+        self._path = identity.folder / ROSTER_FILE
+        self._seen: tuple[int, int] | None = None
+        self._changed = asyncio.Event()
+        self._shut_out: set[str] = set()
+        self._heard = RateLimiter(FLOOD_HZ, FLOOD_BURST)
+        self._log = get_logger("router")
+        self.key = KeySpace(identity.mission).roster
+        """Where rosters are said."""
+
+    @property
+    def roster(self) -> Roster:
+        """In force."""
+        return self._seal.roster
+
+    @property
+    def let_in(self) -> Roster:
+        """The same without those who are shut out."""
+        kept = (each for each in self.roster.entries if each.common_name not in self._shut_out)
+        return replace(self.roster, entries=tuple(kept))
+
+    def flooding(self, entry: RosterEntry | None, now_s: float) -> str | None:
+        """Count one saying of theirs; the common name of who says too much of late.
+
+        A UAV alone: the coordinator's token is that of several machines. May be called on any
+        thread.
+
+        Args:
+            entry: of the roster by which they were let in; None if they are not in it.
+            now_s: now.
+        """
+        if entry is None or entry.role is not Role.UAV:
+            return None
+        return None if self._heard.allows(entry.common_name, now_s) else entry.common_name
+
+    def shut_out(self, common_name: str) -> None:
+        """Let those keys in no more, for as long as this process lives."""
+        in_force = any(each.common_name == common_name for each in self.roster.entries)
+        if not in_force or common_name in self._shut_out:
+            return
+        self._shut_out.add(common_name)
+        self._changed.set()
+        self._log.error(
+            f"{common_name} floods the bus and is shut out; give it new keys, or start this "
+            "router anew",
+            limit_hz=FLOOD_HZ,
+        )
+
+    def hear(self, key: str, data: bytes) -> None:
+        """Somebody says on ``key`` that this is the roster."""
+        message = self._codec.decode(key, data)
+        if message is None:
+            self._log.debug("a bad roster was said", dropped=dict(self._codec.dropped))
+        elif isinstance(message.body, SignedRoster):
+            self._take(message.body.signed)
+
+    def look(self) -> None:
+        """Take the roster in the folder, if that has changed."""
+        try:
+            found = self._path.stat()
+            seen = (found.st_mtime_ns, found.st_size)
+            if seen == self._seen:
+                return
+            self._seen = seen
+            self._take(self._path.read_bytes().decode("ascii", "replace"))
+        except OSError as fault:
+            self._log.debug("the roster cannot be read", problem=fault.strerror or str(fault))
+
+    async def wait_for_change(self, tell: Callable[[str, bytes], None]) -> None:
+        """Return as soon as others are to be let in than the last time; repeats the roster.
+
+        Args:
+            tell: says something on a key.
+        """
+        loop = asyncio.get_running_loop()
+        tell_at_s = loop.time() + self._look_s  # those who were linked before are back by then
+        while not self._changed.is_set():
+            self.look()
+            if loop.time() >= tell_at_s:
+                tell(self.key, self._said())
+                tell_at_s = loop.time() + TELL_S
+            try:
+                async with asyncio.timeout(self._look_s):
+                    await self._changed.wait()
+            except TimeoutError:
+                continue
+        self._changed.clear()
+
+    def _said(self) -> bytes:
+        seal = self._seal
+        stamp, body = Stamp(seal.roster.version, 0), SignedRoster(seal.signed_roster)
+        packed = self._codec.pack(Message(self.identity.mission, AUTHORITY, stamp, body))
+        return packed or b""
+
+    def _take(self, signed: str) -> None:
+        before = self.roster.version
+        try:
+            self._seal.put_in_force(signed)
+        except UnacceptableError as fault:
+            self._log.warning("a roster is not this mission's authority's", problem=fault.reason)
+        except OSError as fault:
+            problem = fault.strerror or str(fault)
+            self._log.warning("the newest roster cannot be kept", problem=problem)
+        if self.roster.version != before:
+            self._changed.set()
+
 
 OPEN_LIMIT_S = 10.0
+
 CLOSE_LIMIT_S = 2.0
+
 INFO_LIMIT_S = 2.0
+
 AGAIN_S = 0.05
 """Between tries to listen where the session before has hardly left."""
 
@@ -44,7 +184,7 @@ class Router:
     def __init__(
         self,
         config: RouterConfig,
-        rosters: Rosters | None,
+        rosters: RosterKeeper | None,
         session: zenoh.Session,
         endpoints: tuple[str, ...],
     ) -> None:
@@ -81,10 +221,10 @@ class Router:
             self._closed = True
             close_session(self._session, limit_s=CLOSE_LIMIT_S)
 
-    def _hear(self, rosters: Rosters) -> None:
+    def _hear(self, rosters: RosterKeeper) -> None:
         """Listen for rosters, and for who floods; callbacks are Zenoh's threads'."""
         loop = asyncio.get_running_loop()
-        root = Keys(rosters.identity.mission).root
+        root = KeySpace(rosters.identity.mission).root
         let_in = rosters.roster  # until it is opened anew, whoever else is in force by then
 
         def on_roster(sample: zenoh.Sample) -> None:
@@ -114,7 +254,7 @@ class Router:
         with contextlib.suppress(zenoh.ZError):
             self._session.put(key, data, allowed_destination=zenoh.Locality.REMOTE)
 
-    async def _reopen(self, rosters: Rosters) -> None:
+    async def _reopen(self, rosters: RosterKeeper) -> None:
         listen = _as_before(self._config.listen, self.endpoints)
         close_session(self._session, limit_s=CLOSE_LIMIT_S)
         async with asyncio.timeout(OPEN_LIMIT_S):
@@ -138,7 +278,7 @@ async def open_router(config: RouterConfig) -> Router:
         BusError: an endpoint is taken, or no listening endpoint came to be.
         InputError: the user's configuration file is wrong, or its keys are no router's.
     """
-    rosters = None if config.identity is None else Rosters(config.identity)
+    rosters = None if config.identity is None else RosterKeeper(config.identity)
     session = await _open(config, rosters, config.listen)
     try:
         endpoints = _listening_endpoints(session)
@@ -151,12 +291,12 @@ async def open_router(config: RouterConfig) -> Router:
 
 
 async def _open(
-    config: RouterConfig, rosters: Rosters | None, listen: tuple[str, ...]
+    config: RouterConfig, rosters: RosterKeeper | None, listen: tuple[str, ...]
 ) -> zenoh.Session:
     zenoh_config = _zenoh_config(config, listen)
     if rosters is None:
         return await open_session(zenoh_config, timeout_s=OPEN_LIMIT_S)
-    from swarm.bus.secure import door_of, secure
+    from swarm.bus.tls import door_of, secure
 
     roster = rosters.let_in
     with door_of(rosters.identity, roster) as door:

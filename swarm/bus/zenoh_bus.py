@@ -24,20 +24,10 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology
-from swarm.bus.keyexpr import check_key, check_key_expr
-from swarm.bus.port import (
-    Answer,
-    Inbox,
-    LinkDown,
-    LinkUp,
-    Query,
-    Sample,
-    TokenGone,
-    TokenSeen,
-    check_payload,
-)
-from swarm.bus.writer import Writer
+from swarm.bus.key_expressions import check_key, check_key_expr
+from swarm.bus.port import Answer, Inbox, Query, Sample, TokenGone, TokenSeen, check_payload
 from swarm.bus.zenoh_session import (
+    LinkWatch,
     close_session,
     endpoints_of,
     mode_of,
@@ -46,12 +36,13 @@ from swarm.bus.zenoh_session import (
     session_config,
     session_config_file,
 )
-from swarm.errors import BusError
-from swarm.log import get_logger
-from swarm.sealing import seal_of
-from swarm.wire.seal import Seal
+from swarm.protocol.seal import Seal, seal_of
+from swarm.runtime.errors import BusError
+from swarm.runtime.log import get_logger
+from swarm.runtime.writer_thread import WriterThread
 
 __all__ = ["ZenohBus", "open_zenoh_bus"]
+
 
 REPLY_WITHIN_S = 10.0
 """A query nobody has answered for this long is given up: who asked waits no longer."""
@@ -62,8 +53,6 @@ FLUSH_LIMIT_S = 0.7
 """How long closing waits for what is published; a blocked link gives up after 0.5 s."""
 WORD_AFTER_S = 1.5
 """Who waits for a bus is told for what, once it has taken so long."""
-LOOK_GAP_S = 0.005
-"""Shortest interval between two looks at the links [wall s]."""
 CLOSE_LIMIT_S = 1.2
 """How long closing waits for the session to say goodbye."""
 
@@ -109,8 +98,7 @@ async def _open(config: BusConfig, timeout_s: float) -> zenoh.Session:
     if identity is None:
         return await _open_without_keys(settings, timeout_s)
     # Loaded by those alone that have keys.
-    from swarm.bus.refusal import why_refused
-    from swarm.bus.secure import secure
+    from swarm.bus.tls import secure, why_refused
 
     mode = mode_of(settings)
     secure(settings, identity, mode, identity.roster)
@@ -128,7 +116,7 @@ async def _open_without_keys(settings: zenoh.Config, timeout_s: float) -> zenoh.
     try:
         return await open_session(settings, timeout_s=timeout_s)
     except BusError as fault:
-        from swarm.bus.refusal import with_keys_only
+        from swarm.bus.tls import with_keys_only
 
         reason = await with_keys_only(endpoints_of(settings, "connect"))
         if mode_of(settings) != "client" or not reason:
@@ -146,59 +134,10 @@ def _zenoh_config(config: BusConfig) -> zenoh.Config:
             return session_config_file(path)
 
 
-class _LinkWatch:
-    """Tells the first and the last transport from the others; used on Zenoh's threads."""
-
-    def __init__(
-        self, session: zenoh.Session, inbox: Inbox, loop: asyncio.AbstractEventLoop
-    ) -> None:
-        self._session = session
-        self._inbox = inbox
-        self._loop = loop
-        self._lock = threading.Lock()
-        self._others: set[str] = set()
-        self._linked = False
-        self._changes = 0
-        self._look_again_s = 0.0
-
-    def on_event(self, event: zenoh.TransportEvent) -> None:
-        """A transport to one of the others came or went."""
-        other = str(event.transport.zid)
-        with self._lock:
-            self._changes += 1
-            if event.kind == zenoh.SampleKind.PUT:
-                self._others.add(other)
-            else:
-                self._others.discard(other)
-            self._set(bool(self._others))
-
-    def look(self) -> None:
-        """Notice a lost link before its event: tokens go a little earlier than transports.
-
-        Not for every token of a flood: looking takes a while, and all else waits meanwhile.
-        """
-        now_s = self._loop.time()
-        with self._lock:
-            changes = self._changes
-            if not self._linked or now_s < self._look_again_s:
-                return
-            self._look_again_s = now_s + LOOK_GAP_S
-        if self._session.info.links():  # not under the lock: it may wait for Zenoh's
-            return
-        with self._lock:
-            if changes == self._changes:
-                self._set(False)
-
-    def _set(self, linked: bool) -> None:
-        if linked != self._linked:
-            self._linked = linked
-            self._inbox.offer_threadsafe(LinkUp() if linked else LinkDown())
-
-
 class _Reply:
     """The way back to one who asked; given up when it is called, dropped or forgotten."""
 
-    def __init__(self, query: zenoh.Query, key: str, writer: Writer) -> None:
+    def __init__(self, query: zenoh.Query, key: str, writer: WriterThread) -> None:
         self._query: zenoh.Query | None = query
         self._key = key
         self._writer = writer
@@ -238,7 +177,7 @@ class ZenohBus:
         self._session = session
         self._inbox = inbox
         self._loop = asyncio.get_running_loop()
-        self._writer = Writer("zenoh writer")
+        self._writer = WriterThread("zenoh writer")
         self._closed = False
         self._subscribed: dict[str, bool] = {}
         self._watched: set[str] = set()
@@ -247,7 +186,7 @@ class ZenohBus:
         # A thread that comes back from Zenoh while the interpreter ends aborts the process.
         atexit.register(self.close)
         self._replies: weakref.WeakSet[_Reply] = weakref.WeakSet()
-        self._links = _LinkWatch(session, inbox, self._loop)
+        self._links = LinkWatch(session, inbox, self._loop)
         self._call(
             lambda: session.info.declare_transport_events_listener(
                 _direct(self._links.on_event), history=True

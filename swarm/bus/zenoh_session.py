@@ -1,15 +1,11 @@
-"""Zenoh sessions: configured as measured, opened in time and closed in time.
-
-Leaves out: what is done with a session (swarm.bus.zenoh_bus, swarm.bus.router).
-Zenoh's own log is never initialised: it could only go to standard output, and as
-long as nobody initialises it nothing is printed, whatever RUST_LOG says.
-"""
+"""Zenoh sessions: configured as measured, opened in time, watched, and closed in time."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import re
+import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
@@ -17,10 +13,10 @@ from pathlib import Path
 import zenoh
 
 from swarm.bus.config import config_file_fault
-from swarm.bus.port import MAX_PAYLOAD_BYTES
-from swarm.errors import BusError
-from swarm.log import get_logger
-from swarm.process import call_in_background
+from swarm.bus.port import MAX_PAYLOAD_BYTES, Inbox, LinkDown, LinkUp
+from swarm.runtime.errors import BusError
+from swarm.runtime.log import get_logger
+from swarm.runtime.process import call_in_background
 
 __all__ = [
     "close_session",
@@ -33,15 +29,22 @@ __all__ = [
     "session_config_file",
 ]
 
+
 OPEN_TIMEOUT_S = 2.0
 """How long an endpoint that does not answer delays the next one; a bad link needs about 1 s."""
+
 KEEP_ALIVES_PER_LEASE = 4
+
 RECONNECT_FIRST_S = 0.1
+
 RECONNECT_SLOWEST_S = 0.5
+
 BLOCKED_CLOSE_S = 0.5
 """A link whose queue does not move for this long is closed, so that one hung reader holds
 the others up no longer."""
+
 HEADERS_BYTES = 64 << 10
+
 DEFAULT_MODE = "peer"
 """Of a Zenoh configuration file that names none."""
 
@@ -156,7 +159,7 @@ def close_session(session: zenoh.Session, *, limit_s: float) -> bool:
     """Close ``session``, waiting at most ``limit_s``; whether it closed in that time.
 
     Into a dead network closing takes 10 s. Then it goes on in the background, and
-    `swarm.process.leave` does not wait for it.
+    `swarm.runtime.process.leave` does not wait for it.
     """
     try:
         call_in_background(session.close, "zenoh close").result(limit_s)
@@ -191,3 +194,56 @@ def _close_unwanted(opening: Future[zenoh.Session]) -> None:
 
 def _ms(duration_s: float) -> int:
     return round(duration_s * 1000)
+
+
+LOOK_GAP_S = 0.005
+"""Shortest interval between two looks at the links [wall s]."""
+
+
+class LinkWatch:
+    """Tells the first and the last transport from the others; used on Zenoh's threads."""
+
+    def __init__(
+        self, session: zenoh.Session, inbox: Inbox, loop: asyncio.AbstractEventLoop
+    ) -> None:
+        self._session = session
+        self._inbox = inbox
+        self._loop = loop
+        self._lock = threading.Lock()
+        self._others: set[str] = set()
+        self._linked = False
+        self._changes = 0
+        self._look_again_s = 0.0
+
+    def on_event(self, event: zenoh.TransportEvent) -> None:
+        """A transport to one of the others came or went."""
+        other = str(event.transport.zid)
+        with self._lock:
+            self._changes += 1
+            if event.kind == zenoh.SampleKind.PUT:
+                self._others.add(other)
+            else:
+                self._others.discard(other)
+            self._set(bool(self._others))
+
+    def look(self) -> None:
+        """Notice a lost link before its event: tokens go a little earlier than transports.
+
+        Not for every token of a flood: looking takes a while, and all else waits meanwhile.
+        """
+        now_s = self._loop.time()
+        with self._lock:
+            changes = self._changes
+            if not self._linked or now_s < self._look_again_s:
+                return
+            self._look_again_s = now_s + LOOK_GAP_S
+        if self._session.info.links():  # not under the lock: it may wait for Zenoh's
+            return
+        with self._lock:
+            if changes == self._changes:
+                self._set(False)
+
+    def _set(self, linked: bool) -> None:
+        if linked != self._linked:
+            self._linked = linked
+            self._inbox.offer_threadsafe(LinkUp() if linked else LinkDown())

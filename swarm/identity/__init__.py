@@ -6,14 +6,13 @@ process without keys never loads it.
 """
 
 from swarm.identity.folder import Identity, load_identity
-from swarm.identity.roles import Role
-from swarm.identity.roster import Entry, Roster, decode_roster, encode_roster
+from swarm.identity.roster import Role, Roster, RosterEntry, decode_roster, encode_roster
 
 __all__ = [
-    "Entry",
     "Identity",
     "Role",
     "Roster",
+    "RosterEntry",
     "decode_roster",
     "encode_roster",
     "load_identity",

@@ -28,8 +28,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from swarm.errors import Fault, InputError
-from swarm.identity.door import DOOR_SECRET_BYTES, door_password
 from swarm.identity.folder import (
     AUTHORITY_FILE,
     AUTHORITY_KEY_FILE,
@@ -42,15 +40,31 @@ from swarm.identity.folder import (
     ROSTER_FILE,
 )
 from swarm.identity.ledger import ISSUED_FILE, Issued, Ledger, decode_ledger, encode_ledger
-from swarm.identity.mavlink_keys import decode_table, encode_table, mavlink_key, new_phrase
 from swarm.identity.private_files import (
+    checked,
+    decoded,
+    read_private,
     replace_private,
     swap_in_folder,
     sync,
 )
-from swarm.identity.reading import checked, decoded, read_private
-from swarm.identity.roles import Role
-from swarm.identity.roster import SERIES_BYTES, Entry, Roster, decode_roster, encode_roster
+from swarm.identity.roster import (
+    SERIES_BYTES,
+    Role,
+    Roster,
+    RosterEntry,
+    decode_roster,
+    encode_roster,
+)
+from swarm.identity.shared_secrets import (
+    DOOR_SECRET_BYTES,
+    decode_table,
+    door_password,
+    encode_table,
+    mavlink_key,
+    new_phrase,
+)
+from swarm.runtime.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -64,6 +78,7 @@ __all__ = [
     "open_authority",
     "require_fit",
 ]
+
 
 MAVLINK_TABLE_FILE: Final = "mavlink-keys.csv"
 
@@ -212,7 +227,9 @@ class Authority:
         entries = {entry.name: entry for entry in before.entries}
         for name, key in keys.items():
             generation = ledger.issued[name].generation
-            entries[name] = Entry(name, names[name], generation, public_bytes(key), not_after_s)
+            entries[name] = RosterEntry(
+                name, names[name], generation, public_bytes(key), not_after_s
+            )
         ordered = tuple(entry for _, entry in sorted(entries.items()))
         roster = Roster(self.mission, series, before.version + 1, ordered)
         data = encode_roster(roster, self._key)  # before anything is written: may be too large
@@ -234,7 +251,7 @@ class Authority:
         return roster
 
     def _files_of(
-        self, entry: Entry, key: Ed25519PrivateKey, not_before_s: int, phrase: str | None
+        self, entry: RosterEntry, key: Ed25519PrivateKey, not_before_s: int, phrase: str | None
     ) -> dict[str, bytes]:
         """What is in the folder of ``entry``."""
         from swarm.identity.certificates import certificate_pem, issue_certificate, key_pem

@@ -28,6 +28,7 @@ __all__ = [
     "read_key",
 ]
 
+
 _AUTHORITY_NAME = "mission authority"
 
 

@@ -1,7 +1,7 @@
 """The commands `swarm keys init`, `add`, `revoke`, `renew`, `publish` and `list`.
 
 Leaves out: what they do (swarm.identity.founding, swarm.identity.authority), and telling a
-running fleet (swarm.identity.publishing).
+running fleet (swarm.bus.roster_publishing).
 """
 
 from __future__ import annotations
@@ -15,16 +15,23 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.identity.changing import Fleet, enact, told, written
+from swarm.identity.changes import FleetAddress, enact, told, written
 from swarm.identity.founding import DEFAULT_DAYS
-from swarm.identity.roles import Role
-from swarm.options import BusOption, ConnectOption, JsonOption, ListenOption, ScenarioArgument
+from swarm.identity.roster import Role
+from swarm.runtime.options import (
+    BusOption,
+    ConnectOption,
+    JsonOption,
+    ListenOption,
+    ScenarioArgument,
+)
 
 if TYPE_CHECKING:
     from swarm.identity.authority import Authority
-    from swarm.identity.roster import Entry
+    from swarm.identity.roster import RosterEntry
 
 __all__ = ["keys"]
+
 
 keys = typer.Typer(
     help="Make the keys of a mission: who may say what, encrypted and signed.",
@@ -138,8 +145,8 @@ def init(
         swarm keys init table-1 --out keys --days 30 --coordinators 2 --routers 2
         swarm keys init table-1 --out keys --mesh --routers 0
     """
-    from swarm.clock import unix_s
     from swarm.identity.founding import found_authority
+    from swarm.runtime.clock import unix_s
     from swarm.scenario import load_scenario
 
     mission = load_scenario(scenario)
@@ -198,9 +205,9 @@ def add(
         swarm keys add keys recorder --role viewer
         swarm keys add keys uav3 --days 30
     """
-    from swarm.clock import unix_s
-    from swarm.errors import Fault, InputError
     from swarm.identity.authority import open_authority
+    from swarm.runtime.clock import unix_s
+    from swarm.runtime.errors import Fault, InputError
 
     authority = open_authority(directory)
     wanted: dict[str, Role] = {}
@@ -220,7 +227,7 @@ def add(
             names = ", ".join(fresh)
             print(f"{authority.mavlink_table}: new pass phrases for the autopilots of {names}")
 
-    fleet = Fleet(bus, listen, connect, as_ or directory / "operator")
+    fleet = FleetAddress(bus, listen, connect, as_ or directory / "operator")
     print(enact(authority, issue, fleet, wanted))
     return 0
 
@@ -257,7 +264,7 @@ def revoke(
         authority.revoke(names)
         print(f"revoked: {', '.join(dict.fromkeys(names))}")
 
-    fleet = Fleet(bus, listen, connect, as_ or directory / "operator")
+    fleet = FleetAddress(bus, listen, connect, as_ or directory / "operator")
     print(enact(authority, take_out, fleet, names))
     return 0
 
@@ -287,14 +294,14 @@ def publish(
         swarm keys publish keys --connect tls/192.168.1.2:7447
         swarm keys publish ~/operator
     """
+    from swarm.bus.roster_publishing import publish as tell
     from swarm.identity.folder import AUTHORITY_KEY_FILE, ROSTER_FILE
     from swarm.identity.listing import read_lists
-    from swarm.identity.publishing import publish as tell
 
     roster, _ = read_lists(directory)
     own = directory / "operator" if (directory / AUTHORITY_KEY_FILE).exists() else directory
     signed = (directory / ROSTER_FILE).read_bytes()
-    config = Fleet(bus, listen, connect, as_ or own).config(signed)
+    config = FleetAddress(bus, listen, connect, as_ or own).config(signed)
     print(told(roster.version, tell(config, lambda: signed)))
     return 0
 
@@ -312,8 +319,8 @@ def renew(directory: DirectoryArgument, days: DaysOption = None) -> int:
         swarm keys renew keys
         swarm keys renew keys --days 30
     """
-    from swarm.clock import unix_s
     from swarm.identity.authority import open_authority
+    from swarm.runtime.clock import unix_s
 
     authority = open_authority(directory)
     with written(directory):
@@ -343,7 +350,6 @@ def list_keys(
         swarm keys list keys
         swarm keys list keys/uav1 --json
     """
-    from swarm.clock import unix_s
     from swarm.identity.listing import (
         attention,
         listing_as_json,
@@ -351,6 +357,7 @@ def list_keys(
         listing_table,
         read_lists,
     )
+    from swarm.runtime.clock import unix_s
 
     roster, issued = read_lists(directory)
     rows = listing_rows(roster, issued, unix_s())
@@ -367,7 +374,7 @@ def list_keys(
     return 0
 
 
-def _tell_folders(authority: Authority, entries: Iterable[Entry]) -> None:
+def _tell_folders(authority: Authority, entries: Iterable[RosterEntry]) -> None:
     """Say which folder goes where, and until when it is good."""
     from swarm.identity.folder import shown_time
 

@@ -22,13 +22,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from swarm.clock import unix_s
-from swarm.errors import Fault, InputError
-from swarm.identity.door import DOOR_SECRET_BYTES
-from swarm.identity.private_files import replace_private
-from swarm.identity.reading import checked, decoded, read_private
-from swarm.identity.roles import Role
-from swarm.identity.roster import Roster, decode_roster
+from swarm.identity.private_files import checked, decoded, read_private, replace_private
+from swarm.identity.roster import Role, Roster, decode_roster
+from swarm.identity.shared_secrets import DOOR_SECRET_BYTES
+from swarm.runtime.clock import unix_s
+from swarm.runtime.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -47,6 +45,7 @@ __all__ = [
     "load_identity",
     "shown_time",
 ]
+
 
 IDENTITY_FILE: Final = "identity.json"
 AUTHORITY_FILE: Final = "authority.pem"

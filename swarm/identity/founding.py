@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from swarm.errors import Fault, InputError
 from swarm.identity.authority import (
     DAY_S,
     EARLY_S,
@@ -22,12 +21,13 @@ from swarm.identity.authority import (
 )
 from swarm.identity.folder import AUTHORITY_FILE, AUTHORITY_KEY_FILE, DOOR_KEY_FILE, ROSTER_FILE
 from swarm.identity.ledger import ISSUED_FILE, Ledger, encode_ledger
-from swarm.identity.mavlink_keys import encode_table
 from swarm.identity.private_files import make_private_folder, write_private
-from swarm.identity.roles import fleet_names
-from swarm.identity.roster import SERIES_BYTES, Roster, encode_roster
+from swarm.identity.roster import SERIES_BYTES, Roster, encode_roster, fleet_names
+from swarm.identity.shared_secrets import encode_table
+from swarm.runtime.errors import Fault, InputError
 
 __all__ = ["DEFAULT_DAYS", "found_authority"]
+
 
 DEFAULT_DAYS: Final = 90
 _AUTHORITY_DAYS: Final = 3650

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from swarm.identity.roles import Role
-from swarm.identity.roster import Entry
+from swarm.identity.roster import Role, RosterEntry
 
 __all__ = ["ISSUED_FILE", "Issued", "Ledger", "decode_ledger", "encode_ledger"]
+
 
 ISSUED_FILE: Final = "issued.json"
 _FORMAT: Final = "peckorder authority 1"
@@ -54,7 +54,7 @@ class Ledger:
         if before is not None and before.role is not role:
             return f"{name!r} is the name of a {before.role}, and no {role} can get it"
         try:
-            Entry(name, role, 1 if before is None else before.generation + 1, bytes(32), 0)
+            RosterEntry(name, role, 1 if before is None else before.generation + 1, bytes(32), 0)
         except ValueError as fault:
             return str(fault)
         return None

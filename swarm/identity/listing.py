@@ -12,25 +12,25 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from swarm.errors import Fault, InputError
 from swarm.identity.folder import AUTHORITY_FILE, ROSTER_FILE
 from swarm.identity.ledger import ISSUED_FILE, Issued, decode_ledger
-from swarm.identity.reading import checked, decoded
-from swarm.identity.roles import Role
-from swarm.identity.roster import Roster, decode_roster
+from swarm.identity.private_files import checked, decoded
+from swarm.identity.roster import Role, Roster, decode_roster
+from swarm.runtime.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 __all__ = [
     "SOON_DAYS",
-    "Row",
+    "IdentityRow",
     "attention",
     "listing_as_json",
     "listing_rows",
     "listing_table",
     "read_lists",
 ]
+
 
 SOON_DAYS: Final = 14
 """Certificates that end within this time are warned of."""
@@ -39,7 +39,7 @@ _RESTORE: Final = "put a copy of the folder back"
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class IdentityRow:
     """One name."""
 
     name: str
@@ -85,10 +85,10 @@ def read_lists(directory: Path) -> tuple[Roster, Mapping[str, Issued]]:
     return roster, decoded(directory / ISSUED_FILE, decode_ledger, _RESTORE).issued
 
 
-def listing_rows(roster: Roster, issued: Mapping[str, Issued], now_s: float) -> list[Row]:
+def listing_rows(roster: Roster, issued: Mapping[str, Issued], now_s: float) -> list[IdentityRow]:
     """Everyone in ``roster``, and those of ``issued`` who are not; by role, then by name."""
     rows = [
-        Row(
+        IdentityRow(
             entry.name,
             entry.role,
             entry.generation,
@@ -98,7 +98,7 @@ def listing_rows(roster: Roster, issued: Mapping[str, Issued], now_s: float) -> 
         for entry in roster.entries
     ]
     rows += [
-        Row(name, each.role, each.generation, None, None)
+        IdentityRow(name, each.role, each.generation, None, None)
         for name, each in issued.items()
         if roster.entry(name) is None
     ]
@@ -106,7 +106,7 @@ def listing_rows(roster: Roster, issued: Mapping[str, Issued], now_s: float) -> 
     return sorted(rows, key=lambda row: (roles.index(row.role), len(row.name), row.name))
 
 
-def listing_table(rows: list[Row]) -> Table:
+def listing_table(rows: list[IdentityRow]) -> Table:
     """The rows for a terminal."""
     from rich.table import Table
 
@@ -120,7 +120,7 @@ def listing_table(rows: list[Row]) -> Table:
     return table
 
 
-def attention(rows: list[Row], folder: str) -> str | None:
+def attention(rows: list[IdentityRow], folder: str) -> str | None:
     """What is to be done about certificates that end; None if nothing is."""
     ending = [row.name for row in rows if row.state in ("expired", "expires soon")]
     if not ending:
@@ -134,7 +134,7 @@ def attention(rows: list[Row], folder: str) -> str | None:
     return f"expired, or within {SOON_DAYS} days: {names}; issue anew: {remedy}"
 
 
-def listing_as_json(roster: Roster, rows: list[Row]) -> dict[str, Any]:
+def listing_as_json(roster: Roster, rows: list[IdentityRow]) -> dict[str, Any]:
     """The same for programs."""
     return {
         "mission": roster.mission,
@@ -154,7 +154,7 @@ def listing_as_json(roster: Roster, rows: list[Row]) -> dict[str, Any]:
     }
 
 
-def _words(row: Row) -> str:
+def _words(row: IdentityRow) -> str:
     if row.state == "expires soon":
         return "ends today" if row.days_left == 0 else f"ends in {row.days_left} d"
     return "" if row.state == "in force" else row.state

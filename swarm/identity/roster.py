@@ -1,4 +1,4 @@
-"""The roster: who belongs to a mission, signed by its authority.
+"""The roster: who belongs to a mission and in which role, signed by its authority.
 
 A roster is public. It names everyone whose certificate is in force, with role, generation
 and public key; who was revoked is not in it. It travels as bytes, on the bus and on disk::
@@ -7,17 +7,19 @@ and public key; who was revoked is not in it. It travels as bytes, on the bus an
 
 The signature is that of the authority over a context of its own and the exact bytes of the
 inner object; it is checked before anything inside is read. Leaves out: the authority that
-makes rosters (swarm.identity.authority) and what processes conclude from one.
+makes rosters (swarm.identity.authority) and what follows from a role on the bus
+(swarm.bus.access, swarm.protocol.seal).
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
-from swarm.identity.roles import Role
 from swarm.model.ids import RESERVED, require_id
 
 if TYPE_CHECKING:
@@ -27,30 +29,99 @@ __all__ = [
     "LONGEST_COMMON_NAME",
     "LONGEST_ROSTER_BYTES",
     "SERIES_BYTES",
-    "Entry",
+    "Role",
     "Roster",
+    "RosterEntry",
     "decode_roster",
     "encode_roster",
+    "fleet_names",
+    "numbered",
 ]
 
+
+class Role(StrEnum):
+    """What one may do; everyone may read everything of the mission."""
+
+    UAV = "uav"
+    """Speaks for the UAV of its name."""
+    COORDINATOR = "coordinator"
+    """Writes brief, plan and board."""
+    ROUTER = "router"
+    """Carries everything between others and says nothing itself."""
+    VIEWER = "viewer"
+    """Reads only: dashboard, recorder, status."""
+    OPERATOR = "operator"
+    """Commands the fleet."""
+
+
+_FIRST_NAMES = {
+    Role.COORDINATOR: "coordinator",
+    Role.ROUTER: "router",
+    Role.VIEWER: "dashboard",
+    Role.OPERATOR: "operator",
+}
+
+
+def numbered(first: str, count: int) -> Iterator[str]:
+    """``first``, ``first-2``, ``first-3`` … ; ``count`` of them."""
+    for number in range(1, count + 1):
+        yield first if number == 1 else f"{first}-{number}"
+
+
+def fleet_names(
+    uavs: Sequence[str], *, coordinators: int, routers: int, dashboards: int, operators: int
+) -> dict[str, Role]:
+    """Role by name of a whole fleet.
+
+    Raises:
+        ValueError: two of them would have one name.
+    """
+    counts = {
+        Role.COORDINATOR: coordinators,
+        Role.ROUTER: routers,
+        Role.VIEWER: dashboards,
+        Role.OPERATOR: operators,
+    }
+    names = dict.fromkeys(uavs, Role.UAV)
+    if len(names) != len(uavs):
+        raise ValueError("UAV ids must differ")
+    for role, count in counts.items():
+        for name in numbered(_FIRST_NAMES[role], count):
+            if name in names:
+                raise ValueError(f"UAV id {name!r} is the name of the {role}'s keys")
+            names[name] = role
+    return names
+
+
 KEY_BYTES: Final = 32
+
 SERIES_BYTES: Final = 16
+
 LONGEST_COMMON_NAME: Final = 64
 """Characters that X.509 allows (RFC 5280, ub-common-name)."""
+
 LONGEST_ROSTER_BYTES: Final = 1 << 20
 
+
 _FORMAT: Final = "peckorder roster 1"
+
 _CONTEXT: Final = b"peckorder roster 1\n"
+
 _SIGNATURE_BYTES: Final = 64
+
 _BEFORE: Final = b'{"signature":"'
+
 _BETWEEN: Final = b'","roster":'
+
 _AFTER: Final = b"}\n"
+
 _ROSTER_AT: Final = len(_BEFORE) + 2 * _SIGNATURE_BYTES + len(_BETWEEN)
+
 _NEWEST_S: Final = 1 << 40
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class RosterEntry:
     """One identity in force.
 
     Raises:
@@ -101,9 +172,9 @@ class Roster:
     """What is signed under one series is worth nothing under another."""
     version: int
     """Grows with every change, also from one series to the next."""
-    entries: tuple[Entry, ...]
+    entries: tuple[RosterEntry, ...]
     """In the order of their names."""
-    _by_name: dict[str, Entry] = field(init=False, compare=False, repr=False)
+    _by_name: dict[str, RosterEntry] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         require_id(self.mission, "mission name")
@@ -116,7 +187,7 @@ class Roster:
             raise ValueError("the names of a roster must differ and be in order")
         object.__setattr__(self, "_by_name", {entry.name: entry for entry in self.entries})
 
-    def entry(self, name: str) -> Entry | None:
+    def entry(self, name: str) -> RosterEntry | None:
         """That of ``name``; None if it is not in force."""
         return self._by_name.get(name)
 
@@ -209,9 +280,9 @@ def _verified(data: bytes, authority_public_key: bytes) -> bytes:
     return inner
 
 
-def _entry(parts: Any) -> Entry:
+def _entry(parts: Any) -> RosterEntry:
     match parts:
         case [str(name), str(role), int(generation), str(public_key), int(not_after_s)]:
-            return Entry(name, Role(role), generation, bytes.fromhex(public_key), not_after_s)
+            return RosterEntry(name, Role(role), generation, bytes.fromhex(public_key), not_after_s)
         case _:
             raise ValueError("it has an entry that is none")

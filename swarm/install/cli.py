@@ -1,6 +1,6 @@
 """The commands `swarm install agent`, `coordinator`, `router` and `dashboard`.
 
-Leaves out: what is installed (swarm.install.steps), and how (swarm.install.machine).
+Leaves out: what is installed (swarm.install.installation), and how (swarm.install.machine).
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.errors import Fault, InputError
+from swarm.runtime.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from swarm.install.machine import Machine
-    from swarm.install.services import Service
-    from swarm.install.steps import Installation
+    from swarm.install.installation import Installation
+    from swarm.install.machine import TargetMachine
+    from swarm.install.services import ServiceInstance
 
 __all__ = ["install"]
+
 
 install = typer.Typer(
     help="Run a process of a fleet as a service of this machine.",
@@ -147,17 +148,17 @@ def _install(
     dry_run: bool,
     uav: str | None = None,
 ) -> int:
-    from swarm.install.machine import Machine
-    from swarm.install.services import KINDS, Service
-    from swarm.install.steps import plan_installation
+    from swarm.install.installation import plan_installation
+    from swarm.install.machine import TargetMachine
+    from swarm.install.services import KINDS, ServiceInstance
 
-    service = Service(KINDS[command], uav)
+    service = ServiceInstance(KINDS[command], uav)
     options = [*own, *words] if words else []
     runs = _program(program, root)
     if root is None and not dry_run:
         _check_program(runs)
     plan = plan_installation(service, options, runs, root)
-    machine = Machine(root, is_root=os.geteuid() == 0)
+    machine = TargetMachine(root, is_root=os.geteuid() == 0)
     if dry_run:
         _show(plan)
     else:
@@ -195,7 +196,7 @@ def _show(plan: Installation) -> None:
         print("(secret)" if file.is_secret else file.content.decode("utf-8", "replace"))
 
 
-def _tell_what_next(plan: Installation, machine: Machine, root: Path | None) -> None:
+def _tell_what_next(plan: Installation, machine: TargetMachine, root: Path | None) -> None:
     service = plan.service
     if lines := _next_commands(service, machine, root):
         print("\nnext:", *lines, sep="\n    ")
@@ -206,7 +207,9 @@ def _tell_what_next(plan: Installation, machine: Machine, root: Path | None) -> 
         print(f"    {shlex.join(by_hand)}")
 
 
-def _next_commands(service: Service, machine: Machine, root: Path | None) -> list[str]:
+def _next_commands(
+    service: ServiceInstance, machine: TargetMachine, root: Path | None
+) -> list[str]:
     boot = service.kind.starts_at_boot
     if root is not None:
         return [f"systemctl --root={root} enable {service.unit}"] if boot else []

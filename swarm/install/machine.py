@@ -3,7 +3,7 @@
 A file is written beside its place and renamed into it, and left alone when it is right
 already. What is below the state's folder belongs to the services: a link that one of them has
 put there is not followed, or it could have any file of the machine given to it. Leaves out:
-what has to be there (swarm.install.steps).
+what has to be there (swarm.install.installation).
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from collections.abc import Sequence
 from enum import Enum
 from pathlib import Path, PurePosixPath
 
-from swarm.errors import Fault, InputError
+from swarm.install.installation import File, Installation
 from swarm.install.services import STATE, SYSUSERS_FILE
-from swarm.install.steps import File, Installation
+from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["Machine", "Outcome"]
+__all__ = ["FileOutcome", "TargetMachine"]
+
 
 _FOLDER_MODE, _STATE_MODE = 0o755, 0o700
 
 
-class Outcome(Enum):
+class FileOutcome(Enum):
     """What became of a file."""
 
     WRITTEN = "written"
@@ -33,7 +34,7 @@ class Outcome(Enum):
     UNCHANGED = "unchanged"
 
 
-class Machine:
+class TargetMachine:
     """The machine that services are installed on.
 
     Args:
@@ -50,7 +51,7 @@ class Machine:
         """Whether systemd starts the services of this very machine."""
         return self._root is None and Path("/run/systemd/system").is_dir()
 
-    def install(self, installation: Installation) -> list[tuple[File, Outcome]]:
+    def install(self, installation: Installation) -> list[tuple[File, FileOutcome]]:
         """Put everything in its place.
 
         Raises:
@@ -78,13 +79,13 @@ class Machine:
         """Where ``path`` of the machine is for this process."""
         return Path(path) if self._root is None else self._root / path.relative_to("/")
 
-    def _put(self, file: File) -> Outcome:
+    def _put(self, file: File) -> FileOutcome:
         path = self.at(file.path)
         self._make_folder(file.path.parent, file.owner)
         there = path.read_bytes() if path.is_file() and not path.is_symlink() else None
         if there == file.content:
             self._set_right(path, file.mode, file.owner)
-            return Outcome.UNCHANGED
+            return FileOutcome.UNCHANGED
         draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
         try:
             with os.fdopen(
@@ -99,7 +100,7 @@ class Machine:
         except OSError:
             draft.unlink(missing_ok=True)
             raise
-        return Outcome.WRITTEN if there is None else Outcome.REPLACED
+        return FileOutcome.WRITTEN if there is None else FileOutcome.REPLACED
 
     def _make_folder(self, folder: PurePosixPath, owner: str | None) -> None:
         """Make a folder with those above it; what is below the state's is its owner's alone."""

@@ -1,6 +1,7 @@
 """What of each kind of process goes where: unit, user, folders, and options that name files.
 
-The units themselves lie in ``units/``. Leaves out: putting anything there (swarm.install.steps).
+The units themselves lie in ``units/``. Leaves out: putting anything there
+(swarm.install.installation).
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ __all__ = [
     "STATE",
     "SYSUSERS_FILE",
     "UNITS",
-    "Kind",
-    "Service",
+    "ServiceInstance",
+    "ServiceKind",
 ]
+
 
 UNITS: Final = Path(__file__).parent / "units"
 """The units as they are shipped; deploy/systemd shows the same."""
@@ -32,7 +34,7 @@ SYSUSERS_FILE: Final = PurePosixPath("/etc/sysusers.d/peckorder.conf")
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class ServiceKind:
     """One kind of process, as a service."""
 
     command: str
@@ -59,33 +61,33 @@ class Kind:
         return f"peckorder-{self.command}{'@' if self.per_uav else ''}.service"
 
 
-KINDS: Final[Mapping[str, Kind]] = {
+KINDS: Final[Mapping[str, ServiceKind]] = {
     kind.command: kind
     for kind in (
-        Kind(
+        ServiceKind(
             "agent",
             has_state=True,
             per_uav=True,
             secrets={"--signing-key": "mavlink.key"},
             settings={"--bus": ".json5"},
         ),
-        Kind(
+        ServiceKind(
             "coordinator",
             has_state=True,
             starts_at_boot=False,
             settings={"--bus": ".json5"},
         ),
-        Kind("router", settings={"--config": ".json5"}),
-        Kind("dashboard", secrets={"--token-file": "token"}, settings={"--bus": ".json5"}),
+        ServiceKind("router", settings={"--config": ".json5"}),
+        ServiceKind("dashboard", secrets={"--token-file": "token"}, settings={"--bus": ".json5"}),
     )
 }
 
 
 @dataclass(frozen=True, slots=True)
-class Service:
+class ServiceInstance:
     """One process on one machine."""
 
-    kind: Kind
+    kind: ServiceKind
     uav: str | None = None
     """Of a kind that runs once for each."""
 

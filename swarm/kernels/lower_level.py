@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelProblem
-from swarm.kernels.arguments import converted
+from swarm.kernels.problem import converted
 
 __all__ = [
     "EXACT_TASKS",
@@ -34,6 +34,7 @@ __all__ = [
     "run_sequences",
     "valued",
 ]
+
 
 _Floats = npt.NDArray[np.float64]
 _Ints = npt.NDArray[np.int64]

@@ -23,6 +23,7 @@ from swarm.kernels.routes import FloatArray, TeamArrays
 
 __all__ = ["MOST_BUCKETS", "Timetable", "priced_lists", "shortest_legs_s"]
 
+
 MOST_BUCKETS = 100_000
 
 

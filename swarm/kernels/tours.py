@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import TourTable
-from swarm.kernels.arguments import converted
+from swarm.kernels.problem import converted
 
-__all__ = ["TourTable", "good_tour", "tour_table"]
+__all__ = ["good_tour", "tour_table"]
 
 
 def tour_table(

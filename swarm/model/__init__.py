@@ -2,9 +2,7 @@
 
 from swarm.model.frames import Origin
 from swarm.model.ids import TaskId, UavId, valid_id
-from swarm.model.mission import Mission
+from swarm.model.mission import Mission, Task, Uav
 from swarm.model.plan import Evaluation, Plan
-from swarm.model.task import Task
-from swarm.model.uav import Uav
 
 __all__ = ["Evaluation", "Mission", "Origin", "Plan", "Task", "TaskId", "Uav", "UavId", "valid_id"]

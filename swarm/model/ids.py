@@ -20,6 +20,7 @@ __all__ = [
     "valid_id",
 ]
 
+
 UavId = NewType("UavId", str)
 TaskId = NewType("TaskId", str)
 

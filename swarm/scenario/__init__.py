@@ -1,7 +1,7 @@
 """Scenario files: TOML in, a validated mission out, one clear line per fault."""
 
+from swarm.scenario.files import resolve_scenario, shipped_scenarios
 from swarm.scenario.read import load_scenario, parse_scenario
-from swarm.scenario.shipped import resolve_scenario, shipped_scenarios
 from swarm.scenario.write import format_scenario
 
 __all__ = [

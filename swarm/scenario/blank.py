@@ -17,17 +17,11 @@ from pydantic_core import PydanticUndefined
 
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.scenario.draft import PAD_SPACING_M, horizon_for
-from swarm.scenario.shapes import (
-    SCHEMA,
-    MissionTable,
-    OriginTable,
-    Scenario,
-    TaskTable,
-    UavTable,
-)
+from swarm.scenario.shapes import SCHEMA, MissionTable, OriginTable, Scenario, TaskTable, UavTable
 from swarm.scenario.write import toml_float, toml_point, toml_string
 
 __all__ = ["Blank", "blank_scenario"]
+
 
 _SPEED_M_S = 8.0
 _SPACING_M = 60.0

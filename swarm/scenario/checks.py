@@ -15,6 +15,7 @@ from swarm.scenario.findings import Document, Finding, Path, absent, close_match
 
 __all__ = ["check", "origin_of"]
 
+
 _FARTHEST_M = 1e7
 _HINTS = 20
 """References that get a suggestion; comparing names is slow, and a file with more is generated."""

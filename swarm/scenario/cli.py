@@ -128,15 +128,15 @@ def import_tasks(
         swarm import trees.geojson --home 47.3977,8.5456,488 -o trees.toml
         swarm import grid.csv --uavs 10 -o grid.toml
     """
-    from swarm.errors import Fault, InputError
     from swarm.model.ids import ID_RULE, valid_id
-    from swarm.scenario.draft import Fleet, draft_scenario
+    from swarm.runtime.errors import Fault, InputError
+    from swarm.scenario.draft import DraftOptions, draft_scenario
     from swarm.scenario.task_files import read_task_file
 
     if name is not None and not valid_id(name):
         raise InputError(Fault("--name", "", f"{name!r} is not an id", f"give {ID_RULE}"))
     tasks = read_task_file(file, home=None if home is None else _origin(home), below_m=below_m)
-    fleet = Fleet(name or _id_of(file.stem), uavs, speed_m_s, horizon_s, value, service_s)
+    fleet = DraftOptions(name or _id_of(file.stem), uavs, speed_m_s, horizon_s, value, service_s)
     text = draft_scenario(tasks, fleet)
     if output is None:
         print(text, end="")
@@ -191,9 +191,9 @@ def new(
         swarm new field.toml --uavs 5 --tasks 20 --origin 47.3977,8.5456,488
         swarm new field.toml && swarm plan field.toml && swarm run field.toml --speedup 5
     """
-    from swarm.errors import Fault, InputError
     from swarm.model.frames import DEFAULT_ORIGIN
     from swarm.model.ids import ID_RULE, valid_id
+    from swarm.runtime.errors import Fault, InputError
     from swarm.scenario.blank import Blank, blank_scenario
 
     if name is not None and not valid_id(name):
@@ -209,8 +209,8 @@ def new(
 
 def _origin(text: str, option: str = "--home", *, alt_m: float | None = None) -> Origin:
     """The place that ``text`` names; ``alt_m`` is its height where it names none."""
-    from swarm.errors import Fault, InputError
     from swarm.model import Origin
+    from swarm.runtime.errors import Fault, InputError
 
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -231,7 +231,7 @@ def _id_of(stem: str) -> str:
 
 def _write(path: Path, text: str, option: str = "--output") -> None:
     """Write a new file; one that is there may have been worked on."""
-    from swarm.errors import Fault, InputError
+    from swarm.runtime.errors import Fault, InputError
 
     where = (option, str(path)) if option else (str(path), "")
     try:

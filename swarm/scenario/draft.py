@@ -16,7 +16,8 @@ from swarm.scenario.read import build_mission
 from swarm.scenario.task_files import TaskFile
 from swarm.scenario.write import toml_float, toml_string
 
-__all__ = ["PAD_SPACING_M", "SPEED_M_S", "Fleet", "draft_scenario", "horizon_for"]
+__all__ = ["PAD_SPACING_M", "SPEED_M_S", "DraftOptions", "draft_scenario", "horizon_for"]
+
 
 SPEED_M_S = 5.0
 """Cruise speed where neither the file nor its reader names one [m/s]."""
@@ -38,7 +39,7 @@ _KEYS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Fleet:
+class DraftOptions:
     """What a scenario says beside its tasks."""
 
     name: str
@@ -54,7 +55,7 @@ class Fleet:
     """Time on the spot of a task that the file gives none [s]."""
 
 
-def draft_scenario(tasks: TaskFile, fleet: Fleet) -> str:
+def draft_scenario(tasks: TaskFile, fleet: DraftOptions) -> str:
     """The text of a scenario in which ``fleet`` does the ``tasks``, starting from their home.
 
     Raises:
@@ -107,7 +108,7 @@ def horizon_for(mission: Mission) -> float:
 
 
 def _lines(
-    tasks: TaskFile, fleet: Fleet, uavs: Iterable[Mapping[str, object]], horizon_s: float
+    tasks: TaskFile, fleet: DraftOptions, uavs: Iterable[Mapping[str, object]], horizon_s: float
 ) -> Iterator[str]:
     yield f"# Tasks of {tasks.source} ({len(tasks.entries)}) for a fleet of {fleet.uavs}."
     yield "# To look over: where the UAVs stand, how fast they fly, and what each task is worth."

@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from swarm.errors import Fault
+from swarm.runtime.errors import Fault
 
 __all__ = [
     "Document",
@@ -27,6 +27,7 @@ __all__ = [
     "printable",
     "shown",
 ]
+
 
 Document = Mapping[str, object]
 """A parsed TOML file."""

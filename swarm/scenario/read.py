@@ -3,7 +3,7 @@
 Only what is no TOML at all stops early. A mission without any task is wrong
 unless it says so itself with ``task = []``: forgetting the tasks is likelier
 than waiting for an operator to add them. Leaves out: finding the file by a
-shipped name (swarm.scenario.shipped).
+shipped name (swarm.scenario.files).
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm.errors import Fault, InputError
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.model.frames import enu_from_wgs84
+from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.checks import check, origin_of
 from swarm.scenario.files import decode, read_bytes
 from swarm.scenario.findings import Document, Finding, faults_of, printable
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from swarm.scenario.task_files import TaskFile
 
 __all__ = ["build_mission", "load_scenario", "parse_scenario", "parse_toml"]
+
 
 _WHAT = "scenario file"
 _WHERE = re.compile(r"(?P<problem>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end.*)\)")

@@ -18,6 +18,7 @@ from swarm.scenario.findings import Document, Finding, Path, absent, close_match
 
 __all__ = ["SCHEMA", "MissionTable", "OriginTable", "Scenario", "TaskTable", "UavTable", "validate"]
 
+
 SCHEMA = 1
 """The version of the format that is read and written."""
 _SLOWEST_M_S = 1e-6

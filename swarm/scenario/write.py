@@ -14,6 +14,7 @@ from swarm.model import Mission, Task, Uav
 
 __all__ = ["format_scenario", "toml_float", "toml_point", "toml_string"]
 
+
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 

@@ -1,4 +1,4 @@
-"""`make fuzz`: a bridge among hostile input, many steps from one seed; see tests.bridge_fuzz.
+"""`make fuzz`: a bridge among hostile input, many steps from one seed.
 
     python -m tests.benchmarks.fuzz_bridge --steps 1000000 --seed 1
     python -m tests.benchmarks.fuzz_bridge --replay "px4 reposition signed:1:42"
@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
-from swarm.clock import SystemClock
-from tests.bridge_fuzz import FLAVOURS, Episode, Setting, setting_of, settings
+from swarm.runtime.clock import SystemClock
+from tests.support.bridge_fuzz import FLAVOURS, Episode, Setting, setting_of, settings
 
 _REPLAY = "SETTING:SEED:EPISODE, as a failure prints it"
 _MOST_FAILURES = 10

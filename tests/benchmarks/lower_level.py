@@ -22,12 +22,13 @@ from pathlib import Path
 import numpy as np
 
 from swarm.allocation import Problem, TeamState, rank_of, rule_by_name
-from swarm.clock import SystemClock
 from swarm.kernels.exact import optimum
 from swarm.kernels.lower_level import GREEDY, default_threads, evaluate_sequences
-from tests.problems import random_problem
+from swarm.runtime.clock import SystemClock
+from tests.support.problems import random_problem
 
 __all__ = ["BatchSpeed", "batch_speed", "best_s", "decision_s", "exact_s", "sweep_limit"]
+
 
 SOURCE = Path(__file__).with_name("sweep_limit.cpp")
 OPTIONS = ("-std=c++17", "-O3", "-ffp-contract=off", "-fno-math-errno")

@@ -1,6 +1,6 @@
 """Records what real firmware says to the orders of our bridge, as test data.
 
-Start firmware in software-in-the-loop as `swarm run` does (sim.launch.firmware says how: any
+Start firmware in software-in-the-loop as `swarm run` does (sim.fleet.firmware says how: any
 instance), then: ``python -m tests.benchmarks.record_autopilot LINK PLAY FILE --speedup N``. A
 LINK is ``tcp:HOST:PORT`` (ArduCopter) or ``udpin:HOST:PORT`` (PX4), N the firmware's own speed-up.
 For the refusals before a position is known it must have been started just before. Plays:
@@ -24,9 +24,10 @@ from typing import Any, Final, Protocol, TextIO
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from agent.mavlink.codec import MavlinkCodec
-from agent.mavlink.flavours import Flavour, flavour_of
-from agent.mavlink.messages import (
+from agent.vehicle.codec import MavlinkCodec
+from agent.vehicle.firmware import firmware_of
+from agent.vehicle.firmware.profile import Firmware
+from agent.vehicle.messages import (
     CommandInt,
     CommandLong,
     GroundHeartbeat,
@@ -36,12 +37,12 @@ from agent.mavlink.messages import (
     Outbound,
     ParameterRead,
     Position,
-    Text,
+    StatusText,
 )
-from agent.mavlink.mission import MissionInForce, MissionPolicy, MissionTransfer
-from agent.mavlink.mission_plan import MissionPlan, MissionSeqs
-from agent.mavlink.state import VehicleState
-from swarm.clock import SystemClock
+from agent.vehicle.mission_plan import MissionPlan, MissionSeqs
+from agent.vehicle.mission_transfer import MissionInForce, MissionPolicy, MissionTransfer
+from agent.vehicle.state import VehicleState
+from swarm.runtime.clock import SystemClock
 
 CLOCK: Final = SystemClock()
 METRES_PER_DEGREE: Final = 111_195.0
@@ -196,10 +197,10 @@ class Ground:
         self.codec: MavlinkCodec | None = None
         self.wait(lambda: self.state.heartbeat is not None, "a heartbeat")
         heartbeat = self.state.heartbeat
-        flavour = None if heartbeat is None else flavour_of(heartbeat)
+        flavour = None if heartbeat is None else firmware_of(heartbeat)
         if flavour is None:
             raise SystemExit("no firmware that is known")
-        self.flavour: Flavour = flavour
+        self.flavour: Firmware = flavour
 
     @property
     def is_px4(self) -> bool:
@@ -275,7 +276,7 @@ class Ground:
             self.state.on_position(message)
         else:
             self.state.on_message(message, now_s)
-        if isinstance(message, Text):
+        if isinstance(message, StatusText):
             self.texts.append(message.text)
         if self._transfer is not None and self.codec is not None:
             for answer in self._transfer.on_message(message, now_s):

@@ -16,8 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from sim.study.generator import mission_of, random_mission
-from swarm.clock import SystemClock
 from swarm.model import Mission
+from swarm.runtime.clock import SystemClock
 from swarm.scenario.write import format_scenario
 
 SIZES = ((1, 318), (50, 500), (200, 5000))

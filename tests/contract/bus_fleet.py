@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
-from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.loopback import free_loopback_endpoints
 from swarm.bus.memory import MemoryNetwork
 from swarm.bus.port import Bus, BusEvent, LinkUp, Sample, TokenSeen
 from swarm.bus.zenoh_bus import open_zenoh_bus

@@ -11,16 +11,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from swarm.bus.port import (
-    MAX_PAYLOAD_BYTES,
-    Answer,
-    LinkUp,
-    Query,
-    Sample,
-    TokenGone,
-    TokenSeen,
-)
-from swarm.errors import BusError
+from swarm.bus.port import MAX_PAYLOAD_BYTES, Answer, LinkUp, Query, Sample, TokenGone, TokenSeen
+from swarm.runtime.errors import BusError
 from tests.contract.bus_fleet import (
     LIMIT_S,
     Join,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agent.mavlink.config import CommandStyle
-from sim.autopilot.flavours import FlavourName
+from agent.vehicle.config import CommandStyle
+from sim.autopilot.options import FirmwareModelName
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
-from tests.bridged_fleet import KINDS, BridgedFleet
-from tests.fleet_builders import plan_for
+from tests.support.bridged_fleet import KINDS, BridgedFleet
+from tests.support.fleet_builders import plan_for
 
 LEG_COSTS_S = {CommandStyle.REPOSITION: 0.25, CommandStyle.MISSION: 0.35}
 """What a leg takes longer than at cruise speed from place to place: the way of the command, or
@@ -17,7 +17,7 @@ the upload; and the stop, which is seen by the next position, 0.2 s later at mos
 GIVING_WAY_COSTS_S = 0.05
 """What a leg takes beside where missions give way to targets: two items more to give and to read
 back, and two commands more. The time that real firmware saves by it is not simulated."""
-FIRST_MISSION_COSTS_S = {FlavourName.ARDUPILOT: 0.0, FlavourName.PX4: 2.2}
+FIRST_MISSION_COSTS_S = {FirmwareModelName.ARDUPILOT: 0.0, FirmwareModelName.PX4: 2.2}
 """What the first mission takes beside, which is not flown for 2 s after its upload."""
 
 
@@ -42,7 +42,7 @@ def scattered(seed: int) -> Mission:
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("flavour", "style"), KINDS)
 def test_executed_lists_equal_the_offline_plan(
-    flavour: FlavourName, style: CommandStyle, seed: int
+    flavour: FirmwareModelName, style: CommandStyle, seed: int
 ) -> None:
     mission = scattered(seed)
     plan = plan_for(mission, "greedy", seed)
@@ -54,9 +54,9 @@ def test_executed_lists_equal_the_offline_plan(
 
     fleet.assert_all_done()
     begins_s = FIRST_MISSION_COSTS_S[flavour] if style is CommandStyle.MISSION else 0.0
-    gives_way = (flavour, style) == (FlavourName.ARDUPILOT, CommandStyle.MISSION)
+    gives_way = (flavour, style) == (FirmwareModelName.ARDUPILOT, CommandStyle.MISSION)
     leg_costs_s = LEG_COSTS_S[style] + (GIVING_WAY_COSTS_S if gives_way else 0.0)
-    result = fleet.world.observer.result()
+    result = fleet.world.mission_state.result()
     assert result.executed_routes == plan.routes
     for route in plan.routes.values():
         for legs, task in enumerate(route, start=1):

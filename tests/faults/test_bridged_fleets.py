@@ -12,8 +12,7 @@ from dataclasses import replace
 
 import pytest
 
-from agent.mavlink.config import CommandStyle
-from agent.vehicle import (
+from agent.core.interface import (
     HandedOver,
     HandOverExplained,
     NotReady,
@@ -21,10 +20,11 @@ from agent.vehicle import (
     ReturnAdvised,
     VehicleReady,
 )
-from sim.autopilot.flavours import FlavourName
-from sim.bridged_vehicle import Equipment
-from swarm.wire.messages import StatusPhase
-from tests.bridged_fleet import FIELD, KINDS, BridgedFleet, fenced
+from agent.vehicle.config import CommandStyle
+from sim.autopilot.options import FirmwareModelName
+from sim.world.bridged_vehicle import Equipment
+from swarm.protocol.uav_messages import StatusPhase
+from tests.support.bridged_fleet import FIELD, KINDS, BridgedFleet, fenced
 
 pytestmark = pytest.mark.parametrize(
     ("flavour", "style"), KINDS, ids=[f"{flavour}-{style}" for flavour, style in KINDS]
@@ -42,7 +42,7 @@ def assert_let_go(fleet: BridgedFleet, uav: str, reason: str) -> None:
     assert reason in in_full
     assert fleet.phase(uav) is StatusPhase.OUT
     assert fleet.note(uav) == in_full
-    claim = fleet.world.observer.replica.claims[uav]
+    claim = fleet.world.mission_state.replica.claims[uav]
     assert (claim.task, claim.handed_over) == (None, True)
     fleet.assert_left_alone_after(uav, HandedOver)
 
@@ -56,14 +56,16 @@ def assert_sent_home(fleet: BridgedFleet, uav: str, reason: str) -> None:
     assert book.reasons(HandedOver) == []
     assert fleet.phase(uav) is StatusPhase.HOME
     assert fleet.note(uav) == told[0]
-    assert not fleet.world.observer.replica.claims[uav].handed_over
+    assert not fleet.world.mission_state.replica.claims[uav].handed_over
     assert {line.split()[1] for line in book.commands_after(book.first_s(ReturnAdvised))} <= {
         "COMMAND_LONG"
     }
     assert not fleet.vehicles[uav].pilot().armed
 
 
-def test_a_pilot_and_a_reboot_take_vehicles_away(flavour: FlavourName, style: CommandStyle) -> None:
+def test_a_pilot_and_a_reboot_take_vehicles_away(
+    flavour: FirmwareModelName, style: CommandStyle
+) -> None:
     fleet = BridgedFleet(flavour, style, faults={"u0": "pilot@11", "u2": "reboot@11"}).fly()
 
     fleet.assert_all_done(without=("u0", "u2"))
@@ -74,14 +76,14 @@ def test_a_pilot_and_a_reboot_take_vehicles_away(flavour: FlavourName, style: Co
 
 
 def test_low_batteries_go_home_and_failsafes_are_left_to_themselves(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     faults = {"u0": "battery-low@11", "u2": "failsafe-rtl@11"}
     fleet = BridgedFleet(flavour, style, faults=faults).fly()
 
     fleet.assert_all_done(without=("u0", "u2"))
     assert_sent_home(fleet, "u0", "battery at 10%, below the reserve of 20%")
-    if (flavour, style) == (FlavourName.PX4, CommandStyle.REPOSITION):
+    if (flavour, style) == (FirmwareModelName.PX4, CommandStyle.REPOSITION):
         # It warns for some seconds in the mode in which it obeys, and is sent home meanwhile.
         assert_sent_home(fleet, "u2", "the autopilot reports a failsafe")
     else:
@@ -102,12 +104,12 @@ def assert_home_after_silence(fleet: BridgedFleet, uav: str) -> None:
     assert re.fullmatch(rf"heard again after \d+ s{why}", fleet.note(uav))
     if by_mission:
         fleet.assert_left_alone_after(uav, HandedOver)
-    assert fleet.world.observer.replica.claims[uav].handed_over is by_mission
+    assert fleet.world.mission_state.replica.claims[uav].handed_over is by_mission
     assert not fleet.vehicles[uav].pilot(LONG_S).armed
 
 
 def test_who_is_silent_comes_home_once_it_is_heard_and_who_is_blind_is_left_alone(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     """The silent one is heard again after 10 s, still flying to where it was sent."""
     faults = {"u0": "silent@11+10", "u2": "gps-lost@11"}
@@ -119,7 +121,7 @@ def test_who_is_silent_comes_home_once_it_is_heard_and_who_is_blind_is_left_alon
 
 
 def test_a_fix_that_comes_late_delays_the_takeoff_and_nothing_else(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(flavour, style, faults={"u0": "gps-lost@0+15", "u2": "gps-lost@0+60"})
     fleet.fly()
@@ -132,7 +134,7 @@ def test_a_fix_that_comes_late_delays_the_takeoff_and_nothing_else(
 
 
 def test_who_cannot_arm_stays_and_who_does_not_move_gives_its_tasks_away(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     faults = {"u0": "refuse-arming@0", "u2": "stuck@11"}
     fleet = BridgedFleet(flavour, style, faults=faults).fly()
@@ -149,7 +151,7 @@ def test_who_cannot_arm_stays_and_who_does_not_move_gives_its_tasks_away(
 
 
 def test_another_vehicle_than_the_configured_one_is_never_commanded(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     def other(equipment: Equipment) -> Equipment:
         return replace(equipment, vehicle=replace(equipment.vehicle, system_id=42))
@@ -166,7 +168,7 @@ def test_another_vehicle_than_the_configured_one_is_never_commanded(
 
 
 def test_a_fence_keeps_targets_from_one_uav_and_brings_a_strayed_one_home(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(flavour, style, change={"u0": fenced(75.0), "u2": fenced(130.0)})
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from agent.mavlink.config import CommandStyle
-from agent.vehicle import HandedOver, Report
-from sim.autopilot.flavours import FlavourName
-from sim.bridged_vehicle import LinkQuality
-from swarm.wire.messages import StatusPhase
-from tests.bridged_fleet import KINDS, BridgedFleet, Sent
+from agent.core.interface import HandedOver, VehicleReport
+from agent.vehicle.config import CommandStyle
+from sim.autopilot.options import FirmwareModelName
+from sim.world.bridged_vehicle import LinkQuality
+from swarm.protocol.uav_messages import StatusPhase
+from tests.support.bridged_fleet import KINDS, BridgedFleet, Sent
 
 
-def cut_in_upload(flavour: FlavourName, silent_s: float) -> BridgedFleet:
+def cut_in_upload(flavour: FirmwareModelName, silent_s: float) -> BridgedFleet:
     """The link of ``u0`` falls silent when half of a mission to its first task is sent."""
     fleet = BridgedFleet(flavour, CommandStyle.MISSION)
     items: list[float] = []
 
-    def watch(uav: str, said: Sent | Report) -> None:
+    def watch(uav: str, said: Sent | VehicleReport) -> None:
         begun = uav == "u0" and fleet.world.zero_s is not None
         if begun and isinstance(said, Sent) and said.name == "MISSION_ITEM_INT":
             items.append(said.at_s)
@@ -28,8 +28,8 @@ def cut_in_upload(flavour: FlavourName, silent_s: float) -> BridgedFleet:
     return fleet.fly()
 
 
-@pytest.mark.parametrize("flavour", list(FlavourName))
-def test_an_upload_that_was_cut_goes_on_after_a_short_silence(flavour: FlavourName) -> None:
+@pytest.mark.parametrize("flavour", list(FirmwareModelName))
+def test_an_upload_that_was_cut_goes_on_after_a_short_silence(flavour: FirmwareModelName) -> None:
     fleet = cut_in_upload(flavour, 3.0)
 
     fleet.assert_all_done()
@@ -38,9 +38,9 @@ def test_an_upload_that_was_cut_goes_on_after_a_short_silence(flavour: FlavourNa
     assert fleet.phase("u0") is StatusPhase.HOME
 
 
-@pytest.mark.parametrize("flavour", list(FlavourName))
+@pytest.mark.parametrize("flavour", list(FirmwareModelName))
 def test_a_long_silence_in_an_upload_leaves_the_vehicle_hovering_or_on_its_way_home(
-    flavour: FlavourName,
+    flavour: FirmwareModelName,
 ) -> None:
     """What the vehicle has no whole mission for it does not fly."""
     fleet = cut_in_upload(flavour, 12.0)
@@ -58,7 +58,7 @@ def test_a_long_silence_in_an_upload_leaves_the_vehicle_hovering_or_on_its_way_h
 @pytest.mark.parametrize("seed", [0, 2])  # of 1, five answers in a row are lost
 @pytest.mark.parametrize(("flavour", "style"), KINDS)
 def test_a_fifth_of_all_frames_lost_each_way_keeps_nobody_from_its_tasks(
-    flavour: FlavourName, style: CommandStyle, seed: int
+    flavour: FirmwareModelName, style: CommandStyle, seed: int
 ) -> None:
     fleet = BridgedFleet(flavour, style, seed=seed, link=LinkQuality(0.05, 0.2)).fly()
 

@@ -6,15 +6,16 @@ from functools import partial
 
 import pytest
 
-from agent.mavlink.bridge import Phase
-from agent.mavlink.config import CommandStyle
-from agent.vehicle import GoTo, HandedOver, Hold, Return
-from coordinator.operator.verdict import Result
-from sim.autopilot.flavours import FlavourName
-from sim.world import Recall
-from swarm.wire.messages import CommandKind, StatusPhase
-from tests.bridged_fleet import KINDS, LIMIT_S, BridgedFleet, Logbook
-from tests.fake_copter import ARM, TAKEOFF
+from agent.core.interface import GoTo, HandedOver, Hold, Return
+from agent.vehicle.activity import FlightPhase
+from agent.vehicle.config import CommandStyle
+from coordinator.operator.commands import RequestResult
+from sim.autopilot.options import FirmwareModelName
+from sim.world.settings import RestartMemory
+from swarm.protocol.messages import CommandKind
+from swarm.protocol.uav_messages import StatusPhase
+from tests.support.bridged_fleet import KINDS, LIMIT_S, BridgedFleet, Logbook
+from tests.support.fake_copter import ARM, TAKEOFF
 
 pytestmark = pytest.mark.parametrize(
     ("flavour", "style"), KINDS, ids=[f"{flavour}-{style}" for flavour, style in KINDS]
@@ -32,9 +33,9 @@ def commands(book: Logbook, *, life: int) -> set[int]:
     return {sent.message.command for sent in of_life if sent.name.startswith("COMMAND")}
 
 
-@pytest.mark.parametrize("found", [Recall.DISK, Recall.NONE])
+@pytest.mark.parametrize("found", [RestartMemory.DISK, RestartMemory.NONE])
 def test_an_agent_that_starts_anew_takes_its_vehicle_on_in_the_air(
-    flavour: FlavourName, style: CommandStyle, found: Recall
+    flavour: FirmwareModelName, style: CommandStyle, found: RestartMemory
 ) -> None:
     fleet = BridgedFleet(flavour, style)
     fleet.at(IN_FLIGHT_S, partial(fleet.world.crash, "u0"))
@@ -52,28 +53,28 @@ def test_an_agent_that_starts_anew_takes_its_vehicle_on_in_the_air(
 
 
 def test_a_vehicle_that_fell_while_its_agent_was_down_is_not_started_again(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(flavour, style, faults={"u0": "reboot@11"})
     fleet.at(14.0, partial(fleet.world.crash, "u0"))
-    fleet.at(20.0, partial(fleet.world.restart, "u0", Recall.DISK))
+    fleet.at(20.0, partial(fleet.world.restart, "u0", RestartMemory.DISK))
     assert fleet.world.run(LIMIT_S)
 
     assert fleet.books["u0"].lives == 2
     assert not {ARM, TAKEOFF} & commands(fleet.books["u0"], life=2)
     assert fleet.note("u0").startswith("it was left in the air and stands on the ground now")
-    assert fleet.world.observer.result().open == ()
+    assert fleet.world.mission_state.result().open == ()
     assert fleet.done_by("u0") == ()
 
 
 def test_a_vehicle_whose_agent_stays_away_comes_home_if_a_mission_stands_on_it(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(flavour, style)
     fleet.at(IN_FLIGHT_S, partial(fleet.world.crash, "u0"))
     fleet.fly()
 
-    result = fleet.world.observer.result()
+    result = fleet.world.mission_state.result()
     assert result.open == ()
     assert result.lost_uavs == ("u0",)
     assert fleet.done_by("u0") == ()
@@ -84,7 +85,7 @@ def test_a_vehicle_whose_agent_stays_away_comes_home_if_a_mission_stands_on_it(
 
 
 def test_a_vehicle_that_is_held_stays_where_it_is_until_it_may_go_on(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(flavour, style)
     places = []
@@ -100,7 +101,9 @@ def test_a_vehicle_that_is_held_stays_where_it_is_until_it_may_go_on(
     fleet.fly()
 
     fleet.assert_all_done()
-    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [Result.OBEYED] * 2
+    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [
+        RequestResult.OBEYED
+    ] * 2
     assert places[0] == pytest.approx(places[1], abs=0.01)
     assert places[0][2] == pytest.approx(10.0, abs=0.5)
     orders = [type(order) for _, order in fleet.books["u0"].ordered]
@@ -110,28 +113,32 @@ def test_a_vehicle_that_is_held_stays_where_it_is_until_it_may_go_on(
 
 
 def test_a_vehicle_that_is_sent_home_takes_no_further_task(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(flavour, style)
     fleet.say(IN_FLIGHT_S, RETURN, "u0")
     fleet.fly()
 
     fleet.assert_all_done(without=("u0",))
-    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [Result.OBEYED]
+    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [RequestResult.OBEYED]
     book = fleet.books["u0"]
     assert isinstance(book.ordered[-1][1], Return)
-    last_targets = [sent for sent in book.sent if sent.phase is Phase.FLYING and not sent.harmless]
+    last_targets = [
+        sent for sent in book.sent if sent.phase is FlightPhase.FLYING and not sent.harmless
+    ]
     assert max(sent.at_s for sent in last_targets) <= book.ordered[-1][0]
     assert not fleet.vehicles["u0"].pilot().armed
 
 
-def test_an_abort_brings_every_vehicle_home(flavour: FlavourName, style: CommandStyle) -> None:
+def test_an_abort_brings_every_vehicle_home(
+    flavour: FirmwareModelName, style: CommandStyle
+) -> None:
     fleet = BridgedFleet(flavour, style)
     fleet.say(IN_FLIGHT_S, ABORT)
     assert fleet.world.run(200.0)
 
-    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [Result.OBEYED]
-    assert fleet.world.observer.result().done == ()
+    assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [RequestResult.OBEYED]
+    assert fleet.world.mission_state.result().done == ()
     for uav, book in fleet.books.items():
         assert fleet.world.finished[uav] == 0
         assert [type(order) for _, order in book.ordered if isinstance(order, GoTo)] == [GoTo]

@@ -1,6 +1,6 @@
 """Random faults of random vehicles behind real bridges, on a network as it is, judged like all.
 
-What must hold of every bridge is watched in every step (tests.bridge_watch).
+What must hold of every bridge is watched in every step (tests.support.bridge_watch).
 """
 
 from __future__ import annotations
@@ -8,16 +8,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agent.mavlink.config import CommandStyle
-from agent.vehicle import GoTo, HandedOver, Refused, ReturnAdvised
+from agent.core.interface import GoTo, HandedOver, Refused, ReturnAdvised
+from agent.vehicle.config import CommandStyle
 from sim.autopilot.faults import FaultKind
-from sim.autopilot.flavours import FlavourName
-from sim.bridged_vehicle import LinkQuality
-from sim.event_queue import EventQueue
-from sim.faults.director import Director
-from sim.faults.judge import Judge
-from sim.rough_network import Conditions, RoughNetwork
-from tests.bridged_fleet import FIELD, BridgedFleet
+from sim.autopilot.options import FirmwareModelName
+from sim.faults.injector import FaultInjector
+from sim.faults.invariants import InvariantChecker
+from sim.world.bridged_vehicle import LinkQuality
+from sim.world.engine import EventQueue
+from sim.world.network import NetworkConditions
+from sim.world.rough_network import RoughNetwork
+from tests.support.bridged_fleet import FIELD, BridgedFleet
 
 LASTING = sorted(set(FaultKind) - {FaultKind.REBOOT, FaultKind.BATTERY_LOW, FaultKind.FAILSAFE_RTL})
 LIMIT_S = 500.0
@@ -37,13 +38,13 @@ def random_faults(rng: np.random.Generator) -> str:
 @pytest.mark.parametrize("seed", range(24))
 def test_whatever_befalls_two_vehicles_the_third_one_does_the_rest(seed: int) -> None:
     rng = np.random.default_rng([seed, 23])
-    flavour = list(FlavourName)[seed % 2]
+    flavour = list(FirmwareModelName)[seed % 2]
     style = list(CommandStyle)[seed // 2 % 2]
     faults = {uav: random_faults(rng) for uav in ("u0", "u2")}
-    judge, networks = Judge(), list[RoughNetwork]()
+    judge, networks = InvariantChecker(), list[RoughNetwork]()
 
     def network(queue: EventQueue) -> RoughNetwork:
-        networks.append(RoughNetwork(queue, Conditions(), seed))
+        networks.append(RoughNetwork(queue, NetworkConditions(), seed))
         return networks[0]
 
     fleet = BridgedFleet(
@@ -60,17 +61,17 @@ def test_whatever_befalls_two_vehicles_the_third_one_does_the_rest(seed: int) ->
         """Who has lost its vehicle, or sends it home, may leave any task; who is refused, one."""
         if isinstance(said, HandedOver | ReturnAdvised):
             for task in FIELD.tasks:
-                judge.transcript.refused(uav, task.id)
+                judge.message_log.refused(uav, task.id)
         elif isinstance(said, Refused) and isinstance(said.order, GoTo):
             judge.refused(fleet.world.processes[uav], said.order)
 
     fleet.on_said = excuse
-    judge.attend(fleet.world, networks[0], Director(fleet.world, networks[0], ()))
+    judge.attend(fleet.world, networks[0], FaultInjector(fleet.world, networks[0], ()))
     ended = fleet.world.run(LIMIT_S)
 
     judge.conclude()
     told = "\n".join((str(faults), *fleet.told()))
     assert judge.broken is None, told
     assert ended, told
-    assert {task.id for task in FIELD.tasks} == set(fleet.world.observer.result().done), told
+    assert {task.id for task in FIELD.tasks} == set(fleet.world.mission_state.result().done), told
     assert fleet.books["u1"].reasons(HandedOver) == [], told

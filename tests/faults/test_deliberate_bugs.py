@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from sim.faults.bugs import BUGS
-from sim.faults.schedule import Kind
+from sim.faults.planted_bugs import BUGS
+from sim.faults.schedule import DisturbanceKind
 from sim.faults.soak import first_breach
 
 SEEDS = range(200)
@@ -14,6 +14,6 @@ SEEDS = range(200)
 
 @pytest.mark.parametrize("bug", sorted(BUGS))
 def test_a_deliberate_bug_is_found(bug: str) -> None:
-    breach = first_breach(SEEDS, tuple(Kind), bug)
+    breach = first_breach(SEEDS, tuple(DisturbanceKind), bug)
 
     assert breach is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.fleet_builders import WatchedWorld, plan_for, random_mission
+from tests.support.fleet_builders import WatchedWorld, plan_for, random_mission
 
 CASES = [("greedy", seed, 8, 25) for seed in range(200)]
 CASES += [("lookahead", seed, 4, 9) for seed in range(40)]
@@ -24,7 +24,7 @@ def test_executed_lists_equal_the_offline_plan(
 
     assert world.run(limit_s=1e5)
 
-    result = world.observer.result()
+    result = world.mission_state.result()
     assert result.executed_routes == plan.routes
     assert result.executed_completion_s == pytest.approx(plan.completion_s, abs=1e-9)
     assert result.executed_objective == pytest.approx(plan.objective, abs=1e-6)

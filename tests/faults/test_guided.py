@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from coordinator.planner.plan import make_plan
-from sim.world import Faults, World
-from swarm.clock import SystemClock
+from sim.world.settings import ScheduledLosses
+from sim.world.virtual_world import World
 from swarm.model import Mission, Plan
-from tests.fleet_builders import able_uavs, random_mission
+from swarm.runtime.clock import SystemClock
+from tests.support.fleet_builders import able_uavs, random_mission
 
 
 def plan(mission: Mission, method: str, seed: int) -> Plan:
@@ -27,7 +28,7 @@ def test_faultless_execution_is_never_worth_less_than_its_plan(seed: int) -> Non
     world = World(mission, plan, method="guided", seed=seed)
 
     assert world.run(1e6)
-    result, planned = world.observer.result(), world.observer.plan
+    result, planned = world.mission_state.result(), world.mission_state.plan
     assert planned is not None
     assert len(result.done) == len(mission.tasks)
     assert result.duplicate_visits == 0
@@ -40,11 +41,11 @@ def test_lists_of_lost_uavs_are_done_by_the_others(seed: int) -> None:
     mission = mission_of(seed, 5, 18)
     rng = np.random.default_rng(2000 + seed)
     lost = [uav.id for uav in mission.uavs[: int(rng.integers(1, 4))]]
-    faults = Faults({uav: float(rng.uniform(0.5, 40.0)) for uav in lost})
+    faults = ScheduledLosses({uav: float(rng.uniform(0.5, 40.0)) for uav in lost})
     world = World(mission, plan, method="guided", seed=seed, faults=faults, latency_s=0.01)
 
     assert world.run(1e6)
-    result = world.observer.result()
+    result = world.mission_state.result()
     left = [uav.id for uav in mission.uavs if uav.id not in lost]
     doable = {task.id for task in mission.tasks if able_uavs(mission, task, left)}
     assert doable <= set(result.done)

@@ -8,23 +8,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from coordinator.observer import MissionResult
-from sim.chaos.insider import Insider
-from sim.event_queue import EventQueue
-from sim.faults.case import TIMING, Case, Verdict, limit_s, play, quick_plan
+from coordinator.mission_view.results import MissionResult
+from sim.faults.case import TIMING, Case, CaseResult, limit_s, play, quick_plan
 from sim.faults.schedule import parse_schedule
-from sim.network import Seat
-from sim.rough_network import Conditions, RoughNetwork
-from sim.sealed_network import SealedNetwork
-from sim.world import Setting, World
-from swarm.limits import Limiter
+from sim.world.engine import EventQueue
+from sim.world.network import NetworkConditions, Node
+from sim.world.rough_network import RoughNetwork
+from sim.world.settings import WorldSettings
+from sim.world.virtual_world import World
+from swarm.bus.admission import RateLimiter
 from swarm.model import UavId
-from swarm.wire.codec import encode
-from swarm.wire.keys import Keys
-from swarm.wire.messages import MAX_COUNT, Message, Outcome, Stamp
-from swarm.wire.seal import Seal
-from tests.builders import OUT
-from tests.keyring import Keyring
+from swarm.protocol.encoding import encode
+from swarm.protocol.fields import MAX_COUNT
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import Message, Stamp
+from swarm.protocol.seal import Seal
+from swarm.protocol.uav_messages import Outcome
+from tests.chaos.insider import Insider
+from tests.faults.sealed_network import SealedNetwork
+from tests.support.builders import OUT
+from tests.support.keyring import Keyring
 
 LIAR = "u0"
 EVERY_S = 0.05
@@ -38,14 +41,14 @@ class Flight:
     case: Case
     lies: bool = True
     keys: Keyring = field(init=False)
-    verdict: Verdict = field(init=False)
+    verdict: CaseResult = field(init=False)
     network: SealedNetwork = field(init=False)
 
     def __post_init__(self) -> None:
         self.keys = keys_of(self.case)
         self.verdict = play(self.case, join=self._join)
 
-    def _join(self, queue: EventQueue, conditions: Conditions, seed: int) -> SealedNetwork:
+    def _join(self, queue: EventQueue, conditions: NetworkConditions, seed: int) -> SealedNetwork:
         self.network = sealed(self.keys, queue, conditions, seed)
         if self.lies:
             self._set_liar_on(self.network, queue, self.keys.seal(LIAR))
@@ -76,7 +79,9 @@ def keys_of(case: Case) -> Keyring:
     return Keyring(*(uav.id for uav in mission.uavs), mission=mission.name)
 
 
-def sealed(keys: Keyring, queue: EventQueue, conditions: Conditions, seed: int) -> SealedNetwork:
+def sealed(
+    keys: Keyring, queue: EventQueue, conditions: NetworkConditions, seed: int
+) -> SealedNetwork:
     return SealedNetwork(
         queue,
         conditions,
@@ -99,8 +104,8 @@ def test_all_fly_as_without_the_liar(seed: int) -> None:
     honest, lied_to = Flight(case(seed), lies=False), Flight(case(seed))
 
     assert lied_to.verdict.broken is None
-    result = lied_to.verdict.world.observer.result()
-    assert result == honest.verdict.world.observer.result()
+    result = lied_to.verdict.world.mission_state.result()
+    assert result == honest.verdict.world.mission_state.result()
     assert result.open == ()
     assert honest.network.ear.dropped == {}
     dropped = lied_to.network.ear.dropped
@@ -128,7 +133,7 @@ def test_whatever_else_goes_wrong_no_invariant_breaks(seed: int) -> None:
     verdict = Flight(case(seed, *FAULTS)).verdict
 
     assert verdict.broken is None
-    assert verdict.world.observer.result().open == ()
+    assert verdict.world.mission_state.result().open == ()
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -139,7 +144,7 @@ def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None
     keys, networks = keys_of(flown), list[SealedNetwork]()
 
     def join(queue: EventQueue) -> SealedNetwork:
-        networks.append(sealed(keys, queue, Conditions(), seed))
+        networks.append(sealed(keys, queue, NetworkConditions(), seed))
         return networks[0]
 
     world = World(
@@ -148,18 +153,18 @@ def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None
         method=flown.method,
         seed=seed,
         timing=TIMING,
-        setting=Setting(network=join, plan_s=0.05, telemetry_gap_s=0.2),
+        setting=WorldSettings(network=join, plan_s=0.05, telemetry_gap_s=0.2),
     )
     before: list[MissionResult] = []
 
     def revoke() -> None:
-        before.append(world.observer.result())
+        before.append(world.mission_state.result())
         networks[0].revoke(keys.signed(keys.without(LIAR)))
 
     world.queue.at(14.0, revoke)
 
     assert world.run(limit_s(flown))
-    result = world.observer.result()
+    result = world.mission_state.result()
     assert result.open == ()
     assert before[0].executed_routes[UavId(LIAR)] == result.executed_routes[UavId(LIAR)]
     assert networks[0].ear.dropped["signer unknown"] > 0
@@ -167,11 +172,11 @@ def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None
 
 @pytest.mark.parametrize("seed", range(2))
 def test_who_gets_new_keys_is_heard_whatever_a_thief_of_the_old_ones_has_said(seed: int) -> None:
-    """The largest stamps there are, for instance, which nobody can outdo under the same keys."""
+    """Such as the largest stamps there are, above which nobody can speak under the same keys."""
     flown = case(seed, f"5 crash {LIAR} for 3 with none")
     keys = keys_of(flown)
 
-    def join(queue: EventQueue, conditions: Conditions, seed: int) -> SealedNetwork:
+    def join(queue: EventQueue, conditions: NetworkConditions, seed: int) -> SealedNetwork:
         network = SealedNetwork(
             queue, conditions, seed, flown.flown().name, keys.seal, keys.seal("dashboard")
         )
@@ -188,14 +193,14 @@ def test_who_gets_new_keys_is_heard_whatever_a_thief_of_the_old_ones_has_said(se
     verdict = play(flown, join=join)
 
     assert verdict.broken is None
-    observer = verdict.world.observer
-    assert observer.result().open == ()
-    claimed = observer.replica.register(Keys(flown.flown().name).claim(LIAR))
+    mission_state = verdict.world.mission_state
+    assert mission_state.result().open == ()
+    claimed = mission_state.replica.register(KeySpace(flown.flown().name).claim(LIAR))
     assert claimed is not None
     assert claimed.stamp < Stamp(MAX_COUNT, MAX_COUNT)
     done_s = [
         message.body.completed_s
-        for message in observer.replica.messages({LIAR})
+        for message in mission_state.replica.messages({LIAR})
         if isinstance(message.body, Outcome)
     ]
     assert max(done_s) > 8.0, "it has taken tasks again"
@@ -204,12 +209,12 @@ def test_who_gets_new_keys_is_heard_whatever_a_thief_of_the_old_ones_has_said(se
 class Storm(RoughNetwork):
     """Lets so little of each writer through that honest registers are lost all the time."""
 
-    def __init__(self, queue: EventQueue, conditions: Conditions, seed: int) -> None:
+    def __init__(self, queue: EventQueue, conditions: NetworkConditions, seed: int) -> None:
         super().__init__(queue, conditions, seed)
         self.lost = 0
-        self._limiter = Limiter(1.5, 4)
+        self._limiter = RateLimiter(1.5, 4)
 
-    def publish(self, sender: Seat, message: Message) -> None:
+    def publish(self, sender: Node, message: Message) -> None:
         if self._limiter.allows(message.writer, self._queue.now_s()):
             super().publish(sender, message)
         else:
@@ -220,7 +225,7 @@ class Storm(RoughNetwork):
 def test_what_a_limit_keeps_out_comes_back_by_repetition_and_questions(seed: int) -> None:
     networks: list[Storm] = []
 
-    def join(queue: EventQueue, conditions: Conditions, seed: int) -> Storm:
+    def join(queue: EventQueue, conditions: NetworkConditions, seed: int) -> Storm:
         networks.append(Storm(queue, conditions, seed))
         return networks[0]
 
@@ -228,4 +233,4 @@ def test_what_a_limit_keeps_out_comes_back_by_repetition_and_questions(seed: int
 
     assert networks[0].lost > 50
     assert verdict.broken is None
-    assert verdict.world.observer.result().open == ()
+    assert verdict.world.mission_state.result().open == ()

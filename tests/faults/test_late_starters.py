@@ -7,15 +7,15 @@ from functools import partial
 
 import pytest
 
-from agent.mavlink.config import CommandStyle
-from agent.vehicle import VehicleReady
-from coordinator.operator.seat import OperatorSeat
-from coordinator.operator.starting import StartWish
-from sim.autopilot.flavours import FlavourName
-from sim.world import Recall
-from swarm.config import Timing
-from swarm.wire.messages import StatusPhase
-from tests.bridged_fleet import FIELD, KINDS, BridgedFleet
+from agent.core.interface import VehicleReady
+from agent.vehicle.config import CommandStyle
+from coordinator.operator.commands import StartRequest
+from coordinator.operator.requests import OperatorClient
+from sim.autopilot.options import FirmwareModelName
+from sim.world.settings import RestartMemory
+from swarm.protocol.timing import Timing
+from swarm.protocol.uav_messages import StatusPhase
+from tests.support.bridged_fleet import FIELD, KINDS, BridgedFleet
 
 pytestmark = pytest.mark.parametrize(
     ("flavour", "style"), KINDS, ids=[f"{flavour}-{style}" for flavour, style in KINDS]
@@ -34,29 +34,29 @@ def hovered_s(fleet: BridgedFleet) -> float:
 
 
 def test_one_whose_agent_died_is_not_waited_for_and_joins_when_it_is_back(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(flavour, style, mission=SLOW, timing=TIMING)
     fleet.at(2.0, partial(fleet.world.crash, "u0"))
-    fleet.at(30.0, partial(fleet.world.restart, "u0", Recall.NONE))
+    fleet.at(30.0, partial(fleet.world.restart, "u0", RestartMemory.NONE))
     fleet.fly()
 
     assert hovered_s(fleet) < 2.0 * RESTART_S
-    assert fleet.world.observer.result().open == ()
+    assert fleet.world.mission_state.result().open == ()
     assert fleet.done_by("u0") != ()
     assert fleet.phase("u0") is StatusPhase.HOME
     assert set(fleet.world.finished.values()) == {0}
 
 
 def test_on_the_operators_word_the_others_start_at_once(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(
         flavour, style, mission=SLOW, timing=TIMING, faults={"u0": "gps-lost@0+35"}
     )
     said_s = HOVER_S
-    seats: list[OperatorSeat] = []
-    fleet.at(said_s, lambda: seats.append(fleet.world.operate(StartWish("u0", "no GPS"))))
+    seats: list[OperatorClient] = []
+    fleet.at(said_s, lambda: seats.append(fleet.world.operate(StartRequest("u0", "no GPS"))))
     fleet.fly()
 
     assert fleet.world.zero_s is not None
@@ -69,7 +69,7 @@ def test_on_the_operators_word_the_others_start_at_once(
 
 
 def test_one_that_gets_ready_too_late_joins_the_mission_that_runs(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     fleet = BridgedFleet(
         flavour, style, mission=SLOW, timing=TIMING, faults={"u0": "gps-lost@0+35"}

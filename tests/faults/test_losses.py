@@ -7,10 +7,10 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from sim.world import Faults
+from sim.world.settings import ScheduledLosses
 from swarm.model import TaskId, UavId
 from swarm.model.ids import COORDINATOR
-from tests.fleet_builders import WatchedWorld, able_uavs, random_mission
+from tests.support.fleet_builders import WatchedWorld, able_uavs, random_mission
 
 SEEDS = range(120)
 
@@ -22,7 +22,7 @@ def rough_world(seed: int) -> WatchedWorld:
     mission = random_mission(rng, n_uav=n_uav, n_task=n_task, popup_frac=0.3)
     lost = [uav.id for uav in mission.uavs if rng.random() < 0.4]
     dies = rng.random() < 0.4 and not any(task.appears_s for task in mission.tasks)
-    faults = Faults(
+    faults = ScheduledLosses(
         lost_at_s={uav: float(rng.uniform(1.0, 120.0)) for uav in lost},
         coordinator_lost_at_s=float(rng.uniform(1.0, 120.0)) if dies else None,
     )
@@ -47,7 +47,7 @@ def survivors(world: WatchedWorld) -> set[str]:
 def test_tasks_are_done_as_long_as_one_capable_uav_is_left(seed: int) -> None:
     world = flown(seed)
 
-    result = world.observer.result()
+    result = world.mission_state.result()
     by_id = {task.id: task for task in world.mission.tasks}
     for task in result.open:
         assert able_uavs(world.mission, by_id[task], survivors(world)) == []
@@ -62,7 +62,7 @@ def test_two_living_uavs_share_a_claim_only_while_news_is_under_way(seed: int) -
     world = flown(seed)
 
     assert all(shared_s <= world.latency_s + 1e-9 for shared_s in world.shared_s.values())
-    assert world.observer.result().duplicate_visits == 0
+    assert world.mission_state.result().duplicate_visits == 0
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -76,7 +76,7 @@ def test_no_task_is_claimed_before_it_appears(seed: int) -> None:
         if claim.task is not None:
             assert made_s >= zero_s + appears_s[TaskId(claim.task)]
             assert claim.decided_s <= made_s
-    for task, completed_s in world.observer.result().executed_completion_s.items():
+    for task, completed_s in world.mission_state.result().executed_completion_s.items():
         assert completed_s >= appears_s[task]
 
 
@@ -84,8 +84,8 @@ def test_no_task_is_claimed_before_it_appears(seed: int) -> None:
 def test_story_tells_every_loss_and_no_other(seed: int) -> None:
     world = flown(seed)
 
-    lost = set(world.observer.result().lost_uavs)
-    sentences = [line.text.replace(";", "").split() for line in world.observer.story]
+    lost = set(world.mission_state.result().lost_uavs)
+    sentences = [line.text.replace(";", "").split() for line in world.mission_state.story]
     told = {words[0] for words in sentences if words[1:2] == ["lost"]}
     assert told - {COORDINATOR} == lost
     assert lost == {uav.id for uav in world.mission.uavs} - survivors(world)
@@ -96,7 +96,7 @@ def test_same_seed_same_story() -> None:
         again = rough_world(seed)
         again.run(limit_s=1e5)
 
-        assert again.observer.story == flown(seed).observer.story
+        assert again.mission_state.story == flown(seed).mission_state.story
         assert again.claimed == flown(seed).claimed
 
 
@@ -109,9 +109,9 @@ def test_one_who_is_lost_before_the_start_is_planned_around() -> None:
 
         assert world.run(limit_s=1e5)
 
-        result = world.observer.result()
+        result = world.mission_state.result()
         assert result.open == ()
-        plan = world.observer.plan
+        plan = world.mission_state.plan
         assert plan is not None
         assert result.executed_routes == {**plan.routes, UavId("u2"): ()}
         assert set(world.finished) == {COORDINATOR, "u0", "u1", "u3"}

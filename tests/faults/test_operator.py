@@ -6,18 +6,19 @@ from functools import partial
 
 import pytest
 
-from coordinator.operator.seat import OperatorSeat
-from coordinator.operator.verdict import Result
-from sim.event_queue import EventQueue
-from sim.faults.case import Verdict, parse_case, play
-from sim.network import IdealNetwork
-from sim.rough_network import Conditions, RoughNetwork, Topology
-from sim.world import Recall, Setting, World
-from swarm.config import Timing
+from coordinator.operator.commands import RequestResult
+from coordinator.operator.requests import OperatorClient
+from sim.faults.case import CaseResult, parse_case, play
+from sim.world.engine import EventQueue
+from sim.world.network import IdealNetwork, NetworkConditions, Topology
+from sim.world.rough_network import RoughNetwork
+from sim.world.settings import RestartMemory, WorldSettings
+from sim.world.virtual_world import World
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import CommandKind, EpochPhase
-from tests.fleet_builders import plan_for
+from swarm.protocol.messages import CommandKind, MissionPhase
+from swarm.protocol.timing import Timing
+from tests.support.fleet_builders import plan_for
 
 HOLD, RESUME, RETURN, ABORT = CommandKind
 TIMING = Timing(status_s=0.5)
@@ -34,11 +35,11 @@ class Play:
     """Two UAVs and eight tasks; the coordinator dies at 10 s, unless told otherwise."""
 
     def __init__(self, *, coordinator_dies: bool = True) -> None:
-        setting = Setting(lambda queue: IdealNetwork(queue, 0.02), kept=[COORDINATOR, "u0"])
+        setting = WorldSettings(lambda queue: IdealNetwork(queue, 0.02), kept=[COORDINATOR, "u0"])
         self.world = World(
             MISSION, plan_for, method="greedy", seed=0, timing=TIMING, setting=setting
         )
-        self.seats: list[OperatorSeat] = []
+        self.seats: list[OperatorClient] = []
         if coordinator_dies:
             self.at(10.0, partial(self.world.crash, COORDINATOR))
 
@@ -50,13 +51,13 @@ class Play:
         self.at(at_s, lambda: self.seats.append(self.world.command(kind, *uav)))
 
     def done(self, uav: str) -> set[str]:
-        return set(self.world.observer.result().executed_routes[UavId(uav)])
+        return set(self.world.mission_state.result().executed_routes[UavId(uav)])
 
     def story(self) -> str:
-        return "\n".join(line.text for line in self.world.observer.story)
+        return "\n".join(line.text for line in self.world.mission_state.story)
 
     @property
-    def results(self) -> list[Result | None]:
+    def results(self) -> list[RequestResult | None]:
         return [None if seat.verdict is None else seat.verdict.result for seat in self.seats]
 
 
@@ -66,8 +67,8 @@ def test_without_a_coordinator_a_held_uav_waits_and_then_takes_part_again() -> N
     play.say(45.0, RESUME, "u0")
     assert play.world.run(LIMIT_S)
 
-    assert play.results == [Result.OBEYED, Result.OBEYED]
-    assert play.world.observer.result().open == ()
+    assert play.results == [RequestResult.OBEYED, RequestResult.OBEYED]
+    assert play.world.mission_state.result().open == ()
     assert play.world.finished == {"u0": 0, "u1": 0}
     assert "operator holds u0" in play.story()
     assert "operator lets u0 go on" in play.story()
@@ -78,9 +79,9 @@ def test_the_others_do_what_a_uav_leaves_that_was_sent_home() -> None:
     play.say(15.0, RETURN, "u0")
     assert play.world.run(LIMIT_S)
 
-    assert play.results == [Result.OBEYED]
+    assert play.results == [RequestResult.OBEYED]
     assert len(play.done("u0")) <= 1
-    assert play.world.observer.result().open == ()
+    assert play.world.mission_state.result().open == ()
     assert play.world.finished == {"u0": 0, "u1": 0}
 
 
@@ -92,19 +93,19 @@ def test_an_abort_brings_everyone_home_and_nothing_more_is_done(*, coordinator_d
     play.at(16.0, lambda: done.append(play.done("u0") | play.done("u1")))
     assert play.world.run(LIMIT_S)
 
-    assert play.results == [Result.OBEYED]
+    assert play.results == [RequestResult.OBEYED]
     assert done == [play.done("u0") | play.done("u1")]
     assert play.world.queue.now_s() < 100.0
     assert {play.world.finished["u0"], play.world.finished["u1"]} == {0}
     if not coordinator_dies:
-        epoch = play.world.observer.replica.epoch
+        epoch = play.world.mission_state.replica.epoch
         assert epoch is not None
-        assert (epoch.phase, epoch.reason) == (EpochPhase.ENDED, "aborted by the operator")
+        assert (epoch.phase, epoch.reason) == (MissionPhase.ENDED, "aborted by the operator")
         assert play.world.finished[COORDINATOR] == 1
 
 
-@pytest.mark.parametrize("found", [Recall.DISK, Recall.NONE])
-def test_an_agent_that_was_down_meanwhile_stays_held(found: Recall) -> None:
+@pytest.mark.parametrize("found", [RestartMemory.DISK, RestartMemory.NONE])
+def test_an_agent_that_was_down_meanwhile_stays_held(found: RestartMemory) -> None:
     play = Play()
     play.at(14.0, partial(play.world.crash, "u0"))
     play.say(15.0, HOLD, "u0")
@@ -116,7 +117,7 @@ def test_an_agent_that_was_down_meanwhile_stays_held(found: Recall) -> None:
     assert play.world.run(LIMIT_S)
 
     assert done[0] == done[1], "it takes no task before it may"
-    assert play.results == [Result.OBEYED, Result.OBEYED]
+    assert play.results == [RequestResult.OBEYED, RequestResult.OBEYED]
     assert play.world.finished == {"u0": 0, "u1": 0}
 
 
@@ -124,11 +125,11 @@ def test_an_agent_that_was_down_meanwhile_comes_home_from_an_aborted_mission() -
     play = Play(coordinator_dies=False)
     play.at(14.0, partial(play.world.crash, "u0"))
     play.say(15.0, ABORT)
-    play.at(16.5, partial(play.world.restart, "u0", Recall.NONE))
+    play.at(16.5, partial(play.world.restart, "u0", RestartMemory.NONE))
     assert play.world.run(LIMIT_S)
 
     assert play.world.finished == {COORDINATOR: 1, "u0": 0, "u1": 0}
-    assert play.results == [Result.OBEYED]
+    assert play.results == [RequestResult.OBEYED]
     assert play.done("u0") | play.done("u1") < {task.id for task in MISSION.tasks}
 
 
@@ -136,11 +137,11 @@ def test_a_coordinator_that_starts_again_after_an_abort_begins_no_other_flight()
     play = Play(coordinator_dies=False)
     play.say(15.0, ABORT)
     play.at(15.5, partial(play.world.crash, COORDINATOR))
-    play.at(17.0, partial(play.world.restart, COORDINATOR, Recall.DISK))
+    play.at(17.0, partial(play.world.restart, COORDINATOR, RestartMemory.DISK))
     assert play.world.run(LIMIT_S)
 
     assert play.world.finished == {COORDINATOR: 1, "u0": 0, "u1": 0}
-    assert play.world.observer.result().epochs == 1
+    assert play.world.mission_state.result().epochs == 1
     assert play.world.queue.now_s() < 100.0
 
 
@@ -151,7 +152,7 @@ def test_commands_to_nobody_and_to_nobody_known_are_told() -> None:
     play.say(15.0, HOLD, "u7")
     assert play.world.run(LIMIT_S)
 
-    assert play.results == [Result.NOT_OBEYED, Result.UNKNOWN_UAV]
+    assert play.results == [RequestResult.NOT_OBEYED, RequestResult.UNKNOWN_UAV]
     texts = [seat.verdict.text for seat in play.seats if seat.verdict is not None]
     assert texts[0].startswith("nobody flies u1")
     assert texts[1] == "the fleet is u0, u1"
@@ -201,7 +202,7 @@ SCHEDULES = {
 }
 
 
-def played(what: str) -> Verdict:
+def played(what: str) -> CaseResult:
     lines = [line.strip() for line in SCHEDULES[what].strip().splitlines()]
     return play(parse_case(lines, what))
 
@@ -216,7 +217,7 @@ def test_part_of_a_fleet_that_was_cut_off_learns_of_the_abort_when_it_is_back() 
 
     assert [world.finished.get(f"u{n}") for n in range(4)] == [0, 0, 0, 0]
     assert world.queue.now_s() < 60.0
-    assert world.observer.result().open != ()
+    assert world.mission_state.result().open != ()
 
 
 def test_one_that_stands_by_ends_a_mission_that_was_aborted_meanwhile() -> None:
@@ -224,24 +225,24 @@ def test_one_that_stands_by_ends_a_mission_that_was_aborted_meanwhile() -> None:
 
     assert world.finished["standby"] == 1
     assert COORDINATOR not in world.finished
-    epoch = world.observer.replica.epoch
+    epoch = world.mission_state.replica.epoch
     assert epoch is not None
-    assert (epoch.phase, epoch.reason) == (EpochPhase.ENDED, "aborted by the operator")
+    assert (epoch.phase, epoch.reason) == (MissionPhase.ENDED, "aborted by the operator")
 
 
 def test_agents_without_the_bus_for_too_long_come_home_and_the_others_do_the_rest() -> None:
     networks: list[RoughNetwork] = []
 
     def network(queue: EventQueue) -> RoughNetwork:
-        networks.append(RoughNetwork(queue, Conditions(Topology.ROUTER), 3))
+        networks.append(RoughNetwork(queue, NetworkConditions(Topology.ROUTER), 3))
         return networks[0]
 
-    setting = Setting(network, without_bus_s=15.0)
+    setting = WorldSettings(network, without_bus_s=15.0)
     world = World(MISSION, plan_for, method="greedy", seed=0, timing=TIMING, setting=setting)
     world.queue.at(10.0, lambda: networks[0].unplug("u0"))
     world.queue.at(60.0, lambda: networks[0].plug("u0"))
     assert world.run(LIMIT_S)
 
     assert world.finished == {COORDINATOR: 0, "u0": 0, "u1": 0}
-    assert len(world.observer.result().executed_routes[UavId("u0")]) < 4
-    assert world.observer.result().open == ()
+    assert len(world.mission_state.result().executed_routes[UavId("u0")]) < 4
+    assert world.mission_state.result().open == ()

@@ -13,21 +13,20 @@ from itertools import pairwise, permutations
 import numpy as np
 import pytest
 
-from agent.events import Action as AgentAction
-from agent.events import Order
-from agent.vehicle import GoTo
-from coordinator.core import CoordinatorCore
-from coordinator.events import Action as CoordinatorAction
-from coordinator.events import Replan
-from coordinator.planner.live import NewPlan, predicted, replan
-from sim.network import IdealNetwork
-from sim.processes import Process
-from sim.world import QUIET, Faults, Replanner, Setting, World, planned_anew
-from swarm.events import Note, Publish
+from agent.core.interface import Action as AgentAction
+from agent.core.interface import GoTo, OrderVehicle
+from coordinator.core.active import CoordinatorCore
+from coordinator.core.events import CoordinatorAction, Replan
+from coordinator.planner.online import ReplanResult, predicted, replan
+from sim.world.engine import Process
+from sim.world.network import IdealNetwork
+from sim.world.settings import QUIET, Replanner, ScheduledLosses, WorldSettings, planned_anew
+from sim.world.virtual_world import World
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Epoch, EpochPhase
-from tests.fleet_builders import plan_for, random_mission
+from swarm.protocol.events import LogLine, Publish
+from swarm.protocol.messages import MissionPhase, PlanEpoch
+from tests.support.fleet_builders import plan_for, random_mission
 
 INTERVAL_S = 1.0
 ANY_PLAN = -1e9
@@ -42,7 +41,7 @@ class ReplannedWorld(World):
         mission: Mission,
         *,
         seed: int = 0,
-        faults: Faults | None = None,
+        faults: ScheduledLosses | None = None,
         planner: Replanner = planned_anew,
         interval_s: float = INTERVAL_S,
         margin_frac: float | None = None,
@@ -51,12 +50,12 @@ class ReplannedWorld(World):
     ) -> None:
         self.legs: list[tuple[str, tuple[float, float, float]]] = []
         """Every order to fly somewhere: UAV and place."""
-        self.epochs: dict[int, Epoch] = {}
-        self.wanted: list[tuple[Replan, NewPlan]] = []
+        self.epochs: dict[int, PlanEpoch] = {}
+        self.wanted: list[tuple[Replan, ReplanResult]] = []
         self.turns: list[tuple[str, float]] = []
         """UAVs that left a task in flight for one that had opened, and when [s mission time]."""
 
-        def watched(request: Replan) -> NewPlan:
+        def watched(request: Replan) -> ReplanResult:
             made = planner(request)
             self.wanted.append((request, made))
             return made
@@ -68,10 +67,12 @@ class ReplannedWorld(World):
             seed=seed,
             faults=faults,
             timing=replace(QUIET, replan_interval_s=interval_s),
-            setting=Setting(lambda queue: IdealNetwork(queue, 0.0), replan=watched, plan_s=plan_s),
+            setting=WorldSettings(
+                lambda queue: IdealNetwork(queue, 0.0), replan=watched, plan_s=plan_s
+            ),
         )
         if margin_frac is not None:
-            self.coordinator._replanning._margin_frac = margin_frac
+            self.coordinator._replan_policy._margin_frac = margin_frac
 
     @property
     def coordinator(self) -> CoordinatorCore:
@@ -81,27 +82,29 @@ class ReplannedWorld(World):
 
     def execute(self, process: Process, action: AgentAction | CoordinatorAction) -> None:
         match action:
-            case Order(GoTo(position_enu_m=place)):
+            case OrderVehicle(GoTo(position_enu_m=place)):
                 self.legs.append((process.name, place))
-            case Note("turns aside" | "released"):
+            case LogLine("turns aside" | "released"):
                 self.turns.append((process.name, self.queue.now_s() - (self.zero_s or 0.0)))
-            case Publish(message) if isinstance(message.body, Epoch):
+            case Publish(message) if isinstance(message.body, PlanEpoch):
                 self.epochs.setdefault(message.body.number, message.body)
         super().execute(process, action)
 
     @property
     def visits(self) -> list[TaskId]:
-        return [task for route in self.observer.result().executed_routes.values() for task in route]
+        return [
+            task for route in self.mission_state.result().executed_routes.values() for task in route
+        ]
 
 
-def disturbed(seed: int, n_uav: int = 5, n_task: int = 20) -> tuple[Mission, Faults]:
+def disturbed(seed: int, n_uav: int = 5, n_task: int = 20) -> tuple[Mission, ScheduledLosses]:
     """A third of the tasks appear late, a third of the UAVs but not the first are lost."""
     rng = np.random.default_rng([seed, 404])
     mission = random_mission(
         rng, n_uav=n_uav, n_task=n_task, popup_frac=0.3, popup_until_s=60.0, incapable_frac=0.1
     )
     lost = [uav.id for uav in mission.uavs[1:] if rng.random() < 0.3]
-    return mission, Faults({uav: float(rng.uniform(1.0, 80.0)) for uav in lost})
+    return mission, ScheduledLosses({uav: float(rng.uniform(1.0, 80.0)) for uav in lost})
 
 
 # -- never revoked ------------------------------------------------------------------------
@@ -120,7 +123,7 @@ def restless(seed: int) -> ReplannedWorld:
 def test_who_flies_to_a_task_ends_it_whatever_epochs_come(seed: int) -> None:
     world = restless(seed)
 
-    result = world.observer.result()
+    result = world.mission_state.result()
     # On an ideal bus nobody has another reason to turn away.
     begun, turned = Counter(uav for uav, _ in world.legs), Counter(uav for uav, _ in world.turns)
     for uav, route in result.executed_routes.items():
@@ -138,7 +141,7 @@ def openings_s(seed: int) -> set[float]:
 
 def cut_short(world: ReplannedWorld, uav: UavId) -> bool:
     """Whether the UAV was lost on its way to a task."""
-    if uav not in world.observer.result().lost_uavs:
+    if uav not in world.mission_state.result().lost_uavs:
         return False
     claim = world.agents[uav].claim
     return claim is not None and claim.task is not None
@@ -213,7 +216,7 @@ def test_a_coordinator_that_swaps_every_second_swaps_nobody_under_way() -> None:
         best = best_targets([0.0, 0.0], Estimates().at(second))
         lists = {name: (f"t{(EAST, WEST).index(to)}",) for name, to in zip("ab", best, strict=True)}
         core, last = world.coordinator, world.coordinator.replica.epoch
-        if last is not None and last.phase is EpochPhase.RUNNING:
+        if last is not None and last.phase is MissionPhase.RUNNING:
             sequence = ("a", "b") if second % 2 == 0 else ("b", "a")
             core._say(replace(last, number=last.number + 1, sequence=sequence, routes=lists))
 
@@ -239,7 +242,7 @@ def test_estimates_that_waver_for_a_whole_mission_cost_no_visit() -> None:
     late = tuple(replace(t, appears_s=3.0 * n) if n > 11 else t for n, t in enumerate(tasks))
     ticks = iter(range(10**6))
 
-    def wavering(request: Replan) -> NewPlan:
+    def wavering(request: Replan) -> ReplanResult:
         situation = request.situation
         speed_m_s = np.array(Estimates().at(next(ticks)))
         problem = replace(situation.problem, speed_m_s=speed_m_s)
@@ -260,17 +263,17 @@ def test_estimates_that_waver_for_a_whole_mission_cost_no_visit() -> None:
 # -- worth it ---------------------------------------------------------------------------------
 
 
-def going_on(request: Replan) -> NewPlan:
+def going_on(request: Replan) -> ReplanResult:
     """No plan at all: what the fleet does anyway."""
     course = request.course
     prediction = predicted(request.situation, course)
-    return NewPlan(course.rule, course.sequence, prediction, prediction)
+    return ReplanResult(course.rule, course.sequence, prediction, prediction)
 
 
 def two_lost(seed: int, method: str, planner: Replanner = planned_anew) -> ReplannedWorld:
     """Two UAVs are lost soon after the start; it is planned anew at 10 s, and once."""
     mission = disturbed(seed)[0].known_at_start()
-    faults = Faults({uav.id: 9.0 for uav in mission.uavs[-2:]})
+    faults = ScheduledLosses({uav.id: 9.0 for uav in mission.uavs[-2:]})
     world = ReplannedWorld(
         mission, seed=seed, faults=faults, method=method, interval_s=10.0, planner=planner
     )
@@ -287,7 +290,7 @@ def test_what_is_predicted_comes_about_if_nothing_else_happens(seed: int, method
     made = world.wanted[0][1]
     adopted = len(world.epochs) == 3  # the first, the next, and the one that ends it all
     expected_s = (made.prediction if adopted else made.going_on).completion_s
-    executed_s = world.observer.result().executed_completion_s
+    executed_s = world.mission_state.result().executed_completion_s
     assert expected_s
     for task, time_s in expected_s.items():
         assert executed_s[TaskId(task)] == pytest.approx(time_s, abs=1e-6)
@@ -298,7 +301,10 @@ def test_a_better_plan_is_worth_as_much_more_as_it_promises() -> None:
     for seed in (*range(4), 22, 29, 31):  # plans are adopted in the last ones
         world, without = two_lost(seed, "guided"), two_lost(seed, "guided", going_on)
         assert len(without.epochs) == 2
-        made, results = world.wanted[0][1], (world.observer.result(), without.observer.result())
+        made, results = (
+            world.wanted[0][1],
+            (world.mission_state.result(), without.mission_state.result()),
+        )
         gains.append(results[0].executed_objective - results[1].executed_objective)
         adopted = len(world.epochs) == 3
         gain = made.prediction.objective - made.going_on.objective

@@ -9,7 +9,7 @@ import pytest
 
 from sim.faults.case import format_case
 from sim.faults.generator import random_case
-from sim.faults.schedule import Kind
+from sim.faults.schedule import DisturbanceKind
 from sim.faults.soak import Breach, first_breach, shrunk
 
 BLOCK = 20
@@ -26,13 +26,13 @@ def told(breach: Breach | None) -> str:
 
 @pytest.mark.parametrize("block", range(BLOCKS))
 def test_every_kind_of_fault_is_survived(block: int) -> None:
-    breach = first_breach(range(block * BLOCK, (block + 1) * BLOCK), tuple(Kind))
+    breach = first_breach(range(block * BLOCK, (block + 1) * BLOCK), tuple(DisturbanceKind))
 
     assert told(breach) == ""
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_each_kind_alone_is_survived(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", list(DisturbanceKind))
+def test_each_kind_alone_is_survived(kind: DisturbanceKind) -> None:
     breach = first_breach(range(100_000, 100_008), (kind,))
 
     assert told(breach) == ""
@@ -41,4 +41,4 @@ def test_each_kind_alone_is_survived(kind: Kind) -> None:
 def test_the_first_seeds_hold_every_kind_of_fault() -> None:
     kinds = {each.kind for seed in range(2 * BLOCK) for each in random_case(seed).schedule}
 
-    assert kinds == set(Kind)
+    assert kinds == set(DisturbanceKind)

@@ -6,17 +6,17 @@ from functools import partial
 
 import pytest
 
-from coordinator.operator.errands import OperatorWish
-from coordinator.operator.seat import OperatorSeat
-from coordinator.operator.task_orders import NewTask, Withdrawal
-from coordinator.operator.verdict import Result
+from coordinator.operator.commands import RequestResult
+from coordinator.operator.requests import OperatorClient, OperatorRequest
+from coordinator.operator.task_edits import NewTask, TaskWithdrawal
 from sim.faults.case import parse_case, play
-from sim.network import IdealNetwork
-from sim.world import Recall, Setting, World
-from swarm.config import Timing
+from sim.world.network import IdealNetwork
+from sim.world.settings import RestartMemory, WorldSettings
+from sim.world.virtual_world import World
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
-from tests.fleet_builders import plan_for
+from swarm.protocol.timing import Timing
+from tests.support.fleet_builders import plan_for
 
 MISSION = Mission(
     "test",
@@ -32,7 +32,7 @@ class Play:
     """Two UAVs and four tasks; what an operator wants, and when."""
 
     def __init__(self) -> None:
-        setting = Setting(lambda queue: IdealNetwork(queue, 0.02), kept=[COORDINATOR, "u0"])
+        setting = WorldSettings(lambda queue: IdealNetwork(queue, 0.02), kept=[COORDINATOR, "u0"])
         self.world = World(
             MISSION,
             plan_for,
@@ -41,13 +41,13 @@ class Play:
             timing=Timing(status_s=0.5),
             setting=setting,
         )
-        self.seats: list[OperatorSeat] = []
+        self.seats: list[OperatorClient] = []
 
     def at(self, at_s: float, act: object) -> None:
         assert callable(act)
         self.world.queue.at(at_s, lambda: act() and None)
 
-    def want(self, at_s: float, wish: OperatorWish) -> None:
+    def want(self, at_s: float, wish: OperatorRequest) -> None:
         self.at(at_s, lambda: self.seats.append(self.world.operate(wish)))
 
     def run(self) -> None:
@@ -55,10 +55,10 @@ class Play:
 
     @property
     def done(self) -> set[str]:
-        return set(self.world.observer.result().done)
+        return set(self.world.mission_state.result().done)
 
     @property
-    def results(self) -> list[Result | None]:
+    def results(self) -> list[RequestResult | None]:
         return [None if seat.verdict is None else seat.verdict.result for seat in self.seats]
 
 
@@ -75,8 +75,8 @@ def test_an_added_task_is_done_with_and_without_a_coordinator(
     play.want(15.0, HERE)
     play.run()
 
-    assert (play.results, play.done) == ([Result.OBEYED], EVERYTHING)
-    assert play.world.observer.result().duplicate_visits == 0
+    assert (play.results, play.done) == ([RequestResult.OBEYED], EVERYTHING)
+    assert play.world.mission_state.result().duplicate_visits == 0
     status = {} if coordinator_dies_s else {COORDINATOR: 0}
     assert play.world.finished == {"u0": 0, "u1": 0} | status
 
@@ -93,31 +93,31 @@ def test_a_task_withdrawn_in_flight_is_left_and_never_done(
     def withdraw() -> None:
         claim = play.world.agents["u0"].claim
         flown.append(None if claim is None else claim.task)
-        play.seats.append(play.world.operate(Withdrawal(str(flown[0]))))
+        play.seats.append(play.world.operate(TaskWithdrawal(str(flown[0]))))
 
     play.at(8.0, withdraw)
     play.run()
 
     assert flown[0] in EVERYTHING
-    assert play.results == [Result.OBEYED]
+    assert play.results == [RequestResult.OBEYED]
     assert play.done == EVERYTHING - {flown[0], "op1"}
     assert play.world.finished["u0"] == play.world.finished["u1"] == 0
 
 
-@pytest.mark.parametrize("found", [Recall.DISK, Recall.NONE])
-def test_a_coordinator_that_starts_anew_waits_for_what_was_added(found: Recall) -> None:
+@pytest.mark.parametrize("found", [RestartMemory.DISK, RestartMemory.NONE])
+def test_a_coordinator_that_starts_anew_waits_for_what_was_added(found: RestartMemory) -> None:
     play = Play()
     play.want(15.0, HERE)
     play.at(16.0, partial(play.world.crash, COORDINATOR))
     play.at(18.0, partial(play.world.restart, COORDINATOR, found))
     play.run()
 
-    assert (play.results, play.done) == ([Result.OBEYED], EVERYTHING)
+    assert (play.results, play.done) == ([RequestResult.OBEYED], EVERYTHING)
     assert play.world.finished == {COORDINATOR: 0, "u0": 0, "u1": 0}
 
 
-@pytest.mark.parametrize("found", [Recall.DISK, Recall.NONE])
-def test_an_agent_that_was_down_meanwhile_learns_of_it(found: Recall) -> None:
+@pytest.mark.parametrize("found", [RestartMemory.DISK, RestartMemory.NONE])
+def test_an_agent_that_was_down_meanwhile_learns_of_it(found: RestartMemory) -> None:
     play = Play()
     play.at(5.0, partial(play.world.crash, COORDINATOR))
     play.at(14.0, partial(play.world.crash, "u0"))
@@ -128,7 +128,7 @@ def test_an_agent_that_was_down_meanwhile_learns_of_it(found: Recall) -> None:
     play.run()
 
     assert boards == [EVERYTHING]
-    assert (play.results, play.done) == ([Result.OBEYED], EVERYTHING)
+    assert (play.results, play.done) == ([RequestResult.OBEYED], EVERYTHING)
 
 
 SCHEDULES = {

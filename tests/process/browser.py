@@ -12,6 +12,7 @@ from playwright.sync_api import BrowserContext, ConsoleMessage, Page, Request, s
 
 __all__ = ["Watched", "open_page"]
 
+
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.loopback import free_loopback_endpoints
 from swarm.model import Mission
 from swarm.scenario.write import format_scenario
 from tests.process.kept_open import KEEPER
@@ -22,6 +22,7 @@ from tests.process.mission import wait_until
 from tests.process.pace import pace
 
 __all__ = ["LIMIT_S", "ByHand"]
+
 
 LIMIT_S = 220.0
 

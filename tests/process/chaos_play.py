@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.chaos.flight import DONE_LINE, ChaosFlight, Verdict, open_chaos_flight
-from sim.launch.fleet import BusKind, LaunchOptions
-from swarm.config import Link
+from sim.fleet.faults.flight import DONE_LINE, ChaosFlight, ChaosVerdict, open_chaos_flight
+from sim.fleet.layout import BusKind, LaunchOptions
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.protocol.timing import LinkKind
 from swarm.scenario.write import format_scenario
 
 __all__ = ["all_done", "logged_done", "play", "story", "survey", "told"]
+
 
 LIMIT_S = 150.0
 
@@ -56,8 +57,8 @@ def play(
     speedup: float,
     routers: int = 1,
     relayed: bool = False,
-    link: Link = Link.NORMAL,
-) -> Verdict:
+    link: LinkKind = LinkKind.NORMAL,
+) -> ChaosVerdict:
     """Fly ``mission``, do to it what ``script`` says, and judge what came of it."""
     scenario = folder / "scenario.toml"
     scenario.write_text(format_scenario(mission))
@@ -74,7 +75,7 @@ def play(
         link=link,
     )
 
-    async def fly() -> Verdict:
+    async def fly() -> ChaosVerdict:
         async with asyncio.timeout(LIMIT_S):
             async with open_chaos_flight(mission, options, relayed=relayed) as flight:
                 try:
@@ -89,14 +90,14 @@ def play(
     return asyncio.run(fly())
 
 
-def story(verdict: Verdict) -> list[str]:
-    """What the onlooker told, line by line."""
-    return [happening.text for happening in verdict.flight.observer.story]
+def story(verdict: ChaosVerdict) -> list[str]:
+    """What the observer told, line by line."""
+    return [happening.text for happening in verdict.flight.mission_state.story]
 
 
 def told(flight: ChaosFlight) -> list[str]:
-    """What the onlooker has told so far, line by line."""
-    return [happening.text for happening in flight.run.observer.story]
+    """What the observer has told so far, line by line."""
+    return [happening.text for happening in flight.run.mission_state.story]
 
 
 def logged_done(flight: ChaosFlight) -> list[str]:
@@ -104,7 +105,7 @@ def logged_done(flight: ChaosFlight) -> list[str]:
     return [m[1] for _, line in flight.lines if (m := DONE_LINE.search(line))]
 
 
-def all_done(verdict: Verdict, n_task: int) -> None:
+def all_done(verdict: ChaosVerdict, n_task: int) -> None:
     """Assert that nothing was lost, no invariant broken and every duplicate counted."""
     told = "\n".join([*story(verdict), *verdict.faults])
     assert verdict.faults == (), told

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import threading
 import time
-import urllib.error
 import urllib.request
 from typing import Any, Self
 
@@ -13,6 +12,7 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 __all__ = ["FeedReader", "answers", "post"]
+
 
 KEYS = {"uavs": "id", "tasks": "id", "commands": "n"}
 

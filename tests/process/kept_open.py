@@ -14,6 +14,7 @@ from swarm.model import Mission, Task, TaskId
 
 __all__ = ["KEEPER", "kept_open", "let_end"]
 
+
 KEEPER = TaskId("keeper")
 
 

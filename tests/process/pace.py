@@ -8,6 +8,7 @@ import time
 
 __all__ = ["pace"]
 
+
 START_S = 1.0
 """A process that takes longer to start is on a slow or busy machine [s]."""
 SLOWEST = 3.0

@@ -16,7 +16,7 @@ HOLDER = """
 import asyncio, sys
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
 from swarm.bus.zenoh_bus import open_zenoh_bus
-from swarm.lifeline import parent_gone
+from swarm.runtime.process import parent_gone
 
 async def hold(kind, key, *endpoints):
     mesh = MeshTopology(endpoints[0], endpoints[1:])

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.loopback import free_loopback_endpoints
 
 pytestmark = [pytest.mark.process]
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from sim.chaos.checks import AGREE_WITHIN_S
-from sim.chaos.flight import ChaosFlight
-from sim.chaos.relay import Quality
-from sim.launch.fleet import BusKind
+from sim.fleet.faults.checks import AGREE_WITHIN_S
+from sim.fleet.faults.flight import ChaosFlight
+from sim.fleet.faults.relay import RelayQuality
+from sim.fleet.layout import BusKind
 from tests.process.chaos_play import all_done, logged_done, play, story, survey, told
 
 pytestmark = [pytest.mark.process]
@@ -103,7 +103,7 @@ def test_nobody_is_lost_on_a_slow_and_lossy_link(tmp_path: Path, bus: BusKind) -
     async def script(flight: ChaosFlight) -> None:
         # Lost three times running, as one segment in 8000 is, it holds a link up for longer than
         # the lease of 1.5 s: that is a loss by right.
-        lossy = Quality(delay_s=0.03, jitter_s=0.005, loss_frac=0.05, most_lost=2)
+        lossy = RelayQuality(delay_s=0.03, jitter_s=0.005, loss_frac=0.05, most_lost=2)
         flight.network.degrade(lossy)
 
     verdict = play(survey(6, 30), tmp_path, script, bus=bus, speedup=SPEEDUP, relayed=True)

@@ -10,11 +10,12 @@ from typing import TypeVar
 
 import pytest
 
-from sim.chaos.checks import AGREE_WITHIN_S
-from sim.chaos.flight import ChaosFlight, Verdict
-from sim.launch.fleet import BusKind
+from sim.fleet.faults.checks import AGREE_WITHIN_S
+from sim.fleet.faults.flight import ChaosFlight, ChaosVerdict
+from sim.fleet.layout import BusKind
 from swarm.model import Task, TaskId
-from swarm.wire.messages import Body, Claim, ClaimPhase, Status
+from swarm.protocol.messages import Body
+from swarm.protocol.uav_messages import Claim, ClaimPhase, Status
 from tests.process.chaos_play import all_done, logged_done, play, story, survey, told
 
 pytestmark = [pytest.mark.process]
@@ -37,7 +38,7 @@ def newest_claim(flight: ChaosFlight, uav: str) -> Claim | None:
     )
 
 
-def said_by(verdict: Verdict, uav: str, kind: type[B]) -> list[tuple[int, B]]:
+def said_by(verdict: ChaosVerdict, uav: str, kind: type[B]) -> list[tuple[int, B]]:
     """Incarnation and content of what a UAV said of that kind, in order."""
     return [
         (message.stamp.incarnation, message.body)

@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from sim.chaos.network import RelayNetwork
-from sim.chaos.relay import Quality, Relay
-from sim.launch.fleet import DialedLink
+from sim.fleet.faults.relay import Relay, RelayNetwork, RelayQuality
+from sim.fleet.layout import DialedLink
 
 pytestmark = pytest.mark.process
 
@@ -67,10 +66,10 @@ async def far_end() -> AsyncIterator[Far]:
 
 
 @asynccontextmanager
-async def relayed(quality: Quality | None = None) -> AsyncIterator[tuple[Relay, Far]]:
+async def relayed(quality: RelayQuality | None = None) -> AsyncIterator[tuple[Relay, Far]]:
     async with far_end() as far:
         relay = Relay("127.0.0.1", far.port, np.random.default_rng(0))
-        relay.quality = quality or Quality()
+        relay.quality = quality or RelayQuality()
         await relay.start()
         try:
             yield relay, far
@@ -126,7 +125,7 @@ def test_bytes_pass_in_order_and_in_both_directions() -> None:
 
 def test_the_end_of_a_connection_is_passed_on_after_its_last_bytes() -> None:
     async def scenario() -> None:
-        async with relayed(Quality(delay_s=0.2)) as (relay, far):
+        async with relayed(RelayQuality(delay_s=0.2)) as (relay, far):
             reader, writer = await dial(relay)
             writer.write(b"last words")
             writer.close()
@@ -170,7 +169,7 @@ def test_an_endpoint_that_is_not_there_refuses() -> None:
 
 def test_delay_holds_in_each_direction() -> None:
     async def scenario() -> None:
-        async with relayed(Quality(delay_s=0.15, jitter_s=0.05)) as (relay, far):
+        async with relayed(RelayQuality(delay_s=0.15, jitter_s=0.05)) as (relay, far):
             reader, writer = await dial(relay)
             await until(lambda: bool(far.writers))
             begin_s = now_s()
@@ -187,7 +186,7 @@ def test_delay_holds_in_each_direction() -> None:
 
 def test_bandwidth_holds() -> None:
     async def scenario() -> None:
-        async with relayed(Quality(rate_bytes_s=100_000.0)) as (relay, far):
+        async with relayed(RelayQuality(rate_bytes_s=100_000.0)) as (relay, far):
             _, writer = await dial(relay)
             begin_s = now_s()
             writer.write(bytes(50_000))
@@ -199,7 +198,7 @@ def test_bandwidth_holds() -> None:
 
 def test_lost_segments_come_late_and_nothing_is_missing_or_out_of_order() -> None:
     async def scenario() -> None:
-        async with relayed(Quality(loss_frac=0.3)) as (relay, far):
+        async with relayed(RelayQuality(loss_frac=0.3)) as (relay, far):
             _, writer = await dial(relay)
             begin_s, sent = now_s(), b""
             for number in range(20):
@@ -286,7 +285,7 @@ def test_a_network_diverts_links_and_cuts_those_of_a_group() -> None:
             network.heal()
             assert not any(relay.is_cut for relay in network.relays.values())
 
-            bad = Quality(delay_s=0.1)
+            bad = RelayQuality(delay_s=0.1)
             network.degrade(bad, links[:1])
             assert [network.relays[link].quality == bad for link in links] == [True, False, False]
             network.degrade(bad)

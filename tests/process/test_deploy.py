@@ -29,8 +29,8 @@ from swarm.bus.config import BusConfig, FileTopology
 from swarm.bus.port import TokenSeen
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.bus.zenoh_session import session_config
-from swarm.config import PRESETS, Link
 from swarm.identity import load_identity
+from swarm.protocol.timing import PRESETS, LinkKind
 from tests.process.router_processes import router
 
 pytestmark = pytest.mark.process
@@ -75,7 +75,7 @@ def test_file_says_what_the_runtime_does_by_itself(path: Path) -> None:
     file = zenoh.Config.from_file(path)
     mode = "router" if path.stem.startswith("router") else "client"
     radio = path.parent.name == "radio"
-    lease_s = PRESETS[Link.BAD if radio else Link.NORMAL].lease_s
+    lease_s = PRESETS[LinkKind.BAD if radio else LinkKind.NORMAL].lease_s
     own = session_config(mode, listen=[], connect=[], lease_s=lease_s)
 
     assert json.loads(file.get_json("mode")) == mode

@@ -13,9 +13,9 @@ from dataclasses import replace
 import pytest
 
 from sim.bench.latency import measure_latencies
+from sim.bench.links import BAD_LINKS, measure_false_losses
 from sim.bench.takeover import stuck_on_demand
-from sim.bench.trouble import BAD_LINKS, measure_false_losses
-from swarm.config import Link
+from swarm.protocol.timing import LinkKind
 
 pytestmark = [pytest.mark.process]
 
@@ -39,7 +39,7 @@ def test_another_holds_the_task_of_a_killed_agent() -> None:
 @pytest.mark.parametrize("relay", [False, True])
 def test_nobody_is_lost_on_links_that_lose_some_packets(relay: bool) -> None:
     # By the preset for bad links: on a slow machine the shorter lease ends without any loss.
-    bad = replace(BAD_LINKS[0], link=Link.BAD)
+    bad = replace(BAD_LINKS[0], link=LinkKind.BAD)
 
     watched = measure_false_losses(bad, 4.0, uavs=2, relay=relay)
 

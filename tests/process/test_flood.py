@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
-from sim.chaos.flood import RATE_HZ, fly_flooded, long_mission
-from sim.chaos.hostile import Kind
-from tests.observed_mission import watch
+from sim.fleet.faults.flood import RATE_HZ, fly_flooded, long_mission
+from sim.fleet.faults.forgery import Malformation
+from tests.support.observed_mission import watch
 
 pytestmark = [pytest.mark.process]
 
@@ -17,7 +17,7 @@ def test_malformed_messages_change_no_decision_and_are_all_counted() -> None:
     flood = asyncio.run(fly_flooded(1.5))
 
     assert flood.flood_s > 5.0
-    for kind in Kind:
+    for kind in Malformation:
         assert flood.sent[kind] >= 2.0 * RATE_HZ, kind  # how many more depends on the machine
     assert flood.answers > 0
     # The same mission in virtual time, where nobody is hostile.

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from sim.launch import guard
-from sim.launch.process import Child, ChildFailedError, Setting
+from sim.fleet import guard
+from sim.fleet.child_process import ChildFailedError, ChildProcess, ProgramEnvironment
 from tests.process.mission import alive, child_pids, wait_until
 
 pytestmark = [pytest.mark.process]
@@ -61,12 +61,12 @@ def test_a_guard_that_is_ended_leaves_no_program(number: signal.Signals) -> None
     assert_ends(guarding, program)
 
 
-def child(command: list[str], folder: Path) -> Child:
-    return Child("program", command, setting=Setting(folder, {"COLOUR": "green"}))
+def child(command: list[str], folder: Path) -> ChildProcess:
+    return ChildProcess("program", command, setting=ProgramEnvironment(folder, {"COLOUR": "green"}))
 
 
 def test_a_program_runs_in_its_folder_with_its_variables(tmp_path: Path) -> None:
-    async def work() -> Child:
+    async def work() -> ChildProcess:
         made = child(["/bin/sh", "-c", 'echo "$COLOUR in $(pwd)"; exit 7'], tmp_path)
         await made.start()
         await made.ended()
@@ -89,7 +89,7 @@ def test_a_program_that_ends_at_once_has_failed(tmp_path: Path) -> None:
 
 
 def test_a_program_that_goes_on_has_settled(tmp_path: Path) -> None:
-    async def work() -> Child:
+    async def work() -> ChildProcess:
         made = child(SLEEPS, tmp_path)
         await made.start()
         try:

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm.clock import unix_s
 from swarm.identity.founding import found_authority
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.runtime.clock import unix_s
 from tests.process.by_hand import ByHand
 
 pytestmark = [pytest.mark.process]

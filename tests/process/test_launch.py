@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from sim.launch.fleet import BusKind, LaunchOptions
-from sim.launch.launch import Launch
+from sim.fleet.launcher import Launcher
+from sim.fleet.layout import BusKind, LaunchOptions
 from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
 from tests.process.mission import alive
@@ -32,7 +32,7 @@ def test_processes_are_killed_restarted_and_ended_by_name(tmp_path: Path) -> Non
     )
 
     async def scenario_of_names() -> None:
-        launch = Launch(mission, options)
+        launch = Launcher(mission, options)
         try:
             await launch.start()
             pilots = {f"autopilot of {uav.id}" for uav in mission.uavs}

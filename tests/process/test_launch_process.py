@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from sim.launch import process
-from sim.launch.process import Child, ChildFailedError
+from sim.fleet import child_process
+from sim.fleet.child_process import ChildFailedError, ChildProcess
 from tests.process.mission import alive, wait_until
 
 pytestmark = pytest.mark.process
@@ -34,7 +34,7 @@ def play(scenario: Callable[[], Awaitable[None]]) -> None:
 
 
 @asynccontextmanager
-async def started(child: Child) -> AsyncIterator[Child]:
+async def started(child: ChildProcess) -> AsyncIterator[ChildProcess]:
     """The child at work; it is ended whatever happens."""
     await child.start()
     try:
@@ -56,7 +56,7 @@ def test_a_child_tells_that_it_is_ready_and_leaves_when_told() -> None:
     lines: list[dict[str, Any]] = []
 
     async def scenario() -> None:
-        async with started(Child("router", ROUTER, on_line=lines.append)) as child:
+        async with started(ChildProcess("router", ROUTER, on_line=lines.append)) as child:
             (said,) = await child.ready()
             assert said["endpoints"][0].startswith("tcp/127.0.0.1:")
             assert lines == [said]
@@ -79,7 +79,7 @@ def test_wrong_usage_is_told_in_the_childs_last_words() -> None:
 
     async def scenario() -> None:
         arguments = ["coordinator", "no-such.toml"]
-        async with started(Child("coordinator", arguments, on_log=on_log)) as child:
+        async with started(ChildProcess("coordinator", arguments, on_log=on_log)) as child:
             with pytest.raises(ChildFailedError, match=r"no-such\.toml") as told:
                 await child.ready()
 
@@ -97,7 +97,7 @@ def test_a_child_that_ends_after_its_words_is_heard_to_the_end(
     script(monkeypatch, tmp_path, """echo '{"a": 1}'; seq 1 20000 >&2; echo '{"b": 2}'; exit 3""")
 
     async def scenario() -> None:
-        async with started(Child("talker", [])) as child:
+        async with started(ChildProcess("talker", [])) as child:
             assert await child.ready() == [{"a": 1}]
             assert await child.ended() == 3
             assert child.last_words() == "20000"
@@ -114,7 +114,7 @@ def test_to_stop_waiting_for_the_end_does_not_stop_the_reading(
     script(monkeypatch, tmp_path, "read -r go; echo the end >&2")
 
     async def scenario() -> None:
-        async with started(Child("talker", [])) as child:
+        async with started(ChildProcess("talker", [])) as child:
             process_ended = asyncio.get_running_loop().create_future()
             process_ended.set_result(0)
             monkeypatch.setattr(child._started, "wait", lambda: process_ended)
@@ -137,7 +137,7 @@ def test_a_child_that_says_too_little_before_it_ends_has_failed(
     script(monkeypatch, tmp_path, "echo '{}'; echo enough >&2")
 
     async def scenario() -> None:
-        async with started(Child("talker", [])) as child:
+        async with started(ChildProcess("talker", [])) as child:
             with pytest.raises(ChildFailedError, match="talker ended with exit status 0: enough"):
                 await child.ready(2)
 
@@ -148,10 +148,10 @@ def test_a_silent_child_is_not_waited_for_longer_than_stated(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     script(monkeypatch, tmp_path, "echo thinking >&2; exec cat")
-    monkeypatch.setattr(process, "READY_TIMEOUT_S", 1.0)
+    monkeypatch.setattr(child_process, "READY_TIMEOUT_S", 1.0)
 
     async def scenario() -> None:
-        async with started(Child("thinker", [])) as child:
+        async with started(ChildProcess("thinker", [])) as child:
             with pytest.raises(ChildFailedError, match="not ready within 1 s: thinking"):
                 await child.ready()
             others = asyncio.all_tasks() - {asyncio.current_task(), *child._readers}
@@ -161,10 +161,10 @@ def test_a_silent_child_is_not_waited_for_longer_than_stated(
 
 
 def test_a_child_that_does_not_listen_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(process, "TERMINATE_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(child_process, "TERMINATE_TIMEOUT_S", 0.3)
 
     async def scenario() -> None:
-        async with started(Child("router", ROUTER)) as child:
+        async with started(ChildProcess("router", ROUTER)) as child:
             await child.ready()
             os.kill(child.pid, signal.SIGSTOP)
             await child.stop()
@@ -178,7 +178,7 @@ def test_a_child_that_does_not_listen_is_killed(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_child_that_was_killed_by_somebody_says_so() -> None:
     async def scenario() -> None:
-        async with started(Child("router", ROUTER)) as child:
+        async with started(ChildProcess("router", ROUTER)) as child:
             await child.ready()
             os.kill(child.pid, signal.SIGKILL)
 
@@ -192,7 +192,7 @@ def test_a_child_that_was_killed_by_somebody_says_so() -> None:
 
 def test_a_child_killed_by_us_is_gone_and_was_stopped() -> None:
     async def scenario() -> None:
-        async with started(Child("router", ROUTER)) as child:
+        async with started(ChildProcess("router", ROUTER)) as child:
             await child.ready()
             await child.kill()
             assert child.returncode == -signal.SIGKILL
@@ -205,7 +205,7 @@ def test_a_child_killed_by_us_is_gone_and_was_stopped() -> None:
 
 def test_a_paused_child_hangs_until_it_is_resumed() -> None:
     async def scenario() -> None:
-        async with started(Child("router", ROUTER)) as child:
+        async with started(ChildProcess("router", ROUTER)) as child:
             await child.ready()
             child.pause()
             child._signal(signal.SIGTERM)
@@ -221,11 +221,11 @@ def test_what_a_child_has_started_itself_ends_with_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     script(monkeypatch, tmp_path, "sleep 60 & echo $! >&2; echo {}; exec cat")
-    monkeypatch.setattr(process, "TERMINATE_TIMEOUT_S", 0.3)
-    monkeypatch.setattr(process, "KILL_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(child_process, "TERMINATE_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(child_process, "KILL_TIMEOUT_S", 0.3)
 
     async def scenario() -> None:
-        child = Child("parent", [])
+        child = ChildProcess("parent", [])
         await child.start()
         assert await child.ready() == [{}]
         begin_s = asyncio.get_running_loop().time()
@@ -239,7 +239,7 @@ def test_what_a_child_has_started_itself_ends_with_it(
 
 def test_a_child_leaves_when_its_parent_closes_the_lifeline() -> None:
     async def scenario() -> None:
-        async with started(Child("router", ROUTER)) as child:
+        async with started(ChildProcess("router", ROUTER)) as child:
             await child.ready()
             assert child._process is not None
             assert child._process.stdin is not None
@@ -257,7 +257,7 @@ def test_what_is_no_json_object_is_passed_over(
     script(monkeypatch, tmp_path, words)
 
     async def scenario() -> None:
-        async with started(Child("talker", [])) as child:
+        async with started(ChildProcess("talker", [])) as child:
             assert await child.ready(2) == [{"a": 1}, {"b": 2}]
 
     play(scenario)
@@ -269,7 +269,7 @@ def test_only_the_newest_lines_of_a_log_are_kept(
     script(monkeypatch, tmp_path, "seq 1 1000 >&2")
 
     async def scenario() -> None:
-        async with started(Child("talker", [])) as child:
+        async with started(ChildProcess("talker", [])) as child:
             await child.ended()
             assert list(child.log) == [str(n) for n in range(801, 1001)]
 
@@ -278,7 +278,7 @@ def test_only_the_newest_lines_of_a_log_are_kept(
 
 def test_a_child_that_was_never_started_can_be_stopped_but_not_asked() -> None:
     async def scenario() -> None:
-        child = Child("nobody", [])
+        child = ChildProcess("nobody", [])
         await child.stop()
         assert child.last_words() == "it left no message"
         with pytest.raises(ValueError, match="has not been started"):

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from sim.chaos.flood import long_mission
+from sim.fleet.faults.flood import long_mission
 from swarm.bus.local_runs import local_runs
 from tests.process.mission import SwarmRun
 from tests.process.test_secure_run import swarm, written

@@ -1,6 +1,6 @@
 """An earlier release and this one fly a mission together, as while a fleet is upgraded.
 
-The earlier one runs from its own sources, on the kernels of this build (tests/releases.py),
+The earlier one runs from its own sources, on the kernels of this build (tests/support/releases.py),
 on a bus without keys: it knows none. Everything said on that bus is heard, and read by both
 releases once more, so that what either of them drops shows wherever it was sent.
 """
@@ -20,26 +20,25 @@ import swarm
 from swarm.bus.config import DEFAULT_LEASE_S
 from swarm.bus.zenoh_session import session_config
 from swarm.model.ids import COORDINATOR, OPERATOR
-from swarm.scenario import load_scenario
-from swarm.scenario.shipped import resolve_scenario
-from swarm.wire.codec import Codec, encode
-from swarm.wire.keys import Keys
-from swarm.wire.messages import (
-    Board,
-    Brief,
-    Claim,
-    Command,
+from swarm.protocol.codec import Codec
+from swarm.protocol.encoding import encode
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import (
     CommandKind,
-    Epoch,
     Message,
-    Outcome,
+    MissionConfig,
+    OperatorCommand,
+    PlanEpoch,
     Snapshot,
     Stamp,
     StartWithout,
-    Status,
+    TaskEntry,
 )
+from swarm.protocol.uav_messages import Claim, Outcome, Status
+from swarm.scenario import load_scenario
+from swarm.scenario.files import resolve_scenario
 from tests.process.by_hand import ByHand
-from tests.releases import kept_releases, python_of, unpacked
+from tests.support.releases import kept_releases, python_of, unpacked
 
 pytestmark = [pytest.mark.process]
 
@@ -70,14 +69,14 @@ class Listener:
         self._session = stack.enter_context(zenoh.open(config))
         self.said: list[tuple[str, bytes]] = []
         self.answered: list[tuple[str, bytes]] = []
-        self._session.declare_subscriber(f"{Keys(MISSION).root}/**", self._hear)
+        self._session.declare_subscriber(f"{KeySpace(MISSION).root}/**", self._hear)
 
     def _hear(self, sample: zenoh.Sample) -> None:
         self.said.append((str(sample.key_expr), sample.payload.to_bytes()))
 
     def ask_all(self) -> None:
         """Ask every process what it knows."""
-        for reply in self._session.get(Keys(MISSION).state("*"), payload=b"", timeout=5.0):
+        for reply in self._session.get(KeySpace(MISSION).state("*"), payload=b"", timeout=5.0):
             assert reply.ok is not None
             self.answered.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
 
@@ -104,10 +103,10 @@ def read_by(release: Path, messages: str) -> dict[str, Any]:
 
 def test_an_earlier_release_drops_and_counts_what_it_does_not_know(release: Path) -> None:
     start = Message(MISSION, OPERATOR, Stamp(9, 1), StartWithout("uav1", 1, "no GPS"))
-    hold = Message(MISSION, OPERATOR, Stamp(9, 2), Command("uav1", CommandKind.HOLD, 1, ""))
+    hold = Message(MISSION, OPERATOR, Stamp(9, 2), OperatorCommand("uav1", CommandKind.HOLD, 1, ""))
     answer = encode(Snapshot(MISSION, "uav1", 1, None, (start, hold)))
     said = [(start.key, encode(start).hex())]
-    answered = [(Keys(MISSION).state("uav1"), answer.hex())]
+    answered = [(KeySpace(MISSION).state("uav1"), answer.hex())]
 
     theirs = read_by(release, json.dumps([said, answered]))
 
@@ -137,7 +136,14 @@ def test_a_process_of_an_earlier_release_takes_its_part(
 
     assert (ours.dropped, theirs["dropped"]) == ({}, {})
     bodies = [message.body for message in heard if message is not None]
-    assert {type(body) for body in bodies} >= {Brief, Board, Epoch, Claim, Outcome, Status}
+    assert {type(body) for body in bodies} >= {
+        MissionConfig,
+        TaskEntry,
+        PlanEpoch,
+        Claim,
+        Outcome,
+        Status,
+    }
     agents_dropped = [body.dropped for body in bodies if isinstance(body, Status)]
     assert all(dropped.keys() <= {"stale"} for dropped in agents_dropped), agents_dropped
     answering = [answer for answer in answers if answer is not None]

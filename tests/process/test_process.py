@@ -12,7 +12,7 @@ pytestmark = pytest.mark.process
 
 DAEMON = """
 import asyncio, sys
-from swarm.process import run_until_stopped
+from swarm.runtime.process import run_until_stopped
 
 async def work():
     print("ready", flush=True)
@@ -132,7 +132,7 @@ def test_second_interrupt_kills_a_daemon_that_hangs_in_its_clean_up() -> None:
 
 LEAVE = """
 import threading
-from swarm.process import call_in_background, leave
+from swarm.runtime.process import call_in_background, leave
 
 print("said")
 outcome = call_in_background({call}, "maybe hanging")

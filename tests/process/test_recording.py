@@ -14,10 +14,10 @@ from mcap.reader import make_reader
 
 from coordinator.recording.playback import Playback
 from coordinator.recording.reader import read_recording
-from coordinator.status.table import mission_status
-from swarm.errors import InputError
+from coordinator.terminal.status_table import mission_status
+from swarm.protocol.board import TaskState
+from swarm.runtime.errors import InputError
 from swarm.scenario.write import format_scenario
-from swarm.state.board import TaskState
 from tests.process.chaos_play import survey
 from tests.process.kept_open import kept_open, let_end
 from tests.process.mission import SwarmRun, wait_until
@@ -73,15 +73,15 @@ def test_killed_recorders_leave_whole_files_and_the_flight_goes_on(tmp_path: Pat
     by_run, by_onlooker = folder / "run.mcap", tmp_path / "onlooker.mcap"
     with SwarmRun([*_flown(tmp_path, 3, 8), "--record", str(by_run)], folder) as run:
         wait_until(lambda: any(words.startswith("agent") for words in run.children()), 60, "start")
-        onlooker = swarm("record", str(by_onlooker), "--connect", router_of(run), *SPEED)
+        observer = swarm("record", str(by_onlooker), "--connect", router_of(run), *SPEED)
         try:
             run.wait_for_line("epoch 1")
             late_s = _grows(by_onlooker)
-            onlooker.send_signal(signal.SIGKILL)
+            observer.send_signal(signal.SIGKILL)
             killed_s = time.time()
-            onlooker.communicate(timeout=60)
+            observer.communicate(timeout=60)
         finally:
-            onlooker.kill()
+            observer.kill()
         let_end()
         status, told = run.result()
 
@@ -98,10 +98,12 @@ def test_killed_recorders_leave_whole_files_and_the_flight_goes_on(tmp_path: Pat
     assert recording.torn is None
     playback = Playback(recording)
     playback.seek(playback.duration_s)
-    found = mission_status(playback.observer, playback.now_s)
+    found = mission_status(playback.mission_state, playback.now_s)
     assert found.scene.count(TaskState.DONE) == 8
     assert found.scene.objective == pytest.approx(told["executed_objective"], abs=1e-9)
-    flown = {uav: list(tasks) for uav, tasks in playback.observer.result().executed_routes.items()}
+    flown = {
+        uav: list(tasks) for uav, tasks in playback.mission_state.result().executed_routes.items()
+    }
     assert flown == told["executed_routes"]
     assert [entry.plan.objective for entry in recording.plans] == [told["objective"]]
     with by_run.open("rb") as file:
@@ -140,6 +142,6 @@ def test_a_recorder_is_stopped_by_its_user_and_by_the_end_of_the_mission(tmp_pat
     assert read_recording(files[0]).torn is None
     whole = Playback(read_recording(files[1]))
     whole.seek(whole.duration_s)
-    assert whole.observer.phase == "ended"
-    assert len(whole.observer.result().done) == 16
+    assert whole.mission_state.phase == "ended"
+    assert len(whole.mission_state.result().done) == 16
     assert files[1].stat().st_size > files[0].stat().st_size

@@ -48,7 +48,7 @@ def test_the_recording_of_a_faultless_flight_is_read_by_others_and_agrees_with_i
     assert [uav["id"] for uav in final["uavs"] if uav["does"] == "lost"] == told["lost_uavs"]
     playback = Playback(read_recording(file))
     playback.seek(playback.duration_s)
-    result = playback.observer.result()
+    result = playback.mission_state.result()
     assert list(result.done) == told["done"]
     assert list(result.lost_uavs) == told["lost_uavs"]
     assert dict(result.executed_completion_s) == told["executed_completion_s"]

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology
-from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.loopback import free_loopback_endpoints
 from swarm.bus.port import LinkDown, LinkUp, Query, TokenGone, TokenSeen
 from swarm.bus.zenoh_bus import open_zenoh_bus
-from swarm.errors import BusError, InputError
+from swarm.runtime.errors import BusError, InputError
 from tests.contract.bus_fleet import Join, Reader, client_seats, run, settle
 from tests.process.router_processes import finish, router, started, token_holder
 
@@ -230,7 +230,7 @@ import asyncio, os, signal, sys, threading, time
 from swarm.bus import zenoh_session
 from swarm.bus.config import BusConfig, ClientTopology
 from swarm.bus.zenoh_bus import open_zenoh_bus
-from swarm.process import leave
+from swarm.runtime.process import leave
 
 zenoh_session.BLOCKED_CLOSE_S = 3.0  # longer than a busy machine is ever late
 late_s = 0.0

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.chaos.flood import long_mission
+from sim.fleet.faults.flood import long_mission
 from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
 from tests.process.mission import SwarmRun, alive, wait_until

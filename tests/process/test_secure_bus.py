@@ -14,23 +14,23 @@ import numpy as np
 import pytest
 
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology, Topology
-from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.loopback import free_loopback_endpoints
 from swarm.bus.port import LinkDown, LinkUp, Query, Sample, TokenSeen
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.bus.zenoh_session import lay_over, open_session, session_config
-from swarm.clock import unix_s
-from swarm.errors import BusError, InputError
 from swarm.identity import Identity, Role, load_identity
 from swarm.identity.authority import Authority
 from swarm.identity.founding import found_authority
-from swarm.wire.keys import Keys
+from swarm.protocol.key_space import KeySpace
+from swarm.runtime.clock import unix_s
+from swarm.runtime.errors import BusError, InputError
 from tests.contract.bus_fleet import LIMIT_S, Reader
 from tests.process.router_processes import router
 
 pytestmark = pytest.mark.process
 
 MISSION = "m"
-KEYS = Keys(MISSION)
+KEYS = KeySpace(MISSION)
 DAY_S = 86_400.0
 REFUSED_S = 0.3
 """A router refuses within milliseconds; whoever is let in is so as soon."""

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from sim.chaos.flood import long_mission
+from sim.fleet.faults.flood import long_mission
 from swarm.cli import main
-from swarm.clock import unix_s
 from swarm.identity.founding import found_authority
 from swarm.model import Mission
+from swarm.runtime.clock import unix_s
 from swarm.scenario.write import format_scenario
 from tests.process.feed_reader import post
 from tests.process.mission import SwarmRun

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus.loopback import free_loopback_endpoints
 from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
 from tests.process.kept_open import kept_open, let_end

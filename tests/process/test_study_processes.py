@@ -14,18 +14,15 @@ from pathlib import Path
 import pytest
 from distributed import LocalCluster
 
-from sim.study.config import RandomMissions, Study, Varied
-from sim.study.dask_cluster import on_dask
-from sim.study.policies import ROSTER, Roster
-from sim.study.row_files import read_rows
-from sim.study.rows import Row, without_wall_times
-from sim.study.runner import Fly, fly_here, in_processes, run_study
-from sim.study.store import MemoryStore
-from sim.study.trial import Briefing, jobs_of
-from sim.uncertainty import Uncertainty
-from swarm.errors import InputError, SwarmError
-from tests.fake_policies import FAKES
+from sim.study.design import Factor, RandomMissions, Study
+from sim.study.policies.roster import ROSTER, PolicyRoster
+from sim.study.runner import Fly, fly_here, in_processes, on_dask, run_study
+from sim.study.store import MemoryStore, read_rows
+from sim.study.trial import TrialContext, TrialRow, jobs_of, without_wall_times
+from sim.world.uncertainty import Uncertainty
+from swarm.runtime.errors import InputError, SwarmError
 from tests.process.mission import wait_until
+from tests.support.fake_policies import FAKES
 
 pytestmark = pytest.mark.process
 
@@ -35,12 +32,12 @@ STUDY = Study(
     policies=("guided", "cbba", "nearest"),
     trials=3,
     uncertainty=Uncertainty(loss=0.3, popup=0.3, message_loss=0.1, speed_sd_frac=0.1),
-    varied=(Varied("popup", (0.6,), trials=2),),
+    varied=(Factor("popup", (0.6,), trials=2),),
 )
 
 
-def flown(fly: Fly, study: Study = STUDY, roster: Roster = ROSTER) -> list[Row]:
-    rows = run_study(Briefing(study, roster), MemoryStore(study), fly, lambda *_: None)
+def flown(fly: Fly, study: Study = STUDY, roster: PolicyRoster = ROSTER) -> list[TrialRow]:
+    rows = run_study(TrialContext(study, roster), MemoryStore(study), fly, lambda *_: None)
     return [without_wall_times(row) for row in rows]
 
 
@@ -136,9 +133,9 @@ def test_numbers_are_the_same_on_a_dask_cluster(cluster: LocalCluster) -> None:
 
 def test_lost_worker_of_a_dask_cluster_costs_nothing(cluster: LocalCluster) -> None:
     fly = on_dask(cluster.scheduler_address)
-    rows: list[list[Row]] = []
+    rows: list[list[TrialRow]] = []
     jobs = jobs_of(STUDY)
-    flying = fly(Briefing(STUDY, ROSTER), jobs)
+    flying = fly(TrialContext(STUDY, ROSTER), jobs)
     rows.append(next(flying))
     os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
     rows += flying

@@ -6,8 +6,8 @@ import asyncio
 
 import pytest
 
-from sim.chaos.insider import Trick
-from sim.chaos.unguarded import fly_unguarded
+from tests.chaos.insider import Trick
+from tests.chaos.unguarded import fly_unguarded
 
 pytestmark = [pytest.mark.process]
 

@@ -36,6 +36,7 @@ __all__ = [
     "runtime_pins",
 ]
 
+
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 PROBE = "cryptography"
 """Asked for first, and for a short time, so that nobody waits long where nobody answers."""

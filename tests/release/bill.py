@@ -26,6 +26,7 @@ from packaging.utils import parse_wheel_filename
 
 __all__ = ["amended", "install", "leaflet_version", "main"]
 
+
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 LEAFLET = "coordinator/dashboard/static/vendor/leaflet/leaflet.js"
 

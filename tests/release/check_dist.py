@@ -37,9 +37,10 @@ from tests.release.bill import install
 
 __all__ = ["check_metadata", "main", "shipped", "source_files"]
 
+
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("agent", "coordinator", "sim", "swarm")
-TESTED = ("agent", "swarm/allocation", "swarm/state", "swarm/wire")
+TESTED = ("agent", "swarm/allocation", "swarm/protocol", "swarm/protocol")
 """Unit tests that need nothing but what is installed, and a few packages."""
 TEST_PACKAGES = ("hypothesis", "jsonschema", "pytest", "pytest-timeout")
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 __all__ = ["arducopter_stand_in", "px4_stand_in"]
 
+
 _ARDUCOPTER = """
 import argparse, os, sys
 parser = argparse.ArgumentParser(allow_abbrev=False)

@@ -16,11 +16,11 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import Delays, VehicleConfig
-from sim.autopilot.endpoint import parse_endpoint
-from sim.autopilot.flavours.ardupilot import ArduCopter
+from sim.autopilot.firmware.ardupilot import ArduCopterModel
+from sim.autopilot.options import parse_endpoint
 from sim.autopilot.server import VehicleServer
-from sim.autopilot.vehicle import Vehicle
-from swarm.clock import ScaledClock
+from sim.autopilot.vehicle import SimulatedAutopilot
+from swarm.runtime.clock import ScaledClock
 
 pytestmark = pytest.mark.sitl
 TIMEOUT_S = 20.0
@@ -64,7 +64,7 @@ class Client:
 async def serving(listen: str) -> AsyncIterator[VehicleServer]:
     clock = ScaledClock(SPEEDUP)
     config = VehicleConfig(1, cruise_m_s=5.0, delays=Delays(0.5, 0.5, 1.0, 1.5))
-    vehicle = Vehicle(config, ArduCopter(), clock.now_s())
+    vehicle = SimulatedAutopilot(config, ArduCopterModel(), clock.now_s())
     server = VehicleServer(vehicle, parse_endpoint(listen), clock)
     await server.start()
     try:
@@ -215,7 +215,7 @@ def test_client_that_hangs_up_is_forgotten_and_can_come_back() -> None:
                 async with connected(server.url) as client:
                     await client.until("HEARTBEAT")
             vehicle = server.vehicle
-            assert isinstance(vehicle, Vehicle)
+            assert isinstance(vehicle, SimulatedAutopilot)
             for _ in range(100):
                 if not vehicle._streams.channels:
                     break

@@ -12,11 +12,7 @@ from dataclasses import replace
 
 import pytest
 
-from agent.mavlink.bridge import Bridge
-from agent.mavlink.config import BridgeConfig, CommandStyle
-from agent.mavlink.events import Event, LinkUp, Received, Send, Tick
-from agent.mavlink.vehicle import MavlinkVehicle
-from agent.vehicle import (
+from agent.core.interface import (
     Arrived,
     GoTo,
     HandedOver,
@@ -24,24 +20,27 @@ from agent.vehicle import (
     Home,
     NotReady,
     Prepare,
-    Report,
     Return,
     Telemetry,
     VehicleReady,
+    VehicleReport,
 )
+from agent.links.mavlink_vehicle import MavlinkVehicle
+from agent.vehicle.bridge import Bridge
+from agent.vehicle.config import BridgeConfig, CommandStyle
+from agent.vehicle.session import BridgeEvent, BytesReceived, LinkOpened, SendBytes, TimePassed
 from sim.autopilot import events as autopilot
 from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.endpoint import Endpoint, Transport
-from sim.autopilot.flavours import FlavourName, flavour_of
-from sim.autopilot.flavours.ardupilot import ArduCopter
-from sim.autopilot.flavours.base import Flavour
-from sim.autopilot.modes import Mode
+from sim.autopilot.firmware.ardupilot import ArduCopterModel
+from sim.autopilot.firmware.model import FirmwareModel
+from sim.autopilot.flight import FlightMode
+from sim.autopilot.options import Endpoint, FirmwareModelName, Transport, firmware_model
 from sim.autopilot.server import VehicleServer
-from sim.autopilot.vehicle import COMPONENT_ID, Vehicle
-from swarm.clock import ScaledClock
-from tests.bridge_flight import ORIGIN
-from tests.lateness import Lateness
+from sim.autopilot.vehicle import COMPONENT_ID, SimulatedAutopilot
+from swarm.runtime.clock import ScaledClock
+from tests.support.bridge_flight import ORIGIN
+from tests.support.lateness import Lateness
 
 pytestmark = pytest.mark.sitl
 
@@ -50,38 +49,38 @@ CONFIG = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, acceptance_radius_m=0.1)
 VEHICLE = VehicleConfig(1, start_enu_m=(5.0, 0.0, 0.0), origin=ORIGIN)
 HOME_M = (5.0, 0.0, 0.0)
 PATIENCE_S = 30.0
-FLAVOURS = pytest.mark.parametrize("flavour", list(FlavourName))
+FLAVOURS = pytest.mark.parametrize("flavour", list(FirmwareModelName))
 STYLES = pytest.mark.parametrize("style", list(CommandStyle))
 
 
 class JoinedFlight:
     """Both machines in one virtual time that leaps from deadline to deadline."""
 
-    def __init__(self, config: BridgeConfig = CONFIG, flavour: Flavour | None = None) -> None:
+    def __init__(self, config: BridgeConfig = CONFIG, flavour: FirmwareModel | None = None) -> None:
         self.now_s = 0.0
         self.bridge = Bridge(config)
-        self.vehicle = Vehicle(VEHICLE, flavour or ArduCopter(), self.now_s)
+        self.vehicle = SimulatedAutopilot(VEHICLE, flavour or ArduCopterModel(), self.now_s)
         self.codec = ChannelCodec(1, COMPONENT_ID, datagrams=False)
-        self.reports: list[tuple[float, Report]] = []
+        self.reports: list[tuple[float, VehicleReport]] = []
         self.track_enu_m: list[tuple[float, float, float]] = []
         """Where the vehicle was, whenever anything happened."""
         self.track_s: list[float] = []
         """When that was."""
         self._read = 0
         self.to_vehicle(autopilot.Connected(0))
-        self.to_bridge(LinkUp())
+        self.to_bridge(LinkOpened())
 
-    def to_bridge(self, event: Event) -> None:
+    def to_bridge(self, event: BridgeEvent) -> None:
         for action in self.bridge.step(event, self.now_s):
-            if isinstance(action, Send):
+            if isinstance(action, SendBytes):
                 for message in self.codec.decode(action.data):
-                    self.to_vehicle(autopilot.Received(0, message))
+                    self.to_vehicle(autopilot.MavlinkReceived(0, message))
             elif not isinstance(action, Telemetry | NotReady):
                 self.reports.append((self.now_s, action))
 
-    def to_vehicle(self, event: autopilot.Event) -> None:
+    def to_vehicle(self, event: autopilot.VehicleEvent) -> None:
         for send in self.vehicle.step(event, self.now_s):
-            self.to_bridge(Received(self.codec.encode(send.message)))
+            self.to_bridge(BytesReceived(self.codec.encode(send.message)))
 
     def wait(self, duration_s: float) -> None:
         """Let time go on, whatever is reported."""
@@ -95,25 +94,25 @@ class JoinedFlight:
         end_s = self.now_s + dead_s
         while (vehicle_s := self.vehicle.next_deadline_s()) < end_s:
             self.now_s = max(self.now_s, vehicle_s)
-            self.vehicle.step(autopilot.Tick(), self.now_s)
+            self.vehicle.step(autopilot.TimeAdvanced(), self.now_s)
         self.now_s = end_s
         self.bridge = Bridge(self.bridge.config)
         self.codec = ChannelCodec(1, COMPONENT_ID, datagrams=False)
         self.to_vehicle(autopilot.Connected(0))
-        self.to_bridge(LinkUp())
+        self.to_bridge(LinkOpened())
 
     def _leap(self) -> None:
         """On to the next deadline of either machine."""
         vehicle_s, bridge_s = self.vehicle.next_deadline_s(), self.bridge.next_deadline_s()
         self.now_s = max(self.now_s, min(vehicle_s, bridge_s))
         if vehicle_s <= self.now_s:
-            self.to_vehicle(autopilot.Tick())
+            self.to_vehicle(autopilot.TimeAdvanced())
         if self.bridge.next_deadline_s() <= self.now_s:
-            self.to_bridge(Tick())
+            self.to_bridge(TimePassed())
         self.track_enu_m.append(self.vehicle.pilot.position_enu_m(self.now_s))
         self.track_s.append(self.now_s)
 
-    def run_until(self, report: Report | type, limit_s: float = 300.0) -> float:
+    def run_until(self, report: VehicleReport | type, limit_s: float = 300.0) -> float:
         """Vehicle time at which that report came."""
         end_s = self.now_s + limit_s
         while self.now_s < end_s:
@@ -126,13 +125,13 @@ class JoinedFlight:
         raise AssertionError(f"no {report} within {limit_s} s, only {self.reports}")
 
 
-def joined(flavour: FlavourName, style: CommandStyle) -> JoinedFlight:
+def joined(flavour: FirmwareModelName, style: CommandStyle) -> JoinedFlight:
     """The bridge, commanding that way, and a vehicle of that firmware."""
     config = replace(CONFIG, command=style, mission_patience_s=PATIENCE_S)
-    return JoinedFlight(config, flavour_of(flavour))
+    return JoinedFlight(config, firmware_model(flavour))
 
 
-def started(flavour: FlavourName, style: CommandStyle) -> JoinedFlight:
+def started(flavour: FirmwareModelName, style: CommandStyle) -> JoinedFlight:
     """The same, hovering at its start."""
     flight = joined(flavour, style)
     flight.to_bridge(START)
@@ -157,16 +156,16 @@ def fly_whole_mission(flight: JoinedFlight) -> None:
 
 @FLAVOURS
 @STYLES
-def test_whole_mission_is_flown(flavour: FlavourName, style: CommandStyle) -> None:
+def test_whole_mission_is_flown(flavour: FirmwareModelName, style: CommandStyle) -> None:
     fly_whole_mission(joined(flavour, style))
 
 
 def test_whole_mission_is_flown_with_the_old_names_of_parameters() -> None:
-    fly_whole_mission(JoinedFlight(flavour=ArduCopter(old_names=True)))
+    fly_whole_mission(JoinedFlight(flavour=ArduCopterModel(old_names=True)))
 
 
 @FLAVOURS
-def test_legs_take_distance_over_speed(flavour: FlavourName) -> None:
+def test_legs_take_distance_over_speed(flavour: FirmwareModelName) -> None:
     flight = started(flavour, CommandStyle.REPOSITION)
     place, spent_s, flown_s = START.position_enu_m, 0.0, 0.0
     for leg in range(20):
@@ -182,7 +181,7 @@ def test_legs_take_distance_over_speed(flavour: FlavourName) -> None:
 @FLAVOURS
 @STYLES
 def test_legs_are_flown_at_cruise_speed_in_the_height_layer(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     flight = started(flavour, style)
     flight.to_bridge(GoTo(1, (5.0, 100.0, 10.0)))
@@ -197,10 +196,12 @@ def test_legs_are_flown_at_cruise_speed_in_the_height_layer(
 
 @FLAVOURS
 @STYLES
-def test_pilot_takes_over_the_simulated_vehicle(flavour: FlavourName, style: CommandStyle) -> None:
+def test_pilot_takes_over_the_simulated_vehicle(
+    flavour: FirmwareModelName, style: CommandStyle
+) -> None:
     mode, name = {
-        FlavourName.ARDUPILOT: (Mode.LOITER, "LOITER"),
-        FlavourName.PX4: (Mode.POSHOLD, "POSCTL"),
+        FirmwareModelName.ARDUPILOT: (FlightMode.LOITER, "LOITER"),
+        FirmwareModelName.PX4: (FlightMode.POSHOLD, "POSCTL"),
     }[flavour]
     flight = started(flavour, style)
     flight.to_bridge(GoTo(1, (5.0, 200.0, 10.0)))
@@ -215,7 +216,7 @@ def test_pilot_takes_over_the_simulated_vehicle(flavour: FlavourName, style: Com
 @FLAVOURS
 @STYLES
 def test_killed_in_mid_leg_and_started_anew_it_arrives_without_turning_back(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     flight = started(flavour, style)
     target, left_s = (5.0, 60.0, 10.0), flight.now_s
@@ -238,7 +239,7 @@ def test_killed_in_mid_leg_and_started_anew_it_arrives_without_turning_back(
 
 @FLAVOURS
 @STYLES
-def test_vehicle_is_stopped_and_goes_on(flavour: FlavourName, style: CommandStyle) -> None:
+def test_vehicle_is_stopped_and_goes_on(flavour: FirmwareModelName, style: CommandStyle) -> None:
     flight = started(flavour, style)
     flight.to_bridge(GoTo(1, (5.0, 100.0, 10.0)))
     flight.wait(8.0)
@@ -258,7 +259,7 @@ def test_vehicle_is_stopped_and_goes_on(flavour: FlavourName, style: CommandStyl
 
 @FLAVOURS
 def test_vehicle_whose_companion_dies_flies_on_waits_and_comes_home_by_itself(
-    flavour: FlavourName,
+    flavour: FirmwareModelName,
 ) -> None:
     flight = started(flavour, CommandStyle.MISSION)
     target = (5.0, 60.0, 10.0)
@@ -269,13 +270,13 @@ def test_vehicle_whose_companion_dies_flies_on_waits_and_comes_home_by_itself(
     there_s = left_s = 0.0
     while pilot.armed:
         flight.now_s = max(flight.now_s, flight.vehicle.next_deadline_s())
-        flight.vehicle.step(autopilot.Tick(), flight.now_s)
+        flight.vehicle.step(autopilot.TimeAdvanced(), flight.now_s)
         if math.dist(pilot.position_enu_m(flight.now_s), target) < 0.5:
             there_s, left_s = there_s or flight.now_s, flight.now_s
         assert flight.now_s - died_s < 300.0
     # A mission that gives way does so for 1.5 times the flight and 10 s, and holds then.
     flight_s = (target[1] - START.position_enu_m[1]) / START.speed_m_s
-    gives_way_s = 0.5 * flight_s + 10.0 if flavour is FlavourName.ARDUPILOT else 0.0
+    gives_way_s = 0.5 * flight_s + 10.0 if flavour is FirmwareModelName.ARDUPILOT else 0.0
     assert left_s - there_s == pytest.approx(PATIENCE_S + gives_way_s, abs=2.0)
     assert math.dist(pilot.position_enu_m(flight.now_s), HOME_M) < 0.5
 
@@ -283,7 +284,7 @@ def test_vehicle_whose_companion_dies_flies_on_waits_and_comes_home_by_itself(
 @FLAVOURS
 @STYLES
 def test_reboot_of_the_simulated_vehicle_is_noticed(
-    flavour: FlavourName, style: CommandStyle
+    flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     flight = started(flavour, style)
     flight.to_vehicle(autopilot.Reboot())
@@ -294,25 +295,25 @@ def test_reboot_of_the_simulated_vehicle_is_noticed(
 @FLAVOURS
 @STYLES
 def test_mission_is_flown_through_sockets_in_time(
-    transport: Transport, flavour: FlavourName, style: CommandStyle
+    transport: Transport, flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     asyncio.run(_fly_through_sockets(transport, flavour, style))
 
 
 async def _fly_through_sockets(
-    transport: Transport, flavour: FlavourName, style: CommandStyle
+    transport: Transport, flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     speedup = 10.0
     clock = ScaledClock(speedup)
     config = replace(CONFIG, command=style)
-    machine = Vehicle(VEHICLE, flavour_of(flavour), clock.now_s())
+    machine = SimulatedAutopilot(VEHICLE, firmware_model(flavour), clock.now_s())
     server = VehicleServer(machine, Endpoint(transport, "127.0.0.1", 0), clock)
     await server.start()
     home = asyncio.Event()
     times_s: list[float] = []
     targets = [(5.0, 12.0, 10.0), (17.0, 12.0, 10.0), (17.0, 0.0, 10.0)]
 
-    def on_report(report: Report) -> None:
+    def on_report(report: VehicleReport) -> None:
         match report:
             case VehicleReady() | Arrived():
                 times_s.append(clock.now_s())

@@ -13,21 +13,19 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from agent.mavlink.config import BridgeConfig
-from agent.mavlink.forwarding import Forwarding
-from agent.mavlink.link_address import UdpOutAddress
-from agent.mavlink.signing import SigningKey
-from agent.mavlink.vehicle import MavlinkVehicle
-from agent.vehicle import Report, VehicleReady
+from agent.core.interface import VehicleReady, VehicleReport
+from agent.links.mavlink_vehicle import FrameForwarder, MavlinkVehicle
+from agent.vehicle.config import BridgeConfig, UdpOutAddress
+from agent.vehicle.signing import SigningKey
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.endpoint import Endpoint, Transport
-from sim.autopilot.flavours.ardupilot import ArduCopter
+from sim.autopilot.firmware.ardupilot import ArduCopterModel
+from sim.autopilot.options import Endpoint, Transport
 from sim.autopilot.server import VehicleServer
-from sim.autopilot.vehicle import Vehicle
-from swarm.clock import ScaledClock
-from swarm.errors import InputError
-from tests.bridge_flight import ORIGIN, START
+from sim.autopilot.vehicle import SimulatedAutopilot
+from swarm.runtime.clock import ScaledClock
+from swarm.runtime.errors import InputError
 from tests.sitl.test_bridge_link import Server, free_port, until
+from tests.support.bridge_flight import ORIGIN, START
 
 pytestmark = pytest.mark.sitl
 
@@ -77,14 +75,16 @@ class GroundStation(asyncio.DatagramProtocol):
 @asynccontextmanager
 async def flown(
     system_id: int, forward: list[str], clock: ScaledClock, key: SigningKey | None = None
-) -> AsyncIterator[tuple[MavlinkVehicle, list[Report]]]:
+) -> AsyncIterator[tuple[MavlinkVehicle, list[VehicleReport]]]:
     """A simulated vehicle and its bridge, under way to its start."""
-    machine = Vehicle(VehicleConfig(system_id, origin=ORIGIN), ArduCopter(), clock.now_s())
+    machine = SimulatedAutopilot(
+        VehicleConfig(system_id, origin=ORIGIN), ArduCopterModel(), clock.now_s()
+    )
     endpoint = Endpoint(Transport.TCP, "127.0.0.1", 0)
     secret = None if key is None else key.secret
     server = VehicleServer(machine, endpoint, clock, signing_secret=secret)
     await server.start()
-    reports: list[Report] = []
+    reports: list[VehicleReport] = []
     config = replace(CONFIG, system_id=system_id)
     vehicle = MavlinkVehicle(config, server.url, clock, reports.append, key=key, forward=forward)
     try:
@@ -148,7 +148,7 @@ def test_frames_are_shown_as_they_came_and_only_the_vehicles() -> None:
     asyncio.run(scenario())
 
 
-def _nobody(report: Report) -> None:
+def _nobody(report: VehicleReport) -> None:
     pass
 
 
@@ -175,7 +175,7 @@ def test_a_ground_station_that_is_not_there_costs_nothing_but_a_count() -> None:
     async def scenario() -> None:
         gone = UdpOutAddress("127.0.0.1", free_port(socket.SOCK_DGRAM))
         nowhere = UdpOutAddress("no-such-host.invalid", 14550)
-        forwarding = Forwarding([gone, nowhere])
+        forwarding = FrameForwarder([gone, nowhere])
         assert forwarding
         forwarding.start()
         try:
@@ -193,7 +193,7 @@ def test_a_ground_station_that_is_not_there_costs_nothing_but_a_count() -> None:
 def test_a_ground_station_that_starts_later_is_shown_the_vehicle() -> None:
     async def scenario() -> None:
         port = free_port(socket.SOCK_DGRAM)
-        forwarding = Forwarding([UdpOutAddress("127.0.0.1", port)])
+        forwarding = FrameForwarder([UdpOutAddress("127.0.0.1", port)])
         forwarding.start()
         loop = asyncio.get_running_loop()
         try:

@@ -14,25 +14,24 @@ from typing import ParamSpec
 
 import pytest
 
-from agent.mavlink.config import BridgeConfig
-from agent.mavlink.link import Link, open_link
-from agent.mavlink.link_address import parse_link
-from agent.mavlink.vehicle import MavlinkVehicle
-from agent.vehicle import (
+from agent.core.interface import (
     Arrived,
     GoTo,
     Home,
     NotReady,
-    Report,
     Return,
     ReturnBegun,
     Telemetry,
     VehicleReady,
+    VehicleReport,
 )
-from swarm.clock import ScaledClock
-from swarm.errors import InputError
-from tests.bridge_flight import ORIGIN, START
-from tests.fake_copter import INTERVAL, FakeCopter
+from agent.links.link import ByteLink, open_link
+from agent.links.mavlink_vehicle import MavlinkVehicle
+from agent.vehicle.config import BridgeConfig, parse_link
+from swarm.runtime.clock import ScaledClock
+from swarm.runtime.errors import InputError
+from tests.support.bridge_flight import ORIGIN, START
+from tests.support.fake_copter import INTERVAL, FakeCopter
 
 pytestmark = pytest.mark.sitl
 
@@ -81,7 +80,7 @@ async def until(condition: Callable[[], bool]) -> None:
 
 
 @asynccontextmanager
-async def opened(url: str, listener: Listener) -> AsyncIterator[Link]:
+async def opened(url: str, listener: Listener) -> AsyncIterator[ByteLink]:
     link = open_link(parse_link(url), listener)
     link.start()
     try:
@@ -238,7 +237,7 @@ async def test_listening_link_answers_whom_it_is_told_to() -> None:
 
 @in_loop
 async def test_a_stranger_at_the_port_keeps_no_vehicle_from_its_agent() -> None:
-    port, reports = free_port(socket.SOCK_DGRAM), list[Report]()
+    port, reports = free_port(socket.SOCK_DGRAM), list[VehicleReport]()
     config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0)
     vehicle = MavlinkVehicle(config, f"udpin:127.0.0.1:{port}", ScaledClock(1.0), reports.append)
     await vehicle.start()
@@ -384,9 +383,9 @@ async def test_vehicle_is_flown_through_a_socket_from_preparation_to_landing() -
     clock = ScaledClock(speedup)
     served = ServedCopter(clock)
     port = await served.listen()
-    reports: list[Report] = []
+    reports: list[VehicleReport] = []
 
-    def on_report(report: Report) -> None:
+    def on_report(report: VehicleReport) -> None:
         """Orders given from inside a report are carried out in order."""
         reports.append(report)
         match report:

@@ -9,28 +9,28 @@ from contextlib import asynccontextmanager
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from agent.mavlink.config import BridgeConfig
-from agent.mavlink.signing import SigningKey
-from agent.mavlink.vehicle import MavlinkVehicle
-from agent.vehicle import (
+from agent.core.interface import (
     Arrived,
     GoTo,
     Home,
     NotReady,
-    Report,
     Return,
     ReturnBegun,
     Telemetry,
     VehicleReady,
+    VehicleReport,
 )
+from agent.links.mavlink_vehicle import MavlinkVehicle
+from agent.vehicle.config import BridgeConfig
+from agent.vehicle.signing import SigningKey
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.endpoint import Endpoint, Transport
-from sim.autopilot.flavours.ardupilot import ArduCopter
+from sim.autopilot.firmware.ardupilot import ArduCopterModel
+from sim.autopilot.options import Endpoint, Transport
 from sim.autopilot.server import VehicleServer
-from sim.autopilot.vehicle import Vehicle
-from swarm.clock import ScaledClock
-from tests.bridge_flight import ORIGIN, START
+from sim.autopilot.vehicle import SimulatedAutopilot
+from swarm.runtime.clock import ScaledClock
 from tests.sitl.test_bridge_link import until
+from tests.support.bridge_flight import ORIGIN, START
 
 pytestmark = pytest.mark.sitl
 
@@ -45,18 +45,18 @@ class Fleet:
 
     def __init__(
         self,
-        machine: Vehicle,
+        machine: SimulatedAutopilot,
         server: VehicleServer,
         key: SigningKey | None,
         clock: ScaledClock,
     ) -> None:
         self.machine = machine
         self.server = server
-        self.reports: list[Report] = []
+        self.reports: list[VehicleReport] = []
         self.bridge = MavlinkVehicle(CONFIG, server.url, clock, self.reports.append, key=key)
 
     @property
-    def news(self) -> list[Report]:
+    def news(self) -> list[VehicleReport]:
         return [r for r in self.reports if not isinstance(r, Telemetry | NotReady)]
 
 
@@ -65,8 +65,10 @@ async def fleet(
     transport: Transport, vehicle_key: SigningKey | None, bridge_key: SigningKey | None
 ) -> AsyncIterator[Fleet]:
     clock = ScaledClock(SPEEDUP)
-    machine = Vehicle(
-        VehicleConfig(1, start_enu_m=(5.0, 0.0, 0.0), origin=ORIGIN), ArduCopter(), clock.now_s()
+    machine = SimulatedAutopilot(
+        VehicleConfig(1, start_enu_m=(5.0, 0.0, 0.0), origin=ORIGIN),
+        ArduCopterModel(),
+        clock.now_s(),
     )
     secret = None if vehicle_key is None else vehicle_key.secret
     endpoint = Endpoint(transport, "127.0.0.1", 0)

@@ -14,13 +14,11 @@ from typing import Any
 
 import pytest
 
-from agent.mavlink.config import BridgeConfig
-from agent.mavlink.link import Link, open_link
-from agent.mavlink.link_address import TcpAddress, UdpOutAddress, parse_link
-from agent.mavlink.vehicle import MavlinkVehicle
-from agent.vehicle import GoTo, HandedOver, Report, VehicleReady
-from swarm.clock import ScaledClock
-from tests.bridge_flight import ORIGIN, START
+from agent.core.interface import GoTo, HandedOver, VehicleReady, VehicleReport
+from agent.links.link import ByteLink, open_link
+from agent.links.mavlink_vehicle import MavlinkVehicle
+from agent.vehicle.config import BridgeConfig, TcpAddress, UdpOutAddress, parse_link
+from swarm.runtime.clock import ScaledClock
 from tests.sitl.test_bridge_link import (
     PATIENCE_S,
     Listener,
@@ -31,12 +29,13 @@ from tests.sitl.test_bridge_link import (
     opened,
     until,
 )
+from tests.support.bridge_flight import ORIGIN, START
 
 pytestmark = pytest.mark.sitl
 
 
 @asynccontextmanager
-async def impatient(url: str, listener: Listener, silence_s: float) -> AsyncIterator[Link]:
+async def impatient(url: str, listener: Listener, silence_s: float) -> AsyncIterator[ByteLink]:
     link = open_link(parse_link(url), listener, silence_s=silence_s)
     link.start()
     try:
@@ -87,7 +86,7 @@ async def test_vehicle_behind_a_half_open_connection_is_handed_over_and_heard_ag
     clock = ScaledClock(speedup)
     served = ServedCopter(clock)
     port = await served.listen()
-    reports: list[Report] = []
+    reports: list[VehicleReport] = []
     config = BridgeConfig(1, ORIGIN, silence_timeout_s=10.0, position_rate_hz=20.0)
     vehicle = MavlinkVehicle(config, f"tcp:127.0.0.1:{port}", clock, reports.append)
     try:
@@ -210,7 +209,7 @@ async def test_silent_connection_is_given_up_with_the_vehicle() -> None:
     clock = ScaledClock(speedup)
     served = ServedCopter(clock)
     port = await served.listen()
-    reports: list[Report] = []
+    reports: list[VehicleReport] = []
     config = BridgeConfig(1, ORIGIN, silence_timeout_s=60.0, position_rate_hz=20.0)
     vehicle = MavlinkVehicle(config, f"tcp:127.0.0.1:{port}", clock, reports.append)
     try:

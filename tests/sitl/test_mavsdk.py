@@ -26,20 +26,19 @@ from mavsdk.plugins.mission_raw import MissionItem
 from mavsdk.plugins.telemetry import FlightMode, LandedState
 
 from sim.autopilot.config import Delays, VehicleConfig
-from sim.autopilot.endpoint import parse_endpoint
-from sim.autopilot.flavours import FlavourName, flavour_of
+from sim.autopilot.options import FirmwareModelName, firmware_model, parse_endpoint
 from sim.autopilot.server import VehicleServer
-from sim.autopilot.vehicle import Vehicle
-from swarm.clock import ScaledClock
+from sim.autopilot.vehicle import SimulatedAutopilot
 from swarm.model.frames import wgs84_from_enu
+from swarm.runtime.clock import ScaledClock
 
 pytestmark = pytest.mark.sitl
 DEADLINE_S = 60.0
 SPEEDUP = 10.0
 HEIGHT_M = 15.0
 CONFIG = VehicleConfig(1, cruise_m_s=10.0, climb_m_s=5.0, land_m_s=3.0)
-KINDS = {FlavourName.ARDUPILOT: Autopilot.ARDUPILOT, FlavourName.PX4: Autopilot.PX4}
-FLAVOURS = pytest.mark.parametrize("flavour", list(FlavourName))
+KINDS = {FirmwareModelName.ARDUPILOT: Autopilot.ARDUPILOT, FirmwareModelName.PX4: Autopilot.PX4}
+FLAVOURS = pytest.mark.parametrize("flavour", list(FirmwareModelName))
 
 
 class Pilot:
@@ -52,9 +51,9 @@ class Pilot:
         self.parameters = ParamAsync(system)
         self.mission = MissionRawAsync(system)
 
-    async def ask_for_streams(self, flavour: FlavourName) -> None:
+    async def ask_for_streams(self, flavour: FirmwareModelName) -> None:
         """Ask for what ArduPilot streams to nobody unasked."""
-        if flavour is FlavourName.ARDUPILOT:
+        if flavour is FirmwareModelName.ARDUPILOT:
             await self.telemetry.set_rate_health(5.0)
             await self.telemetry.set_rate_position(5.0)
             await self.telemetry.set_rate_landed_state(5.0)
@@ -91,11 +90,13 @@ async def seeing(
 
 @asynccontextmanager
 async def connected(
-    flavour: FlavourName, delays: Delays, config: VehicleConfig = CONFIG
+    flavour: FirmwareModelName, delays: Delays, config: VehicleConfig = CONFIG
 ) -> AsyncIterator[Pilot]:
     """A vehicle that has just been powered up, and MAVSDK connected to it."""
     clock = ScaledClock(SPEEDUP)
-    vehicle = Vehicle(replace(config, delays=delays), flavour_of(flavour), clock.now_s())
+    vehicle = SimulatedAutopilot(
+        replace(config, delays=delays), firmware_model(flavour), clock.now_s()
+    )
     server = VehicleServer(vehicle, parse_endpoint("tcp:127.0.0.1:0"), clock)
     await server.start()
     settings = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
@@ -145,7 +146,7 @@ async def start_mission(pilot: Pilot) -> None:
             await asyncio.wait([seen], timeout=1.0)
 
 
-async def fly(pilot: Pilot, flavour: FlavourName) -> list[int]:
+async def fly(pilot: Pilot, flavour: FirmwareModelName) -> list[int]:
     """A whole flight; the numbers of the items that MAVSDK saw become the current one."""
     action, telemetry, mission = pilot.action, pilot.telemetry, pilot.mission
     await action.arm()
@@ -158,13 +159,13 @@ async def fly(pilot: Pilot, flavour: FlavourName) -> list[int]:
     await action.takeoff()
     await until(telemetry.subscribe_position(), lambda at: at.relative_altitude_m > HEIGHT_M - 0.1)
 
-    if flavour is FlavourName.PX4:
+    if flavour is FirmwareModelName.PX4:
         await pilot.in_mode(FlightMode.HOLD)
 
     sent = items()
     await mission.upload_mission(sent)
     held = await mission.download_mission()
-    if flavour is FlavourName.PX4:
+    if flavour is FirmwareModelName.PX4:
         assert [str(item) for item in held] == [str(item) for item in sent]
     else:
         assert [(item.x, item.y, item.z) for item in held[1:]] == [
@@ -197,7 +198,7 @@ async def fly(pilot: Pilot, flavour: FlavourName) -> list[int]:
 
 
 @FLAVOURS
-def test_mavsdk_flies_a_whole_mission_and_comes_home(flavour: FlavourName) -> None:
+def test_mavsdk_flies_a_whole_mission_and_comes_home(flavour: FirmwareModelName) -> None:
     async def flight() -> None:
         async with connected(flavour, Delays()) as pilot:
             assert await pilot.system.autopilot_type() == KINDS[flavour]
@@ -210,7 +211,7 @@ def test_mavsdk_flies_a_whole_mission_and_comes_home(flavour: FlavourName) -> No
                 ),
             )
             # Ten seconds of the vehicle are one here, which a slow machine may need to go on.
-            if flavour is FlavourName.PX4:
+            if flavour is FirmwareModelName.PX4:
                 await pilot.parameters.set_param_float("COM_DISARM_PRFLT", 300.0)
                 assert await pilot.parameters.get_param_float("MPC_XY_CRUISE") == 10.0
                 assert await pilot.parameters.get_param_int("SYS_AUTOSTART") == 10040
@@ -227,7 +228,7 @@ def test_mavsdk_flies_a_whole_mission_and_comes_home(flavour: FlavourName) -> No
 
 @FLAVOURS
 def test_mavsdk_is_told_clearly_that_a_vehicle_without_position_cannot_be_armed(
-    flavour: FlavourName,
+    flavour: FirmwareModelName,
 ) -> None:
     async def refusal() -> None:
         delays = Delays(0.0, 0.0, 1e6, 1e6)

@@ -16,7 +16,7 @@ import pytest
 from mavsdk.plugins.mission_raw import MissionItem
 
 from sim.autopilot.config import Delays
-from sim.autopilot.flavours import FlavourName
+from sim.autopilot.options import FirmwareModelName
 from swarm.cli import main
 from swarm.model.frames import Origin, enu_from_wgs84
 from tests.sitl.test_mavsdk import CONFIG, FLAVOURS, Pilot, connected, start_mission, until
@@ -58,7 +58,7 @@ TASKS_M = ((50.0, 5.0, 0.0), (50.0, 65.0, 4.0), (-30.0, 65.0, 0.0))
 _WAYPOINT = 16
 
 
-def exported(folder: Path, flavour: FlavourName) -> Path:
+def exported(folder: Path, flavour: FirmwareModelName) -> Path:
     """The only plan of the scenario, made by the command line."""
     (folder / "fields.toml").write_text(SCENARIO, encoding="utf-8")
     plans = folder / "plans"
@@ -102,7 +102,7 @@ def visits(places_m: list[tuple[float, float, float]], layer_m: float) -> list[i
 
 @FLAVOURS
 def test_exported_plan_is_read_by_mavsdk_flown_in_order_and_ends_at_home(
-    flavour: FlavourName, tmp_path: Path
+    flavour: FirmwareModelName, tmp_path: Path
 ) -> None:
     plan = exported(tmp_path, flavour)
     layer_m = json.loads(plan.read_text(encoding="utf-8"))["peckorder"]["layer_m"]
@@ -111,7 +111,7 @@ def test_exported_plan_is_read_by_mavsdk_flown_in_order_and_ends_at_home(
         where = replace(CONFIG, origin=ORIGIN, start_enu_m=START_M)
         async with connected(flavour, Delays(), where) as pilot:
             await ready(pilot)
-            if flavour is FlavourName.PX4:
+            if flavour is FirmwareModelName.PX4:
                 # It waits on the ground for the mission mode, ten times as fast as this test.
                 await pilot.parameters.set_param_float("COM_DISARM_PRFLT", 300.0)
             items = await imported(pilot, plan)

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from agent.mavlink.config import CommandStyle
-from sim.launch.firmware import FirmwareKind
+from agent.vehicle.config import CommandStyle
+from sim.fleet.firmware import FirmwareKind
 from tests.process.mission import alive, wait_until
 from tests.process.pace import pace
 from tests.sitl.firmware_stand_in import arducopter_stand_in, px4_stand_in

@@ -11,13 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim.launch.firmware import FirmwareKind
+from sim.fleet.firmware import FirmwareKind
 from swarm.scenario import load_scenario
-from swarm.scenario.shipped import resolve_scenario
+from swarm.scenario.files import resolve_scenario
 from tests.process.mission import SwarmRun
 from tests.process.pace import pace
 
 __all__ = ["MEADOW", "TASKS", "UAVS", "Autopilot", "Flown", "autopilot_of", "fly"]
+
 
 MEADOW = resolve_scenario("meadow")
 _MISSION = load_scenario(MEADOW)
@@ -59,7 +60,7 @@ def fly(folder: Path, *arguments: str, speedup: float | None = None) -> Flown:
 
 @dataclass(frozen=True, slots=True)
 class Autopilot:
-    """What flies in one flavour on this machine."""
+    """What flies with one firmware on this machine."""
 
     option: str
     """For ``--autopilot``."""

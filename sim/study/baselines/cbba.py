@@ -1,31 +1,179 @@
 """The consensus-based bundle algorithm, the decentralised auction that most comparisons name.
 
 Written from Choi, Brunet and How 2009 (doi:10.1109/TRO.2009.2022423): every UAV builds a bundle
-of tasks by its own marginal gains in J (phase 1), then neighbours agree on winners by the action
-rules of `sim.study.baselines.consensus` (phase 2); who is outbid drops that task and all it had
-added after it. Marginal gains of eq. 1 may grow when other tasks join a path, and then the
+of tasks by its own marginal gains in J (phase 1, `Insertion`), then neighbours agree on winners by
+the action rules of their Table I (phase 2, `Beliefs`); who is outbid drops that task and all it
+had added after it. Marginal gains of eq. 1 may grow when other tasks join a path, and then the
 auction need not end; so a bid is never above the UAV's earlier ones, while the choice goes by the
 true gains (Johnson, Ponda, Choi and How 2012, doi:10.1109/CDC.2012.6425867).
 Two departures: tasks whose gain is negative are bid for too, since eq. 1 wants all on the lists;
-a task dropped because an earlier one was lost keeps the rival who also outbid it.
-Leaves out: messages that are lost or late; rounds are synchronous.
+a task dropped because an earlier one was lost keeps the rival who also outbid it. Equal bids go to
+the smaller UAV index. Leaves out: messages that are lost or late; rounds are synchronous.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.planner.stop import ShouldStop, never
-from sim.study.baselines.consensus import NO_BID, NOBODY, Beliefs, hear
-from sim.study.baselines.index_rule import Routes
-from sim.study.baselines.insertion import Insertion
-from sim.study.baselines.value_per_time import VALUE_PER_TIME
-from swarm.allocation import Problem, TeamState, evaluate, rank_of, run
-from swarm.allocation.problem import BoolArray, IntArray
+from coordinator.planner.options import ShouldStop, never
+from sim.study.baselines.index_rules import VALUE_PER_TIME, Routes
+from swarm.allocation import evaluate, rank_of, run
+from swarm.allocation.lower_level import TeamState
+from swarm.allocation.problem import BoolArray, FloatArray, IntArray, Problem
 
-__all__ = ["CbbaResult", "cbba"]
+__all__ = ["NOBODY", "NO_BID", "Beliefs", "CbbaResult", "Insertion", "cbba", "update_beliefs"]
+
+
+class Insertion:
+    """Gains of insertion into paths that begin where the team stands.
+
+    Args:
+        problem: the mission.
+        state: when and where each UAV is free, and what it has survived; at its start when None.
+
+    Keeps (n_task,) distances for every task that has been on a path: at most n_task² floats.
+    """
+
+    def __init__(self, problem: Problem, state: TeamState | None = None) -> None:
+        self._problem = problem
+        self._state = TeamState.at_start(problem) if state is None else state
+        self._from_task_m: dict[int, FloatArray] = {}
+        self._columns_m = np.ascontiguousarray(problem.task_enu_m.T)
+        self._from_start_m = [self._distances_m(place) for place in self._state.place_enu_m]
+
+    def gains(self, uav: int, path: Sequence[int]) -> tuple[FloatArray, IntArray]:
+        """The best insertion of each task into ``path``.
+
+        Returns:
+            (n_task,) marginal J of each task at its best place [value·s], meaningless for tasks
+            that are on the path, and (n_task,) those places: 0 is before the first task. Ties go
+            to the earlier place.
+        """
+        problem = self._problem
+        rows_m = [self._from_start_m[uav], *(self._row_m(task) for task in path)]
+        go_s = np.array(rows_m) / problem.speed_m_s[uav]
+        nodes = np.array(path, dtype=np.int64)
+        legs_s = go_s[np.arange(len(path)), nodes]
+        free_s = np.concatenate(
+            ([self._state.free_s[uav]], legs_s + problem.service_s[nodes])
+        ).cumsum()
+        survived = np.concatenate(
+            ([self._state.survived[uav]], problem.survival[uav, nodes])
+        ).cumprod()
+        weight = survived[:-1] * problem.weight[uav, nodes]
+        later_weight = _from_the_end(weight)
+        later_worth = _from_the_end(weight * (problem.horizon_s - free_s[1:]))
+
+        detour_s = go_s + problem.service_s
+        gain = problem.horizon_s - free_s[:, None] - detour_s
+        gain *= survived[:, None] * problem.weight[uav]
+        detour_s[:-1] += go_s[1:] - legs_s[:, None]
+        survival = problem.survival[uav]
+        gain -= survival * detour_s * later_weight[:, None]
+        gain -= (1.0 - survival) * later_worth[:, None]
+        places: IntArray = np.argmax(gain, axis=0)
+        return gain[places, np.arange(problem.n_task)], places
+
+    def _row_m(self, task: int) -> FloatArray:
+        row = self._from_task_m.get(task)
+        if row is None:
+            row = self._from_task_m[task] = self._distances_m(self._problem.task_enu_m[task])
+        return row
+
+    def _distances_m(self, place_enu_m: FloatArray) -> FloatArray:
+        distances: FloatArray = np.sqrt(((self._columns_m - place_enu_m[:, None]) ** 2).sum(axis=0))
+        return distances
+
+
+def _from_the_end(terms: FloatArray) -> FloatArray:
+    """(n + 1,) sum of the terms from each place on; the last is 0."""
+    sums: FloatArray = np.concatenate((np.cumsum(terms[::-1])[::-1], [0.0]))
+    return sums
+
+
+NOBODY = -1
+"""Winner of a task for which no bid is known."""
+
+NO_BID = -np.inf
+"""Bid for such a task. The paper has 0, and tasks not worth it stay behind; eq. 1 wants all."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beliefs:
+    """What every UAV believes; row i is UAV i's."""
+
+    winner: IntArray
+    """(n_uav, n_task) z: who wins each task; `NOBODY` if none."""
+    bid: FloatArray
+    """(n_uav, n_task) y: the winner's bid [value·s]; `NO_BID` if none."""
+    heard: IntArray
+    """(n_uav, n_uav) s: the round of the newest information about each UAV."""
+
+    @classmethod
+    def blank(cls, n_uav: int, n_task: int) -> Beliefs:
+        """Nobody has bid, nobody has been heard."""
+        return cls(
+            np.full((n_uav, n_task), NOBODY, dtype=np.int64),
+            np.full((n_uav, n_task), NO_BID),
+            np.zeros((n_uav, n_uav), dtype=np.int64),
+        )
+
+    def copy(self) -> Beliefs:
+        """Independent arrays."""
+        return Beliefs(self.winner.copy(), self.bid.copy(), self.heard.copy())
+
+
+def update_beliefs(
+    beliefs: Beliefs, said: Beliefs, sender: int, receivers: IntArray, now: int
+) -> None:
+    """Let ``receivers`` take in one message of ``sender``.
+
+    Args:
+        beliefs: changed in place.
+        said: what was believed when the message was sent.
+        sender: index of a UAV, not among the receivers.
+        receivers: (k,) indices.
+        now: number of this round; timestamps of direct contact.
+    """
+    own = receivers[:, None]
+    mine, my_bid = beliefs.winner[receivers], beliefs.bid[receivers]
+    theirs, their_bid = said.winner[sender], said.bid[sender]
+    better = (their_bid > my_bid) | ((their_bid == my_bid) & (theirs < mine))
+
+    news = said.heard[sender] > beliefs.heard[receivers]  # (k, n_uav): s_km > s_im
+    stale = said.heard[sender] < beliefs.heard[receivers]
+    # a winner that is nobody points anywhere; every use below asks for somebody first
+    news_of_mine = np.take_along_axis(news, np.maximum(mine, 0), axis=1)
+    news_of_theirs = news[:, theirs]
+    stale_of_theirs = stale[:, theirs]
+
+    i_win, sender_wins, nobody = mine == own, mine == sender, mine == NOBODY
+    third = ~(i_win | sender_wins | nobody)
+    says_self, says_nobody = theirs == sender, theirs == NOBODY
+    says_me = theirs == own
+    says_third = ~(says_self | says_nobody | says_me)
+    same, other = third & (mine == theirs), third & (mine != theirs)
+
+    update: BoolArray = says_self & (
+        (i_win & better) | sender_wins | (third & (news_of_mine | better)) | nobody
+    )
+    reset: BoolArray = says_me & (sender_wins | (third & news_of_mine))
+    update |= (
+        says_third
+        & news_of_theirs
+        & ((i_win & better) | sender_wins | same | (other & (news_of_mine | better)) | nobody)
+    )
+    reset |= says_third & sender_wins & ~news_of_theirs
+    reset |= says_third & other & news_of_mine & stale_of_theirs
+    update |= says_nobody & (sender_wins | (third & news_of_mine))
+
+    beliefs.winner[receivers] = np.where(update, theirs, np.where(reset, NOBODY, mine))
+    beliefs.bid[receivers] = np.where(update, their_bid, np.where(reset, NO_BID, my_bid))
+    beliefs.heard[receivers] = np.maximum(beliefs.heard[receivers], said.heard[sender])
+    beliefs.heard[receivers, sender] = now
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +313,7 @@ class _Auction:
         self.rounds += 1
         for sender, receivers in enumerate(self._receivers):
             if len(receivers):
-                hear(self._beliefs, said, sender, receivers, self.rounds)
+                update_beliefs(self._beliefs, said, sender, receivers, self.rounds)
 
     def _release(self, uav: int) -> None:
         """Drop the first task lost and all added after it (eq. 8 of the 2009 paper)."""

@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from sim.study.baselines.index_rule import Routes
+from sim.study.baselines.index_rules import Routes
 from swarm.allocation.problem import FloatArray, IntArray, Problem
-from swarm.errors import Fault, InputError
+from swarm.runtime.errors import Fault, InputError
 
 __all__ = ["SHORTFALL", "is_installed", "matrix_bytes", "ortools_routes", "require_installed"]
+
 
 SHORTFALL = (
     "OR-Tools has no value that falls with time and depends on who serves: a task's lateness "

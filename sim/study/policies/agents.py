@@ -4,7 +4,7 @@ The coordinator plans once, before the mission; under `guided` it lives on and p
 the others it dies as the mission begins, and tasks that appear or are withdrawn come from an
 operator's seat. A UAV that has set out for a task is diverted by nobody's plan. Decisions are
 timed as whole steps of an agent in which it decided. Leaves out: the world they fly in
-(sim.fated_world) and policies that know of everything at once (other modules here).
+(sim.world.stochastic_world) and policies that know of everything at once (other modules here).
 """
 
 from __future__ import annotations
@@ -13,16 +13,15 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from agent.core import AgentCore
-from agent.events import Action, Event
-from sim.fate import Fate
-from sim.fated_world import FatedWorld
-from sim.study.flight import Flight
-from sim.study.policy import Planner
-from sim.study.tally import Tally
-from swarm.clock import Clock
-from swarm.events import Note
+from agent.core.agent_core import AgentCore
+from agent.core.interface import Action, Event
+from sim.study.policies.roster import Planner
+from sim.world.outcome import FlightOutcome, Tally
+from sim.world.stochastic_world import StochasticWorld
+from sim.world.uncertainty import Realization
 from swarm.model import Mission, Plan
+from swarm.protocol.events import LogLine
+from swarm.runtime.clock import Clock
 
 __all__ = ["GREEDY", "GUIDED", "GUIDED_ALONE", "LOOKAHEAD", "AgentsPolicy"]
 
@@ -40,7 +39,7 @@ class _TimedAgent(AgentCore):
         began_s = self._clock.now_s()
         actions = super().step(event, now_s)
         if actions and any(
-            isinstance(action, Note) and action.text == "decided" for action in actions
+            isinstance(action, LogLine) and action.text == "decided" for action in actions
         ):
             self._taken_s.append(self._clock.now_s() - began_s)
         return actions
@@ -57,7 +56,7 @@ class AgentsPolicy:
     coordinator_lost_s: float | None = 0.0
     """Mission time at which the coordinator dies [s]; None if it lives."""
 
-    def fly(self, fate: Fate, plan: Planner, clock: Clock) -> Flight:
+    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
         """Fly a mission to its end.
 
         Args:
@@ -71,7 +70,7 @@ class AgentsPolicy:
             return plan(mission, method)
 
         tally, taken_s = Tally(), list[float]()
-        flown = FatedWorld(
+        flown = StochasticWorld(
             fate,
             make_plan,
             method=self.method,
@@ -81,7 +80,7 @@ class AgentsPolicy:
             make_agent=partial(_TimedAgent, clock=clock, taken_s=taken_s),
         )
         flown.run()
-        return Flight(
+        return FlightOutcome(
             visits=tuple(tally.visits),
             lost_uavs=tuple(flown.lost),
             epochs=tally.epochs,

@@ -1,10 +1,10 @@
-"""A value that nobody can exceed who meets the same fate, not even one who knows all of it.
+"""A value that nobody can exceed who meets the same realization, not even one who knows all of it.
 
-**What counts.** Whoever decides, every task adds to `sim.study.flight.value_of` at one visit at
+**What counts.** Whoever decides, every task adds to `sim.world.outcome.value_of` at one visit at
 most. Let j be the UAV that makes it, at time t, at the end of its k-th attempt. What the visit adds
-is at most S·m·(D − t)⁺ times p, or times 1 where outcomes are drawn. Then k is 1, or the number
-of the attempt that the fate lets succeed; that must be 1 as well unless the mission reattempts, as
-no UAV tries again what is not open again. So
+is at most S·m·(D − t)⁺ times p, or times 1 where outcomes are drawn. Then k is 1, or the number of
+the attempt that the realization lets succeed; that must be 1 as well unless the mission reattempts,
+as no UAV tries again what is not open again. So
 
 - t is not before the task has appeared, j could be there and k services are over, nor after the
   task is withdrawn or j is lost; earlier attempts may have been made long before, so after its
@@ -15,8 +15,8 @@ no UAV tries again what is not open again. So
   each with the power of its number of attempts.
 
 **Flights.** Between two of its counted visits j moves from true stop to true stop and then serves.
-It may turn off on the way, towards other tasks, and however it turns its velocity stays within
-what the fate lets it fly in that direction at the greatest speed of all its legs. With a wind
+It may turn off on the way, towards other tasks, and however it turns its velocity stays within what
+the realization lets it fly in that direction at the greatest speed of all its legs. With a wind
 these velocities form a convex set around 0 (two balls' common part), so by the triangle inequality
 no detour is faster than the straight leg at that speed. Without variation from leg to leg that is
 the leg as it is really flown; with it the bound is that much too generous.
@@ -41,9 +41,9 @@ from functools import partial
 import numpy as np
 
 from coordinator.planner.bound import lagrangian_bound
-from sim.fate import Fate
-from sim.kinematics import Point
-from sim.study.policy import Planner
+from sim.study.policies.roster import Planner
+from sim.world.motion import Point
+from sim.world.uncertainty import Realization
 from swarm.allocation import Problem
 from swarm.allocation.problem import BoolArray, FloatArray, IntArray
 from swarm.kernels.routes import RouteArrays, TeamArrays
@@ -51,6 +51,7 @@ from swarm.kernels.routes_bound import Timetable, priced_lists
 from swarm.model import Task, Uav
 
 __all__ = ["Clairvoyant", "clairvoyant_bound"]
+
 
 _CYCLES = 60
 _OPERATIONS = 1e10
@@ -79,13 +80,13 @@ class Clairvoyant:
     name = "clairvoyant"
     what = "no policy can be better: an upper bound that knows all draws"
 
-    def value(self, fate: Fate, plan: Planner) -> float:
-        """The bound for that fate [value·s]; it needs no plan."""
+    def value(self, fate: Realization, plan: Planner) -> float:
+        """The bound for that realization [value·s]; it needs no plan."""
         del plan
         return clairvoyant_bound(fate)
 
 
-def clairvoyant_bound(fate: Fate) -> float:
+def clairvoyant_bound(fate: Realization) -> float:
     """No flight in ``fate`` has a larger value [value·s].
 
     A quarter of a second at 10 UAVs × 50 tasks. Where lists are long (more than ten tasks) the
@@ -119,7 +120,7 @@ def clairvoyant_bound(fate: Fate) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Hindsight:
-    """The mission as it looks to one who knows the fate."""
+    """The mission as it looks to one who knows the realization."""
 
     team: TeamArrays
     worth: FloatArray
@@ -131,8 +132,8 @@ class _Hindsight:
     timetable: Timetable
 
     @classmethod
-    def of(cls, fate: Fate) -> _Hindsight:
-        """All that the fate says of every UAV and task."""
+    def of(cls, fate: Realization) -> _Hindsight:
+        """All that the realization says of every UAV and task."""
         mission = fate.mission
         problem = Problem.from_mission(mission)
         attempts, survives = _attempts(fate)
@@ -178,7 +179,7 @@ class _Hindsight:
         return worth
 
 
-def _attempts(fate: Fate) -> tuple[IntArray, BoolArray]:
+def _attempts(fate: Realization) -> tuple[IntArray, BoolArray]:
     """(n_uav, n_task) attempts until one succeeds, 0 for never; whether the UAV survives them."""
     mission = fate.mission
     shape = (len(mission.uavs), len(mission.tasks))
@@ -190,7 +191,7 @@ def _attempts(fate: Fate) -> tuple[IntArray, BoolArray]:
     return attempts, survives
 
 
-def _attempts_of(fate: Fate, uav: Uav, task: Task) -> tuple[int, bool]:
+def _attempts_of(fate: Realization, uav: Uav, task: Task) -> tuple[int, bool]:
     most = _MOST_ATTEMPTS if fate.mission.reattempt_failed else 1
     for attempt in range(1, most + 1):
         survives = fate.survives(uav, task, attempt)
@@ -201,7 +202,7 @@ def _attempts_of(fate: Fate, uav: Uav, task: Task) -> tuple[int, bool]:
     return (most + 1, True) if fate.mission.reattempt_failed else (0, True)
 
 
-def _flights_s(fate: Fate) -> tuple[FloatArray, FloatArray]:
+def _flights_s(fate: Realization) -> tuple[FloatArray, FloatArray]:
     """Least flight times, from starts (n_uav, n_task) and between tasks (n_uav, n_task, n_task)."""
     mission = fate.mission
     n_uav, n_task = len(mission.uavs), len(mission.tasks)
@@ -214,7 +215,7 @@ def _flights_s(fate: Fate) -> tuple[FloatArray, FloatArray]:
     return start_s, between_s
 
 
-def _at_its_fastest(fate: Fate, uav: Uav) -> Uav:
+def _at_its_fastest(fate: Realization, uav: Uav) -> Uav:
     """The UAV with the speed on its fastest leg as its cruise speed, as variation there goes."""
     here = uav.position_enu_m
     still_m_s = fate.speed_m_s(uav, None, here, here)
@@ -223,7 +224,7 @@ def _at_its_fastest(fate: Fate, uav: Uav) -> Uav:
     return replace(uav, speed_m_s=uav.speed_m_s * max(1.0, fastest_m_s / still_m_s))
 
 
-def _legs_s(fate: Fate, uav: Uav, starts: list[Point], stops: list[Point]) -> FloatArray:
+def _legs_s(fate: Realization, uav: Uav, starts: list[Point], stops: list[Point]) -> FloatArray:
     """(len(starts), len(stops)) straight flights."""
     begin, end = np.array(starts, float).reshape(-1, 3), np.array(stops, float).reshape(-1, 3)
     length_m = np.sqrt(((end[None] - begin[:, None]) ** 2).sum(axis=2))

@@ -14,15 +14,15 @@ from typing import Protocol
 
 import numpy as np
 
-from sim.kinematics import Point
+from sim.world.motion import Point
 from swarm.allocation import Problem, TeamState
 from swarm.allocation.problem import FloatArray, IntArray
-from swarm.clock import Clock
+from swarm.runtime.clock import Clock
 
-__all__ = ["Account", "Chooser", "Leg", "News", "Situation", "as_point", "between"]
+__all__ = ["Account", "Dispatcher", "TeamLeg", "TeamNews", "TeamSituation", "as_point", "between"]
 
 
-class News(Enum):
+class TeamNews(Enum):
     """What may have happened since choices were last made."""
 
     BEGUN = auto()
@@ -38,11 +38,11 @@ class News(Enum):
     LOST = auto()
     """A UAV; the task it was doing is open again."""
     TIME = auto()
-    """The interval has passed after which a chooser wants to be asked."""
+    """The interval has passed after which a dispatcher wants to be asked."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Leg:
+class TeamLeg:
     """One UAV's way to a task, and its service there."""
 
     task: int
@@ -65,8 +65,8 @@ class Leg:
 
 
 @dataclass(slots=True, eq=False)
-class Situation:
-    """Where the mission stands; choosers read it and change nothing."""
+class TeamSituation:
+    """Where the mission stands; dispatchers read it and change nothing."""
 
     problem: Problem
     """All UAVs, and the tasks that have appeared so far: new ones come last."""
@@ -79,7 +79,7 @@ class Situation:
     """(n_uav,) place in the priority sequence; 0 decides first."""
     now_s: float = 0.0
     """Mission time [s]."""
-    legs: dict[int, Leg] = field(default_factory=dict)
+    legs: dict[int, TeamLeg] = field(default_factory=dict)
     """By UAV index: what it is doing."""
     survived_before: FloatArray = field(default_factory=lambda: np.ones(0))
     """(n_uav,) S of eq. 1 without the tasks under way."""
@@ -109,7 +109,7 @@ class Situation:
 
 @dataclass(slots=True)
 class Account:
-    """What a chooser tells of its work."""
+    """What a dispatcher tells of its work."""
 
     clock: Clock
     epochs: int = 0
@@ -127,7 +127,7 @@ class Account:
         self.decision_s.append(self.clock.now_s() - begin_s)
 
 
-class Chooser(Protocol):
+class Dispatcher(Protocol):
     """Who decides for all."""
 
     @property
@@ -135,7 +135,7 @@ class Chooser(Protocol):
         """Of its work so far."""
         ...
 
-    def hear(self, situation: Situation, news: Collection[News]) -> Collection[int]:
+    def hear(self, situation: TeamSituation, news: Collection[TeamNews]) -> Collection[int]:
         """Something has happened, all of it at the same moment.
 
         Returns:
@@ -143,7 +143,7 @@ class Chooser(Protocol):
         """
         ...
 
-    def choose(self, situation: Situation, uav: int) -> int | None:
+    def choose(self, situation: TeamSituation, uav: int) -> int | None:
         """The open task that ``uav``, which is free, shall do now; None: it waits for news."""
         ...
 

@@ -1,12 +1,12 @@
 """A fleet with ideal communication, decision by decision: every UAV knows at once what all do.
 
-What happens comes from a drawn future (`sim.fate`): losses, pop-ups and withdrawals by time, the
-outcome of every attempt, how fast a leg is really flown and where it really ends. Who decides
-knows nominal speeds, the tasks that have appeared, and where UAVs believe to be; without
+What happens comes from a drawn future (`sim.world.uncertainty`): losses, pop-ups and withdrawals by
+time, the outcome of every attempt, how fast a leg is really flown and where it really ends. Who
+decides knows nominal speeds, the tasks that have appeared, and where UAVs believe to be; without
 uncertainty times are those of `swarm.allocation.evaluate`, float for float. UAVs decide when they
 are free, those free at the same moment in the order of their ranks; idle ones are asked again
-whenever anything has happened. Leaves out: how is decided (the other modules of this package),
-and agents, messages and vehicles (sim.world).
+whenever anything has happened. Leaves out: how is decided (the other modules of this package), and
+agents, messages and vehicles (sim.world.virtual_world).
 """
 
 from __future__ import annotations
@@ -19,10 +19,17 @@ from functools import partial
 
 import numpy as np
 
-from sim.fate import Fate
-from sim.kinematics import Point
-from sim.study.flight import Flight, Visit
-from sim.study.policies.situation import Chooser, Leg, News, Situation, as_point, between
+from sim.study.policies.situation import (
+    Dispatcher,
+    TeamLeg,
+    TeamNews,
+    TeamSituation,
+    as_point,
+    between,
+)
+from sim.world.motion import Point
+from sim.world.outcome import FlightOutcome, TaskVisit
+from sim.world.uncertainty import Realization
 from swarm.allocation import Problem, TeamState, rank_of
 from swarm.model import UavId
 
@@ -30,37 +37,39 @@ __all__ = ["fly_team"]
 
 
 def fly_team(
-    fate: Fate,
-    chooser: Chooser,
+    fate: Realization,
+    dispatcher: Dispatcher,
     *,
     sequence: Sequence[UavId] | None = None,
     every_s: float | None = None,
-) -> Flight:
+) -> FlightOutcome:
     """Fly a mission to its end.
 
     Args:
         fate: what happens.
-        chooser: decides.
+        dispatcher: decides.
         sequence: UAVs, first decider first; those not in it follow, as the mission has them.
-        every_s: the chooser hears that this interval has passed, again and again [s]; > 0.
+        every_s: the dispatcher hears that this interval has passed, again and again [s]; > 0.
 
     Raises:
-        ValueError: the interval is not positive, or the chooser wants what it must not.
+        ValueError: the interval is not positive, or the dispatcher wants what it must not.
     """
     if every_s is not None and not 0.0 < every_s < math.inf:
         raise ValueError(f"every_s must be > 0 and finite, not {every_s}")
-    flight = _Flying(fate, chooser, sequence or ())
+    flight = _TeamFlight(fate, dispatcher, sequence or ())
     if every_s is not None:
         flight.remind(every_s)
     return flight.run()
 
 
-class _Flying:
+class _TeamFlight:
     """One mission in progress."""
 
-    def __init__(self, fate: Fate, chooser: Chooser, sequence: Sequence[UavId]) -> None:
+    def __init__(
+        self, fate: Realization, dispatcher: Dispatcher, sequence: Sequence[UavId]
+    ) -> None:
         self._fate = fate
-        self._chooser = chooser
+        self._dispatcher = dispatcher
         mission = fate.mission
         gone_s = fate.withdrawn_at_s
         self._uavs = mission.uavs
@@ -72,14 +81,14 @@ class _Flying:
         self._all = Problem.from_mission(mission, tasks=self._tasks)
         self._rows = {uav.id: row for row, uav in enumerate(self._uavs)}
         self._columns = {task.id: column for column, task in enumerate(self._tasks)}
-        self._heap: list[tuple[float, int, Callable[[], Collection[News]]]] = []
+        self._heap: list[tuple[float, int, Callable[[], Collection[TeamNews]]]] = []
         self._numbers = itertools.count()
         self._survival_matters = not fate.uncertainty.survival
         n_known = sum(task.appears_s == 0.0 for task in self._tasks)
         problem = self._problem_of(n_known)
         listed = [self._rows[uav] for uav in sequence if uav in self._rows]
         rest = [row for row in range(problem.n_uav) if row not in listed]
-        self._situation = Situation(
+        self._situation = TeamSituation(
             problem=problem,
             state=TeamState.at_start(problem),
             rank=rank_of([*listed, *rest]),
@@ -89,26 +98,26 @@ class _Flying:
         self._due_s = np.zeros(problem.n_uav)
         self._true_enu_m = {row: uav.position_enu_m for row, uav in enumerate(self._uavs)}
         self._attempts: dict[tuple[int, int], int] = {}
-        self._visits: list[Visit] = []
+        self._visits: list[TaskVisit] = []
         self._lost: list[UavId] = []
         self._released = 0
         self._schedule()
 
     def remind(self, every_s: float) -> None:
-        """Let the chooser hear that time passes, while anything else is to come."""
+        """Let the dispatcher hear that time passes, while anything else is to come."""
         when_s = self._situation.now_s + every_s
 
-        def pass_by() -> Collection[News]:
+        def pass_by() -> Collection[TeamNews]:
             if self._heap:
                 self.remind(every_s)
-            return (News.TIME,)
+            return (TeamNews.TIME,)
 
         self._at(when_s, pass_by)
 
-    def run(self) -> Flight:
+    def run(self) -> FlightOutcome:
         """Fly until nothing is left to happen."""
         situation, heap = self._situation, self._heap
-        news: set[News] = {News.BEGUN}
+        news: set[TeamNews] = {TeamNews.BEGUN}
         waiting: list[int] = []
         while True:
             while heap and heap[0][0] <= situation.now_s:
@@ -120,15 +129,15 @@ class _Flying:
                 news.clear()
             elif waiting:
                 uav = waiting.pop(0)
-                task = self._chooser.choose(situation, uav)
+                task = self._dispatcher.choose(situation, uav)
                 if task is not None:
                     self._set_off(uav, task)
             elif heap:
                 situation.now_s = heap[0][0]
             else:
                 break
-        account = self._chooser.account
-        return Flight(
+        account = self._dispatcher.account
+        return FlightOutcome(
             visits=tuple(self._visits),
             lost_uavs=tuple(self._lost),
             epochs=account.epochs,
@@ -149,7 +158,7 @@ class _Flying:
         for late_s in sorted({task.appears_s for task in self._tasks} - {0.0}):
             self._at(late_s, self._appear)
 
-    def _at(self, time_s: float, happen: Callable[[], Collection[News]]) -> None:
+    def _at(self, time_s: float, happen: Callable[[], Collection[TeamNews]]) -> None:
         heapq.heappush(self._heap, (time_s, next(self._numbers), happen))
 
     def _is_over(self) -> bool:
@@ -159,15 +168,15 @@ class _Flying:
         state = situation.state
         return not situation.problem.capable[state.active][:, state.open].any()
 
-    def _appear(self) -> Collection[News]:
+    def _appear(self) -> Collection[TeamNews]:
         situation = self._situation
         n_known = sum(task.appears_s <= situation.now_s for task in self._tasks)
         new = np.ones(n_known - situation.problem.n_task, dtype=np.bool_)
         situation.problem = self._problem_of(n_known)
         situation.state.open = np.concatenate((situation.state.open, new))
-        return (News.APPEARED,)
+        return (TeamNews.APPEARED,)
 
-    def _withdraw(self, task: int) -> Collection[News]:
+    def _withdraw(self, task: int) -> Collection[TeamNews]:
         situation = self._situation
         doer = next((uav for uav, leg in situation.legs.items() if leg.task == task), None)
         if doer is not None:
@@ -175,9 +184,9 @@ class _Flying:
         elif not situation.state.open[task]:
             return ()
         situation.state.open[task] = False
-        return (News.WITHDRAWN,)
+        return (TeamNews.WITHDRAWN,)
 
-    def _lose(self, uav: int) -> Collection[News]:
+    def _lose(self, uav: int) -> Collection[TeamNews]:
         situation = self._situation
         if not situation.state.active[uav]:
             return ()
@@ -186,9 +195,9 @@ class _Flying:
         if leg is not None:
             situation.state.open[leg.task] = True
         self._lost.append(self._uavs[uav].id)
-        return (News.LOST,)
+        return (TeamNews.LOST,)
 
-    def _end(self, uav: int, leg: Leg) -> Collection[News]:
+    def _end(self, uav: int, leg: TeamLeg) -> Collection[TeamNews]:
         situation = self._situation
         if situation.legs.get(uav) is not leg:
             return ()  # given up, or lost on the way
@@ -197,7 +206,7 @@ class _Flying:
         key = uav, leg.task
         attempt = self._attempts[key] = self._attempts.get(key, 0) + 1
         done = self._fate.succeeds(who, task, attempt)
-        self._visits.append(Visit(who.id, task.id, situation.now_s, done))
+        self._visits.append(TaskVisit(who.id, task.id, situation.now_s, done))
         self._true_enu_m[uav] = leg.true_stop_enu_m
         self._due_s[uav] = situation.now_s
         if self._survival_matters:
@@ -205,18 +214,18 @@ class _Flying:
         situation.state.survived[uav] = situation.survived_before[uav]
         reopens = not done and self._fate.mission.reattempt_failed
         situation.state.open[leg.task] = reopens
-        news = [News.REOPENED if reopens else News.ENDED]
+        news = [TeamNews.REOPENED if reopens else TeamNews.ENDED]
         if not self._fate.survives(who, task, attempt):
             news += self._lose(uav)
         return news
 
     # -- what UAVs do -----------------------------------------------------------------
 
-    def _tell(self, news: Collection[News]) -> list[int]:
-        """Let the chooser hear of it; who is to be asked now, in their order."""
+    def _tell(self, news: Collection[TeamNews]) -> list[int]:
+        """Let the dispatcher hear of it; who is to be asked now, in their order."""
         situation = self._situation
         np.maximum(self._due_s, situation.now_s, out=situation.state.free_s)
-        for uav in sorted(self._chooser.hear(situation, news)):
+        for uav in sorted(self._dispatcher.hear(situation, news)):
             if uav not in situation.in_flight():
                 raise ValueError(f"UAV {self._uavs[uav].id} is not in flight and cannot give up")
             task = situation.legs[uav].task
@@ -248,7 +257,7 @@ class _Flying:
         speed_m_s = self._fate.speed_m_s(who, what.id, true_start, stop)
         arrives_s = now_s + _distance_m(true_start, stop) / speed_m_s
         travel_s = _distance_m(start, what.position_enu_m) / who.speed_m_s
-        leg = Leg(
+        leg = TeamLeg(
             task=task,
             start_enu_m=start,
             left_s=now_s,

@@ -1,6 +1,6 @@
 """Files that tasks come from: QGroundControl plans, waypoint files, GeoJSON and CSV."""
 
-from swarm.scenario.task_files.entries import Entry, Request, TaskFile
 from swarm.scenario.task_files.read import SUFFIXES, read_task_file
+from swarm.scenario.task_files.task_file import FileTask, ReadOptions, TaskFile
 
-__all__ = ["SUFFIXES", "Entry", "Request", "TaskFile", "read_task_file"]
+__all__ = ["SUFFIXES", "FileTask", "ReadOptions", "TaskFile", "read_task_file"]

@@ -12,12 +12,19 @@ import csv
 import io
 from collections.abc import Sequence
 
-from swarm.errors import Fault, InputError
+from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import number_of, printable, shown
-from swarm.scenario.task_files.entries import TASK_KEYS, Entry, Request, TaskFile, gather
-from swarm.scenario.task_files.names import slip_of
+from swarm.scenario.task_files.task_file import (
+    TASK_KEYS,
+    FileTask,
+    ReadOptions,
+    TaskFile,
+    gather,
+    slip_of,
+)
 
 __all__ = ["read_csv"]
+
 
 _DEGREES = ("lat_deg", "lon_deg", "alt_m")
 _METRES = ("east_m", "north_m", "up_m")
@@ -26,7 +33,7 @@ _WORDS = {"id", "kind"}
 _WANTED = "give columns lat_deg and lon_deg, or east_m and north_m"
 
 
-def read_csv(text: str, request: Request) -> TaskFile:
+def read_csv(text: str, request: ReadOptions) -> TaskFile:
     """The tasks of a table.
 
     Raises:
@@ -82,7 +89,9 @@ def _check(header: Sequence[str], source: str, place: str) -> None:
         raise InputError(*faults)
 
 
-def _entry(place: str, header: Sequence[str], cells: Sequence[str], source: str) -> Entry | Fault:
+def _entry(
+    place: str, header: Sequence[str], cells: Sequence[str], source: str
+) -> FileTask | Fault:
     if len(cells) > len(header):
         problem = f"has {len(cells)} cells for {len(header)} columns"
         return Fault(source, place, problem, "put cells with a separator in them in quotes")
@@ -102,7 +111,7 @@ def _entry(place: str, header: Sequence[str], cells: Sequence[str], source: str)
             return Fault(source, f"{place}, {name}", "is empty", "give a number such as 12.5")
     if in_metres:
         table["position_m"] = [table.pop(name) for name in _METRES if name in table]
-    return Entry(table, place)
+    return FileTask(table, place)
 
 
 def _number(text: str) -> float | None:

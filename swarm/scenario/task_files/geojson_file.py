@@ -10,18 +10,26 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 
-from swarm.errors import Fault, InputError
+from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import number_of, printable, shown
-from swarm.scenario.task_files.entries import TASK_KEYS, Entry, Request, TaskFile, gather
-from swarm.scenario.task_files.json_text import member, parse_object
-from swarm.scenario.task_files.names import slip_of
+from swarm.scenario.task_files.task_file import (
+    TASK_KEYS,
+    FileTask,
+    ReadOptions,
+    TaskFile,
+    gather,
+    member,
+    parse_object,
+    slip_of,
+)
 
 __all__ = ["read_geojson"]
+
 
 _WHAT = "a FeatureCollection of Points in GeoJSON"
 
 
-def read_geojson(text: str, request: Request) -> TaskFile:
+def read_geojson(text: str, request: ReadOptions) -> TaskFile:
     """The tasks of a feature collection.
 
     Raises:
@@ -35,7 +43,7 @@ def read_geojson(text: str, request: Request) -> TaskFile:
     if not isinstance(features, list):
         raise InputError(Fault(request.source, "features", "is not an array", f"give {_WHAT}"))
     left_out: Counter[str] = Counter()
-    found: list[Entry | Fault] = []
+    found: list[FileTask | Fault] = []
     for index, feature in enumerate(features):
         properties = member(feature, "properties")
         given = properties if isinstance(properties, Mapping) else {}
@@ -47,7 +55,7 @@ def read_geojson(text: str, request: Request) -> TaskFile:
 
 def _entry(
     place: str, feature: object, properties: Mapping[str, object], source: str
-) -> Entry | Fault:
+) -> FileTask | Fault:
     geometry = member(feature, "geometry", "type")
     if geometry != "Point":
         problem = f"{shown(geometry)} is not 'Point'" if geometry else "has no geometry"
@@ -75,4 +83,4 @@ def _entry(
             return Fault(source, where, f"{shown(name)} is unknown", f"did you mean {slip!r}?")
         if name in TASK_KEYS and name != "id" and value is not None:
             table[name] = value
-    return Entry(table, place)
+    return FileTask(table, place)

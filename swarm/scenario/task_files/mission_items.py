@@ -13,18 +13,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-from swarm.errors import Fault
 from swarm.model import Origin
+from swarm.runtime.errors import Fault
 from swarm.scenario.findings import number_of, shown
-from swarm.scenario.task_files.entries import Entry
+from swarm.scenario.task_files.task_file import FileTask
 
-__all__ = ["BELOW_M", "Command", "Frame", "Item", "left_out_of", "stops_of", "whole_of"]
+__all__ = [
+    "BELOW_M",
+    "MavCommand",
+    "MavFrame",
+    "WaypointItem",
+    "left_out_of",
+    "stops_of",
+    "whole_of",
+]
+
 
 BELOW_M = 10.0
 """How far a task lies below its waypoint [m]: the coordinator's lowest layer unless told."""
 
 
-class Command(IntEnum):
+class MavCommand(IntEnum):
     """MAV_CMD, as far as it matters here."""
 
     WAYPOINT = 16
@@ -39,7 +48,7 @@ class Command(IntEnum):
     CHANGE_SPEED = 178
 
 
-class Frame(IntEnum):
+class MavFrame(IntEnum):
     """MAV_FRAME, as far as it matters here."""
 
     GLOBAL = 0
@@ -56,22 +65,22 @@ class Frame(IntEnum):
 
 
 _STOPS = {
-    Command.WAYPOINT,
-    Command.LOITER_UNLIMITED,
-    Command.LOITER_TURNS,
-    Command.LOITER_TIME,
-    Command.LOITER_TO_ALTITUDE,
-    Command.SPLINE_WAYPOINT,
+    MavCommand.WAYPOINT,
+    MavCommand.LOITER_UNLIMITED,
+    MavCommand.LOITER_TURNS,
+    MavCommand.LOITER_TIME,
+    MavCommand.LOITER_TO_ALTITUDE,
+    MavCommand.SPLINE_WAYPOINT,
 }
-_WITH_HOLD = {Command.WAYPOINT, Command.LOITER_TIME, Command.SPLINE_WAYPOINT}
+_WITH_HOLD = {MavCommand.WAYPOINT, MavCommand.LOITER_TIME, MavCommand.SPLINE_WAYPOINT}
 """Commands whose first parameter is a time on the spot [s]."""
-_ABOVE_SEA = {Frame.GLOBAL, Frame.GLOBAL_INT}
-_ABOVE_HOME = {Frame.GLOBAL_RELATIVE, Frame.GLOBAL_RELATIVE_INT}
-_ABOVE_GROUND = {Frame.GLOBAL_TERRAIN, Frame.GLOBAL_TERRAIN_INT}
+_ABOVE_SEA = {MavFrame.GLOBAL, MavFrame.GLOBAL_INT}
+_ABOVE_HOME = {MavFrame.GLOBAL_RELATIVE, MavFrame.GLOBAL_RELATIVE_INT}
+_ABOVE_GROUND = {MavFrame.GLOBAL_TERRAIN, MavFrame.GLOBAL_TERRAIN_INT}
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class WaypointItem:
     """One item of a mission."""
 
     command: int
@@ -91,8 +100,8 @@ def whole_of(value: object) -> int | None:
 
 
 def stops_of(
-    items: Sequence[Item], home: Origin | None, below_m: float, homeless: Fault
-) -> list[Entry | Fault]:
+    items: Sequence[WaypointItem], home: Origin | None, below_m: float, homeless: Fault
+) -> list[FileTask | Fault]:
     """The tasks that ``items`` become; items that are not flown to become none.
 
     Args:
@@ -108,18 +117,18 @@ def stops_of(
     return [_stop(item, homeless.source, home_alt_m, below_m) for item in stops]
 
 
-def left_out_of(items: Sequence[Item]) -> Counter[str]:
+def left_out_of(items: Sequence[WaypointItem]) -> Counter[str]:
     """What in ``items`` becomes no task, by name."""
     return Counter(_name(item.command) for item in items if item.command not in _STOPS)
 
 
 def _name(command: int) -> str:
-    if command not in set(Command):
+    if command not in set(MavCommand):
         return f"command {command}"
-    return Command(command).name.lower().replace("_", " ")
+    return MavCommand(command).name.lower().replace("_", " ")
 
 
-def _stop(item: Item, source: str, home_alt_m: float, below_m: float) -> Entry | Fault:
+def _stop(item: WaypointItem, source: str, home_alt_m: float, below_m: float) -> FileTask | Fault:
     hold, *_, lat, lon, height = item.params
     lat_deg, lon_deg = number_of(lat), number_of(lon)
     if lat_deg is None or lon_deg is None or lat_deg == lon_deg == 0.0:
@@ -139,10 +148,10 @@ def _stop(item: Item, source: str, home_alt_m: float, below_m: float) -> Entry |
     table: dict[str, object] = {"lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m - below_m}
     if item.command in _WITH_HOLD and number_of(hold):
         table["service_s"] = number_of(hold)
-    return Entry(table, item.place)
+    return FileTask(table, item.place)
 
 
-def _alt_m(item: Item, home_alt_m: float) -> float | None:
+def _alt_m(item: WaypointItem, home_alt_m: float) -> float | None:
     """Height of the waypoint above mean sea level [m]; None when it cannot be told."""
     height_m = number_of(item.params[6])
     if item.frame in _ABOVE_SEA:

@@ -11,22 +11,22 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from swarm.errors import Fault, InputError
 from swarm.model import Origin
+from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import number_of, shown
-from swarm.scenario.task_files.entries import Request, TaskFile, gather
-from swarm.scenario.task_files.json_text import member, parse_object
 from swarm.scenario.task_files.mission_items import (
     BELOW_M,
-    Command,
-    Frame,
-    Item,
+    MavCommand,
+    MavFrame,
+    WaypointItem,
     left_out_of,
     stops_of,
     whole_of,
 )
+from swarm.scenario.task_files.task_file import ReadOptions, TaskFile, gather, member, parse_object
 
 __all__ = ["LAYER_KEY", "read_plan"]
+
 
 LAYER_KEY = "peckorder"
 """Top-level key under which an exported plan keeps its height layer, for the way back."""
@@ -38,7 +38,7 @@ _TRANSECTS = "TransectStyleComplexItem"
 _FIXED_WING = 1
 
 
-def read_plan(text: str, request: Request) -> TaskFile:
+def read_plan(text: str, request: ReadOptions) -> TaskFile:
     """The tasks of a plan.
 
     Raises:
@@ -51,7 +51,7 @@ def read_plan(text: str, request: Request) -> TaskFile:
     if below_m is None:
         layer_m = number_of(member(document, LAYER_KEY, "layer_m"))
         below_m = BELOW_M if layer_m is None else layer_m
-    items: list[Item] = []
+    items: list[WaypointItem] = []
     faults: list[Fault] = []
     landings: Counter[str] = Counter()
     for place, value in _numbered("mission.items", mission["items"]):
@@ -59,7 +59,7 @@ def read_plan(text: str, request: Request) -> TaskFile:
             landings["landing pattern"] += 1
             continue
         for item in _items(place, value, request.source):
-            if isinstance(item, Item):
+            if isinstance(item, WaypointItem):
                 items.append(item)
             else:
                 faults.append(item)
@@ -127,7 +127,7 @@ def _numbered(place: str, values: object) -> Iterator[tuple[str, object]]:
         yield f"{place}[{index}]", value
 
 
-def _items(place: str, value: object, source: str) -> Iterator[Item | Fault]:
+def _items(place: str, value: object, source: str) -> Iterator[WaypointItem | Fault]:
     """The mission items of one entry of ``items``."""
     match member(value, "type"):
         case "SimpleItem":
@@ -139,7 +139,7 @@ def _items(place: str, value: object, source: str) -> Iterator[Item | Fault]:
             yield Fault(source, place, problem, "give 'SimpleItem' or 'ComplexItem'")
 
 
-def _simple(place: str, value: object, source: str) -> Item | Fault:
+def _simple(place: str, value: object, source: str) -> WaypointItem | Fault:
     command, frame = whole_of(member(value, "command")), whole_of(member(value, "frame"))
     params = member(value, "params")
     if command is None or frame is None:
@@ -149,12 +149,12 @@ def _simple(place: str, value: object, source: str) -> Item | Fault:
         return Fault(
             source, place, f"{found} instead of 7", "save the plan again in QGroundControl"
         )
-    return Item(
+    return WaypointItem(
         command, frame, params, place, alt_m=number_of(member(value, "AMSLAltAboveTerrain"))
     )
 
 
-def _complex(place: str, value: object, source: str) -> Iterator[Item | Fault]:
+def _complex(place: str, value: object, source: str) -> Iterator[WaypointItem | Fault]:
     stored = member(value, _TRANSECTS, "Items")
     corners = member(value, _TRANSECTS, "VisualTransectPoints")
     if isinstance(stored, list) and stored:
@@ -167,21 +167,21 @@ def _complex(place: str, value: object, source: str) -> Iterator[Item | Fault]:
         for inner, corner in _numbered(f"{place}.{_TRANSECTS}.VisualTransectPoints", corners):
             pair = corner[:2] if isinstance(corner, list) and len(corner) >= 2 else [None, None]
             params = [0.0, 0.0, 0.0, None, *pair, height_m]
-            yield Item(Command.WAYPOINT, frame, params, inner)
+            yield WaypointItem(MavCommand.WAYPOINT, frame, params, inner)
     else:
         kind = shown(member(value, "complexItemType") or "complex item")
         remedy = "replace it by waypoints, a survey or a corridor scan"
         yield Fault(source, place, f"{kind} holds no waypoints", remedy)
 
 
-def _camera_frame(camera: object) -> Frame:
+def _camera_frame(camera: object) -> MavFrame:
     """What a survey's height counts from: a mode since QGroundControl 4.2, a flag before."""
     if member(camera, "DistanceToSurfaceRelative") is False:
-        return Frame.GLOBAL
+        return MavFrame.GLOBAL
     match whole_of(member(camera, "DistanceMode")):
         case 2:
-            return Frame.GLOBAL
+            return MavFrame.GLOBAL
         case 3 | 4:
-            return Frame.GLOBAL_TERRAIN
+            return MavFrame.GLOBAL_TERRAIN
         case _:
-            return Frame.GLOBAL_RELATIVE
+            return MavFrame.GLOBAL_RELATIVE

@@ -8,17 +8,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from swarm.errors import Fault, InputError
 from swarm.model import Origin
+from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.files import decode, read_bytes
 from swarm.scenario.findings import printable
 from swarm.scenario.task_files.csv_file import read_csv
-from swarm.scenario.task_files.entries import Reader, Request, TaskFile
 from swarm.scenario.task_files.geojson_file import read_geojson
 from swarm.scenario.task_files.plan_file import read_plan
+from swarm.scenario.task_files.task_file import Reader, ReadOptions, TaskFile
 from swarm.scenario.task_files.waypoints_file import read_waypoints
 
 __all__ = ["SUFFIXES", "read_task_file"]
+
 
 _READERS: Mapping[str, Reader] = {
     ".plan": read_plan,
@@ -53,7 +54,9 @@ def read_task_file(
     if below_m is not None and reader in _PLACES:
         problem = "holds places and no waypoints that tasks could lie below"
         raise InputError(Fault(source, "", problem, "leave out --below-m"))
-    tasks = reader(decode(read_bytes(path, _WHAT), source, _WHAT), Request(source, home, below_m))
+    tasks = reader(
+        decode(read_bytes(path, _WHAT), source, _WHAT), ReadOptions(source, home, below_m)
+    )
     if tasks.home is None and tasks.in_degrees:
         problem = "names no home, and places in degrees need one"
         remedy = "name it: --home LAT,LON,ALT, or [origin] in the scenario"

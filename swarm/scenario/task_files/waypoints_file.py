@@ -6,19 +6,26 @@ is home. Leaves out: version 120, which has no home.
 
 from __future__ import annotations
 
-from swarm.errors import Fault, InputError
 from swarm.model import Origin
+from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import number_of, shown
-from swarm.scenario.task_files.entries import Request, TaskFile, gather
-from swarm.scenario.task_files.mission_items import BELOW_M, Item, left_out_of, stops_of, whole_of
+from swarm.scenario.task_files.mission_items import (
+    BELOW_M,
+    WaypointItem,
+    left_out_of,
+    stops_of,
+    whole_of,
+)
+from swarm.scenario.task_files.task_file import ReadOptions, TaskFile, gather
 
 __all__ = ["read_waypoints"]
+
 
 _HEADER = "QGC WPL 110"
 _FIELDS = 12
 
 
-def read_waypoints(text: str, request: Request) -> TaskFile:
+def read_waypoints(text: str, request: ReadOptions) -> TaskFile:
     """The tasks of a waypoint file.
 
     Raises:
@@ -36,7 +43,7 @@ def read_waypoints(text: str, request: Request) -> TaskFile:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     faults = [row for row in rows if isinstance(row, Fault)]
-    items = [row for row in rows if isinstance(row, Item)]
+    items = [row for row in rows if isinstance(row, WaypointItem)]
     own, items = (items[0], items[1:]) if items and not faults else (None, items)
     home = request.home or (None if own is None else _home(own))
     below_m = BELOW_M if request.below_m is None else request.below_m
@@ -56,7 +63,7 @@ def read_waypoints(text: str, request: Request) -> TaskFile:
     )
 
 
-def _item(place: str, fields: list[str], source: str) -> Item | Fault:
+def _item(place: str, fields: list[str], source: str) -> WaypointItem | Fault:
     if len(fields) != _FIELDS:
         problem = f"has {len(fields)} fields instead of {_FIELDS}"
         remedy = "give index, current, frame, command, four params, latitude, longitude, height, 1"
@@ -69,7 +76,7 @@ def _item(place: str, fields: list[str], source: str) -> Item | Fault:
     if frame is None or command is None:
         wrong = fields[2] if frame is None else fields[3]
         return Fault(source, place, f"{wrong} is not a whole number", "give a frame and a command")
-    return Item(command, frame, numbers[4:11], place)
+    return WaypointItem(command, frame, numbers[4:11], place)
 
 
 def _number(text: str) -> float | None:
@@ -79,7 +86,7 @@ def _number(text: str) -> float | None:
         return None
 
 
-def _home(item: Item) -> Origin | None:
+def _home(item: WaypointItem) -> Origin | None:
     lat_deg, lon_deg, alt_m = (number_of(param) for param in item.params[4:7])
     if lat_deg is None or lon_deg is None or alt_m is None or lat_deg == lon_deg == 0.0:
         return None  # ground stations write 0, 0 for a home that was never set

@@ -10,28 +10,39 @@ from dataclasses import dataclass, field
 import pytest
 
 from agent import runner
-from agent.core import AgentCore
-from agent.events import Action, Event
+from agent.core.agent_core import AgentCore
+from agent.core.interface import (
+    Action,
+    Event,
+    Home,
+    NotReady,
+    Prepare,
+    Return,
+    ReturnBegun,
+    VehicleOrder,
+    VehicleReady,
+    VehicleReport,
+)
 from agent.runner import run_agent, seat_or_stop
-from agent.vehicle import Home, NotReady, Orders, Prepare, Report, Return, ReturnBegun, VehicleReady
 from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import Bus, BusEvent, Sample, TokenGone, TokenSeen
-from swarm.config import Timing
-from swarm.errors import BusError
-from swarm.events import Stop
 from swarm.model import Origin
 from swarm.model.ids import COORDINATOR
-from swarm.process import StopRequest
-from swarm.shell import take_seat
-from swarm.wire.codec import Codec, encode
-from swarm.wire.keys import Keys
-from swarm.wire.messages import EpochPhase, Message, Snapshot
-from tests.builders import IDLE, MISSION, brief, epoch, message, uav
-from tests.shell_play import HandClock, play, take_until, until
+from swarm.protocol.codec import Codec
+from swarm.protocol.encoding import encode
+from swarm.protocol.events import Stop
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import Message, MissionPhase, Snapshot
+from swarm.protocol.timing import Timing
+from swarm.runtime.errors import BusError
+from swarm.runtime.process import StopRequest
+from swarm.runtime.shell import join_mission
+from tests.support.builders import IDLE, MISSION, brief, epoch, message, uav
+from tests.support.shell_play import HandClock, play, take_until, until
 
-KEYS = Keys(MISSION)
+KEYS = KeySpace(MISSION)
 BRIEF = message(COORDINATOR, brief(uav("u0", east_m=3.0, speed_m_s=2.0), layer_m=10.0), counter=1)
-ENDED = message(COORDINATOR, epoch("u0", phase=EpochPhase.ENDED), counter=2)
+ENDED = message(COORDINATOR, epoch("u0", phase=MissionPhase.ENDED), counter=2)
 INTERRUPTED = 130
 
 
@@ -44,10 +55,10 @@ class FakeVehicle:
     """Does at once what it is told, unless its link is broken or it stays away."""
 
     origin: Origin
-    report: Callable[[Report], None]
+    report: Callable[[VehicleReport], None]
     broken: bool = False
     stays_away: bool = False
-    orders: list[Orders] = field(default_factory=list)
+    orders: list[VehicleOrder] = field(default_factory=list)
     closed: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
 
@@ -56,7 +67,7 @@ class FakeVehicle:
         if self.broken:
             raise OwnError
 
-    def order(self, order: Orders) -> None:
+    def order(self, order: VehicleOrder) -> None:
         self.orders.append(order)
         if isinstance(order, Prepare):
             self.report(VehicleReady())
@@ -112,11 +123,11 @@ async def at_work(
     """The agent of u0, whose vehicle is a `FakeVehicle`."""
     network = MemoryNetwork()
     watching, seat = network.join("watching"), network.join("u0")
-    take_seat(watching, MISSION, None, status=True)
+    join_mission(watching, MISSION, None, status=True)
     core = AgentCore(MISSION, "u0", 1, Timing(), memory)
     stop, vehicles, clock = StopRequest(), list[FakeVehicle](), HandClock()
 
-    def make_vehicle(origin: Origin, report: Callable[[Report], None]) -> FakeVehicle:
+    def make_vehicle(origin: Origin, report: Callable[[VehicleReport], None]) -> FakeVehicle:
         vehicles.append(FakeVehicle(origin, report, broken, stays_away))
         return vehicles[-1]
 

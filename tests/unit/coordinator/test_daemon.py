@@ -11,23 +11,25 @@ from functools import partial
 
 import pytest
 
-from coordinator.core import CoordinatorCore, FlightLayers
+from coordinator.core.active import CoordinatorCore
+from coordinator.core.publication import FlightLayers
 from coordinator.daemon import run_coordinator
-from coordinator.planner.stop import ShouldStop
+from coordinator.planner.options import ShouldStop
 from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import BusEvent, Sample
-from swarm.config import Timing
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.shell import take_seat
-from swarm.state.registers import Replica
-from swarm.wire.codec import Codec, encode
-from swarm.wire.keys import Keys
-from swarm.wire.messages import Body, EpochPhase, Message
-from tests.builders import IDLE, MISSION, OUT, done, held, message, mission, task, uav
-from tests.shell_play import LIMIT_S, HandClock, play, take_until, until
+from swarm.protocol.codec import Codec
+from swarm.protocol.encoding import encode
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import Body, Message, MissionPhase
+from swarm.protocol.registers import Replica
+from swarm.protocol.timing import Timing
+from swarm.runtime.shell import join_mission
+from tests.support.builders import IDLE, MISSION, OUT, done, held, message, mission, task, uav
+from tests.support.shell_play import LIMIT_S, HandClock, play, take_until, until
 
-KEYS = Keys(MISSION)
+KEYS = KeySpace(MISSION)
 WHOLE = mission([uav("u0")], [task("t0", 1.0)])
 MakePlan = Callable[[Mission, str, int, ShouldStop], Plan]
 
@@ -50,12 +52,12 @@ class Played:
     running: asyncio.Task[int]
     clock: HandClock
     fleet: MemoryBus
-    onlooker: MemoryBus
+    observer: MemoryBus
 
     def heard(self, said: Message) -> bool:
         return self.running.done() or said in self.core.replica.messages()
 
-    async def phase(self, phase: EpochPhase) -> None:
+    async def phase(self, phase: MissionPhase) -> None:
         def reached() -> bool:
             epoch = self.core.replica.epoch
             return epoch is not None and epoch.phase is phase
@@ -72,9 +74,9 @@ class Played:
 async def at_work(make_plan: MakePlan = planned, flown: Mission = WHOLE) -> AsyncIterator[Played]:
     """The coordinator of ``flown``, by one UAV."""
     network = MemoryNetwork()
-    onlooker = network.join("onlooker")
+    observer = network.join("onlooker")
     fleet, seat = network.join("u0"), network.join(COORDINATOR)
-    take_seat(fleet, MISSION, "u0", status=False)
+    join_mission(fleet, MISSION, "u0", status=False)
     core = CoordinatorCore(
         flown,
         method="greedy",
@@ -87,7 +89,7 @@ async def at_work(make_plan: MakePlan = planned, flown: Mission = WHOLE) -> Asyn
     clock = HandClock()
     running = asyncio.create_task(run_coordinator(core, flown, seat, clock, make_plan))
     try:
-        yield Played(core, running, clock, fleet, onlooker)
+        yield Played(core, running, clock, fleet, observer)
     finally:
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
@@ -133,15 +135,15 @@ def test_a_mission_is_flown_to_its_end() -> None:
         async with at_work() as played:
             await until(lambda: played.core.plan is not None, "a plan")
             played.say(IDLE)
-            await played.phase(EpochPhase.RUNNING)
+            await played.phase(MissionPhase.RUNNING)
             played.say(done("t0"), OUT, counter=2)
-            await played.phase(EpochPhase.ENDED)
+            await played.phase(MissionPhase.ENDED)
             played.fleet.close()
             for counter in range(10):
                 # The clock stands still between events: whatever is heard moves it on.
                 played.clock.time_s += 0.5
                 said = message("u1", OUT, counter=counter)
-                played.onlooker.publish(said.key, encode(said))
+                played.observer.publish(said.key, encode(said))
                 await until(partial(played.heard, said), "hearing the onlooker")
             assert await played.running == 0
 
@@ -154,7 +156,7 @@ def test_a_mission_that_cannot_be_planned_ends_with_the_reason() -> None:
 
     async def scenario() -> None:
         async with at_work(make_plan) as played:
-            await played.phase(EpochPhase.ENDED)
+            await played.phase(MissionPhase.ENDED)
             epoch = played.core.replica.epoch
             assert epoch is not None
             assert "no UAV can do it" in epoch.reason
@@ -204,9 +206,9 @@ def test_a_running_mission_is_planned_anew_beside_the_loop() -> None:
     async def scenario() -> None:
         async with at_work(flown=mission([uav("u0")], tasks)) as played:
             await until(lambda: played.core.plan is not None, "a plan")
-            played.core._replanning._margin_frac = -1.0  # whatever is planned becomes an epoch
+            played.core._replan_policy._margin_frac = -1.0  # whatever is planned becomes an epoch
             played.say(IDLE)
-            await played.phase(EpochPhase.RUNNING)
+            await played.phase(MissionPhase.RUNNING)
             played.clock.time_s += 6.0
             played.say(held("t0", 0.0, completion_s=9.0), counter=2)
 

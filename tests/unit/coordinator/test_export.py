@@ -13,14 +13,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.core import FlightLayers
-from coordinator.export import Firmware, uav_plan, write_plans
+from coordinator.core.publication import FlightLayers
+from coordinator.export import ExportFirmware, uav_plan, write_plans
 from coordinator.planner.plan import make_plan
 from swarm.cli import main
-from swarm.clock import SystemClock
-from swarm.errors import InputError
 from swarm.model import Mission, Origin, Plan, Task, TaskId, Uav, UavId
 from swarm.model.frames import enu_from_wgs84
+from swarm.runtime.clock import SystemClock
+from swarm.runtime.errors import InputError
 from swarm.scenario.task_files import read_task_file
 from swarm.scenario.task_files.mission_items import BELOW_M
 
@@ -38,7 +38,7 @@ SHARED = [("type", str), ("frame", int), ("command", int), ("autoContinue", bool
 
 
 def exported(route: tuple[Task, ...] = TASKS, uav: Uav = UAV, layer_m: float = 13.0) -> Any:
-    return json.loads(json.dumps(uav_plan(uav, route, ORIGIN, layer_m, Firmware.PX4)))
+    return json.loads(json.dumps(uav_plan(uav, route, ORIGIN, layer_m, ExportFirmware.PX4)))
 
 
 def mission(**changes: object) -> Mission:
@@ -84,7 +84,7 @@ def test_plan_takes_off_visits_the_tasks_and_returns_in_the_layer_of_its_uav() -
 
 
 def test_ardupilot_is_told_from_px4() -> None:
-    found: Any = uav_plan(UAV, TASKS, ORIGIN, 10.0, Firmware.ARDUPILOT)
+    found: Any = uav_plan(UAV, TASKS, ORIGIN, 10.0, ExportFirmware.ARDUPILOT)
 
     assert found["mission"]["firmwareType"] == 3
 
@@ -101,12 +101,12 @@ def test_every_uav_with_tasks_gets_a_file_and_an_older_one_of_an_idle_uav_goes(
     split = replace(planned(both), routes={UavId("u1"): (A,), UavId("u2"): (B,)})
     alone = replace(split, routes={UavId("u1"): (A, B), UavId("u2"): ()})
 
-    assert write_plans(folder, both, split, Firmware.PX4) == [
+    assert write_plans(folder, both, split, ExportFirmware.PX4) == [
         folder / "m.u1.plan",
         folder / "m.u2.plan",
     ]
     (folder / "of somebody else.plan").touch()
-    assert write_plans(folder, both, alone, Firmware.PX4) == [folder / "m.u1.plan"]
+    assert write_plans(folder, both, alone, ExportFirmware.PX4) == [folder / "m.u1.plan"]
     assert sorted(path.name for path in folder.iterdir()) == ["m.u1.plan", "of somebody else.plan"]
 
 
@@ -114,7 +114,7 @@ def test_mission_without_an_origin_cannot_be_exported(tmp_path: Path) -> None:
     lost = mission(origin=None)
 
     with pytest.raises(InputError, match="origin: is missing, and --export needs it"):
-        write_plans(tmp_path, lost, planned(lost), Firmware.PX4)
+        write_plans(tmp_path, lost, planned(lost), ExportFirmware.PX4)
 
 
 @st.composite
@@ -150,7 +150,7 @@ def test_exported_lists_come_back_as_the_same_places(
     origin = what.origin
     assert origin is not None
 
-    written = write_plans(folder, what, made, Firmware.ARDUPILOT)
+    written = write_plans(folder, what, made, ExportFirmware.ARDUPILOT)
 
     assert len(written) == sum(1 for route in made.routes.values() if route)
     for uav, route in made.routes.items():

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import make_plan
-from coordinator.planner.stop import after_evaluations
-from coordinator.plot import draw_plan, path_looks, plan_figure
+from coordinator.plot import draw_plan, path_styles, plan_figure
 from coordinator.plot_labels import Label, place_labels
-from swarm.clock import SystemClock
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
-from tests.problems import table_1_mission
+from swarm.runtime.clock import SystemClock
+from tests.support.problems import table_1_mission
 
 
 def plan_of(mission: Mission) -> Plan:
@@ -57,8 +57,8 @@ def test_figure_names_all_places_and_the_worth() -> None:
 
 
 def test_uavs_differ_by_colour_or_by_line() -> None:
-    assert len(set(path_looks(28))) == 28
-    assert len({look.dashes for look in path_looks(4)}) == 4
+    assert len(set(path_styles(28))) == 28
+    assert len({look.dashes for look in path_styles(4)}) == 4
 
 
 def test_legend_counts_the_tasks_of_long_lists() -> None:

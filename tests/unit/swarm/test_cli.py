@@ -15,8 +15,14 @@ import typer
 
 import swarm
 from swarm.cli import COMMAND_GROUP, main
-from swarm.errors import BusError, Fault, InputError
-from swarm.options import JsonOption, LifelineOption, ScenarioArgument, SeedOption, TimeLimitOption
+from swarm.runtime.errors import BusError, Fault, InputError
+from swarm.runtime.options import (
+    JsonOption,
+    LifelineOption,
+    ScenarioArgument,
+    SeedOption,
+    TimeLimitOption,
+)
 
 SCENARIO = str(Path(__file__).parents[2] / "data" / "scenarios" / "small.toml")
 

@@ -6,10 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.dashboard.access import Pace, access_for, is_loopback, read_token
-from coordinator.dashboard.listening import url_of
-from coordinator.dashboard.place import parse_place
-from swarm.errors import InputError
+from coordinator.dashboard.access import (
+    RateLimit,
+    access_for,
+    is_loopback,
+    parse_serve_address,
+    read_token,
+    url_of,
+)
+from swarm.runtime.errors import InputError
 
 TOKEN = "0123456789abcdef"
 
@@ -98,7 +103,7 @@ def test_any_other_token_is_turned_down(token: str | None) -> None:
 
 
 def test_a_burst_is_allowed_and_then_so_many_a_second_each() -> None:
-    pace = Pace(burst=3.0, per_s=2.0, clients=2)
+    pace = RateLimit(burst=3.0, per_s=2.0, clients=2)
 
     assert [pace.allows("a", 0.0) for _ in range(4)] == [True, True, True, False]
     assert pace.allows("b", 0.0)
@@ -106,7 +111,7 @@ def test_a_burst_is_allowed_and_then_so_many_a_second_each() -> None:
 
 
 def test_only_so_many_clients_are_remembered() -> None:
-    pace = Pace(burst=1.0, per_s=0.1, clients=2)
+    pace = RateLimit(burst=1.0, per_s=0.1, clients=2)
     for client in "abc":
         pace.allows(client, 0.0)
 
@@ -159,9 +164,9 @@ def test_loopback_is_known(host: str) -> None:
 
 
 def test_a_place_is_a_port_with_or_without_an_address(tmp_path: Path) -> None:
-    here = parse_place("0", {})
-    there = parse_place("[::1]:8123", {}, must_be_free=False)
-    open_to_all = parse_place("0.0.0.0:8124", {}, must_be_free=False)
+    here = parse_serve_address("0", {})
+    there = parse_serve_address("[::1]:8123", {}, must_be_free=False)
+    open_to_all = parse_serve_address("0.0.0.0:8124", {}, must_be_free=False)
     words = open_to_all.arguments(tmp_path)
 
     assert (here.host, here.url, here.token) == (
@@ -176,7 +181,9 @@ def test_a_place_is_a_port_with_or_without_an_address(tmp_path: Path) -> None:
 
 
 def test_a_token_of_the_operators_is_not_told_again(tmp_path: Path) -> None:
-    place = parse_place("0.0.0.0:8124", {"SWARM_DASHBOARD_TOKEN": TOKEN}, must_be_free=False)
+    place = parse_serve_address(
+        "0.0.0.0:8124", {"SWARM_DASHBOARD_TOKEN": TOKEN}, must_be_free=False
+    )
 
     assert place.lines == [f"dashboard: {place.url}"]
     assert place.arguments(tmp_path) == ["--host", "0.0.0.0", "--port", "8124"]
@@ -185,7 +192,7 @@ def test_a_token_of_the_operators_is_not_told_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "http://x:1", "70000", "a b:1", ":1", "-1", "1.5"])
 def test_what_is_no_place_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="is no place to listen at; give PORT"):
-        parse_place(text, {}, must_be_free=False)
+        parse_serve_address(text, {}, must_be_free=False)
 
 
 def test_a_port_that_is_taken_is_told_in_one_line() -> None:
@@ -194,6 +201,6 @@ def test_a_port_that_is_taken_is_told_in_one_line() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(InputError, match=f"port {port}: Address already in use") as refused:
-            parse_place(str(port), {})
+            parse_serve_address(str(port), {})
 
     assert len(str(refused.value).splitlines()) == 1

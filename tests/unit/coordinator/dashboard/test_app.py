@@ -13,11 +13,12 @@ from prometheus_client.parser import text_string_to_metric_families
 from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
-from coordinator.dashboard.access import Access
+from coordinator.dashboard.access import AccessRules
 from coordinator.dashboard.app import create_app
-from coordinator.dashboard.feed import Display
-from swarm.wire.messages import Command, CommandKind, StatusPhase, TaskOrder
-from tests.desk_play import DeskPlay, FakePlayer
+from coordinator.dashboard.feed import PageSettings
+from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit
+from swarm.protocol.uav_messages import StatusPhase
+from tests.support.desk_play import DeskPlay, FakePlayer
 
 TOKEN = "0123456789abcdef"
 NAMES = frozenset({"testserver"})
@@ -64,8 +65,8 @@ def locked(play: DeskPlay, tmp_path: Path) -> Iterator[TestClient]:
 def client(play: DeskPlay, static: Path, token: str | None = None) -> TestClient:
     (static / "index.html").write_text("<!doctype html><title>page</title>")
     (static / "app.js").write_text("// script")
-    access = Access(NAMES, any_address=False, token=token)
-    display = Display(token is not None, "https://{s}.tiles.example/{z}/{x}/{y}.png", "them")
+    access = AccessRules(NAMES, any_address=False, token=token)
+    display = PageSettings(token is not None, "https://{s}.tiles.example/{z}/{x}/{y}.png", "them")
     made = create_app(play, access, display, clock=StillClock(), static=static)
     return TestClient(made.app)
 
@@ -112,7 +113,7 @@ def test_the_feed_begins_whole_and_goes_on_with_changes(page: TestClient, play: 
 
 def test_whoever_looks_on_is_told_of_the_end(play: DeskPlay, tmp_path: Path) -> None:
     (tmp_path / "index.html").touch()
-    made = create_app(play, Access(NAMES, any_address=False, token=None), static=tmp_path)
+    made = create_app(play, AccessRules(NAMES, any_address=False, token=None), static=tmp_path)
     with (
         TestClient(made.app) as opened,
         opened.websocket_connect("/feed") as socket,
@@ -139,7 +140,9 @@ def test_a_fault_of_the_feed_ends_what_is_done_beside_it(tmp_path: Path) -> None
     async def nothing() -> None:
         await asyncio.Event().wait()
 
-    made = create_app(BrokenPlay(), Access(NAMES, any_address=False, token=None), static=tmp_path)
+    made = create_app(
+        BrokenPlay(), AccessRules(NAMES, any_address=False, token=None), static=tmp_path
+    )
     with TestClient(made.app) as opened:
         assert opened.portal is not None
         with pytest.raises(RuntimeError, match="a bug"):
@@ -163,7 +166,7 @@ def test_an_aborted_mission_takes_no_tasks(page: TestClient, play: DeskPlay) -> 
 
     (abort,) = (message.body for message in play.said)
 
-    assert abort == Command("fleet", CommandKind.ABORT, 1, "storm")
+    assert abort == OperatorCommand("fleet", CommandKind.ABORT, 1, "storm")
     assert play.desk.rows[0].text == "abort"
     assert (aborted.status_code, task.status_code) == (200, 400)
     assert task.json()["error"] == "the mission has ended: nothing is taken up any more"
@@ -186,7 +189,7 @@ def test_a_task_is_said_as_it_was_drawn(page: TestClient, play: DeskPlay) -> Non
 
     (order,) = (message.body for message in play.said)
 
-    assert isinstance(order, TaskOrder)
+    assert isinstance(order, TaskEdit)
     assert (order.task, order.position_enu_m, order.value) == ("x", (1.0, 2.0, 3.0), 4.0)
     assert (order.service_s, order.kind, order.withdrawn) == (5.0, "photo", False)
 

@@ -8,13 +8,13 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dashboard.feed import Display, Feed
-from swarm.events import Heard
+from coordinator.dashboard.feed import Feed, PageSettings
 from swarm.model.ids import COORDINATOR
-from swarm.wire.choice import Basis, Candidate, Choice
-from swarm.wire.messages import EpochPhase, Message, Result, Stamp, StatusPhase
-from tests.builders import MISSION, OUT
-from tests.desk_play import DeskPlay, FakePlayer
+from swarm.protocol.events import MessageReceived
+from swarm.protocol.messages import Message, MissionPhase, Stamp
+from swarm.protocol.uav_messages import AttemptResult, Candidate, Choice, ChoiceBasis, StatusPhase
+from tests.support.builders import MISSION, OUT
+from tests.support.desk_play import DeskPlay, FakePlayer
 
 KEYS = {"uavs": "id", "tasks": "id", "lists": "uav", "commands": "n"}
 LOGS = ("story", "choices", "objective_curve")
@@ -43,7 +43,7 @@ class Page:
 
 
 def feed_of(play: DeskPlay) -> Feed:
-    return Feed(play, Display())
+    return Feed(play, PageSettings())
 
 
 def without_silence(picture: dict[str, Any]) -> dict[str, Any]:
@@ -144,7 +144,7 @@ def test_the_plan_is_worth_what_its_first_lists_are() -> None:
     feed = feed_of(play)
     feed.look()
     play.post("popup", 7)
-    play.epoch(EpochPhase.RUNNING, {"u1": ("popup",)}, number=2)
+    play.epoch(MissionPhase.RUNNING, {"u1": ("popup",)}, number=2)
     feed.look()
 
     plan = json.loads(feed.frame(None))["plan"]
@@ -157,7 +157,7 @@ def test_the_plan_is_worth_what_its_first_lists_are() -> None:
 def test_who_comes_late_knows_no_plan() -> None:
     play = DeskPlay()
     play.begin()
-    play.epoch(EpochPhase.RUNNING, {"u1": ("t1",)}, number=2)
+    play.epoch(MissionPhase.RUNNING, {"u1": ("t1",)}, number=2)
     feed = feed_of(play)
     feed.look()
 
@@ -221,12 +221,12 @@ def test_a_uav_that_left_in_order_is_still_home_and_a_lost_one_lost() -> None:
 def test_a_choice_is_told_with_its_candidates() -> None:
     play = DeskPlay()
     play.begin()
-    basis = Basis(0.0, (0.0, 0.0, 0.0), 1.0, (), (), (), {}, 7)
+    basis = ChoiceBasis(0.0, (0.0, 0.0, 0.0), 1.0, (), (), (), {}, 7)
     candidates = (Candidate("t1", 9.0), Candidate("t2", 8.0))
     choice = Choice(4, "t1", None, 1.0, 1, "greedy", 0, 9.0, 8.0, True, 2.0, candidates, basis)
     message = Message(MISSION, "u1", Stamp(3, 9), choice)
-    play.take(Heard(message))
-    play.take(Heard(message))
+    play.take(MessageReceived(message))
+    play.take(MessageReceived(message))
     feed = feed_of(play)
     feed.look()
     feed.look()
@@ -253,13 +253,13 @@ who = st.sampled_from(["u1", "u2", "u3"])
 which = st.sampled_from(["t1", "t2", "t3", "t4"])
 happenings = st.one_of(
     st.tuples(st.just("claim"), who, which),
-    st.tuples(st.just("end"), who, which, st.sampled_from(Result)),
+    st.tuples(st.just("end"), who, which, st.sampled_from(AttemptResult)),
     st.tuples(st.just("status"), who, st.sampled_from(StatusPhase), st.integers(0, 3)),
     st.tuples(st.just("post"), which, st.integers(0, 3)),
     st.tuples(st.just("lose"), who | st.just(COORDINATOR)),
     st.tuples(st.just("wait"), st.floats(0.1, 3.0)),
     st.tuples(st.just("begin"), st.just(("t1", "t2")), st.integers(2, 4)),
-    st.tuples(st.just("epoch"), st.sampled_from(EpochPhase)),
+    st.tuples(st.just("epoch"), st.sampled_from(MissionPhase)),
     st.tuples(st.just("look"), st.booleans(), st.booleans()),
 )
 

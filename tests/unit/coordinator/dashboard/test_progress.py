@@ -1,4 +1,4 @@
-"""J after each task agrees with what the observer makes of the end."""
+"""J after each task agrees with what the mission state makes of the end."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from coordinator.dashboard.progress import progress_of
-from coordinator.observer import Observer
-from tests.observed_mission import random_mission, shipped, watch
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.results import progress_of
+from tests.support.observed_mission import random_mission, shipped, watch
 
 
 @pytest.mark.parametrize("name", ["table-1", "valley-popups"])
 def test_the_curve_ends_where_the_result_does(name: str) -> None:
-    observer = watch(shipped(name))
-    problem = observer.board.problem
+    mission_state = watch(shipped(name))
+    problem = mission_state.board.problem
     assert problem is not None
 
-    progress, result = progress_of(problem, observer.replica.outcomes), observer.result()
+    progress, result = progress_of(problem, mission_state.replica.outcomes), mission_state.result()
 
     assert progress.objective == pytest.approx(result.executed_objective)
     assert {uav: tuple(t) for uav, t in progress.flown.items()} == result.executed_routes
@@ -32,10 +32,10 @@ def test_the_curve_grows_task_by_task() -> None:
     mission = random_mission(3, 9, seed=1)
     curves: list[list[tuple[float, float]]] = []
 
-    def see(observer: Observer, _now_s: float) -> None:
-        problem = observer.board.problem
+    def see(mission_state: MissionState, _now_s: float) -> None:
+        problem = mission_state.board.problem
         if problem is not None:
-            curves.append(progress_of(problem, observer.replica.outcomes).curve)
+            curves.append(progress_of(problem, mission_state.replica.outcomes).curve)
 
     watch(mission, step_s=20.0, see=see)
 

@@ -7,33 +7,25 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.operator.commanding import CommandWish
-from coordinator.operator.seat import OperatorSeat
-from coordinator.operator.verdict import Result
-from swarm.config import Timing
-from swarm.events import (
+from coordinator.operator.commands import CommandRequest, RequestResult
+from coordinator.operator.requests import OperatorClient
+from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
+from swarm.protocol.events import (
     Ask,
-    BusFact,
+    CommonAction,
+    CommonEvent,
     Finish,
-    Heard,
-    Learned,
+    MessageReceived,
     PeerGone,
     PeerSeen,
     Publish,
+    SnapshotsReceived,
     Tick,
-    Wish,
 )
-from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
-from swarm.wire.messages import (
-    Body,
-    Command,
-    CommandKind,
-    Message,
-    Snapshot,
-    Stamp,
-    StatusPhase,
-)
-from tests.builders import IDLE, MISSION, OUT, brief, message, status, uav
+from swarm.protocol.messages import Body, CommandKind, Message, OperatorCommand, Snapshot, Stamp
+from swarm.protocol.timing import Timing
+from swarm.protocol.uav_messages import StatusPhase
+from tests.support.builders import IDLE, MISSION, OUT, brief, message, status, uav
 
 HOLD, RESUME, RETURN, ABORT = CommandKind
 BRIEF = message(COORDINATOR, brief(uav("u0"), uav("u1")))
@@ -46,15 +38,15 @@ class Seat:
     """An operator's seat beside ``u0`` and ``u1``, whom the test plays."""
 
     def __init__(self, kind: CommandKind, target: str = "u0") -> None:
-        self.core = OperatorSeat(
+        self.core = OperatorClient(
             MISSION,
-            CommandWish(kind, target, "because"),
+            CommandRequest(kind, target, "because"),
             incarnation=50,
             timing=TIMING,
             patience_s=PATIENCE_S,
         )
         self.now_s = 0.0
-        self.wishes: list[Wish] = []
+        self.wishes: list[CommonAction] = []
         self._counter = 0
         self._do(self.core.start(0.0))
         for writer in ("u0", "u1"):
@@ -62,16 +54,16 @@ class Seat:
             self.does(writer, StatusPhase.FLYING)
 
     def learn(self, *messages: Message) -> None:
-        self.happen(Learned((Snapshot(MISSION, "u1", 1, None, (BRIEF, *messages)),)))
+        self.happen(SnapshotsReceived((Snapshot(MISSION, "u1", 1, None, (BRIEF, *messages)),)))
 
     def does(self, writer: str, phase: StatusPhase) -> None:
         self.hear(writer, status(phase))
 
     def hear(self, writer: str, body: Body) -> None:
         self._counter += 1
-        self.happen(Heard(message(writer, body, self._counter)))
+        self.happen(MessageReceived(message(writer, body, self._counter)))
 
-    def happen(self, fact: BusFact, at_s: float | None = None) -> None:
+    def happen(self, fact: CommonEvent, at_s: float | None = None) -> None:
         self.now_s = self.now_s if at_s is None else at_s
         self._do(self.core.step(fact, self.now_s))
 
@@ -84,14 +76,14 @@ class Seat:
         return [wish.message for wish in self.wishes if isinstance(wish, Publish)]
 
     @property
-    def result(self) -> Result | None:
+    def result(self) -> RequestResult | None:
         return None if self.core.verdict is None else self.core.verdict.result
 
     @property
     def text(self) -> str:
         return "" if self.core.verdict is None else self.core.verdict.text
 
-    def _do(self, wishes: Sequence[Wish]) -> None:
+    def _do(self, wishes: Sequence[CommonAction]) -> None:
         self.wishes += wishes
 
 
@@ -102,14 +94,14 @@ def test_it_learns_before_it_speaks_and_names_the_flight() -> None:
     seat.learn()
 
     assert seat.said == [
-        Message(MISSION, OPERATOR, Stamp(50, 1), Command("u0", HOLD, 1, "because"))
+        Message(MISSION, OPERATOR, Stamp(50, 1), OperatorCommand("u0", HOLD, 1, "because"))
     ]
 
 
 def test_a_mission_that_is_only_overheard_is_asked_about() -> None:
     seat = Seat(HOLD)
-    seat.happen(Learned(()))
-    seat.happen(Heard(BRIEF))
+    seat.happen(SnapshotsReceived(()))
+    seat.happen(MessageReceived(BRIEF))
     seat.wishes.clear()
     seat.wait(TIMING.ask_s)
 
@@ -119,7 +111,7 @@ def test_a_mission_that_is_only_overheard_is_asked_about() -> None:
 
 def test_it_speaks_above_every_command_that_is_known() -> None:
     seat = Seat(RESUME)
-    seat.learn(Message(MISSION, OPERATOR, Stamp(7_000, 3), Command(FLEET, ABORT, 1, "")))
+    seat.learn(Message(MISSION, OPERATOR, Stamp(7_000, 3), OperatorCommand(FLEET, ABORT, 1, "")))
 
     assert seat.said[0].stamp > Stamp(7_000, 3)
 
@@ -133,7 +125,7 @@ def test_it_repeats_itself_until_it_is_obeyed_and_then_ends() -> None:
 
     seat.does("u0", StatusPhase.HOLDING)
 
-    assert seat.result is Result.OBEYED
+    assert seat.result is RequestResult.OBEYED
     assert Finish(0) in seat.wishes
     assert seat.core.next_deadline_s() is None
 
@@ -144,14 +136,14 @@ def test_a_hold_is_obeyed_once_the_vehicle_stands() -> None:
     seat.hear("u0", replace(status(StatusPhase.HOLDING), note="being stopped, held"))
     assert seat.result is None
     seat.hear("u0", replace(status(StatusPhase.HOLDING), note="held"))
-    assert seat.result is Result.OBEYED
+    assert seat.result is RequestResult.OBEYED
 
 
 def test_a_vehicle_that_cannot_be_stopped_does_not_obey() -> None:
     seat = Seat(HOLD)
     seat.learn()
     seat.hear("u0", replace(status(StatusPhase.HOLDING), note="cannot hold: it goes on"))
-    assert seat.result is Result.NOT_OBEYED
+    assert seat.result is RequestResult.NOT_OBEYED
     assert Finish(1) in seat.wishes
 
 
@@ -163,7 +155,7 @@ def test_what_a_uav_said_before_the_command_proves_nothing() -> None:
     seat.does("u0", StatusPhase.HOLDING)
     assert seat.result is None
     seat.does("u0", StatusPhase.PREPARING)
-    assert seat.result is Result.OBEYED
+    assert seat.result is RequestResult.OBEYED
 
 
 @pytest.mark.parametrize("kind", [HOLD, RESUME, RETURN])
@@ -172,7 +164,7 @@ def test_a_vehicle_that_is_not_commanded_is_told(kind: CommandKind) -> None:
     seat.learn()
     seat.does("u0", StatusPhase.OUT)
 
-    assert seat.result is Result.NOT_OBEYED
+    assert seat.result is RequestResult.NOT_OBEYED
     assert seat.text.startswith("u0 takes no part, and its vehicle is not commanded")
 
 
@@ -181,7 +173,7 @@ def test_who_is_on_its_way_home_does_not_go_on() -> None:
     seat.learn()
     seat.does("u0", StatusPhase.RETURNING)
 
-    assert (seat.result, Finish(1) in seat.wishes) == (Result.NOT_OBEYED, True)
+    assert (seat.result, Finish(1) in seat.wishes) == (RequestResult.NOT_OBEYED, True)
 
 
 def test_who_was_stopped_on_its_way_home_goes_on_home() -> None:
@@ -190,7 +182,7 @@ def test_who_was_stopped_on_its_way_home_goes_on_home() -> None:
     seat.learn()
     seat.does("u0", StatusPhase.RETURNING)
 
-    assert seat.result is Result.OBEYED
+    assert seat.result is RequestResult.OBEYED
 
 
 @pytest.mark.parametrize(
@@ -210,7 +202,7 @@ def test_when_nothing_comes_of_it_it_says_why(*, gone: bool, text: str) -> None:
         seat.happen(PeerGone("u0"))
     seat.wait(PATIENCE_S)
 
-    assert seat.result is Result.NOT_OBEYED
+    assert seat.result is RequestResult.NOT_OBEYED
     assert seat.text.startswith(text)
 
 
@@ -226,11 +218,11 @@ def test_who_goes_on_all_the_same_is_told() -> None:
 def test_another_operators_later_word_ends_it() -> None:
     seat = Seat(HOLD)
     seat.learn()
-    other = Message(MISSION, OPERATOR, Stamp(60, 1), Command("u0", RESUME, 1, ""))
-    seat.happen(Heard(other))
+    other = Message(MISSION, OPERATOR, Stamp(60, 1), OperatorCommand("u0", RESUME, 1, ""))
+    seat.happen(MessageReceived(other))
 
     assert (seat.result, seat.text) == (
-        Result.NOT_OBEYED,
+        RequestResult.NOT_OBEYED,
         "another operator has said resume meanwhile",
     )
 
@@ -239,7 +231,7 @@ def test_a_uav_that_is_not_in_the_fleet_is_not_commanded() -> None:
     seat = Seat(HOLD, "u9")
     seat.learn()
 
-    assert (seat.said, seat.result) == ([], Result.UNKNOWN_UAV)
+    assert (seat.said, seat.result) == ([], RequestResult.UNKNOWN_UAV)
     assert seat.text == "the fleet is u0, u1"
 
 
@@ -247,7 +239,7 @@ def test_a_mission_nobody_knows_is_told() -> None:
     seat = Seat(HOLD)
     seat.wait(PATIENCE_S)
 
-    assert seat.result is Result.UNKNOWN_MISSION
+    assert seat.result is RequestResult.UNKNOWN_MISSION
     assert seat.text == "nothing is known of mission test: u0, u1 cannot tell it yet"
 
 
@@ -260,7 +252,7 @@ def test_an_abort_is_obeyed_when_everyone_there_goes_home() -> None:
     seat.hear("u1", OUT)
     seat.happen(PeerGone("u1"))
     seat.happen(Tick(), seat.now_s + TIMING.loss_delay_s)
-    assert seat.result is Result.OBEYED
+    assert seat.result is RequestResult.OBEYED
 
 
 def test_what_is_the_same_for_several_uavs_is_told_once() -> None:
@@ -280,5 +272,5 @@ def test_an_abort_that_a_lost_uav_has_not_heard_is_told() -> None:
     seat.happen(PeerGone("u1"))
     seat.wait(PATIENCE_S)
 
-    assert seat.result is Result.NOT_OBEYED
+    assert seat.result is RequestResult.NOT_OBEYED
     assert seat.text.startswith("nobody flies u1")

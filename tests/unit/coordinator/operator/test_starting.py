@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from coordinator.operator.seat import OperatorSeat
-from coordinator.operator.starting import StartWish
-from coordinator.operator.verdict import Result
-from swarm.config import Timing
-from swarm.events import Heard, Learned, PeerSeen, Publish, Tick, Wish
+from coordinator.operator.commands import RequestResult, StartRequest
+from coordinator.operator.requests import OperatorClient
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Body, EpochPhase, Message, Snapshot, StartWithout
-from tests.builders import IDLE, MISSION, brief, epoch, message, uav
+from swarm.protocol.events import (
+    CommonAction,
+    MessageReceived,
+    PeerSeen,
+    Publish,
+    SnapshotsReceived,
+    Tick,
+)
+from swarm.protocol.messages import Body, Message, MissionPhase, Snapshot, StartWithout
+from swarm.protocol.timing import Timing
+from tests.support.builders import IDLE, MISSION, brief, epoch, message, uav
 
 BRIEF = message(COORDINATOR, brief(uav("u0"), uav("u1"), uav("u2")))
 PATIENCE_S = 10.0
@@ -22,15 +28,15 @@ class Seat:
     """An operator's seat beside a fleet that gets ready."""
 
     def __init__(self, target: str = "u2", *, coordinator: bool = True, known: Body | None = None):
-        self.core = OperatorSeat(
+        self.core = OperatorClient(
             MISSION,
-            StartWish(target, "no GPS"),
+            StartRequest(target, "no GPS"),
             incarnation=50,
             timing=Timing(silence_s=100.0),
             patience_s=PATIENCE_S,
         )
         self.now_s = 0.0
-        self.wishes: list[Wish] = list(self.core.start(0.0))
+        self.wishes: list[CommonAction] = list(self.core.start(0.0))
         self._counter = 1
         for writer in [*["coordinator"] * coordinator, "u0", "u1"]:
             self.wishes += self.core.step(PeerSeen(writer), 0.0)
@@ -38,12 +44,14 @@ class Seat:
         self.learn("u0", BRIEF, *before)
 
     def learn(self, writer: str, *messages: Message) -> None:
-        fact = Learned((Snapshot(MISSION, writer, 1, None, messages),))
+        fact = SnapshotsReceived((Snapshot(MISSION, writer, 1, None, messages),))
         self.wishes += self.core.step(fact, self.now_s)
 
     def hear(self, writer: str, body: Body) -> None:
         self._counter += 1
-        self.wishes += self.core.step(Heard(message(writer, body, self._counter)), self.now_s)
+        self.wishes += self.core.step(
+            MessageReceived(message(writer, body, self._counter)), self.now_s
+        )
 
     def confirm(self) -> None:
         self.learn(COORDINATOR, BRIEF, self.said[-1])
@@ -58,7 +66,7 @@ class Seat:
         return [wish.message for wish in self.wishes if isinstance(wish, Publish)]
 
     @property
-    def told(self) -> tuple[Result, str] | None:
+    def told(self) -> tuple[RequestResult, str] | None:
         verdict = self.core.verdict
         return None if verdict is None else (verdict.result, verdict.text)
 
@@ -73,14 +81,14 @@ def test_it_is_done_when_the_mission_has_started_without_it() -> None:
     assert seat.told is None
 
     seat.hear(COORDINATOR, epoch("u0", "u1"))
-    assert seat.told == (Result.OBEYED, "the mission has started without u2")
+    assert seat.told == (RequestResult.OBEYED, "the mission has started without u2")
 
 
 def test_a_uav_that_got_ready_meanwhile_takes_part() -> None:
     seat = Seat()
     seat.hear(COORDINATOR, epoch("u0", "u1", "u2"))
 
-    assert seat.told == (Result.OBEYED, "the mission has started with u2")
+    assert seat.told == (RequestResult.OBEYED, "the mission has started with u2")
 
 
 def test_what_else_the_start_waits_for_is_told() -> None:
@@ -88,7 +96,7 @@ def test_what_else_the_start_waits_for_is_told() -> None:
     seat.hear("u0", IDLE)
     seat.confirm()
 
-    assert seat.told == (Result.OBEYED, "without u2; the mission waits for u1")
+    assert seat.told == (RequestResult.OBEYED, "without u2; the mission waits for u1")
 
 
 def test_a_plan_that_takes_long_is_told_in_the_end() -> None:
@@ -98,7 +106,10 @@ def test_a_plan_that_takes_long_is_told_in_the_end() -> None:
     seat.confirm()
     seat.wait()
 
-    assert seat.told == (Result.OBEYED, "without u2; the mission starts as soon as it is planned")
+    assert seat.told == (
+        RequestResult.OBEYED,
+        "without u2; the mission starts as soon as it is planned",
+    )
 
 
 def test_nobody_confirms_it() -> None:
@@ -107,23 +118,23 @@ def test_nobody_confirms_it() -> None:
     alone.wait()
 
     text = "the coordinator has not confirmed it within 10 s"
-    assert deaf.told == (Result.NOT_OBEYED, text)
+    assert deaf.told == (RequestResult.NOT_OBEYED, text)
     text = "there is no coordinator that could start the mission"
-    assert alone.told == (Result.NOT_OBEYED, text)
+    assert alone.told == (RequestResult.NOT_OBEYED, text)
 
 
 @pytest.mark.parametrize(
     ("phase", "text"),
     [
-        (EpochPhase.RUNNING, "the mission has started already: nobody waits for u2"),
-        (EpochPhase.ENDED, "the mission has ended: nobody waits for u2"),
+        (MissionPhase.RUNNING, "the mission has started already: nobody waits for u2"),
+        (MissionPhase.ENDED, "the mission has ended: nobody waits for u2"),
     ],
 )
-def test_after_the_start_it_is_too_late(phase: EpochPhase, text: str) -> None:
+def test_after_the_start_it_is_too_late(phase: MissionPhase, text: str) -> None:
     seat = Seat(known=epoch("u0", "u1", phase=phase))
 
-    assert (seat.told, seat.said) == ((Result.NOT_OBEYED, text), [])
+    assert (seat.told, seat.said) == ((RequestResult.NOT_OBEYED, text), [])
 
 
 def test_a_uav_that_is_not_in_the_fleet_is_wrong_input() -> None:
-    assert Seat("u9").told == (Result.UNKNOWN_UAV, "the fleet is u0, u1, u2")
+    assert Seat("u9").told == (RequestResult.UNKNOWN_UAV, "the fleet is u0, u1, u2")

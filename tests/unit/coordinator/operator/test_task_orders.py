@@ -8,26 +8,34 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.observer import Observer
-from coordinator.operator.commanding import CommandWish
-from coordinator.operator.errands import Errand, Errands
-from coordinator.operator.task_orders import NewTask, Wgs84, Withdrawal
-from coordinator.operator.verdict import Result
-from swarm.config import Timing
-from swarm.events import Ask, BusFact, Heard, Learned, PeerSeen, Publish, Tick, Wish
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.operator.commands import CommandRequest, RequestResult
+from coordinator.operator.requests import RequestTracker, TrackedRequest
+from coordinator.operator.task_edits import NewTask, TaskWithdrawal, Wgs84
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR, OPERATOR
-from swarm.wire.messages import (
+from swarm.protocol.events import (
+    Ask,
+    CommonAction,
+    CommonEvent,
+    MessageReceived,
+    PeerSeen,
+    Publish,
+    SnapshotsReceived,
+    Tick,
+)
+from swarm.protocol.messages import (
     Body,
     CommandKind,
-    EpochPhase,
     Message,
+    MissionPhase,
     Snapshot,
     Stamp,
-    StatusPhase,
-    TaskOrder,
+    TaskEdit,
 )
-from tests.builders import (
+from swarm.protocol.timing import Timing
+from swarm.protocol.uav_messages import StatusPhase
+from tests.support.builders import (
     IDLE,
     MISSION,
     OUT,
@@ -51,13 +59,15 @@ HERE = NewTask((3.0, 4.0, 0.0))
 
 
 class Desk:
-    """An operator's errands beside ``u0`` and ``u1``, whom the test plays."""
+    """An operator's requests beside ``u0`` and ``u1``, whom the test plays."""
 
     def __init__(self, flown: Mission | None = None) -> None:
-        self.observer = Observer(flown or mission(FLEET, []), TIMING)
-        self.errands = Errands(self.observer, incarnation=50, timing=TIMING, patience_s=PATIENCE_S)
+        self.mission_state = MissionState(flown or mission(FLEET, []), TIMING)
+        self.errands = RequestTracker(
+            self.mission_state, incarnation=50, timing=TIMING, patience_s=PATIENCE_S
+        )
         self.now_s = 0.0
-        self.wishes: list[Wish] = []
+        self.wishes: list[CommonAction] = []
         self._counter = 0
         self.hear(COORDINATOR, brief(*FLEET))
         self.hear(COORDINATOR, entry("t0", value=2.0), entry("t1", number=4, value=6.0))
@@ -70,21 +80,21 @@ class Desk:
     def hear(self, writer: str, *bodies: Body) -> None:
         for body in bodies:
             self._counter += 1
-            self.happen(Heard(message(writer, body, self._counter)))
+            self.happen(MessageReceived(message(writer, body, self._counter)))
 
-    def give(self, wish: NewTask | Withdrawal | CommandWish) -> Errand:
-        errand = self.errands.give(wish, self.now_s)
+    def give(self, wish: NewTask | TaskWithdrawal | CommandRequest) -> TrackedRequest:
+        tracked_request = self.errands.give(wish, self.now_s)
         self.happen(Tick())
-        return errand
+        return tracked_request
 
-    def confirm(self, errand: Errand, *writers: str) -> None:
-        assert errand.said is not None
-        answers = [Snapshot(MISSION, w, 1, None, (errand.said,)) for w in writers]
-        self.happen(Learned(tuple(answers)))
+    def confirm(self, tracked_request: TrackedRequest, *writers: str) -> None:
+        assert tracked_request.said is not None
+        answers = [Snapshot(MISSION, w, 1, None, (tracked_request.said,)) for w in writers]
+        self.happen(SnapshotsReceived(tuple(answers)))
 
-    def happen(self, fact: BusFact, at_s: float | None = None) -> None:
+    def happen(self, fact: CommonEvent, at_s: float | None = None) -> None:
         self.now_s = self.now_s if at_s is None else at_s
-        self.observer.step(fact, self.now_s)
+        self.mission_state.step(fact, self.now_s)
         self.wishes += self.errands.step(fact, self.now_s)
 
     def wait(self, until_s: float) -> None:
@@ -97,9 +107,9 @@ class Desk:
         return [wish.message for wish in self.wishes if isinstance(wish, Publish)]
 
 
-def came(errand: Errand) -> tuple[Result, str]:
-    assert errand.verdict is not None
-    return errand.verdict.result, errand.verdict.text
+def came(tracked_request: TrackedRequest) -> tuple[RequestResult, str]:
+    assert tracked_request.verdict is not None
+    return tracked_request.verdict.result, tracked_request.verdict.text
 
 
 # -- adding -------------------------------------------------------------------------------
@@ -109,60 +119,72 @@ def test_a_task_is_added_at_the_end_of_the_board_worth_the_boards_median() -> No
     desk = Desk()
     desk.give(NewTask((3.0, 4.0, 0.0), service_s=5.0, kind="look", reason="smoke"))
 
-    expected = TaskOrder("op1", 5, (3.0, 4.0, 0.0), 4.0, 5.0, "look", False, 1, "smoke")
+    expected = TaskEdit("op1", 5, (3.0, 4.0, 0.0), 4.0, 5.0, "look", False, 1, "smoke")
     assert desk.said == [Message(MISSION, OPERATOR, Stamp(50, 1), expected)]
 
 
 def test_it_repeats_and_asks_until_everyone_there_has_confirmed() -> None:
     desk = Desk()
-    errand = desk.give(HERE)
+    tracked_request = desk.give(HERE)
     desk.wait(2.5 * TIMING.announce_s)
     assert (len(desk.said), len(set(desk.said))) == (3, 1)
     assert desk.wishes.count(Ask()) >= 4
 
-    desk.confirm(errand, "u0")
-    assert errand.verdict is None
-    desk.confirm(errand, "u1")
+    desk.confirm(tracked_request, "u0")
+    assert tracked_request.verdict is None
+    desk.confirm(tracked_request, "u1")
     desk.hear("u1", held("op1", 6.0))
-    assert came(errand) == (Result.OBEYED, "op1 is on the board, worth 4; u1 flies there")
+    assert came(tracked_request) == (
+        RequestResult.OBEYED,
+        "op1 is on the board, worth 4; u1 flies there",
+    )
     assert desk.errands.next_deadline_s() is None
 
 
 def test_a_task_that_nobody_takes_at_once_is_told_so() -> None:
     desk = Desk()
-    errand = desk.give(HERE)
-    desk.confirm(errand, "u0", "u1")
+    tracked_request = desk.give(HERE)
+    desk.confirm(tracked_request, "u0", "u1")
     desk.wait(5.0)
 
-    assert came(errand) == (Result.OBEYED, "op1 is on the board, worth 4; nobody has taken it yet")
+    assert came(tracked_request) == (
+        RequestResult.OBEYED,
+        "op1 is on the board, worth 4; nobody has taken it yet",
+    )
     assert desk.now_s < 2.0
 
 
 def test_who_has_not_confirmed_in_time_is_named() -> None:
     desk = Desk()
-    errand = desk.give(HERE)
-    desk.confirm(errand, "u1")
+    tracked_request = desk.give(HERE)
+    desk.confirm(tracked_request, "u1")
     desk.wait(PATIENCE_S)
 
-    result, text = came(errand)
-    assert (result, text.rpartition("; ")[2]) == (Result.OBEYED, "u0 has not confirmed it yet")
+    result, text = came(tracked_request)
+    assert (result, text.rpartition("; ")[2]) == (
+        RequestResult.OBEYED,
+        "u0 has not confirmed it yet",
+    )
 
 
 def test_without_any_answer_it_was_not_seen_to_arrive() -> None:
     desk = Desk()
-    errand = desk.give(HERE)
+    tracked_request = desk.give(HERE)
     desk.wait(PATIENCE_S)
 
-    assert came(errand) == (Result.NOT_OBEYED, "op1: nobody has confirmed it within 10 s")
+    assert came(tracked_request) == (
+        RequestResult.NOT_OBEYED,
+        "op1: nobody has confirmed it within 10 s",
+    )
 
 
 def test_a_task_no_uav_is_capable_of_is_added_all_the_same() -> None:
     desk = Desk()
-    errand = desk.give(replace(HERE, kind="lift"))
-    desk.confirm(errand, "u0", "u1")
+    tracked_request = desk.give(replace(HERE, kind="lift"))
+    desk.confirm(tracked_request, "u0", "u1")
 
-    result, text = came(errand)
-    assert result is Result.OBEYED
+    result, text = came(tracked_request)
+    assert result is RequestResult.OBEYED
     assert text.endswith("but no UAV is capable of it: the success of each there is 0")
 
 
@@ -170,12 +192,12 @@ def test_when_nobody_takes_part_any_more_it_was_in_vain() -> None:
     desk = Desk()
     desk.hear("u0", OUT)
     desk.hear("u1", OUT)
-    errand = desk.give(HERE)
-    desk.confirm(errand, "u0")
+    tracked_request = desk.give(HERE)
+    desk.confirm(tracked_request, "u0")
 
-    result, text = came(errand)
+    result, text = came(tracked_request)
     assert (result, text.partition("; ")[2]) == (
-        Result.NOT_OBEYED,
+        RequestResult.NOT_OBEYED,
         "but nobody who could do it takes part any more",
     )
 
@@ -187,9 +209,9 @@ def test_when_nobody_takes_part_any_more_it_was_in_vain() -> None:
 def test_an_id_that_is_taken_is_refused(name: str, why: str) -> None:
     desk = Desk(mission(FLEET, [task("late", 9.0, appears_s=50.0)]))
     desk.hear("u0", done("t1"))
-    errand = desk.give(replace(HERE, task=name))
+    tracked_request = desk.give(replace(HERE, task=name))
 
-    assert came(errand) == (Result.TAKEN_ID, f"{why}: give another id, or none")
+    assert came(tracked_request) == (RequestResult.TAKEN_ID, f"{why}: give another id, or none")
     assert desk.said == []
 
 
@@ -202,10 +224,10 @@ def test_ids_that_are_not_chosen_by_hand_go_on() -> None:
 
 def test_a_place_on_the_earth_is_brought_into_the_missions_frame() -> None:
     desk = Desk()
-    errand = desk.give(NewTask(Wgs84(47.0, 8.001)))
-    assert errand.said is not None
-    body = errand.said.body
-    assert isinstance(body, TaskOrder)
+    tracked_request = desk.give(NewTask(Wgs84(47.0, 8.001)))
+    assert tracked_request.said is not None
+    body = tracked_request.said.body
+    assert isinstance(body, TaskEdit)
     assert body.position_enu_m[0] == pytest.approx(76.05, abs=0.1)
     assert body.position_enu_m[1:] == (0.0, 0.0)
 
@@ -232,34 +254,37 @@ def test_what_no_message_can_carry_is_refused(fields: dict[str, object], problem
 def test_a_withdrawal_is_obeyed_once_all_know_and_nobody_flies_there() -> None:
     desk = Desk()
     desk.hear("u1", held("t1", 1.0))
-    errand = desk.give(Withdrawal("t1", "done by hand"))
+    tracked_request = desk.give(TaskWithdrawal("t1", "done by hand"))
     (message,) = desk.said
-    assert isinstance(message.body, TaskOrder)
+    assert isinstance(message.body, TaskEdit)
     assert (message.body.withdrawn, message.body.value, message.body.number) == (True, 6.0, 4)
-    desk.confirm(errand, "u0", "u1")
-    assert errand.verdict is None
+    desk.confirm(tracked_request, "u0", "u1")
+    assert tracked_request.verdict is None
 
     desk.hear("u1", IDLE)
-    assert came(errand) == (Result.OBEYED, "t1 is withdrawn")
+    assert came(tracked_request) == (RequestResult.OBEYED, "t1 is withdrawn")
 
 
 def test_who_does_not_give_a_withdrawn_task_up_is_named() -> None:
     desk = Desk()
     desk.hear("u1", held("t1", 1.0))
-    errand = desk.give(Withdrawal("t1"))
-    desk.confirm(errand, "u0", "u1")
+    tracked_request = desk.give(TaskWithdrawal("t1"))
+    desk.confirm(tracked_request, "u0", "u1")
     desk.wait(PATIENCE_S)
 
-    assert came(errand) == (Result.NOT_OBEYED, "u1 still claims t1")
+    assert came(tracked_request) == (RequestResult.NOT_OBEYED, "u1 still claims t1")
 
 
 def test_a_task_that_is_done_meanwhile_cannot_be_withdrawn() -> None:
     desk = Desk()
-    errand = desk.give(Withdrawal("t1"))
+    tracked_request = desk.give(TaskWithdrawal("t1"))
     desk.hear("u1", done("t1"))
-    desk.confirm(errand, "u0", "u1")
+    desk.confirm(tracked_request, "u0", "u1")
 
-    assert came(errand) == (Result.NOT_OBEYED, "t1 was done before it could be withdrawn")
+    assert came(tracked_request) == (
+        RequestResult.NOT_OBEYED,
+        "t1 was done before it could be withdrawn",
+    )
 
 
 def test_what_is_not_there_done_or_withdrawn_is_refused_in_words() -> None:
@@ -267,19 +292,25 @@ def test_what_is_not_there_done_or_withdrawn_is_refused_in_words() -> None:
     desk.hear("u0", done("t0"))
     desk.hear(OPERATOR, order("t1", withdrawn=True))
 
-    assert came(desk.give(Withdrawal("t9"))) == (Result.UNKNOWN_TASK, "the board holds t0, t1")
-    assert came(desk.give(Withdrawal("t0"))) == (Result.NOT_OBEYED, "t0 is done already")
-    assert came(desk.give(Withdrawal("t1"))) == (Result.NOT_OBEYED, "t1 is withdrawn already")
+    assert came(desk.give(TaskWithdrawal("t9"))) == (
+        RequestResult.UNKNOWN_TASK,
+        "the board holds t0, t1",
+    )
+    assert came(desk.give(TaskWithdrawal("t0"))) == (RequestResult.NOT_OBEYED, "t0 is done already")
+    assert came(desk.give(TaskWithdrawal("t1"))) == (
+        RequestResult.NOT_OBEYED,
+        "t1 is withdrawn already",
+    )
     assert desk.said == []
 
 
 def test_who_knows_the_scenario_withdraws_a_pop_up_before_it_appears() -> None:
     desk = Desk(mission(FLEET, [task("late", 9.0, 3.0, appears_s=50.0)]))
-    errand = desk.give(Withdrawal("late"))
+    tracked_request = desk.give(TaskWithdrawal("late"))
 
-    assert errand.verdict is None
-    assert desk.observer.board.states["late"].value == "withdrawn"
-    assert desk.observer.result().open == ()
+    assert tracked_request.verdict is None
+    assert desk.mission_state.board.states["late"].value == "withdrawn"
+    assert desk.mission_state.result().open == ()
 
 
 # -- many at once, and others ---------------------------------------------------------------
@@ -287,8 +318,8 @@ def test_who_knows_the_scenario_withdraws_a_pop_up_before_it_appears() -> None:
 
 def test_several_errands_are_followed_side_by_side() -> None:
     desk = Desk()
-    held_uav = desk.give(CommandWish(CommandKind.HOLD, "u0"))
-    added, gone = desk.give(HERE), desk.give(Withdrawal("t0"))
+    held_uav = desk.give(CommandRequest(CommandKind.HOLD, "u0"))
+    added, gone = desk.give(HERE), desk.give(TaskWithdrawal("t0"))
     assert len({message.stamp for message in desk.said}) == 3
 
     desk.confirm(gone, "u0", "u1")
@@ -300,7 +331,7 @@ def test_several_errands_are_followed_side_by_side() -> None:
 
 def test_it_speaks_above_all_that_any_operator_has_said() -> None:
     desk = Desk()
-    desk.happen(Heard(Message(MISSION, OPERATOR, Stamp(7_000, 3), order("op1"))))
+    desk.happen(MessageReceived(Message(MISSION, OPERATOR, Stamp(7_000, 3), order("op1"))))
     desk.give(HERE)
 
     assert desk.said[0].stamp > Stamp(7_000, 3)
@@ -308,83 +339,89 @@ def test_it_speaks_above_all_that_any_operator_has_said() -> None:
 
 def test_another_operators_later_word_ends_it() -> None:
     desk = Desk()
-    errand = desk.give(HERE)
+    tracked_request = desk.give(HERE)
     later = Message(MISSION, OPERATOR, Stamp(60, 1), order("op1", withdrawn=True))
-    desk.happen(Heard(later))
+    desk.happen(MessageReceived(later))
 
     text = "another operator has withdrawn op1 meanwhile"
-    assert came(errand) == (Result.NOT_OBEYED, text)
+    assert came(tracked_request) == (RequestResult.NOT_OBEYED, text)
 
 
 def test_after_the_end_nothing_is_taken_up() -> None:
     desk = Desk()
     before = desk.give(HERE)
-    desk.hear(COORDINATOR, epoch("u0", "u1", phase=EpochPhase.ENDED, number=2))
-    assert came(before)[0] is Result.NOT_OBEYED
+    desk.hear(COORDINATOR, epoch("u0", "u1", phase=MissionPhase.ENDED, number=2))
+    assert came(before)[0] is RequestResult.NOT_OBEYED
 
     text = "the mission has ended: nothing is taken up any more"
-    assert came(desk.give(HERE)) == (Result.NOT_OBEYED, text)
-    assert came(desk.give(Withdrawal("t0"))) == (Result.NOT_OBEYED, text)
+    assert came(desk.give(HERE)) == (RequestResult.NOT_OBEYED, text)
+    assert came(desk.give(TaskWithdrawal("t0"))) == (RequestResult.NOT_OBEYED, text)
 
 
 def test_a_mission_that_ends_by_what_was_ordered_has_obeyed() -> None:
-    over = epoch("u0", "u1", phase=EpochPhase.ENDED, number=2)
+    over = epoch("u0", "u1", phase=MissionPhase.ENDED, number=2)
     desk = Desk()
-    added, gone = desk.give(HERE), desk.give(Withdrawal("t0"))
+    added, gone = desk.give(HERE), desk.give(TaskWithdrawal("t0"))
     desk.hear("u0", done("op1"))
     desk.hear(COORDINATOR, over)
 
-    assert came(added) == (Result.OBEYED, "op1 was added and is done")
-    assert came(gone) == (Result.OBEYED, "t0 is withdrawn")
+    assert came(added) == (RequestResult.OBEYED, "op1 was added and is done")
+    assert came(gone) == (RequestResult.OBEYED, "t0 is withdrawn")
 
 
 def test_when_the_brief_turns_out_to_be_of_another_run_it_says_so_anew() -> None:
     desk = Desk()
-    errand = desk.give(HERE)
+    tracked_request = desk.give(HERE)
     desk.hear(COORDINATOR, replace(brief(*FLEET), run=5))
     desk.happen(Tick())
 
-    assert errand.said is not None
-    assert [m.body.run for m in desk.said if isinstance(m.body, TaskOrder)] == [1, 5]
-    assert "op1" in desk.observer.replica.board
+    assert tracked_request.said is not None
+    assert [m.body.run for m in desk.said if isinstance(m.body, TaskEdit)] == [1, 5]
+    assert "op1" in desk.mission_state.replica.board
 
 
 # -- operators at the same moment ---------------------------------------------------------
 
 
-def hear_other(desk: Desk, body: TaskOrder, incarnation: int = 60) -> None:
+def hear_other(desk: Desk, body: TaskEdit, incarnation: int = 60) -> None:
     """Another operator, who has not heard of this one's order, says so."""
-    desk.happen(Heard(message(OPERATOR, body, 1, incarnation)))
+    desk.happen(MessageReceived(message(OPERATOR, body, 1, incarnation)))
 
 
 def test_a_task_that_crosses_anothers_under_one_id_gets_the_next_one() -> None:
     desk = Desk()
-    errand = desk.give(HERE)
+    tracked_request = desk.give(HERE)
     hear_other(desk, order("op1", 8.0))
 
     assert [said.body for said in desk.said] == [
-        TaskOrder("op1", 5, (3.0, 4.0, 0.0), 4.0, 0.0, None, False, 1, ""),
-        TaskOrder("op2", 10, (3.0, 4.0, 0.0), 4.0, 0.0, None, False, 1, ""),
+        TaskEdit("op1", 5, (3.0, 4.0, 0.0), 4.0, 0.0, None, False, 1, ""),
+        TaskEdit("op2", 10, (3.0, 4.0, 0.0), 4.0, 0.0, None, False, 1, ""),
     ]
     assert desk.said[1].stamp > Stamp(60, 1)
-    assert {"op1", "op2"} <= desk.observer.replica.board.keys()
-    desk.confirm(errand, "u0", "u1")
+    assert {"op1", "op2"} <= desk.mission_state.replica.board.keys()
+    desk.confirm(tracked_request, "u0", "u1")
     desk.hear("u1", held("op2", 6.0))
-    assert came(errand) == (Result.OBEYED, "op2 is on the board, worth 4; u1 flies there")
+    assert came(tracked_request) == (
+        RequestResult.OBEYED,
+        "op2 is on the board, worth 4; u1 flies there",
+    )
 
 
 def test_who_spoke_later_keeps_the_id() -> None:
     desk = Desk()
-    errand = desk.give(HERE)
+    tracked_request = desk.give(HERE)
     hear_other(desk, order("op1", 8.0), incarnation=40)
 
-    assert [said.body.task for said in desk.said if isinstance(said.body, TaskOrder)] == ["op1"]
-    assert errand.verdict is None
+    assert [said.body.task for said in desk.said if isinstance(said.body, TaskEdit)] == ["op1"]
+    assert tracked_request.verdict is None
 
 
 def test_an_id_that_was_chosen_by_hand_is_not_changed() -> None:
     desk = Desk()
-    errand = desk.give(replace(HERE, task="fire"))
+    tracked_request = desk.give(replace(HERE, task="fire"))
     hear_other(desk, order("fire", 8.0))
 
-    assert came(errand) == (Result.NOT_OBEYED, "another operator has changed fire meanwhile")
+    assert came(tracked_request) == (
+        RequestResult.NOT_OBEYED,
+        "another operator has changed fire meanwhile",
+    )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from coordinator.operator.task_seat import TaskSeat
-from swarm.config import Timing
-from swarm.events import Finish, Heard, LinkChanged, Publish, Tick, Wish
+from sim.world.scripted_operator import ScriptedOperator
 from swarm.model import TaskId
 from swarm.model.ids import OPERATOR
-from swarm.wire.messages import TaskOrder
-from tests.builders import entry, message, mission, task, uav
+from swarm.protocol.events import CommonAction, Finish, LinkChanged, MessageReceived, Publish, Tick
+from swarm.protocol.messages import TaskEdit
+from swarm.protocol.timing import Timing
+from tests.support.builders import entry, message, mission, task, uav
 
 TIMING = Timing(announce_s=4.0, silence_s=20.0)
 FLOWN = mission([uav("u0")], [task("t0", 5.0), task("t1", 9.0), task("late", 7.0, appears_s=30.0)])
@@ -18,9 +18,9 @@ ZERO_S = 80.0
 
 def flown(
     withdrawn_at_s: dict[str, float] | None = None, *, since_s: float = 10.0, until_s: float = 1e6
-) -> tuple[TaskSeat, list[tuple[float, Wish]]]:
+) -> tuple[ScriptedOperator, list[tuple[float, CommonAction]]]:
     """A seat of which the operator sits down at 20 s, its wishes, and when [s mission time]."""
-    seat = TaskSeat(
+    seat = ScriptedOperator(
         FLOWN,
         {TaskId(name): at_s for name, at_s in (withdrawn_at_s or {}).items()},
         since_s=since_s,
@@ -37,14 +37,14 @@ def flown(
     return seat, told
 
 
-def said(wishes: list[tuple[float, Wish]]) -> list[tuple[float, str, bool]]:
+def said(wishes: list[tuple[float, CommonAction]]) -> list[tuple[float, str, bool]]:
     found = []
     for at_s, wish in wishes:
         if isinstance(wish, Publish):
             assert wish.message.writer == OPERATOR
             assert wish.message.stamp.incarnation == 50
             body = wish.message.body
-            assert isinstance(body, TaskOrder)
+            assert isinstance(body, TaskEdit)
             assert body.run == 7
             found.append((at_s, body.task, body.withdrawn))
     return found
@@ -77,7 +77,7 @@ def test_it_repeats_what_it_said_for_a_while_and_leaves_when_nothing_is_to_come(
     assert [at_s for at_s, _, _ in said(told)] == [30.0, 34.0, 38.0, 42.0]
     assert told[-1][1] == Finish(0)
     assert seat.next_deadline_s() is None
-    assert seat.step(Heard(message("u0", entry("t0"))), 1e6) == []
+    assert seat.step(MessageReceived(message("u0", entry("t0"))), 1e6) == []
 
 
 def test_where_nothing_is_to_come_it_leaves_at_once() -> None:

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.planner.assignment import single_stage
+from coordinator.planner.sequence_space import single_stage
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
-from tests.problems import any_problem, random_problem
+from tests.support.problems import any_problem, random_problem
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from coordinator.planner.bound import trivial_bound, upper_bound
 from coordinator.planner.exact import optimum
-from coordinator.planner.routes import guided_plan
-from coordinator.planner.stop import after_evaluations
+from coordinator.planner.options import after_evaluations
+from coordinator.planner.plan import guided_plan
 from sim.study.generator import random_mission
-from swarm.allocation.guided import route_arrays
+from swarm.allocation.rules import route_arrays
 from swarm.kernels.routes import TeamArrays
 from swarm.kernels.routes_bound import priced_lists, shortest_legs_s
-from tests.problems import any_problem, random_problem, table_1
+from tests.support.problems import any_problem, random_problem, table_1
 
 
 @settings(deadline=None, max_examples=60)

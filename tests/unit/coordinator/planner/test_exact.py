@@ -13,7 +13,7 @@ from coordinator.planner.exact import (
     worst_value,
 )
 from swarm.allocation import evaluate, reference
-from tests.problems import any_problem, random_problem, table_1
+from tests.support.problems import any_problem, random_problem, table_1
 
 
 @settings(deadline=None, max_examples=60)

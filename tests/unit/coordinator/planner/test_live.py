@@ -8,15 +8,22 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from coordinator.planner.live import Course, Prediction, Situation, predicted, replan, worth
-from coordinator.planner.stop import ShouldStop, after_evaluations, never
+from coordinator.planner.online import (
+    EpochPolicy,
+    Prediction,
+    Situation,
+    objective_to_go,
+    predicted,
+    replan,
+)
+from coordinator.planner.options import ShouldStop, after_evaluations, never
 from swarm.allocation import reference
 from swarm.allocation.objective import evaluate
-from swarm.allocation.reference_routes import team_worth
-from swarm.state.board import TaskBoard
-from swarm.state.registers import Replica
-from swarm.wire.messages import Claim, ClaimPhase
-from tests.builders import (
+from swarm.allocation.reference import team_worth
+from swarm.protocol.board import TaskBoard
+from swarm.protocol.registers import Replica
+from swarm.protocol.uav_messages import Claim, ClaimPhase
+from tests.support.builders import (
     IDLE,
     MISSION,
     OUT,
@@ -30,9 +37,9 @@ from tests.builders import (
     task,
     uav,
 )
-from tests.running_mission import RunningMission
+from tests.support.running_mission import RunningMission
 
-GREEDY = Course("greedy", (), {})
+GREEDY = EpochPolicy("greedy", (), {})
 
 
 def fork() -> RunningMission:
@@ -162,7 +169,7 @@ def test_a_claim_on_a_task_that_is_done_binds_nobody() -> None:
 def test_prediction_equals_the_plain_lower_level_from_the_live_state(rule: str, seed: int) -> None:
     situation = midway(seed)
     order = np.random.default_rng(seed).permutation(situation.problem.n_uav).tolist()
-    course = Course(rule, tuple(situation.problem.uav_ids[index] for index in order), {})
+    course = EpochPolicy(rule, tuple(situation.problem.uav_ids[index] for index in order), {})
 
     found = predicted(situation, course)
 
@@ -180,7 +187,7 @@ def test_prediction_equals_the_plain_lower_level_from_the_live_state(rule: str, 
 def test_completion_times_are_those_of_the_mission_clock() -> None:
     running = fork().say("a", held("t1", 0.0, completion_s=30.0)).say("b", OUT)
 
-    found = predicted(running.at(12.0), Course("guided", (), {"a": ("t1", "t0", "t2")}))
+    found = predicted(running.at(12.0), EpochPolicy("guided", (), {"a": ("t1", "t0", "t2")}))
 
     assert found.lists == {"a": ("t0", "t2"), "b": ()}
     assert found.completion_s == {"t1": 30.0, "t0": 50.0, "t2": 120.0}
@@ -193,13 +200,13 @@ def test_guided_predicts_no_less_than_its_lists_are_worth() -> None:
         plan = replan(situation, GREEDY, "guided", stop=after_evaluations(500))
         lists = plan.prediction.lists
 
-        found = predicted(situation, Course("guided", plan.sequence, lists))
+        found = predicted(situation, EpochPolicy("guided", plan.sequence, lists))
 
         assert found.objective >= plan.prediction.objective - 1e-9
 
 
 def test_by_an_unknown_rule_nothing_is_done() -> None:
-    found = predicted(fork().at(0.0), Course("newer", (), {}))
+    found = predicted(fork().at(0.0), EpochPolicy("newer", (), {}))
 
     assert found == Prediction({"a": (), "b": ()}, {}, 0.0)
 
@@ -225,7 +232,7 @@ def test_rules_with_a_sequence_get_the_best_of_all(rule: str, seed: int) -> None
     plan = replan(situation, GREEDY, rule)
 
     worths = [
-        predicted(situation, Course(rule, sequence, {})).objective
+        predicted(situation, EpochPolicy(rule, sequence, {})).objective
         for sequence in permutations(sorted(situation.taking_part))
     ]
     assert plan.rule == rule
@@ -267,13 +274,15 @@ def test_a_plan_is_predicted_by_the_lists_that_would_be_published(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     running = fork().say("a", done("t0", 10.0)).say("a", held("t1", 10.0, completion_s=30.0))
-    courses: list[Course] = []
+    courses: list[EpochPolicy] = []
 
-    def recording(situation: Situation, course: Course, stop: ShouldStop = never) -> Prediction:
+    def recording(
+        situation: Situation, course: EpochPolicy, stop: ShouldStop = never
+    ) -> Prediction:
         courses.append(course)
         return predicted(situation, course, stop)
 
-    monkeypatch.setattr("coordinator.planner.live.predicted", recording)
+    monkeypatch.setattr("coordinator.planner.online.predicted", recording)
     plan = replan(running.at(12.0), GREEDY, "guided")
 
     # With a task on no list, done or claimed though it be, every decision would be searched anew.
@@ -284,7 +293,7 @@ def test_a_plan_is_predicted_by_the_lists_that_would_be_published(
 def test_stopped_at_once_everything_has_a_prediction_all_the_same() -> None:
     for seed in range(20):
         situation = midway(seed, max_uavs=4, max_tasks=12)
-        course = Course("guided", (), {})
+        course = EpochPolicy("guided", (), {})
 
         plan = replan(situation, course, "guided", stop=lambda _: True)
 
@@ -305,7 +314,7 @@ def test_stopped_after_some_decisions_the_lists_are_flown_to_their_end() -> None
         return True
 
     lists = {"a": ("t0", "t1"), "b": ("t2",)}
-    found = predicted(running.at(0.0), Course("guided", ("a", "b"), lists), after_one_decision)
+    found = predicted(running.at(0.0), EpochPolicy("guided", ("a", "b"), lists), after_one_decision)
 
     assert found.lists == lists
     assert found.completion_s == {"t0": 10.0, "t1": 30.0, "t2": 20.0}
@@ -320,7 +329,7 @@ def test_good_lists_are_worth_what_was_predicted_of_them(seed: int) -> None:
 
     plan = replan(situation, GREEDY, "guided", stop=after_evaluations(500))
 
-    value = worth(situation, plan.prediction.lists)
+    value = objective_to_go(situation, plan.prediction.lists)
     assert value == pytest.approx(plan.prediction.objective, rel=1e-6, abs=1e-6)
 
 
@@ -330,8 +339,8 @@ def test_worth_skips_what_is_done_and_finds_a_place_for_what_is_on_no_list() -> 
     running.say("a", Claim(ClaimPhase.HELD, "t0", 0.0, 0, 10.0)).lose("b")
 
     # a ends t0 at 10 s, t1 at 30 s, and takes t2 at 80 s though it was on another's list.
-    assert worth(running.at(1.0), lists) == pytest.approx(470.0 + 420.0)
-    assert worth(running.say("a", OUT).at(1.0), lists) == 0.0
+    assert objective_to_go(running.at(1.0), lists) == pytest.approx(470.0 + 420.0)
+    assert objective_to_go(running.say("a", OUT).at(1.0), lists) == 0.0
 
 
 def best_of_all_lists(situation: Situation) -> float:

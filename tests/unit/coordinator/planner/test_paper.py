@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from coordinator.planner.exact import optimum, worst_value
-from coordinator.planner.sequence import best_sequence
+from coordinator.planner.sequence_search import best_sequence
 from swarm.allocation import TeamState, evaluate, rank_of, rule_by_name, run
-from tests.problems import paper_problem, table_1
+from tests.support.problems import paper_problem, table_1
 
 GREEDY = {
     (1, 2, 3): 116.1364,

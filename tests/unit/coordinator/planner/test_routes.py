@@ -2,11 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from coordinator.planner.plan import make_plan
-from coordinator.planner.routes import guided_plan
-from coordinator.planner.stop import after_evaluations
+from coordinator.planner.options import after_evaluations
+from coordinator.planner.plan import guided_plan, make_plan
 from swarm.allocation import TeamState, evaluate
-from tests.problems import random_problem, table_1_mission
+from tests.support.problems import random_problem, table_1_mission
 
 
 class StillClock:

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.planner.sequence import SearchLimits, best_sequence
-from coordinator.planner.stop import after_evaluations
+from coordinator.planner.options import after_evaluations
+from coordinator.planner.sequence_search import SearchLimits, best_sequence
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.allocation.problem import FloatArray
-from tests.problems import any_problem, random_problem, table_1
+from tests.support.problems import any_problem, random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)
 NO_LISTING = SearchLimits(first_rounds=0, first_rounds_large_fleet=0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coordinator.planner.sequence import SearchLimits, SequenceSearch, best_sequence
-from coordinator.planner.stop import after_evaluations
+from coordinator.planner.options import after_evaluations
+from coordinator.planner.sequence_search import SearchLimits, SequenceSearch, best_sequence
 from swarm.allocation import TeamState, evaluate, rank_of, rule_by_name, run
-from tests.problems import random_problem
+from tests.support.problems import random_problem
 
 NO_LISTING = SearchLimits(first_rounds=0, first_rounds_large_fleet=0)
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from coordinator.planner.stop import after_evaluations, after_time, first_of, never, part_of
+from coordinator.planner.options import after_evaluations, after_time, first_of, never, part_of
 
 
 class HandClock:

@@ -8,26 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.recording.explain import Explanation, explain_task, explain_uav
+from coordinator.recording.explanation import Explanation, explain_task, explain_uav
 from coordinator.recording.growing_mcap import Patch
 from coordinator.recording.reader import Recording, read_recording
-from coordinator.recording.recorder import About, Recorder
-from coordinator.recording.records import Begun
-from swarm.config import Timing
-from swarm.errors import InputError
-from swarm.events import BusFact, Heard, PeerGone, PeerSeen, Tick
+from coordinator.recording.recorder import Recorder, RecordingInfo
+from coordinator.recording.records import RecordingStarted
 from swarm.model.ids import COORDINATOR, OPERATOR
-from swarm.wire.choice import Basis, Candidate
-from swarm.wire.messages import (
-    Body,
-    Choice,
-    Command,
-    CommandKind,
-    EpochPhase,
-    StatusPhase,
-    TaskOrder,
-)
-from tests.builders import (
+from swarm.protocol.events import CommonEvent, MessageReceived, PeerGone, PeerSeen, Tick
+from swarm.protocol.messages import Body, CommandKind, MissionPhase, OperatorCommand, TaskEdit
+from swarm.protocol.timing import Timing
+from swarm.protocol.uav_messages import Candidate, Choice, ChoiceBasis, StatusPhase
+from swarm.runtime.errors import InputError
+from tests.support.builders import (
     IDLE,
     MISSION,
     OUT,
@@ -53,9 +45,9 @@ class Tape:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._recorder = Recorder(About(MISSION, TIMING))
+        self._recorder = Recorder(RecordingInfo(MISSION, TIMING))
         self._counters: Counter[str] = Counter()
-        self._recorder.note(Begun(), 0.0, 0)
+        self._recorder.note(RecordingStarted(), 0.0, 0)
         for name in (COORDINATOR, "u0", "u1"):
             self.happen(PeerSeen(name), -1.0)
         self.say(COORDINATOR, brief(uav("u0"), uav("u1")), -1.0)
@@ -65,13 +57,13 @@ class Tape:
         self.say("u1", IDLE, -0.5)
         self.say(COORDINATOR, epoch("u0", "u1"), 0.0)
 
-    def happen(self, fact: BusFact, mission_s: float) -> None:
+    def happen(self, fact: CommonEvent, mission_s: float) -> None:
         now_s = BEGIN_S + mission_s
         self._recorder.note(fact, now_s, round(now_s * 1e9))
 
     def say(self, writer: str, body: Body, mission_s: float) -> None:
         self._counters[writer] += 1
-        self.happen(Heard(message(writer, body, self._counters[writer])), mission_s)
+        self.happen(MessageReceived(message(writer, body, self._counters[writer])), mission_s)
 
     def lose(self, writer: str, mission_s: float) -> None:
         self.happen(PeerGone(writer), mission_s)
@@ -90,7 +82,7 @@ def tape(tmp_path: Path) -> Tape:
 
 
 def choice(task: str, left: str | None = None, *, certificate: bool = False) -> Choice:
-    basis = Basis(0.0, (0.0, 0.0, 0.0), 0.5, (), (), (), {}, 0)
+    basis = ChoiceBasis(0.0, (0.0, 0.0, 0.0), 0.5, (), (), (), {}, 0)
     others = (Candidate(task, 8.0), Candidate("t1" if task == "t0" else "t0", 6.5))
     return Choice(1, task, left, 0.0, 1, "greedy", 0, 8.0, 6.5, certificate, 10.0, others, basis)
 
@@ -178,12 +170,12 @@ def test_an_end_that_is_heard_of_after_the_next_claim_is_no_giving_up(tape: Tape
 
 
 def test_the_operator_is_named_where_it_was_the_operator(tape: Tape) -> None:
-    order = TaskOrder("extra", 2, (0.0, -5.0, 0.0), 3.0, 1.5, None, False, 1, "smoke seen")
+    order = TaskEdit("extra", 2, (0.0, -5.0, 0.0), 3.0, 1.5, None, False, 1, "smoke seen")
     tape.say(OPERATOR, order, 4.0)
     tape.say("u0", held("extra", 5.0), 5.0)
-    tape.say(OPERATOR, Command("u0", CommandKind.HOLD, 1, "traffic"), 6.0)
+    tape.say(OPERATOR, OperatorCommand("u0", CommandKind.HOLD, 1, "traffic"), 6.0)
     tape.say("u0", PAUSED, 6.1)
-    gone = TaskOrder("extra", 2, (0.0, -5.0, 0.0), 3.0, 1.5, None, True, 1, "false alarm")
+    gone = TaskEdit("extra", 2, (0.0, -5.0, 0.0), 3.0, 1.5, None, True, 1, "false alarm")
     tape.say(OPERATOR, gone, 8.0)
     recording = tape.stop()
 
@@ -199,8 +191,8 @@ def test_the_operator_is_named_where_it_was_the_operator(tape: Tape) -> None:
 
 
 def test_what_the_operator_said_of_an_earlier_flight_is_no_part_of_the_story(tape: Tape) -> None:
-    tape.say(OPERATOR, Command("u0", CommandKind.HOLD, 0, "traffic"), 4.0)
-    tape.say(OPERATOR, TaskOrder("t0", 0, (0.0, 0.0, 0.0), 1.0, 0.0, None, True, 0, ""), 5.0)
+    tape.say(OPERATOR, OperatorCommand("u0", CommandKind.HOLD, 0, "traffic"), 4.0)
+    tape.say(OPERATOR, TaskEdit("t0", 0, (0.0, 0.0, 0.0), 1.0, 0.0, None, True, 0, ""), 5.0)
     recording = tape.stop()
 
     assert not any("operator" in text for text in texts(explain_uav(recording, "u0")))
@@ -209,7 +201,7 @@ def test_what_the_operator_said_of_an_earlier_flight_is_no_part_of_the_story(tap
 
 def test_an_end_that_is_restated_is_told_once(tape: Tape) -> None:
     for mission_s in (9.0, 10.0, 11.0):
-        ended = epoch("u0", phase=EpochPhase.ENDED, number=2, reason="all over")
+        ended = epoch("u0", phase=MissionPhase.ENDED, number=2, reason="all over")
         tape.say(COORDINATOR, replace(ended, mission_s=mission_s), mission_s)
 
     assert texts(explain_uav(tape.stop(), "u0")).count("The mission was over: all over.") == 1
@@ -219,7 +211,7 @@ def test_a_failed_attempt_and_the_way_home_are_told(tape: Tape) -> None:
     tape.say("u0", held("t0", 0.0), 0.0)
     tape.say("u0", failed("t0", 9.0), 9.0)
     tape.say("u0", IDLE, 9.0)
-    tape.say(COORDINATOR, epoch("u0", phase=EpochPhase.ENDED, number=2, reason="all over"), 9.5)
+    tape.say(COORDINATOR, epoch("u0", phase=MissionPhase.ENDED, number=2, reason="all over"), 9.5)
     tape.say("u0", OUT, 19.0)
     tape.say("u0", status(StatusPhase.HOME), 20.0)
     tape.happen(PeerGone("u0"), 21.0)

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import NonSeekingReader, make_reader
 
-from coordinator.recording.file_records import FileRecords
 from coordinator.recording.growing_mcap import GrowingMcap
-from tests.recordings import Disk
+from coordinator.recording.reader import FileRecords
+from tests.support.recordings import Disk
 
 SCHEMA = b'{"type":"object"}'
 

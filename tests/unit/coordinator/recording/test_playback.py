@@ -7,11 +7,11 @@ import json
 import pytest
 
 from coordinator.recording.playback import Playback
-from coordinator.recording.player import Player
+from coordinator.recording.player import RecordingPlayer
 from coordinator.recording.reader import Recording, read_recording
-from coordinator.status.table import mission_status, status_as_json
-from tests.observed_mission import shipped
-from tests.recordings import fly_recorded
+from coordinator.terminal.status_table import mission_status, status_as_json
+from tests.support.observed_mission import shipped
+from tests.support.recordings import fly_recorded
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 def picture(playback: Playback) -> str:
-    return json.dumps(status_as_json(mission_status(playback.observer, playback.now_s)))
+    return json.dumps(status_as_json(mission_status(playback.mission_state, playback.now_s)))
 
 
 def straight(recording: Recording, t_s: float) -> str:
@@ -91,7 +91,7 @@ class Wall:
 
 def test_the_page_stops_winds_and_plays_on(recording: Recording) -> None:
     wall = Wall()
-    player = Player(Playback(recording), wall)
+    player = RecordingPlayer(Playback(recording), wall)
 
     player.control(playing=False, speed=4.0, t_s=1.0)
     wall.time_s = 10.0
@@ -108,12 +108,12 @@ def test_the_page_stops_winds_and_plays_on(recording: Recording) -> None:
 
 def test_who_plays_on_from_the_end_begins_anew(recording: Recording) -> None:
     wall = Wall()
-    player = Player(Playback(recording), wall)
+    player = RecordingPlayer(Playback(recording), wall)
     player.control(playing=None, speed=None, t_s=1e9)
-    before = player.observer
+    before = player.mission_state
 
     player.control(playing=True, speed=None, t_s=None)
 
     assert player.state.t_s == 0.0
     assert player.state.playing
-    assert player.observer is not before
+    assert player.mission_state is not before

@@ -16,15 +16,14 @@ from mcap.reader import make_reader
 from mcap.records import Chunk, DataEnd, Footer, Header
 from mcap.writer import MCAP0_MAGIC
 
-from coordinator.recording.file_records import FileRecords
 from coordinator.recording.playback import Playback
-from coordinator.recording.reader import Recording, read_recording
-from coordinator.recording.records import Begun
-from coordinator.status.table import mission_status, status_as_json
-from swarm.errors import InputError
+from coordinator.recording.reader import FileRecords, Recording, read_recording
+from coordinator.recording.records import RecordingStarted
+from coordinator.terminal.status_table import mission_status, status_as_json
 from swarm.model import Plan
-from tests.observed_mission import shipped
-from tests.recordings import Flown, fly_recorded
+from swarm.runtime.errors import InputError
+from tests.support.observed_mission import shipped
+from tests.support.recordings import Flown, fly_recorded
 
 LOST = "uav3"
 
@@ -42,7 +41,7 @@ def recording(flown: Flown, tmp_path: Path) -> Recording:
 
 
 def final(playback: Playback) -> dict[str, Any]:
-    return status_as_json(mission_status(playback.observer, playback.now_s))
+    return status_as_json(mission_status(playback.mission_state, playback.now_s))
 
 
 def read_or_refuse(path: Path) -> Recording | str:
@@ -56,7 +55,9 @@ def test_the_facts_are_those_that_the_core_got_at_the_same_times(
     flown: Flown, recording: Recording
 ) -> None:
     noted = [
-        (now_s, what) for now_s, what in flown.steps.noted if not isinstance(what, Plan | Begun)
+        (now_s, what)
+        for now_s, what in flown.steps.noted
+        if not isinstance(what, Plan | RecordingStarted)
     ]
 
     assert [(entry.now_s, entry.fact) for entry in recording.entries] == noted
@@ -75,12 +76,12 @@ def test_replay_ends_with_the_very_picture_of_the_flight(
 
     playback.seek(playback.duration_s)
 
-    live = status_as_json(mission_status(flown.observer, playback.now_s))
+    live = status_as_json(mission_status(flown.mission_state, playback.now_s))
     assert json.dumps(final(playback)) == json.dumps(live)
-    assert [line.text for line in playback.observer.story] == [
-        line.text for line in flown.observer.story
+    assert [line.text for line in playback.mission_state.story] == [
+        line.text for line in flown.mission_state.story
     ]
-    assert playback.observer.result() == flown.observer.result()
+    assert playback.mission_state.result() == flown.mission_state.result()
 
 
 def test_the_mcap_library_reads_it_and_every_message_fits_its_schema(flown: Flown) -> None:
@@ -115,7 +116,7 @@ def test_scene_and_curves_tell_how_it_ended(flown: Flown) -> None:
         if channel.topic == "/log":
             logs.append(told["message"])
 
-    result = flown.observer.result()
+    result = flown.mission_state.result()
     assert last["/progress"]["objective"] == result.executed_objective
     assert last["/progress"]["done"] == len(result.done) == 8
     assert last["/progress"]["lost"] == 1
@@ -138,7 +139,7 @@ def test_a_file_torn_anywhere_gives_all_that_was_written_before(every: int, tmp_
         facts = [
             (now_s, what)
             for now_s, what in steps.noted[: steps.written[number - 1]]
-            if not isinstance(what, Plan | Begun)
+            if not isinstance(what, Plan | RecordingStarted)
         ]
         for cut in {0, 1, 9, 60, 4096, len(patch.data) // 2, len(patch.data) - 1}:
             if cut >= len(patch.data):

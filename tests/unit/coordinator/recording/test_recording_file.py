@@ -9,27 +9,32 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.recording.flight_recorder import FlightRecorder, recording_to, virtual_ns
+from coordinator.recording.flight_recorder import (
+    FileSink,
+    FlightRecorder,
+    RecordingThread,
+    recording_to,
+    virtual_ns,
+)
 from coordinator.recording.growing_mcap import GrowingMcap, Patch
 from coordinator.recording.reader import read_recording
-from coordinator.recording.recorder import About
-from coordinator.recording.recording_file import FileSink, RecordingThread
-from coordinator.recording.records import Begun
-from swarm.config import Timing
-from swarm.errors import InputError
-from swarm.events import Heard
+from coordinator.recording.recorder import RecordingInfo
+from coordinator.recording.records import RecordingStarted
 from swarm.model.ids import COORDINATOR
-from tests.builders import MISSION, brief, epoch, message, uav
-from tests.recordings import Disk
+from swarm.protocol.events import MessageReceived
+from swarm.protocol.timing import Timing
+from swarm.runtime.errors import InputError
+from tests.support.builders import MISSION, brief, epoch, message, uav
+from tests.support.recordings import Disk
 
-ABOUT = About(MISSION, Timing(), virtual=True)
+ABOUT = RecordingInfo(MISSION, Timing(), virtual=True)
 
 
 def mission_begins(recorder: FlightRecorder, count: int = 1) -> None:
-    recorder.note(Begun(), 0.0)
-    recorder.note(Heard(message(COORDINATOR, brief(uav("u0")))), 0.5)
+    recorder.note(RecordingStarted(), 0.0)
+    recorder.note(MessageReceived(message(COORDINATOR, brief(uav("u0")))), 0.5)
     for number in range(count):
-        recorder.note(Heard(message(COORDINATOR, epoch("u0"), counter=number + 2)), 1.0)
+        recorder.note(MessageReceived(message(COORDINATOR, epoch("u0"), counter=number + 2)), 1.0)
 
 
 def test_everything_handed_over_is_written_when_it_closes(tmp_path: Path) -> None:
@@ -83,7 +88,7 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None
 
     mission_begins(recorder)
     recorder.close()
-    recorder.note(Begun(), 2.0)
+    recorder.note(RecordingStarted(), 2.0)
 
     assert said == ["No space left on device"]
     assert recorder.fault == "No space left on device"
@@ -126,7 +131,7 @@ def test_a_write_that_fails_half_way_leaves_the_file_as_it_was(
 def test_a_hung_disk_costs_facts_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("coordinator.recording.recording_file.MAX_WAITING", 5)
+    monkeypatch.setattr("coordinator.recording.flight_recorder.MAX_WAITING", 5)
     path, said = tmp_path / "flight.mcap", list[str]()
 
     with recording_to(path, ABOUT, virtual_ns, said.append) as recorder:
@@ -138,7 +143,7 @@ def test_a_hung_disk_costs_facts_and_says_so(
 
 
 def test_who_has_time_waits_for_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordinator.recording.recording_file.MAX_WAITING", 5)
+    monkeypatch.setattr("coordinator.recording.flight_recorder.MAX_WAITING", 5)
     disk, done = Disk(), list[int]()
     thread = RecordingThread(GrowingMcap("test", {}, "about"), disk, patient=True, period_s=0.001)
 
@@ -181,7 +186,7 @@ class BrokenSink(Disk):
 def test_what_goes_wrong_while_writing_keeps_nobody_waiting(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("coordinator.recording.recording_file.MAX_WAITING", 2)
+    monkeypatch.setattr("coordinator.recording.flight_recorder.MAX_WAITING", 2)
     said = list[str]()
     mcap = GrowingMcap("test", {}, "about")
     mcap.define("thing", b"{}")
@@ -208,7 +213,7 @@ class HungSink(Disk):
 
 
 def test_a_disk_that_hangs_keeps_nobody_from_leaving(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordinator.recording.recording_file.HUNG_S", 0.05)
+    monkeypatch.setattr("coordinator.recording.flight_recorder.HUNG_S", 0.05)
     disk, said = HungSink(), list[str]()
     recorder = FlightRecorder(ABOUT, disk, virtual_ns, said.append)
     mission_begins(recorder)

@@ -11,22 +11,29 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.recording.records import SCHEMAS, Begun, UnreadableError, decode, encode, schema_of
-from swarm.events import (
-    BusFact,
-    Heard,
+from coordinator.recording.records import (
+    SCHEMAS,
+    RecordingStarted,
+    UnreadableError,
+    decode,
+    encode,
+    schema_of,
+)
+from swarm.model.ids import OPERATOR
+from swarm.protocol.events import (
+    CommonEvent,
     KeysReplaced,
-    Learned,
     LinkChanged,
+    MessageReceived,
     PeerGone,
     PeerSeen,
+    SnapshotsReceived,
     Stop,
     Tick,
 )
-from swarm.model.ids import OPERATOR
-from swarm.wire.messages import Message, Snapshot, TaskOrder
-from tests.builders import MISSION, done, held, message
-from tests.message_strategies import (
+from swarm.protocol.messages import Message, Snapshot, TaskEdit
+from tests.support.builders import MISSION, done, held, message
+from tests.support.message_strategies import (
     counts,
     ids,
     messages,
@@ -40,7 +47,7 @@ from tests.message_strategies import (
 )
 
 orders = st.builds(
-    TaskOrder,
+    TaskEdit,
     task=task_ids,
     number=counts,
     position_enu_m=points,
@@ -63,15 +70,15 @@ snapshots = st.builds(
     st.none() | numbers,
     st.lists(everything, max_size=3).map(tuple),
 )
-facts: st.SearchStrategy[BusFact | Begun] = st.one_of(
-    everything.map(Heard),
-    st.lists(snapshots, max_size=2).map(tuple).map(Learned),
+facts: st.SearchStrategy[CommonEvent | RecordingStarted] = st.one_of(
+    everything.map(MessageReceived),
+    st.lists(snapshots, max_size=2).map(tuple).map(SnapshotsReceived),
     uav_ids.map(PeerSeen),
     uav_ids.map(PeerGone),
     st.frozensets(uav_ids, max_size=3).map(KeysReplaced),
     st.booleans().map(LinkChanged),
     st.just(Tick()),
-    st.just(Begun()),
+    st.just(RecordingStarted()),
 )
 
 
@@ -84,7 +91,7 @@ def validator(schema: str) -> Any:
 
 @given(facts, st.floats(0.0, 1e9), st.none() | numbers)
 def test_every_fact_comes_back_as_it_was_and_fits_its_schema(
-    fact: BusFact | Begun, now_s: float, mission_s: float | None
+    fact: CommonEvent | RecordingStarted, now_s: float, mission_s: float | None
 ) -> None:
     line = encode(fact, MISSION, now_s, mission_s)
 
@@ -100,8 +107,8 @@ def test_all_schemas_are_objects_with_their_names() -> None:
 
 
 def test_topics_are_bus_keys_without_the_task() -> None:
-    said = encode(Heard(message("u1", held("t1", 0.0))), MISSION, 0.0, None)
-    ended = encode(Heard(message("u1", done("t1"))), MISSION, 0.0, None)
+    said = encode(MessageReceived(message("u1", held("t1", 0.0))), MISSION, 0.0, None)
+    ended = encode(MessageReceived(message("u1", done("t1"))), MISSION, 0.0, None)
 
     assert said is not None
     assert ended is not None

@@ -4,29 +4,37 @@ from __future__ import annotations
 
 from collections import Counter
 
-from coordinator.recording.watching import Witness
-from swarm.config import Timing
-from swarm.events import BusFact, Finish, Heard, LinkChanged, PeerGone, PeerSeen, Tick
+from coordinator.recording.recorder import RecordingObserver
 from swarm.model.ids import COORDINATOR
-from swarm.wire.messages import Body, EpochPhase
-from tests.builders import MISSION, OUT, brief, epoch, message, uav
+from swarm.protocol.events import (
+    CommonEvent,
+    Finish,
+    LinkChanged,
+    MessageReceived,
+    PeerGone,
+    PeerSeen,
+    Tick,
+)
+from swarm.protocol.messages import Body, MissionPhase
+from swarm.protocol.timing import Timing
+from tests.support.builders import MISSION, OUT, brief, epoch, message, uav
 
 
 class Watch:
-    """A witness of a mission with one UAV."""
+    """A recording observer of a mission with one UAV."""
 
     def __init__(self, until_s: float | None = None) -> None:
         timing = Timing(silence_s=1e6)
-        self.witness = Witness(MISSION, timing, linger_s=5.0, until_s=until_s)
+        self.witness = RecordingObserver(MISSION, timing, linger_s=5.0, until_s=until_s)
         self._counters: Counter[str] = Counter()
         self.witness.start(0.0)
 
-    def ends(self, fact: BusFact, now_s: float) -> bool:
+    def ends(self, fact: CommonEvent, now_s: float) -> bool:
         return Finish(0) in self.witness.step(fact, now_s)
 
     def hears(self, writer: str, body: Body, now_s: float) -> bool:
         self._counters[writer] += 1
-        return self.ends(Heard(message(writer, body, self._counters[writer])), now_s)
+        return self.ends(MessageReceived(message(writer, body, self._counters[writer])), now_s)
 
     def begin(self) -> None:
         assert not self.ends(PeerSeen("u0"), 1.0)
@@ -70,7 +78,7 @@ def test_a_cut_link_ends_nothing_unless_the_mission_was_over() -> None:
     assert not watch.ends(Tick(), 500.0)
 
     watch.ends(LinkChanged(True), 501.0)
-    watch.hears(COORDINATOR, epoch("u0", phase=EpochPhase.ENDED, number=2), 502.0)
+    watch.hears(COORDINATOR, epoch("u0", phase=MissionPhase.ENDED, number=2), 502.0)
     assert not watch.ends(LinkChanged(False), 503.0)
     assert watch.ends(Tick(), 508.0)
 

@@ -5,8 +5,8 @@ import json
 
 from rich.console import Console
 
-from sim.bench.decide import decide_as_json, decide_as_rich, measure_decisions
-from swarm.clock import SystemClock
+from sim.bench.decisions import decide_as_json, decide_as_rich, measure_decisions
+from swarm.runtime.clock import SystemClock
 
 
 def test_decisions_of_every_rule_are_timed() -> None:

@@ -8,41 +8,41 @@ from collections.abc import Sequence
 import pytest
 from rich.console import Console
 
-from coordinator.observer import MissionResult
+from coordinator.mission_view.results import MissionResult
 from sim.bench.failover import (
-    Failover,
-    Settings,
+    FailoverResults,
+    FailoverSettings,
     bound_s,
     failover_as_json,
     failover_as_rich,
 )
-from sim.bench.flood import flood_as_json, flood_as_rich
-from sim.bench.latency import Latencies
-from sim.bench.machine import Machine
-from sim.bench.takeover import Blow, Takeovers
-from sim.bench.trouble import BAD_LINKS, FalseLosses, Partition, Traffic, survey
-from sim.chaos.flood import RATE_HZ, Flood, long_mission, times_for
-from sim.chaos.hostile import Kind
-from sim.launch.fleet import BusKind
+from sim.bench.latency import DecisionLatencies
+from sim.bench.links import BAD_LINKS, FalseLosses, PartitionResult, Traffic, survey_mission
+from sim.bench.machine import MachineInfo
+from sim.bench.security_report import flood_as_json, flood_as_rich
+from sim.bench.takeover import FailureMode, Takeovers
+from sim.fleet.faults.flood import RATE_HZ, Flood, long_mission, times_for
+from sim.fleet.faults.forgery import Malformation
+from sim.fleet.layout import BusKind
 from swarm.cli import main
-from swarm.config import Link
 from swarm.model import TaskId, UavId
+from swarm.protocol.timing import LinkKind
 
-MACHINE = Machine("a processor", 2, 2**32, "Linux x86_64", {"Python": "3.11"}, 0.5)
-DONE = Failover(
+MACHINE = MachineInfo("a processor", 2, 2**32, "Linux x86_64", {"Python": "3.11"}, 0.5)
+DONE = FailoverResults(
     MACHINE,
-    Settings(seed=7),
+    FailoverSettings(seed=7),
     (
-        Takeovers(Blow.KILL, Link.NORMAL, BusKind.ROUTER, (0.51, 0.53), 0),
-        Takeovers(Blow.HANG, Link.CLEAN, BusKind.MESH, (1.2,), 1),
+        Takeovers(FailureMode.KILL, LinkKind.NORMAL, BusKind.ROUTER, (0.51, 0.53), 0),
+        Takeovers(FailureMode.HANG, LinkKind.CLEAN, BusKind.MESH, (1.2,), 1),
     ),
     (
         FalseLosses(BAD_LINKS[0], 5, 120.0, "tun", 0, 4000, 200),
         FalseLosses(BAD_LINKS[2], 5, 120.0, "relay", 3, 0, 0),
     ),
-    (Partition(10, 120, 30.0, 17, 0.8, 120, ()),),
+    (PartitionResult(10, 120, 30.0, 17, 0.8, 120, ()),),
     (Traffic(10, 20.0, {"Status": 1000, "Claim": 200}, {"Status": 200_000, "Claim": 20_000}),),
-    (Latencies("guided", 5, 40, (0.002, 0.004)),),
+    (DecisionLatencies("guided", 5, 40, (0.002, 0.004)),),
 )
 
 
@@ -77,13 +77,13 @@ def test_json_holds_the_same_and_every_time() -> None:
 
 
 def test_silent_agents_may_take_lease_and_silence() -> None:
-    assert bound_s(Blow.KILL, Link.BAD) == 1.0
-    assert bound_s(Blow.HANG, Link.NORMAL) == 6.5
-    assert bound_s(Blow.DEADLOCK, Link.BAD) == 28.0
+    assert bound_s(FailureMode.KILL, LinkKind.BAD) == 1.0
+    assert bound_s(FailureMode.HANG, LinkKind.NORMAL) == 6.5
+    assert bound_s(FailureMode.DEADLOCK, LinkKind.BAD) == 28.0
 
 
 def test_surveys_are_as_dense_whatever_their_size() -> None:
-    small, large = survey(3, 18, 0), survey(100, 600, 0)
+    small, large = survey_mission(3, 18, 0), survey_mission(100, 600, 0)
 
     assert (len(large.uavs), len(large.tasks)) == (100, 600)
     for mission in (small, large):
@@ -100,7 +100,7 @@ def flooded(stale: int = 24, executed: Sequence[str] = ("t1",), fates: Sequence[
     return Flood(
         result=MissionResult(routes, {}, 1.0, (TaskId("t1"),), (), (), 0, 1.0, (), 1),
         planned={UavId("uav1"): ("t1",)},
-        sent={Kind.RANDOM: 24, Kind.OLD: 24},
+        sent={Malformation.RANDOM: 24, Malformation.OLD: 24},
         answers=5,
         flood_s=1.0,
         before={"uav1": {"malformed": 3}},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.bench.latency import Latencies, Tap
+from sim.bench.latency import DecisionLatencies, MavlinkTap
 
 
 class HandClock:
@@ -37,7 +37,7 @@ def go(east: int) -> bytes:
 
 def test_new_targets_after_the_first_task_are_timed_by_the_newest_report() -> None:
     clock = HandClock()
-    tap = Tap(clock)
+    tap = MavlinkTap(clock)
     said = [
         (0.0, tap.from_vehicle, report()),
         (1.0, tap.from_agent, go(1)),  # to the start
@@ -58,7 +58,7 @@ def test_new_targets_after_the_first_task_are_timed_by_the_newest_report() -> No
 
 
 def test_quantiles_are_times_that_were_measured() -> None:
-    measured = Latencies("greedy", 2, 9, tuple(float(number) for number in range(1, 101)))
+    measured = DecisionLatencies("greedy", 2, 9, tuple(float(number) for number in range(1, 101)))
 
     assert [measured.quantile_s(share) for share in (0.5, 0.99, 1.0)] == [50.0, 99.0, 100.0]
-    assert Latencies("greedy", 2, 9, ()).quantile_s(0.5) is None
+    assert DecisionLatencies("greedy", 2, 9, ()).quantile_s(0.5) is None

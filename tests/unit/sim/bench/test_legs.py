@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from sim.bench.legs import leg_times, legs_flown, load_run
-from swarm.errors import InputError
+from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario
-from swarm.scenario.shipped import resolve_scenario
+from swarm.scenario.files import resolve_scenario
 
 MEADOW = load_scenario(resolve_scenario("meadow"))
 FLOWN = {

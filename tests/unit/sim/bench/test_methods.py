@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import pytest
 
-from sim.bench.methods import METHODS
+from sim.bench.solvers import METHODS
 from sim.study.baselines import ortools_routing
 from sim.study.generator import random_mission
 from swarm.allocation import evaluate
-from swarm.clock import SystemClock
-from tests.problems import table_1
+from swarm.runtime.clock import SystemClock
+from tests.support.problems import table_1
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -4,28 +4,27 @@ from dataclasses import replace
 
 import pytest
 
-from sim.bench.methods import METHODS
-from sim.bench.plan_bench import LONG_RUN, PlanBench, measure, summaries
-from sim.bench.worker import Answer, Job, Source, do, problem_of
+from sim.bench.plans import LONG_RUN, PlanBench, measure_plans, summaries
+from sim.bench.solvers import METHODS, MissionSource, PlanningJob, PlanningRun, problem_of, run_job
 from swarm.allocation import evaluate
-from swarm.clock import SystemClock
-from swarm.errors import SwarmError
+from swarm.runtime.clock import SystemClock
+from swarm.runtime.errors import SwarmError
 
-SMALL = ("3×8", Source(n_uav=3, n_task=8))
+SMALL = ("3×8", MissionSource(n_uav=3, n_task=8))
 
 
-def in_process(job: Job) -> Answer:
-    return do(job, SystemClock())
+def in_process(job: PlanningJob) -> PlanningRun:
+    return run_job(job, SystemClock())
 
 
 def small_bench(long_run_s: float | None = None) -> PlanBench:
     names = ["guided", "nearest", "exact"]
-    return measure([SMALL], names, [0.05, 0.1], [0, 1], long_run_s=long_run_s, run=in_process)
+    return measure_plans([SMALL], names, [0.05, 0.1], [0, 1], long_run_s=long_run_s, run=in_process)
 
 
 def test_every_method_meets_every_mission_and_limit() -> None:
     told: list[str] = []
-    bench = measure(
+    bench = measure_plans(
         [SMALL], ["nearest", "cbba"], [0.1, 0.2], [0, 5], run=in_process, on_progress=told.append
     )
     keys = [(row.case, row.seed, row.method, row.limit_s) for row in bench.measured]
@@ -44,8 +43,8 @@ def test_ratios_are_to_the_best_on_the_same_mission() -> None:
             assert row.objective is not None
             assert row.ratio == pytest.approx(row.objective / max(worths))
             assert row.ratio_long is None
-        problem = problem_of(Source(n_uav=3, n_task=8, seed=seed))
-        job = Job(Source(n_uav=3, n_task=8, seed=seed), "nearest", 1.0, seed)
+        problem = problem_of(MissionSource(n_uav=3, n_task=8, seed=seed))
+        job = PlanningJob(MissionSource(n_uav=3, n_task=8, seed=seed), "nearest", 1.0, seed)
         nearest, _ = evaluate(problem, in_process(job).routes)
         assert {row.objective for row in rows if row.method == "nearest"} == {nearest}
 
@@ -59,14 +58,14 @@ def test_a_long_run_is_a_yardstick_of_its_own() -> None:
 
 
 def test_a_method_that_does_not_fit_or_fails_says_so() -> None:
-    def run(job: Job) -> Answer:
+    def run(job: PlanningJob) -> PlanningRun:
         if job.method == "cbba":
             raise SwarmError("method cbba failed: of something")
         answer = in_process(job)
         return replace(answer, routes=[[], [], []]) if job.seed else answer
 
-    source = ("3×30", Source(n_uav=3, n_task=30))
-    bench = measure([source], ["exact", "cbba", "nearest"], [0.1], [0, 1], run=run)
+    source = ("3×30", MissionSource(n_uav=3, n_task=30))
+    bench = measure_plans([source], ["exact", "cbba", "nearest"], [0.1], [0, 1], run=run)
     notes = {(row.method, row.seed): row.note for row in bench.measured}
     assert notes["exact", 0] == "too large to prove"
     assert notes["cbba", 0] == "method cbba failed: of something"
@@ -80,12 +79,12 @@ def test_a_method_that_does_not_fit_or_fails_says_so() -> None:
 
 
 def test_tasks_left_out_and_late_ones_are_counted() -> None:
-    def run(job: Job) -> Answer:
+    def run(job: PlanningJob) -> PlanningRun:
         answer = in_process(job)
         return replace(answer, routes=[answer.routes[0], [], []])
 
-    tight = Source(n_uav=3, n_task=8, horizon_s=1.0)
-    row = measure([("3×8", tight)], ["nearest"], [0.1], [0], run=run).measured[0]
+    tight = MissionSource(n_uav=3, n_task=8, horizon_s=1.0)
+    row = measure_plans([("3×8", tight)], ["nearest"], [0.1], [0], run=run).measured[0]
     assert row.unassigned + row.late == 8
     assert row.unassigned > 0
     assert row.late > 0

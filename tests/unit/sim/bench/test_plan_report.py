@@ -9,39 +9,41 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from sim.bench.plan_bench import LONG_RUN, PlanBench, measure
-from sim.bench.plan_plot import comparison_figure, scaling_figure, write_figure
 from sim.bench.plan_report import (
-    Grid,
+    PlanTable,
     as_json,
     as_markdown,
     as_rich,
+    comparison_figure,
     comparison_grids,
+    scaling_figure,
     scaling_grid,
+    write_figure,
 )
-from sim.bench.worker import Answer, Job, Source, do
+from sim.bench.plans import LONG_RUN, PlanBench, measure_plans
+from sim.bench.solvers import MissionSource, PlanningJob, PlanningRun, run_job
 from sim.study.baselines.ortools_routing import SHORTFALL
-from swarm.clock import SystemClock
+from swarm.runtime.clock import SystemClock
 
 
-def in_process(job: Job) -> Answer:
-    return do(job, SystemClock())
+def in_process(job: PlanningJob) -> PlanningRun:
+    return run_job(job, SystemClock())
 
 
 @pytest.fixture(scope="module")
 def bench() -> PlanBench:
-    sources = [(f"3×{n}", Source(n_uav=3, n_task=n)) for n in (8, 20)]
+    sources = [(f"3×{n}", MissionSource(n_uav=3, n_task=n)) for n in (8, 20)]
     names = ["guided", "ortools", "exact"]
-    return measure(sources, names, [0.05, 0.1], [0, 1], long_run_s=0.1, run=in_process)
+    return measure_plans(sources, names, [0.05, 0.1], [0, 1], long_run_s=0.1, run=in_process)
 
 
 @pytest.fixture(scope="module")
 def scaling() -> PlanBench:
-    sources = [(f"3×{n}", Source(n_uav=3, n_task=n)) for n in (8, 20)]
-    return measure(sources, ["guided", "greedy"], [0.1], [0], run=in_process)
+    sources = [(f"3×{n}", MissionSource(n_uav=3, n_task=n)) for n in (8, 20)]
+    return measure_plans(sources, ["guided", "greedy"], [0.1], [0], run=in_process)
 
 
-def told(bench: PlanBench, grids: list[Grid], width: int = 80) -> str:
+def told(bench: PlanBench, grids: list[PlanTable], width: int = 80) -> str:
     stream = io.StringIO()
     Console(file=stream, width=width).print(as_rich(bench, grids))
     return stream.getvalue()
@@ -108,8 +110,8 @@ def test_scaling_tells_the_first_plan_and_memory(scaling: PlanBench) -> None:
 
 
 def test_refused_sizes_stay_in_the_scaling_table() -> None:
-    source = ("2×30", Source(n_uav=2, n_task=30))
-    grid = scaling_grid(measure([source], ["exact"], [0.1], [0], run=in_process))
+    source = ("2×30", MissionSource(n_uav=2, n_task=30))
+    grid = scaling_grid(measure_plans([source], ["exact"], [0.1], [0], run=in_process))
     assert grid.rows == (("2×30", "exact", *("–",) * 6, "too large to prove"),)
 
 

@@ -11,19 +11,27 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from sim.bench.flooding import Poured
 from sim.bench.machine import this_machine
-from sim.bench.process_costs import LAUNCHER, Costs, ProcessCosts, kind_of
-from sim.bench.secure import CostFlight, SecureBench, Way, in_turn
-from sim.bench.secure_report import secure_as_json, secure_as_rich
-from sim.launch.launch import Launch
-from tests.builders import mission, task, uav
-from tests.unit.sim.test_launch_fleet import OPTIONS
+from sim.bench.security import (
+    LAUNCHER,
+    CostFlight,
+    CostsByKind,
+    FloodTotals,
+    ProcessMeter,
+    SecureBench,
+    SecurityMode,
+    in_turn,
+    kind_of,
+)
+from sim.bench.security_report import secure_as_json, secure_as_rich
+from sim.fleet.launcher import Launcher
+from tests.support.builders import mission, task, uav
+from tests.unit.sim.fleet.test_fleet import OPTIONS
 
 PLAIN = CostFlight(
-    way=Way.PLAIN,
-    start=Costs({"agent": 2, "router": 1}, {"agent": 3.0, "router": 0.5}, {"agent": 8e7}),
-    whole=Costs({"agent": 2, "router": 1}, {"agent": 5.0, "router": 1.5}, {"agent": 8e7}),
+    way=SecurityMode.PLAIN,
+    start=CostsByKind({"agent": 2, "router": 1}, {"agent": 3.0, "router": 0.5}, {"agent": 8e7}),
+    whole=CostsByKind({"agent": 2, "router": 1}, {"agent": 5.0, "router": 1.5}, {"agent": 8e7}),
     takeoff_wall_s=9.0,
     flight_wall_s=30.0,
     target_ms=(1.0, 2.0, 3.0),
@@ -36,12 +44,19 @@ PLAIN = CostFlight(
 )
 SECURE = replace(
     PLAIN,
-    way=Way.SECURE,
-    whole=Costs({"agent": 2, "router": 1}, {"agent": 5.5, "router": 1.6}, {"agent": 9e7}),
+    way=SecurityMode.SECURE,
+    whole=CostsByKind({"agent": 2, "router": 1}, {"agent": 5.5, "router": 1.6}, {"agent": 9e7}),
     target_ms=(2.0, 4.0),
 )
 BENCH = SecureBench(
-    "table-1", 2, 5, 4.0, "router", 0, (PLAIN, SECURE), {Way.PLAIN: (0.001,), Way.SECURE: (0.002,)}
+    "table-1",
+    2,
+    5,
+    4.0,
+    "router",
+    0,
+    (PLAIN, SECURE),
+    {SecurityMode.PLAIN: (0.001,), SecurityMode.SECURE: (0.002,)},
 )
 
 
@@ -53,7 +68,7 @@ def shown(bench: SecureBench) -> str:
 
 
 def test_who_flies_first_takes_turns() -> None:
-    plain, secure, flooded = Way
+    plain, secure, flooded = SecurityMode
     assert in_turn([plain, secure], 0) == []
     assert in_turn([plain, secure, flooded], 2) == [
         *(plain, secure, flooded),
@@ -68,9 +83,9 @@ def test_processes_are_counted_by_their_command() -> None:
 
 def test_only_what_was_used_since_the_beginning_counts_for_the_launcher() -> None:
     fleet = mission([uav("u0")], [task("t0", 1.0)])
-    costs = ProcessCosts(os.getpid())
+    costs = ProcessMeter(os.getpid())
     np.linalg.inv(np.eye(300))  # something to do
-    costs.look(Launch(fleet, OPTIONS))
+    costs.look(Launcher(fleet, OPTIONS))
 
     told = costs.costs()
     assert told.processes == {LAUNCHER: 1}
@@ -100,7 +115,11 @@ def test_a_task_left_or_an_honest_message_refused_is_a_failure(broken: CostFligh
 
 def test_a_flood_is_refused_and_the_others_are_quick_all_the_same() -> None:
     flooded = replace(
-        SECURE, way=Way.FLOODED, refused={"too many": 900}, poured_hz=9999.6, target_ms=(99.0,)
+        SECURE,
+        way=SecurityMode.FLOODED,
+        refused={"too many": 900},
+        poured_hz=9999.6,
+        target_ms=(99.0,),
     )
     bench = replace(BENCH, flights=(PLAIN, SECURE, flooded))
 
@@ -113,12 +132,12 @@ def test_a_flood_is_refused_and_the_others_are_quick_all_the_same() -> None:
 
 
 def test_a_hostile_process_tells_how_much_it_has_sent() -> None:
-    poured = Poured()
+    poured = FloodTotals()
     for line in ('{"sent": 100, "wall_s": 1.0}', "Traceback", "[1]", '{"sent": 500, "wall_s": 4}'):
         poured.hear("hostile", line)
 
     assert poured.rate_hz == 125.0
-    assert Poured().rate_hz == 0.0
+    assert FloodTotals().rate_hz == 0.0
 
 
 def test_programs_are_told_the_same() -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sim.bench.takeover import Blow, Takeovers, far_mission
-from sim.launch.fleet import BusKind
-from swarm.config import Link
+from sim.bench.takeover import FailureMode, Takeovers, far_mission
+from sim.fleet.layout import BusKind
+from swarm.protocol.timing import LinkKind
 
 
 def takeovers(*times_s: float, missed: int = 0) -> Takeovers:
-    return Takeovers(Blow.KILL, Link.NORMAL, BusKind.ROUTER, times_s, missed)
+    return Takeovers(FailureMode.KILL, LinkKind.NORMAL, BusKind.ROUTER, times_s, missed)
 
 
 def test_quantiles_are_times_that_were_measured() -> None:

@@ -7,12 +7,12 @@ import json
 import pytest
 from rich.console import Console
 
-from agent.mavlink.vehicle import TURNAROUNDS
+from agent.links.mavlink_vehicle import TURNAROUNDS
 from sim.bench.machine import this_machine
 from sim.bench.turnaround import (
-    Round,
+    TurnaroundFlight,
     Turnarounds,
-    listen,
+    told_turnarounds,
     turnarounds_as_json,
     turnarounds_as_rich,
 )
@@ -23,8 +23,8 @@ FLIGHTS = Turnarounds(
     4.0,
     20.0,
     (
-        Round((1.0, 2.0, 9.0), (30.0,), 2, 101.0, 100.0, 3, 3, 0.5),
-        Round((4.0,), (), 1, 50.0, None, 3, 2, 0.5),
+        TurnaroundFlight((1.0, 2.0, 9.0), (30.0,), 2, 101.0, 100.0, 3, 3, 0.5),
+        TurnaroundFlight((4.0,), (), 1, 50.0, None, 3, 2, 0.5),
     ),
 )
 
@@ -32,7 +32,7 @@ FLIGHTS = Turnarounds(
 def test_turnarounds_are_read_from_lines_of_a_log() -> None:
     said = {"event": TURNAROUNDS, "target_ms": [1.5], "in_force_ms": [], "idled": 0}
 
-    assert list(listen(json.dumps(said))) == [said]
+    assert list(told_turnarounds(json.dumps(said))) == [said]
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_turnarounds_are_read_from_lines_of_a_log() -> None:
     ["", "no JSON", f"no JSON about {TURNAROUNDS}", f'["{TURNAROUNDS}"]', '{"event": "airborne"}'],
 )
 def test_other_lines_tell_of_none(line: str) -> None:
-    assert list(listen(line)) == []
+    assert list(told_turnarounds(line)) == []
 
 
 def test_times_of_all_flights_are_summed_up_and_each_flight_is_set_beside_its_plan() -> None:

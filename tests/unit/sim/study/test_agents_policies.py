@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import make_plan
-from coordinator.planner.stop import after_evaluations
-from sim.study.flight import Flight, score
 from sim.study.policies.agents import GREEDY, GUIDED, GUIDED_ALONE, LOOKAHEAD, AgentsPolicy
-from sim.study.policy import Planner
-from sim.uncertainty import Uncertainty
-from swarm.clock import SystemClock
+from sim.study.policies.roster import Planner
+from sim.world.outcome import FlightOutcome, score
+from sim.world.uncertainty import Uncertainty
 from swarm.model import Mission, Plan, TaskId, UavId
-from tests.builders import mission, task, uav
-from tests.fleet_builders import random_mission
+from swarm.runtime.clock import SystemClock
+from tests.support.builders import mission, task, uav
+from tests.support.fleet_builders import random_mission
 
 POLICIES = [GREEDY, LOOKAHEAD, GUIDED_ALONE, GUIDED]
 ALL = pytest.mark.parametrize("policy", POLICIES, ids=lambda policy: policy.name)
@@ -50,7 +50,9 @@ def planner() -> tuple[Planner, list[Plan]]:
     return plan, made
 
 
-def fly(policy: AgentsPolicy, uncertainty: Uncertainty, flown: Mission, seed: int = 1) -> Flight:
+def fly(
+    policy: AgentsPolicy, uncertainty: Uncertainty, flown: Mission, seed: int = 1
+) -> FlightOutcome:
     return policy.fly(uncertainty.draw(flown, 60.0, seed), planner()[0], StepClock())
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from sim.study.figures import draw_figures, hierarchical_figure, optimal_figure, random_figure
-from sim.study.reproduce import Reproduction, reproduce_paper
-from swarm.clock import SystemClock
+from sim.study.paper.figures import draw_figures, hierarchical_figure, optimal_figure, random_figure
+from sim.study.paper.reproduction import Reproduction, reproduce_paper
+from swarm.runtime.clock import SystemClock
 
 
 @pytest.fixture(scope="module")

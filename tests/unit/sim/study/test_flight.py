@@ -1,8 +1,8 @@
 from __future__ import annotations
 
-from sim.study.flight import Visit, value_of
+from sim.world.outcome import TaskVisit, value_of
 from swarm.model import TaskId, UavId
-from tests.builders import mission, task, uav
+from tests.support.builders import mission, task, uav
 from tests.unit.sim.study.policies.play import fate_of
 
 
@@ -13,7 +13,7 @@ def test_a_withdrawn_task_is_worth_nothing_to_who_has_not_heard_of_it() -> None:
     )
 
     def worth(completed_s: float) -> float:
-        return value_of(fate, [Visit(UavId("u"), TaskId("t"), completed_s, done=True)])
+        return value_of(fate, [TaskVisit(UavId("u"), TaskId("t"), completed_s, done=True)])
 
     assert worth(10.0) == 180.0
     assert worth(10.5) == 0.0

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coordinator.planner.routes import guided_plan
-from coordinator.planner.stop import after_evaluations
+from coordinator.planner.options import after_evaluations
+from coordinator.planner.plan import guided_plan
 from sim.study.generator import random_mission
 from swarm.allocation import evaluate
 

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from sim.study.quantities import QUANTITIES, uncertainty_words
-from sim.uncertainty import Uncertainty
+from sim.study.style import QUANTITIES, uncertainty_words
+from sim.world.uncertainty import Uncertainty
 from swarm.model import TaskId, UavId
 
 

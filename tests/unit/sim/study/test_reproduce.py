@@ -7,11 +7,11 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from sim.study.reproduce import Reproduction, reproduce_paper
-from sim.study.reproduce_expected import Expectations, PaperFigures, Printed
-from sim.study.reproduce_random import STUDIED
-from sim.study.reproduce_report import reproduction_text
-from swarm.clock import SystemClock
+from sim.study.paper.random_problems import STUDIED
+from sim.study.paper.report import reproduction_text
+from sim.study.paper.reproduction import Reproduction, reproduce_paper
+from sim.study.paper.tables import Expectations, PaperFigures, Printed
+from swarm.runtime.clock import SystemClock
 
 PROBLEMS = 6
 

@@ -7,13 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from sim.study.cli import _tell
-from sim.study.reproduce import reproduce_paper
-from sim.study.reproduce_expected import Expectations, Printed
+from sim.study.paper.cli import _tell
+from sim.study.paper.reproduction import reproduce_paper
+from sim.study.paper.tables import Expectations, Printed
 from swarm.cli import main
-from swarm.clock import SystemClock
+from swarm.runtime.clock import SystemClock
 
-COMMANDS = {"reproduce": EntryPoint("reproduce", "sim.study.cli:reproduce", "peckorder.commands")}
+COMMANDS = {
+    "reproduce": EntryPoint("reproduce", "sim.study.paper.cli:reproduce", "peckorder.commands")
+}
 
 
 def reproduce(*arguments: str) -> int:

@@ -6,44 +6,44 @@ import numpy as np
 import pytest
 
 from sim.study.generator import random_table_problem
-from sim.study.reproduce_expected import Expectations, PaperFigures, Printed
-from sim.study.reproduce_random import (
+from sim.study.paper.random_problems import (
     READINGS,
     STUDIED,
     Average,
     ProblemResult,
-    RandomStudy,
+    RandomResults,
     Reading,
-    study_random,
+    reproduce_random,
 )
+from sim.study.paper.tables import Expectations, PaperFigures, Printed
 from swarm.allocation import reference
-from tests.problems import table_1
+from tests.support.problems import table_1
 
 
-def two_problems() -> RandomStudy:
+def two_problems() -> RandomResults:
     """Rules worth 50 and 0 by two sequences, between -100 and 100."""
     sequences = {"greedy": (50.0, 0.0), "lookahead": (0.0, 50.0)}
     result = ProblemResult(optimum=100.0, worst=-100.0, sequences=sequences, guided=100.0)
-    return RandomStudy(0, (result, result))
+    return RandomResults(0, (result, result))
 
 
 def test_result_is_the_same_for_any_number_of_threads() -> None:
     table = table_1()
 
-    assert study_random(table, 7, 5, threads=3) == study_random(table, 7, 5)
+    assert reproduce_random(table, 7, 5, threads=3) == reproduce_random(table, 7, 5)
 
 
 def test_more_problems_leave_the_first_as_they_were() -> None:
     table = table_1()
-    few, many = study_random(table, 2, 1), study_random(table, 4, 1)
+    few, many = reproduce_random(table, 2, 1), reproduce_random(table, 4, 1)
 
     assert many.problems[:2] == few.problems
-    assert study_random(table, 2, 2).problems != few.problems
+    assert reproduce_random(table, 2, 2).problems != few.problems
 
 
 def test_values_are_those_of_the_definitions() -> None:
     table = table_1()
-    result = study_random(table, 1, 9).problems[0]
+    result = reproduce_random(table, 1, 9).problems[0]
     problem = random_table_problem(table, 9, 0)
 
     greedy = [
@@ -73,7 +73,7 @@ def test_problems_keep_all_of_table_1_but_the_places() -> None:
 def test_progress_counts_the_problems() -> None:
     told: list[int] = []
 
-    study_random(table_1(), 3, 0, threads=2, progress=told.append)
+    reproduce_random(table_1(), 3, 0, threads=2, progress=told.append)
 
     assert told == [1, 2, 3]
 
@@ -83,7 +83,7 @@ def test_nothing_to_do_or_nobody_to_do_it_is_refused(
     problems: int, threads: int, name: str
 ) -> None:
     with pytest.raises(ValueError, match=name):
-        study_random(table_1(), problems, 0, threads=threads)
+        reproduce_random(table_1(), problems, 0, threads=threads)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_interval_is_students() -> None:
 
 def test_a_plan_better_than_the_optimum_fails() -> None:
     good = two_problems()
-    bad = RandomStudy(
+    bad = RandomResults(
         0, (ProblemResult(100.0, -100.0, dict.fromkeys(STUDIED[:2], (50.0,)), 100.1),)
     )
     limits = Expectations(normalised_at_least={})

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.study.reproduce_theorems import TheoremResult, allocations, check_theorems
+from sim.study.paper.theorems import TheoremResult, allocations, check_theorems
 from swarm.allocation import reference
-from tests.problems import random_problem, table_1
+from tests.support.problems import random_problem, table_1
 
 
 @pytest.mark.parametrize(("n_uav", "n_task"), [(1, 4), (2, 3), (3, 3), (3, 0)])

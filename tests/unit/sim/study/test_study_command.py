@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from sim.study import policies
-from sim.study.rows import COLUMNS
+from sim.study.policies import roster
+from sim.study.trial import COLUMNS
 from swarm.cli import main
-from tests.fake_policies import FAKES, Interrupted
+from tests.support.fake_policies import FAKES, Interrupted
 
 SMALL = ["study", "--random", "2,4", "--trials", "3", "--loss", "0.3", "--jobs", "1"]
 CHEAP = ["--policies", "nearest,value-per-time"]
@@ -118,7 +118,7 @@ def test_what_becomes_of_failed_tasks_is_told(capsys: pytest.CaptureFixture[str]
 def test_interruption_ends_with_130_and_says_what_is_kept(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(policies, "ROSTER", FAKES)
+    monkeypatch.setattr(roster, "ROSTER", FAKES)
     Interrupted.flown = 0
     command = [*SMALL, "--policies", "interrupted", "--out", str(tmp_path), "--no-plots"]
 
@@ -235,7 +235,7 @@ def test_help_names_every_policy(capsys: pytest.CaptureFixture[str]) -> None:
 
     assert status == 0
     words = out.replace(",", " ").replace(":", " ").replace(".", " ").split()
-    assert set(policies.ROSTER.policies) <= set(words)
+    assert set(roster.ROSTER.policies) <= set(words)
 
 
 def test_file_without_markers_is_refused_before_anything_is_flown(

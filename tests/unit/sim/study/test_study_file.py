@@ -6,14 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from sim.study.config import RandomMissions, SameMission, Study, Varied
-from sim.study.overrides import shipped_studies
-from sim.study.policies import ROSTER
-from sim.study.study_file import load_study, parse_study
-from sim.study.study_text import format_study
-from sim.uncertainty import Uncertainty
-from swarm.errors import InputError
+from sim.study.design import Factor, RandomMissions, SameMission, Study
+from sim.study.policies.roster import ROSTER
+from sim.study.request import shipped_studies
+from sim.study.study_file import format_study, load_study, parse_study
+from sim.world.uncertainty import Uncertainty
 from swarm.model import TaskId, UavId
+from swarm.runtime.errors import InputError
 from swarm.scenario import format_scenario, load_scenario, shipped_scenarios
 
 LEAST = 'schema = 1\nname = "mine"\n[mission]\nrandom = { uavs = 2, tasks = 3 }\n'
@@ -65,7 +64,7 @@ def test_everything_a_file_says_is_read() -> None:
             withdrawn_at_s={TaskId("t3"): 40.0},
         ),
         reattempt=True,
-        varied=(Varied("loss", (0.0, 0.5), 5), Varied("wind_m_s", (3.0,))),
+        varied=(Factor("loss", (0.0, 0.5), 5), Factor("wind_m_s", (3.0,))),
     )
 
 

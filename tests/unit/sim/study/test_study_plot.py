@@ -8,8 +8,7 @@ import matplotlib.image
 import pytest
 from matplotlib.figure import Figure
 
-from sim.study.plot_parts import look_of
-from sim.study.study_plot import (
+from sim.study.plots import (
     churn_bars_figure,
     churn_figure,
     comparison_figure,
@@ -17,20 +16,23 @@ from sim.study.study_plot import (
     time_figure,
     value_figure,
 )
-from sim.study.summary import About, Setting, Summary, summarise
-from tests.study_rows import study_rows
+from sim.study.style import style_of
+from sim.study.summary import PointSummary, StudyDescription, StudySummary, summarise
+from tests.support.study_rows import study_rows
 
 POLICIES = ("central", "greedy", "guided")
 
 
 @pytest.fixture(scope="module")
-def summary() -> Summary:
+def summary() -> StudySummary:
     rows = study_rows(POLICIES, {"loss": (0.0, 0.4)}, trials=3)
-    return summarise(rows, "central", About(ideal=frozenset({"central"}), machine="a machine"))
+    return summarise(
+        rows, "central", StudyDescription(ideal=frozenset({"central"}), machine="a machine")
+    )
 
 
 @pytest.fixture(scope="module")
-def own(summary: Summary) -> Setting:
+def own(summary: StudySummary) -> PointSummary:
     return summary.settings[0]
 
 
@@ -39,7 +41,7 @@ def row_names(figure: Figure) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def drawn(summary: Summary, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def drawn(summary: StudySummary, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return draw_study(summary, tmp_path_factory.mktemp("figures"))
 
 
@@ -62,7 +64,7 @@ def test_every_figure_is_a_valid_png_and_svg(drawn: list[Path]) -> None:
 
 
 def test_same_rows_give_the_same_files(
-    drawn: list[Path], summary: Summary, own: Setting, tmp_path: Path
+    drawn: list[Path], summary: StudySummary, own: PointSummary, tmp_path: Path
 ) -> None:
     again = draw_study(replace(summary, settings=(own,)), tmp_path)
 
@@ -73,7 +75,7 @@ def test_same_rows_give_the_same_files(
 
 
 def test_all_policies_are_listed_best_first_with_their_figures(
-    summary: Summary, own: Setting
+    summary: StudySummary, own: PointSummary
 ) -> None:
     figure = comparison_figure(summary, own)
 
@@ -83,7 +85,7 @@ def test_all_policies_are_listed_best_first_with_their_figures(
     assert figure.get_supxlabel() == "† modelled with ideal communication only"
 
 
-def test_value_is_drawn_against_what_is_varied(summary: Summary) -> None:
+def test_value_is_drawn_against_what_is_varied(summary: StudySummary) -> None:
     figure = value_figure(summary, "loss")
     left, right = figure.axes
 
@@ -108,7 +110,7 @@ def test_what_lies_far_from_the_reference_is_told_instead_of_drawn() -> None:
     assert figure.get_supxlabel() == "below the right panel too: poor"
 
 
-def test_duplicates_and_churn_are_bars_or_lines(summary: Summary, own: Setting) -> None:
+def test_duplicates_and_churn_are_bars_or_lines(summary: StudySummary, own: PointSummary) -> None:
     bars, lines = churn_bars_figure(summary, own), churn_figure(summary, "loss")
 
     assert row_names(bars) == ["guided", "central †", "greedy"]
@@ -118,7 +120,7 @@ def test_duplicates_and_churn_are_bars_or_lines(summary: Summary, own: Setting) 
 
 
 def test_decision_times_are_sorted_and_say_where_they_were_taken(
-    summary: Summary, own: Setting
+    summary: StudySummary, own: PointSummary
 ) -> None:
     figure = time_figure(summary, own)
 
@@ -142,10 +144,12 @@ def test_bound_alone_is_drawn_without_times_or_counts() -> None:
 
 def test_policies_of_ones_own_get_looks_of_their_own() -> None:
     mine = (*"abcd", "interval:30", "interval:60")
-    looks = [look_of(name, (*POLICIES, *mine)) for name in (*POLICIES, *mine)]
+    looks = [style_of(name, (*POLICIES, *mine)) for name in (*POLICIES, *mine)]
 
     assert len(set(looks)) == len(looks)
 
 
 def test_number_of_a_policy_leaves_its_look() -> None:
-    assert look_of("interval:60", ("central", "interval:60")) == look_of("interval", ("interval",))
+    assert style_of("interval:60", ("central", "interval:60")) == style_of(
+        "interval", ("interval",)
+    )

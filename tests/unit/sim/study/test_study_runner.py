@@ -8,17 +8,23 @@ from pathlib import Path
 
 import pytest
 
-from sim.study.config import RandomMissions, SameMission, Study, Varied, fate_seed, span_s
-from sim.study.row_files import read_rows, write_parquet
-from sim.study.rows import BOUND, COLUMNS, Row, without_wall_times
+from sim.study.design import Factor, RandomMissions, SameMission, Study, fate_seed, span_s
 from sim.study.runner import fly_here, run_study
-from sim.study.store import FolderStore, MemoryStore
+from sim.study.store import FolderStore, MemoryStore, read_rows, write_parquet
 from sim.study.summary import summarise
-from sim.study.trial import Briefing, Job, jobs_of
-from sim.uncertainty import Uncertainty
-from swarm.errors import InputError
+from sim.study.trial import (
+    BOUND,
+    COLUMNS,
+    TrialContext,
+    TrialJob,
+    TrialRow,
+    jobs_of,
+    without_wall_times,
+)
+from sim.world.uncertainty import Uncertainty
+from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario, shipped_scenarios
-from tests.fake_policies import FAKES, Interrupted
+from tests.support.fake_policies import FAKES, Interrupted
 
 STUDY = Study(
     name="test",
@@ -26,7 +32,7 @@ STUDY = Study(
     policies=("in-order:20", "same"),
     trials=3,
     uncertainty=Uncertainty(loss=0.3, popup=0.3, outcomes=True),
-    varied=(Varied("loss", (0.0, 0.3, 0.6), trials=4), Varied("popup", (1.0,))),
+    varied=(Factor("loss", (0.0, 0.3, 0.6), trials=4), Factor("popup", (1.0,))),
 )
 
 
@@ -34,8 +40,8 @@ def no_progress(done: int, total: int) -> None:
     pass
 
 
-def flown(study: Study) -> list[Row]:
-    rows = run_study(Briefing(study, FAKES), MemoryStore(study), fly_here, no_progress)
+def flown(study: Study) -> list[TrialRow]:
+    rows = run_study(TrialContext(study, FAKES), MemoryStore(study), fly_here, no_progress)
     return [without_wall_times(row) for row in rows]
 
 
@@ -61,7 +67,7 @@ def test_rows_are_those_of_every_point_trial_and_policy_in_order() -> None:
 def test_points_with_the_same_setting_share_what_is_flown() -> None:
     own, same = ([row for row in flown(STUDY) if row.point == point] for point in (0, 2))
 
-    assert Job(0, 2) not in jobs_of(STUDY)
+    assert TrialJob(0, 2) not in jobs_of(STUDY)
     assert [replace(row, point=0, vary="", at=None) for row in same if row.trial < 3] == own
 
 
@@ -131,17 +137,17 @@ def test_offline_plan_is_worked_out_once_for_missions_that_begin_alike() -> None
 # -- folders --------------------------------------------------------------------------------
 
 
-def run_in(folder: Path, study: Study = STUDY) -> tuple[list[Row], list[Job]]:
+def run_in(folder: Path, study: Study = STUDY) -> tuple[list[TrialRow], list[TrialJob]]:
     """The rows without wall times, and the jobs that were flown for them."""
-    seen: list[Job] = []
+    seen: list[TrialJob] = []
 
-    def fly(briefing: Briefing, jobs: Sequence[Job]) -> Generator[list[Row]]:
+    def fly(briefing: TrialContext, jobs: Sequence[TrialJob]) -> Generator[list[TrialRow]]:
         seen.extend(jobs)
         yield from fly_here(briefing, jobs)
 
     store = FolderStore(folder, study, FAKES)
     try:
-        rows = run_study(Briefing(study, FAKES), store, fly, no_progress)
+        rows = run_study(TrialContext(study, FAKES), store, fly, no_progress)
     finally:
         store.close()
     assert read_rows(folder / "trials.csv") == rows
@@ -181,7 +187,7 @@ def test_job_is_flown_again_unless_all_its_rows_are_there(tmp_path: Path) -> Non
     left = [line for line in lines if not line.startswith("3,loss,0.6,2,same,")]
     (tmp_path / "trials.csv").write_text("".join(left))
 
-    assert run_in(tmp_path) == (rows, [Job(2, 3)])
+    assert run_in(tmp_path) == (rows, [TrialJob(2, 3)])
 
 
 def test_interrupted_study_keeps_what_is_done_and_goes_on(tmp_path: Path) -> None:
@@ -194,7 +200,7 @@ def test_interrupted_study_keeps_what_is_done_and_goes_on(tmp_path: Path) -> Non
     rows, jobs = run_in(tmp_path, study)
 
     assert {row.trial for row in kept} == {0, 1}
-    assert jobs == [Job(2, 0)]
+    assert jobs == [TrialJob(2, 0)]
     assert len(rows) == 6
 
 
@@ -203,7 +209,7 @@ def test_more_trials_go_on_from_those_there_are(tmp_path: Path) -> None:
 
     rows, jobs = run_in(tmp_path, replace(STUDY, varied=(), trials=5))
 
-    assert jobs == [Job(3, 0), Job(4, 0)]
+    assert jobs == [TrialJob(3, 0), TrialJob(4, 0)]
     assert rows == flown(replace(STUDY, varied=(), trials=5))
 
 
@@ -306,5 +312,5 @@ def test_parquet_holds_the_same_rows(tmp_path: Path) -> None:
     table = pq.read_table(write_parquet(tmp_path, rows))
 
     assert tuple(table.column_names) == COLUMNS
-    assert [Row(**found) for found in table.to_pylist()] == rows
+    assert [TrialRow(**found) for found in table.to_pylist()] == rows
     assert not list(tmp_path.glob("*.next"))

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from sim.study.rows import BOUND
 from sim.study.statistics import Estimate, mean_of, ratio_of, share_of
-from sim.study.summary import About, Summary, summarise
-from sim.uncertainty import Uncertainty
-from tests.study_rows import study_rows
+from sim.study.summary import StudyDescription, StudySummary, summarise
+from sim.study.trial import BOUND
+from sim.world.uncertainty import Uncertainty
+from tests.support.study_rows import study_rows
 
-ABOUT = About(
+ABOUT = StudyDescription(
     missions="random missions of 3 UAVs and 9 tasks",
     uncertainty=Uncertainty(loss=0.3),
     seed=7,
@@ -26,7 +26,7 @@ ABOUT = About(
 )
 
 
-def terminal(summary: Summary, width: int = 100) -> str:
+def terminal(summary: StudySummary, width: int = 100) -> str:
     console = Console(file=StringIO(), width=width)
     console.print(summary.table())
     assert isinstance(console.file, StringIO)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import Problem, TeamState, rank_of, rule_by_name
-from tests.problems import line_of_tasks, random_problem
+from tests.support.problems import line_of_tasks, random_problem
 
 
 def lookahead_choice(problem: Problem) -> int:

@@ -20,7 +20,7 @@ from swarm.allocation import (
     run,
 )
 from swarm.allocation.problem import FloatArray
-from tests.problems import any_problem, random_problem, table_1
+from tests.support.problems import any_problem, random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)
 

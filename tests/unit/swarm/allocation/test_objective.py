@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.allocation import TeamState, evaluate, executed_objective, reference
-from swarm.allocation.reference_routes import team_worth
-from tests.problems import any_problem, random_problem, table_1
+from swarm.allocation.reference import team_worth
+from tests.support.problems import any_problem, random_problem, table_1
 
 
 def random_routes(rng: np.random.Generator, n_uav: int, n_task: int) -> list[list[int]]:

@@ -8,7 +8,7 @@ import pytest
 
 from swarm.allocation import Problem
 from swarm.model import Task, TaskId
-from tests.problems import random_problem, table_1, table_1_mission
+from tests.support.problems import random_problem, table_1, table_1_mission
 
 
 def arguments() -> dict[str, Any]:

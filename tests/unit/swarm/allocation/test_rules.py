@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import Decision, Problem, TeamState, rank_of, rule_by_name
-from swarm.allocation.rules import EXACT_TASKS
-from tests.problems import any_problem, line_of_tasks, random_problem, table_1
+from swarm.kernels.lower_level import EXACT_TASKS
+from tests.support.problems import any_problem, line_of_tasks, random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)
 

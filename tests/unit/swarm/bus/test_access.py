@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 
 from swarm.bus.access import access_settings
-from swarm.identity import Entry, Role, Roster
-from swarm.wire.codec import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES
-from swarm.wire.keys import Keys
-from swarm.wire.seal import ENVELOPE_BYTES
+from swarm.identity import Role, Roster, RosterEntry
+from swarm.protocol.encoding import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.seal import ENVELOPE_BYTES
 
-KEYS = Keys("m")
+KEYS = KeySpace("m")
 NAMES = {
     "uav1": Role.UAV,
     "uav2": Role.UAV,
@@ -32,7 +32,7 @@ NAMES = {
 
 def roster(*without: str, generation: int = 1) -> Roster:
     entries = [
-        Entry(name, role, generation, bytes(32), 0)
+        RosterEntry(name, role, generation, bytes(32), 0)
         for name, role in sorted(NAMES.items())
         if name not in without
     ]
@@ -199,7 +199,7 @@ def test_questions_by_way_of_another_router_are_not_limited_as_if_one_asked_them
         "m",
         bytes(16),
         1,
-        tuple(Entry(name, Role.ROUTER, 1, bytes(32), 0) for name in ("router", "router-2")),
+        tuple(RosterEntry(name, Role.ROUTER, 1, bytes(32), 0) for name in ("router", "router-2")),
     )
 
     assert all("query" not in limit["messages"] for limit in access_settings(two)["downsampling"])
@@ -231,7 +231,7 @@ def test_what_is_longer_than_any_process_reads_is_not_passed_on(
 
 
 def test_large_fleet_takes_few_rules_each() -> None:
-    fleet = tuple(Entry(f"uav{n:03}", Role.UAV, 1, bytes(32), 0) for n in range(200))
+    fleet = tuple(RosterEntry(f"uav{n:03}", Role.UAV, 1, bytes(32), 0) for n in range(200))
 
     control = access_settings(Roster("m", bytes(16), 1, fleet))["access_control"]
 

@@ -10,7 +10,7 @@ import zenoh
 
 from swarm.bus.port import Inbox
 from swarm.bus.zenoh_bus import MOST_ANSWERS, ZenohBus
-from tests.shell_play import play
+from tests.support.shell_play import play
 
 
 @dataclass

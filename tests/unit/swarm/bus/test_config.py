@@ -17,7 +17,7 @@ from swarm.bus.config import (
     RouterConfig,
     bus_config,
 )
-from swarm.errors import InputError
+from swarm.runtime.errors import InputError
 
 A = "tcp/127.0.0.1:7447"
 B = "tcp/127.0.0.1:7448"

@@ -18,13 +18,13 @@ from swarm.bus.config import (
     MeshTopology,
     RouterConfig,
     bus_config,
+    is_loopback,
 )
-from swarm.bus.privacy import is_loopback
-from swarm.bus.seat import DEFAULT_SEAT, Seat, seated
-from swarm.clock import unix_s
-from swarm.errors import InputError
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
 from swarm.identity import Identity, Role, load_identity
 from swarm.identity.founding import found_authority
+from swarm.runtime.clock import unix_s
+from swarm.runtime.errors import InputError
 
 HERE = "tcp/127.0.0.1:7447"
 AWAY = "tcp/192.168.1.2:7447"
@@ -139,10 +139,10 @@ def run(*arguments: str, roles: tuple[Role, ...] = ()) -> list[BusConfig]:
     app = typer.Typer()
 
     @app.command()
-    @seated
+    @with_connection_options
     def command(
         name: str,
-        seat: Seat = DEFAULT_SEAT,
+        seat: ConnectionOptions = DEFAULT_CONNECTION,
         loud: Annotated[bool, typer.Option("--loud")] = False,
     ) -> int:
         assert (name, loud) == ("x", True)
@@ -150,15 +150,15 @@ def run(*arguments: str, roles: tuple[Role, ...] = ()) -> list[BusConfig]:
         assert run_again(seat) == made[-1]
         return 0
 
-    def run_again(seat: Seat) -> BusConfig:
+    def run_again(seat: ConnectionOptions) -> BusConfig:
         if seat.bus == "mesh":
             return made[-1]
         other: list[BusConfig] = []
         again = typer.Typer()
 
         @again.command()
-        @seated
-        def command(seat: Seat = DEFAULT_SEAT) -> int:
+        @with_connection_options
+        def command(seat: ConnectionOptions = DEFAULT_CONNECTION) -> int:
             other.append(seat.config())
             return 0
 

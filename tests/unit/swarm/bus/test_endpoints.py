@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm.bus import endpoints
-from swarm.bus.endpoints import free_loopback_endpoints
+from swarm.bus import loopback
+from swarm.bus.loopback import free_loopback_endpoints
 
 
 def ports(chosen: tuple[str, ...]) -> list[int]:
@@ -42,7 +42,7 @@ def test_unusable_range_falls_back(
     file = tmp_path / "ip_local_port_range"
     if content is not None:
         file.write_text(content)
-    monkeypatch.setattr(endpoints, "PORT_RANGE_FILE", file)
+    monkeypatch.setattr(loopback, "PORT_RANGE_FILE", file)
 
     assert all(
         port < 32768 for port in ports(free_loopback_endpoints(20, np.random.default_rng(3)))

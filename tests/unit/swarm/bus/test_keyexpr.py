@@ -7,7 +7,7 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.bus.keyexpr import check_key, check_key_expr, intersects
+from swarm.bus.key_expressions import check_key, check_key_expr, intersects
 
 CHUNKS = st.sampled_from(["a", "b", "ab", "@a", "@b", "*", "**"])
 EXPRESSIONS = st.lists(CHUNKS, min_size=1, max_size=7).map("/".join)

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from swarm.bus import seat as seat_module
+from swarm.bus import connection as seat_module
 from swarm.bus.config import MeshTopology
+from swarm.bus.connection import ConnectionOptions
 from swarm.bus.local_runs import LocalRun, announced, begun, local_runs
-from swarm.bus.seat import Seat
-from swarm.config import Link
-from swarm.errors import InputError
+from swarm.protocol.timing import LinkKind
+from swarm.runtime.errors import InputError
 
 ME = os.getpid()
 RUN = LocalRun(
@@ -26,7 +26,7 @@ RUN = LocalRun(
     mission="table-1",
     mesh=True,
     endpoints=("tcp/127.0.0.1:10001", "tcp/127.0.0.1:10002"),
-    link=Link.CLEAN,
+    link=LinkKind.CLEAN,
 )
 PARENT = replace(RUN, pid=os.getppid(), begun=begun(os.getppid()), mission="meadow", mesh=False)
 
@@ -50,7 +50,7 @@ def on(*runs: LocalRun) -> Iterator[None]:
             yield
 
 
-def refusal(seat: Seat, mission: str | None = None) -> str:
+def refusal(seat: ConnectionOptions, mission: str | None = None) -> str:
     with pytest.raises(InputError) as refused:
         seat.found(mission)
     (fault,) = refused.value.faults
@@ -140,49 +140,51 @@ def test_where_there_is_no_room_for_its_file_a_run_says_so(
 
 
 def test_where_no_run_is_on_a_command_looks_for_its_router_as_ever() -> None:
-    assert Seat().found(None) == Seat()
-    assert refusal(Seat(bus="run")).startswith("no run of this user is on here")
+    assert ConnectionOptions().found(None) == ConnectionOptions()
+    assert refusal(ConnectionOptions(bus="run")).startswith("no run of this user is on here")
 
 
 def test_the_only_run_is_found_without_a_word() -> None:
     with on(RUN):
-        place = Seat().found(None)
+        place = ConnectionOptions().found(None)
         topology = place.config().topology
     assert isinstance(topology, MeshTopology)
     assert topology.dial == RUN.endpoints
     assert topology.listen.startswith("tcp/127.0.0.1:")
     assert topology.listen not in RUN.endpoints
-    assert place.link is Link.CLEAN
+    assert place.link is LinkKind.CLEAN
     with on(PARENT):
-        assert Seat().found(None).arguments()[:2] == ["--bus", "router"]
+        assert ConnectionOptions().found(None).arguments()[:2] == ["--bus", "router"]
 
 
 def test_whatever_is_named_counts() -> None:
     with on(RUN):
         for seat in (
-            Seat(connect=["tcp/127.0.0.1:7447"]),
-            Seat(bus="mesh", listen="tcp/127.0.0.1:7001"),
-            Seat(keys=Path("keys")),
+            ConnectionOptions(connect=["tcp/127.0.0.1:7447"]),
+            ConnectionOptions(bus="mesh", listen="tcp/127.0.0.1:7001"),
+            ConnectionOptions(keys=Path("keys")),
         ):
             assert seat.found(None) == seat
 
 
 def test_of_several_runs_the_mission_or_the_process_says_which() -> None:
     with on(RUN, PARENT):
-        assert Seat().found("meadow").connect == list(PARENT.endpoints)
-        assert Seat(bus=f"run:{ME}").found(None).bus == "mesh"
-        assert Seat().found("elsewhere") == Seat()
+        assert ConnectionOptions().found("meadow").connect == list(PARENT.endpoints)
+        assert ConnectionOptions(bus=f"run:{ME}").found(None).bus == "mesh"
+        assert ConnectionOptions().found("elsewhere") == ConnectionOptions()
         named = f"meadow (pid {PARENT.pid}), table-1 (pid {ME})"
-        assert refusal(Seat()) == (f"several runs are on here: {named}: name one with --mission")
+        assert refusal(ConnectionOptions()) == (
+            f"several runs are on here: {named}: name one with --mission"
+        )
     with on(RUN, replace(PARENT, mission="table-1")):
-        assert "give --bus run:" in refusal(Seat(), "table-1")
+        assert "give --bus run:" in refusal(ConnectionOptions(), "table-1")
 
 
 def test_beside_a_router_nobody_guesses_which_is_meant(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(seat_module, "accepts", lambda endpoint: endpoint.endswith(":7447"))
     with on(RUN):
-        text = refusal(Seat())
-        assert Seat(bus="run").found(None).bus == "mesh"
+        text = refusal(ConnectionOptions())
+        assert ConnectionOptions(bus="run").found(None).bus == "mesh"
     assert "--bus run for the run, or --connect tcp/127.0.0.1:7447 for the router" in text
 
 
@@ -191,10 +193,10 @@ def test_keys_of_the_run_are_those_of_who_asks_and_have_to_be_readable(tmp_path:
     viewer.mkdir(mode=0o700)
     secure = replace(RUN, viewer_keys=str(viewer), operator_keys=str(operator))
     with on(secure):
-        place = Seat().found(None)
+        place = ConnectionOptions().found(None)
         assert place.keys == viewer
         assert place.listen.startswith("tls/")
         with pytest.raises(InputError, match="--keys DIR with those of an operator"):
-            Seat().found(None, operator=True)
-        given = Seat(bus="run", keys=viewer).found(None, operator=True)
+            ConnectionOptions().found(None, operator=True)
+        given = ConnectionOptions(bus="run", keys=viewer).found(None, operator=True)
         assert given.keys == viewer

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from swarm.bus.rosters import FLOOD_BURST, Rosters
-from swarm.clock import unix_s
+from swarm.bus.router import FLOOD_BURST, RosterKeeper
 from swarm.identity import load_identity
 from swarm.identity.authority import Authority
 from swarm.identity.folder import ROSTER_FILE
 from swarm.identity.founding import found_authority
 from swarm.model.ids import AUTHORITY
-from swarm.wire.codec import encode
-from swarm.wire.messages import Message, SignedRoster, Stamp
+from swarm.protocol.encoding import encode
+from swarm.protocol.messages import Message, SignedRoster, Stamp
+from swarm.runtime.clock import unix_s
 
-Play = Callable[[Rosters], Awaitable[None]]
+Play = Callable[[RosterKeeper], Awaitable[None]]
 
 
 @pytest.fixture
@@ -26,9 +26,9 @@ def authority(tmp_path: Path) -> Authority:
     return found_authority(tmp_path / "keys", "m", ["uav1", "uav2"], now_s=unix_s())
 
 
-def play(authority: Authority, scenario: Play) -> Rosters:
+def play(authority: Authority, scenario: Play) -> RosterKeeper:
     """Rosters of its router after the scenario."""
-    rosters = Rosters(load_identity(authority.folder("router")), look_s=0.01)
+    rosters = RosterKeeper(load_identity(authority.folder("router")), look_s=0.01)
     asyncio.run(_within_limit(scenario(rosters)))
     return rosters
 
@@ -50,7 +50,7 @@ def said(authority: Authority) -> bytes:
 
 
 def test_a_newer_roster_in_the_folder_counts(authority: Authority) -> None:
-    async def scenario(rosters: Rosters) -> None:
+    async def scenario(rosters: RosterKeeper) -> None:
         authority.revoke(["uav1"])
         await rosters.wait_for_change(tell_nobody)
 
@@ -61,7 +61,7 @@ def test_a_newer_roster_on_the_bus_counts_and_is_kept(authority: Authority) -> N
     file = authority.folder("router") / ROSTER_FILE
     before = file.read_bytes()
 
-    async def scenario(rosters: Rosters) -> None:
+    async def scenario(rosters: RosterKeeper) -> None:
         authority.revoke(["uav1"])
         newer = file.read_bytes()
         file.write_bytes(before)  # as on a machine of its own
@@ -82,7 +82,7 @@ def test_an_older_roster_and_what_is_none_change_nothing(
     file = authority.folder("router") / ROSTER_FILE
     foreign = found_authority(tmp_path / "other", "m", ["uav1", "uav2"], now_s=unix_s())
 
-    async def scenario(rosters: Rosters) -> None:
+    async def scenario(rosters: RosterKeeper) -> None:
         in_force = rosters.roster
         for data in (older, said(foreign), b"", b"no roster", b"\x91" * 100_000):
             rosters.hear(rosters.key, data)
@@ -100,7 +100,7 @@ def test_an_older_roster_and_what_is_none_change_nothing(
 
 
 def test_the_roster_is_told_to_who_has_missed_it(authority: Authority) -> None:
-    async def scenario(rosters: Rosters) -> None:
+    async def scenario(rosters: RosterKeeper) -> None:
         told: asyncio.Future[tuple[str, bytes]] = asyncio.get_running_loop().create_future()
         waiting = asyncio.create_task(
             rosters.wait_for_change(lambda key, data: told.set_result((key, data)))
@@ -112,7 +112,7 @@ def test_the_roster_is_told_to_who_has_missed_it(authority: Authority) -> None:
 
 
 def test_who_floods_is_shut_out_until_it_has_new_keys(authority: Authority) -> None:
-    async def scenario(rosters: Rosters) -> None:
+    async def scenario(rosters: RosterKeeper) -> None:
         floods = [
             rosters.flooding(rosters.roster.entry("uav1"), 0.0) for _ in range(FLOOD_BURST + 1)
         ]
@@ -134,7 +134,7 @@ def test_who_floods_is_shut_out_until_it_has_new_keys(authority: Authority) -> N
 
 def test_an_honest_uav_is_never_taken_for_a_flood(authority: Authority) -> None:
     """Not at 200 sayings a second for a minute, nor when it greets 200 others at once."""
-    rosters = Rosters(load_identity(authority.folder("router")))
+    rosters = RosterKeeper(load_identity(authority.folder("router")))
 
     assert not any(rosters.flooding(rosters.roster.entry("uav1"), n / 200.0) for n in range(12_000))
     assert not any(rosters.flooding(rosters.roster.entry("uav1"), 100.0) for _ in range(1000))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from swarm.bus.writer import Writer
+from swarm.runtime.writer_thread import WriterThread
 
 LIMIT_S = 10.0
 
@@ -13,7 +13,7 @@ LIMIT_S = 10.0
 class Stuck:
     """A call that waits until it is let go."""
 
-    def __init__(self, writer: Writer) -> None:
+    def __init__(self, writer: WriterThread) -> None:
         self.began = threading.Event()
         self.go_on = threading.Event()
         writer.submit(self._call)
@@ -30,7 +30,7 @@ def noting(made: list[str], name: str) -> Callable[[], None]:
 
 def test_calls_are_made_in_order_and_all_before_closing_ends() -> None:
     made: list[str] = []
-    writer = Writer("w")
+    writer = WriterThread("w")
     names = [str(n) for n in range(500)]
     for name in names:
         writer.submit(noting(made, name))
@@ -42,7 +42,7 @@ def test_calls_are_made_in_order_and_all_before_closing_ends() -> None:
 
 def test_oldest_call_that_need_not_be_made_gives_way() -> None:
     made: list[str] = []
-    writer = Writer("w", max_jobs=3)
+    writer = WriterThread("w", max_jobs=3)
     stuck = Stuck(writer)
     writer.submit(noting(made, "declare"), must_run=True)
     for name in "abcd":
@@ -57,7 +57,7 @@ def test_oldest_call_that_need_not_be_made_gives_way() -> None:
 
 def test_large_calls_give_way_by_size() -> None:
     made: list[str] = []
-    writer = Writer("w", max_bytes=100)
+    writer = WriterThread("w", max_bytes=100)
     stuck = Stuck(writer)
     for name in "abc":
         writer.submit(noting(made, name), size_bytes=40)
@@ -69,7 +69,7 @@ def test_large_calls_give_way_by_size() -> None:
 
 def test_hanging_call_does_not_keep_closing_beyond_its_limit() -> None:
     made: list[str] = []
-    writer = Writer("w")
+    writer = WriterThread("w")
     stuck = Stuck(writer)
     writer.submit(noting(made, "never"))
 

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from swarm.errors import InputError
 from swarm.identity import Role, decode_roster, load_identity
 from swarm.identity.authority import Authority, open_authority
-from swarm.identity.door import door_dictionary, door_password
 from swarm.identity.founding import found_authority
+from swarm.identity.shared_secrets import door_dictionary, door_password
+from swarm.runtime.errors import InputError
 
 NOW_S = 1_800_000_000.0
 DAY_S = 86_400.0

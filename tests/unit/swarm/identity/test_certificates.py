@@ -15,11 +15,11 @@ import pytest
 from cryptography import x509
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from swarm.clock import unix_s
 from swarm.identity import Role
 from swarm.identity.authority import open_authority
 from swarm.identity.certificates import common_name_of, read_certificate
 from swarm.identity.founding import found_authority
+from swarm.runtime.clock import unix_s
 
 NOW_S = unix_s()
 DAY_S = 86_400.0

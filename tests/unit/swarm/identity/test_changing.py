@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from swarm.bus.config import BusConfig
-from swarm.clock import unix_s
-from swarm.errors import BusError, InputError, SwarmError
 from swarm.identity import decode_roster
 from swarm.identity.authority import Authority
-from swarm.identity.changing import Fleet, enact, told
+from swarm.identity.changes import FleetAddress, enact, told
 from swarm.identity.founding import found_authority
+from swarm.runtime.clock import unix_s
+from swarm.runtime.errors import BusError, InputError, SwarmError
 
 ROUTER = "tls/127.0.0.1:7447"
 
@@ -24,8 +24,8 @@ def authority(tmp_path: Path) -> Authority:
     return found_authority(tmp_path / "keys", "table-1", ["uav1"], now_s=unix_s(), operators=2)
 
 
-def fleet(authority: Authority, name: str = "operator", connect: str = ROUTER) -> Fleet:
-    return Fleet("router", "", [connect] if connect else None, authority.folder(name))
+def fleet(authority: Authority, name: str = "operator", connect: str = ROUTER) -> FleetAddress:
+    return FleetAddress("router", "", [connect] if connect else None, authority.folder(name))
 
 
 def revoking(authority: Authority, name: str = "uav1") -> Callable[[], object]:
@@ -94,7 +94,7 @@ def test_only_an_operator_or_a_coordinator_tells(authority: Authority) -> None:
 def test_keys_of_another_authority_tell_nothing(authority: Authority, tmp_path: Path) -> None:
     found_authority(tmp_path / "other", "table-1", ["uav1"], now_s=unix_s())
     shutil.copytree(tmp_path / "other" / "operator", tmp_path / "foreign")
-    foreign = Fleet("router", "", [ROUTER], tmp_path / "foreign")
+    foreign = FleetAddress("router", "", [ROUTER], tmp_path / "foreign")
 
     with pytest.raises(InputError, match=r"--as: .*foreign: these keys are from another authority"):
         enact(authority, revoking(authority), foreign, ["uav1"])

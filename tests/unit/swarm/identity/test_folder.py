@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from swarm.errors import InputError
 from swarm.identity import Role, Roster, load_identity
 from swarm.identity.authority import open_authority
 from swarm.identity.founding import found_authority
+from swarm.runtime.errors import InputError
 
 NOW_S = 1_800_000_000.0
 DAY_S = 86_400.0
@@ -252,7 +252,7 @@ def test_a_damaged_roster_on_disk_is_replaced(keys: Path) -> None:
 
 def test_without_keys_the_cryptography_library_is_not_loaded() -> None:
     code = (
-        "import sys, swarm.identity.cli, swarm.identity.door, swarm.identity.authority\n"
+        "import sys, swarm.identity.cli, swarm.identity.shared_secrets, swarm.identity.authority\n"
         "sys.exit(any(name.startswith('cryptography') for name in sys.modules))"
     )
 

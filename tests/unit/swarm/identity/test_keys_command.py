@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from swarm.cli import main
-from swarm.clock import unix_s
 from swarm.identity import Role, load_identity
 from swarm.identity.authority import open_authority
 from swarm.identity.founding import found_authority
 from swarm.model.frames import DEFAULT_ORIGIN
+from swarm.runtime.clock import unix_s
 from swarm.scenario.blank import Blank, blank_scenario
 
 COMMANDS = {"keys": EntryPoint("keys", "swarm.identity.cli:keys", "peckorder.commands")}

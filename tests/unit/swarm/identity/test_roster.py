@@ -10,13 +10,13 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.identity import Entry, Role, Roster, decode_roster, encode_roster
+from swarm.identity import Role, Roster, RosterEntry, decode_roster, encode_roster
 from swarm.identity.roster import LONGEST_ROSTER_BYTES
 
 AUTHORITY = Ed25519PrivateKey.from_private_bytes(bytes(range(32)))
 PUBLIC_KEY = AUTHORITY.public_key().public_bytes_raw()
-UAV1 = Entry("uav1", Role.UAV, 1, bytes(31) + b"\x01", 1_800_000_000)
-ROUTER = Entry("router", Role.ROUTER, 3, bytes(31) + b"\x02", 1_800_000_000)
+UAV1 = RosterEntry("uav1", Role.UAV, 1, bytes(31) + b"\x01", 1_800_000_000)
+ROUTER = RosterEntry("router", Role.ROUTER, 3, bytes(31) + b"\x02", 1_800_000_000)
 ROSTER = Roster("table-1", bytes(16), 4, (ROUTER, UAV1))
 DATA = encode_roster(ROSTER, AUTHORITY)
 
@@ -25,7 +25,7 @@ DATA = encode_roster(ROSTER, AUTHORITY)
 def rosters(draw: st.DrawFn) -> Roster:
     names = draw(st.lists(st.from_regex(r"uav[A-Za-z0-9_.-]{0,8}", fullmatch=True), unique=True))
     entries = [
-        Entry(
+        RosterEntry(
             name,
             draw(st.sampled_from(Role)),
             draw(st.integers(1, 9999)),
@@ -102,7 +102,7 @@ def test_a_roster_of_another_format_is_refused_though_it_is_signed() -> None:
 
 def test_a_fleet_of_a_thousand_fits_into_a_message_with_room_to_spare() -> None:
     names = sorted(f"uav{number}" for number in range(1000))
-    entries = tuple(Entry(name, Role.UAV, 9, bytes(32), 1_800_000_000) for name in names)
+    entries = tuple(RosterEntry(name, Role.UAV, 9, bytes(32), 1_800_000_000) for name in names)
 
     data = encode_roster(Roster("m", bytes(16), 1, entries), AUTHORITY)
 
@@ -111,14 +111,14 @@ def test_a_fleet_of_a_thousand_fits_into_a_message_with_room_to_spare() -> None:
 
 def test_one_that_no_message_could_carry_is_not_made() -> None:
     names = sorted(f"uav{number:050}" for number in range(8000))
-    entries = tuple(Entry(name, Role.UAV, 9, bytes(32), 1_800_000_000) for name in names)
+    entries = tuple(RosterEntry(name, Role.UAV, 9, bytes(32), 1_800_000_000) for name in names)
 
     with pytest.raises(ValueError, match="8000 names is too large"):
         encode_roster(Roster("m", bytes(16), 1, entries), AUTHORITY)
 
 
 @pytest.mark.parametrize("entries", [(UAV1, ROUTER), (UAV1, UAV1)])
-def test_names_are_in_order_and_there_once(entries: tuple[Entry, ...]) -> None:
+def test_names_are_in_order_and_there_once(entries: tuple[RosterEntry, ...]) -> None:
     with pytest.raises(ValueError, match="differ and be in order"):
         Roster("m", bytes(16), 1, entries)
 
@@ -140,8 +140,8 @@ def test_newer_ones_supersede_older_ones_of_the_same_mission() -> None:
 
 
 def test_it_tells_whose_key_is_another_or_none_since_an_older_one() -> None:
-    def entry(name: str, generation: int, key: int) -> Entry:
-        return Entry(name, Role.UAV, generation, bytes([key]) * 32, 1 << 39)
+    def entry(name: str, generation: int, key: int) -> RosterEntry:
+        return RosterEntry(name, Role.UAV, generation, bytes([key]) * 32, 1 << 39)
 
     before = Roster("m", bytes(16), 1, (entry("a", 1, 1), entry("b", 1, 2), entry("c", 1, 3)))
     after = Roster("m", bytes(16), 2, (entry("a", 1, 1), entry("b", 2, 4), entry("d", 1, 5)))
@@ -166,7 +166,7 @@ def test_no_entry_takes_another_s_place(
     name: str, role: Role, generation: int, problem: str
 ) -> None:
     with pytest.raises(ValueError, match=problem):
-        Entry(name, role, generation, bytes(32), 0)
+        RosterEntry(name, role, generation, bytes(32), 0)
 
 
 def test_its_text_shows_no_more_than_people_need() -> None:

@@ -7,17 +7,24 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from swarm.bus.memory import MemoryBus, MemoryNetwork
-from swarm.clock import ScaledClock
-from swarm.events import BusFact, Finish, Heard, Learned, Stop, Wish
-from swarm.identity.herald import Herald, roster_message
-from swarm.identity.roster import Entry, Roster
-from swarm.shell import Shell, take_seat
-from swarm.state.registers import Replica
-from swarm.wire.messages import Snapshot
-from swarm.wire.seal import Seal
-from tests.builders import MISSION
-from tests.keyring import Keyring
-from tests.shell_play import play
+from swarm.identity.announcer import RosterAnnouncer, roster_message
+from swarm.identity.roster import Roster, RosterEntry
+from swarm.protocol.events import (
+    CommonAction,
+    CommonEvent,
+    Finish,
+    MessageReceived,
+    SnapshotsReceived,
+    Stop,
+)
+from swarm.protocol.messages import Snapshot
+from swarm.protocol.registers import Replica
+from swarm.protocol.seal import Seal
+from swarm.runtime.clock import ScaledClock
+from swarm.runtime.shell import Shell, join_mission
+from tests.support.builders import MISSION
+from tests.support.keyring import Keyring
+from tests.support.shell_play import play
 
 UAVS = ("u0", "u1", "u2")
 KEYS = Keyring(*UAVS)
@@ -31,14 +38,14 @@ class Member:
         self.replica = Replica()
         self.stopped = ""
 
-    def start(self, now_s: float) -> Sequence[Wish]:
+    def start(self, now_s: float) -> Sequence[CommonAction]:
         return []
 
-    def step(self, fact: BusFact, now_s: float) -> Sequence[Wish]:
+    def step(self, fact: CommonEvent, now_s: float) -> Sequence[CommonAction]:
         match fact:
-            case Heard(message):
+            case MessageReceived(message):
                 self.replica.join(message)
-            case Learned(snapshots):
+            case SnapshotsReceived(snapshots):
                 for snapshot in snapshots:
                     self.replica.join_all(snapshot.messages)
             case Stop(reason):
@@ -52,7 +59,7 @@ class Member:
         return None
 
 
-async def _run(shell: Shell[BusFact, Wish], bus: MemoryBus) -> None:
+async def _run(shell: Shell[CommonEvent, CommonAction], bus: MemoryBus) -> None:
     try:
         await shell.run()
     finally:
@@ -61,11 +68,11 @@ async def _run(shell: Shell[BusFact, Wish], bus: MemoryBus) -> None:
 
 def told(
     roster: Roster, *, seals: dict[str, Seal], writers: Sequence[str] = UAVS
-) -> tuple[Herald, dict[str, Member]]:
+) -> tuple[RosterAnnouncer, dict[str, Member]]:
     """What comes of it when the operator tells ``roster`` to those with ``seals``."""
     members = {name: Member() for name in seals}
 
-    async def tell() -> Herald:
+    async def tell() -> RosterAnnouncer:
         network, clock = MemoryNetwork(), ScaledClock(PACE)
         running = []
         for name, member in members.items():
@@ -75,7 +82,7 @@ def told(
                 messages = tuple(member.replica.answers(name, ()))
                 return Snapshot(MISSION, name, 1, None, messages)
 
-            shell: Shell[BusFact, Wish] = Shell(
+            shell: Shell[CommonEvent, CommonAction] = Shell(
                 member,
                 bus,
                 clock,
@@ -86,15 +93,15 @@ def told(
                 snapshot=snapshot,
                 known=member.replica.digest,
             )
-            take_seat(bus, MISSION, name, status=False)
+            join_mission(bus, MISSION, name, status=False)
             running.append(asyncio.create_task(_run(shell, bus)))
         signed = KEYS.signed(roster).encode()
         seal = KEYS.seal("operator")
         seal.put_in_force(signed.decode())
-        herald = Herald(roster_message(MISSION, roster.version, signed), writers, 100.0)
+        announcer = RosterAnnouncer(roster_message(MISSION, roster.version, signed), writers, 100.0)
         bus = network.join("operator", seal=seal)
-        telling: Shell[BusFact, Wish] = Shell(
-            herald,
+        telling: Shell[CommonEvent, CommonAction] = Shell(
+            announcer,
             bus,
             clock,
             mission=MISSION,
@@ -102,14 +109,14 @@ def told(
             from_bus=lambda fact: fact,
             execute=lambda _: None,
             snapshot=None,
-            known=herald.known,
+            known=announcer.known,
         )
-        take_seat(bus, MISSION, None, status=False)
+        join_mission(bus, MISSION, None, status=False)
         await telling.run()
         for task in running:
             task.cancel()
         await asyncio.gather(*running, return_exceptions=True)
-        return herald
+        return announcer
 
     return play(tell), members
 
@@ -117,10 +124,10 @@ def told(
 def test_all_but_the_revoked_confirm_it_and_the_revoked_stops() -> None:
     seals = {name: KEYS.seal(name) for name in UAVS}
 
-    herald, members = told(KEYS.without("u1"), seals=seals)
+    announcer, members = told(KEYS.without("u1"), seals=seals)
 
-    assert herald.has == {"u0", "u2"}
-    assert herald.lacking == []
+    assert announcer.has == {"u0", "u2"}
+    assert announcer.lacking == []
     assert [seals[name].roster.version for name in UAVS] == [2, 2, 2]
     assert members["u1"].stopped == "its keys were revoked or replaced"
     assert members["u0"].stopped == members["u2"].stopped == ""
@@ -130,13 +137,13 @@ def test_who_flies_with_keys_that_were_issued_anew_stops() -> None:
     seals = {name: KEYS.seal(name) for name in UAVS}
     others = tuple(entry for entry in KEYS.roster.entries if entry.name != "u1")
     (before,) = set(KEYS.roster.entries) - set(others)
-    after = Entry("u1", before.role, 2, bytes(32), before.not_after_s)
+    after = RosterEntry("u1", before.role, 2, bytes(32), before.not_after_s)
     entries = tuple(sorted((*others, after), key=lambda entry: entry.name))
 
     roster = replace(KEYS.roster, version=2, entries=entries)
-    herald, members = told(roster, seals=seals, writers=("u0", "u2"))
+    announcer, members = told(roster, seals=seals, writers=("u0", "u2"))
 
-    assert herald.lacking == []
+    assert announcer.lacking == []
     assert members["u1"].stopped
     assert not members["u0"].stopped
 
@@ -145,7 +152,7 @@ def test_a_fleet_that_has_a_newer_roster_already_is_not_set_back() -> None:
     newer = replace(KEYS.without("u1"), version=5)
     seals = {name: KEYS.seal(name, newer) for name in ("u0", "u2")}
 
-    herald, _ = told(KEYS.without("u2"), seals=seals)
+    announcer, _ = told(KEYS.without("u2"), seals=seals)
 
-    assert herald.other_version == 5
+    assert announcer.other_version == 5
     assert seals["u0"].roster == newer

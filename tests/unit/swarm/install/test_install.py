@@ -11,7 +11,7 @@ import pytest
 
 from swarm.cli import main
 from swarm.identity.authority import open_authority
-from swarm.install.words import kept_words
+from swarm.install.installation import kept_words
 
 SERIAL = ["--mavlink", "serial:/dev/ttyAMA0:921600"]
 CONNECT = ["--connect", "tls/192.168.1.2:7447"]

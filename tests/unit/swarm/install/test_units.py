@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from swarm.cli import _installed_commands, main
-from swarm.install.services import DEFAULT_PROGRAM, FOLDER, KINDS, STATE, UNITS, Kind
-from swarm.install.words import VARIABLE
+from swarm.install.installation import VARIABLE
+from swarm.install.services import DEFAULT_PROGRAM, FOLDER, KINDS, STATE, UNITS, ServiceKind
 
 DEPLOY = Path(__file__).parents[4] / "deploy" / "systemd"
 ANALYZE = shutil.which("systemd-analyze")
@@ -24,7 +24,7 @@ MOST_EXPOSED = 20
 KIND = pytest.mark.parametrize("kind", KINDS.values(), ids=str)
 
 
-def settings(kind: Kind) -> dict[str, list[str]]:
+def settings(kind: ServiceKind) -> dict[str, list[str]]:
     """Of a unit, by name, in order."""
     found: dict[str, list[str]] = {}
     for line in (UNITS / kind.unit_file).read_text().splitlines():
@@ -34,13 +34,15 @@ def settings(kind: Kind) -> dict[str, list[str]]:
     return found
 
 
-def sandbox(kind: Kind) -> str:
+def sandbox(kind: ServiceKind) -> str:
     text = (UNITS / kind.unit_file).read_text()
     return text[text.index("# What it may touch") : text.index("[Install]")]
 
 
 @KIND
-def test_unit_runs_its_command_as_a_user_of_its_own_with_the_options_installed(kind: Kind) -> None:
+def test_unit_runs_its_command_as_a_user_of_its_own_with_the_options_installed(
+    kind: ServiceKind,
+) -> None:
     unit = settings(kind)
     name = f"{kind.command}-%i" if kind.per_uav else kind.command
 
@@ -53,7 +55,7 @@ def test_unit_runs_its_command_as_a_user_of_its_own_with_the_options_installed(k
 
 
 @KIND
-def test_unit_comes_back_however_often_it_fails_and_is_watched(kind: Kind) -> None:
+def test_unit_comes_back_however_often_it_fails_and_is_watched(kind: ServiceKind) -> None:
     unit = settings(kind)
 
     assert unit["StartLimitIntervalSec"] == ["0"]

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from swarm.install.words import kept_words, option_value, replaced, with_words
+from swarm.install.installation import kept_words, option_value, replaced, with_words
 
 WORDS = ["--mission", "field", "--forward", "udp:a:1", "--forward=udp:b:2", "--rejoin"]
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from swarm.allocation import evaluate, reference
 from swarm.kernels.exact import MOST_TASKS, MOST_UNCERTAIN_TASKS, optimum
-from tests.problems import any_problem, random_problem
+from tests.support.problems import any_problem, random_problem
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -18,8 +18,8 @@ from swarm.allocation import (
     rule_by_name,
     run,
 )
-from swarm.allocation.rules import EXACT_TASKS
 from swarm.kernels.lower_level import (
+    EXACT_TASKS,
     GREEDY,
     LOOKAHEAD,
     UNDONE,
@@ -31,7 +31,7 @@ from swarm.kernels.lower_level import (
     valued,
 )
 from swarm.kernels.lower_level import run as run_compiled
-from tests.problems import any_problem, line_of_tasks, random_problem, table_1
+from tests.support.problems import any_problem, line_of_tasks, random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)
 NAMES: dict[RuleCode, str] = {GREEDY: "greedy", LOOKAHEAD: "lookahead"}

@@ -10,7 +10,7 @@ import pytest
 from swarm.allocation import TeamState
 from swarm.kernels.lower_level import GREEDY, decide
 from swarm.kernels.problem import prepare
-from tests.problems import table_1
+from tests.support.problems import table_1
 
 
 def arguments() -> dict[str, Any]:

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import Problem, TeamState, evaluate, run
-from swarm.allocation.guided import GuidedRule, route_arrays, team_arrays
 from swarm.allocation.lower_level import Decision
-from swarm.allocation.reference_routes import team_worth
+from swarm.allocation.reference import team_worth
+from swarm.allocation.rules import GuidedRule, route_arrays, team_arrays
 from swarm.kernels.rollout import guided_choice
 from swarm.kernels.routes import optimise_routes
-from tests.problems import any_problem, random_problem
+from tests.support.problems import any_problem, random_problem
 
 SEEDS = st.integers(0, 2**32 - 1)
 

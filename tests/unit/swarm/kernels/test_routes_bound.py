@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import TeamState
-from swarm.allocation.guided import route_arrays, team_arrays
-from swarm.allocation.reference_routes import list_worth, timed_list_worth
+from swarm.allocation.reference import list_worth, timed_list_worth
+from swarm.allocation.rules import route_arrays, team_arrays
 from swarm.kernels.routes import TeamArrays
 from swarm.kernels.routes_bound import Timetable, priced_lists, shortest_legs_s
-from tests.problems import any_problem
+from tests.support.problems import any_problem
 
 
 @settings(deadline=None, max_examples=60)

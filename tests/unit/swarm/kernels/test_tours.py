@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from swarm.allocation import reference
 from swarm.allocation.problem import FloatArray
-from swarm.kernels.tours import TourTable, good_tour, tour_table
-from tests.problems import random_problem
+from swarm.kernels._kernels import TourTable
+from swarm.kernels.tours import good_tour, tour_table
+from tests.support.problems import random_problem
 
 SEEDS = st.integers(0, 2**32 - 1)
 TourProblem = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]

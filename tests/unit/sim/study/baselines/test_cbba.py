@@ -8,12 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.planner.exact import optimum
-from coordinator.planner.stop import after_evaluations
-from sim.study.baselines.cbba import cbba
-from sim.study.baselines.insertion import Insertion
+from coordinator.planner.options import after_evaluations
+from sim.study.baselines.cbba import Insertion, cbba
 from swarm.allocation import Problem, TeamState, evaluate
 from swarm.model import TaskId, UavId
-from tests.problems import random_problem, table_1
+from tests.support.problems import random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)
 

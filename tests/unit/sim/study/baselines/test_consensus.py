@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.study.baselines.consensus import NO_BID, NOBODY, Beliefs, hear
+from sim.study.baselines.cbba import NO_BID, NOBODY, Beliefs, update_beliefs
 
 ME, SENDER, M, N = 0, 1, 2, 3
 LEAVE, UPDATE, RESET = "leave", "update", "reset"
@@ -24,7 +24,7 @@ def outcome(
     beliefs.heard[ME] = 4
     said.heard[SENDER] = [8 if uav in newer else 2 for uav in range(4)]
     before = (int(beliefs.winner[ME, 0]), float(beliefs.bid[ME, 0]))
-    hear(beliefs, said, SENDER, np.array([ME]), now)
+    update_beliefs(beliefs, said, SENDER, np.array([ME]), now)
     after = (int(beliefs.winner[ME, 0]), float(beliefs.bid[ME, 0]))
     assert beliefs.heard[ME, SENDER] == now
     assert all(beliefs.heard[ME, u] == (8 if u in newer else 4) for u in (M, N))

@@ -7,12 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.study.baselines.index_rule import IndexRule, Routes
-from sim.study.baselines.nearest import NEAREST, nearest_first
-from sim.study.baselines.value_per_time import VALUE_PER_TIME, makespan_s, value_per_time
+from sim.study.baselines.index_rules import (
+    NEAREST,
+    VALUE_PER_TIME,
+    IndexRule,
+    Routes,
+    makespan_s,
+    nearest_first,
+    value_per_time,
+)
 from swarm.allocation import Problem, TeamState, rank_of
 from swarm.allocation.reference import completion_s
-from tests.problems import random_problem, table_1
+from tests.support.problems import random_problem, table_1
 
 
 def by_hand(problem: Problem, sequence: list[int], rule: str) -> Routes:

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.study.baselines.insertion import Insertion
+from sim.study.baselines.cbba import Insertion
 from swarm.allocation import TeamState, evaluate
 from swarm.allocation.reference import objective
-from tests.problems import random_problem
+from tests.support.problems import random_problem
 
 
 @given(seed=st.integers(0, 2**32 - 1))

@@ -5,11 +5,11 @@ import pytest
 
 from coordinator.planner.exact import optimum
 from sim.study.baselines import ortools_routing
+from sim.study.baselines.index_rules import value_per_time
 from sim.study.baselines.ortools_routing import matrix_bytes, ortools_routes, require_installed
-from sim.study.baselines.value_per_time import value_per_time
 from swarm.allocation import evaluate
-from swarm.errors import InputError
-from tests.problems import random_problem, table_1
+from swarm.runtime.errors import InputError
+from tests.support.problems import random_problem, table_1
 
 
 def test_every_task_is_with_a_capable_uav() -> None:

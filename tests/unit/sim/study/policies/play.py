@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from sim.fate import Fate
-from sim.study.flight import Flight
 from sim.study.generator import mission_of
-from sim.study.policies.situation import Account, News, Situation
-from sim.study.policy import Planner
-from sim.uncertainty import Uncertainty
+from sim.study.policies.roster import Planner
+from sim.study.policies.situation import Account, TeamNews, TeamSituation
+from sim.world.outcome import FlightOutcome
+from sim.world.uncertainty import Realization, Uncertainty
 from swarm.allocation import Problem, evaluate
 from swarm.model import Mission, Plan, TaskId, UavId
 
@@ -31,15 +30,15 @@ class Script:
 
     def __init__(self, routes: Sequence[Sequence[int]]) -> None:
         self.account = Account(StillClock())
-        self.heard: list[tuple[float, set[News]]] = []
+        self.heard: list[tuple[float, set[TeamNews]]] = []
         self.asked: list[tuple[float, int]] = []
         self._routes = [list(route) for route in routes]
 
-    def hear(self, situation: Situation, news: Collection[News]) -> Collection[int]:
+    def hear(self, situation: TeamSituation, news: Collection[TeamNews]) -> Collection[int]:
         self.heard.append((situation.now_s, set(news)))
         return ()
 
-    def choose(self, situation: Situation, uav: int) -> int | None:
+    def choose(self, situation: TeamSituation, uav: int) -> int | None:
         self.asked.append((situation.now_s, uav))
         for task in self._routes[uav]:
             if task < situation.problem.n_task and situation.state.open[task]:
@@ -55,9 +54,9 @@ def fate_of(
     seed: int = 0,
     lost_at_s: Mapping[str, float] | None = None,
     withdrawn_at_s: Mapping[str, float] | None = None,
-) -> Fate:
+) -> Realization:
     """A future in which only this happens."""
-    return Fate(
+    return Realization(
         mission=mission,
         seed=seed,
         span_s=100.0,
@@ -67,7 +66,7 @@ def fate_of(
     )
 
 
-def calm(problem: Problem) -> Fate:
+def calm(problem: Problem) -> Realization:
     """Nothing happens."""
     return fate_of(mission_of(problem, "calm"))
 
@@ -100,7 +99,7 @@ def planner_of(problem: Problem, routes: Sequence[Sequence[int]]) -> Planner:
     return planner
 
 
-def flown(problem: Problem, flight: Flight) -> list[list[int]]:
+def flown(problem: Problem, flight: FlightOutcome) -> list[list[int]]:
     """Task indices per UAV in the order of their visits."""
     routes: list[list[int]] = [[] for _ in problem.uav_ids]
     for visit in flight.visits:
@@ -109,6 +108,6 @@ def flown(problem: Problem, flight: Flight) -> list[list[int]]:
     return routes
 
 
-def times_s(flight: Flight) -> dict[str, float]:
+def times_s(flight: FlightOutcome) -> dict[str, float]:
     """When each task was last visited [s]."""
     return {visit.task: visit.completed_s for visit in flight.visits}

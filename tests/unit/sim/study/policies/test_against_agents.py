@@ -7,13 +7,13 @@ from dataclasses import replace
 import pytest
 
 from coordinator.planner.plan import make_plan
-from sim.study.flight import Flight
 from sim.study.generator import mission_of, random_mission
 from sim.study.policies.agents import GREEDY, LOOKAHEAD, AgentsPolicy
-from sim.study.policies.rules import RuleChooser
+from sim.study.policies.dispatchers import RuleDispatcher
 from sim.study.policies.situation import Account
 from sim.study.policies.team import fly_team
-from sim.uncertainty import Uncertainty
+from sim.world.outcome import FlightOutcome
+from sim.world.uncertainty import Uncertainty
 from swarm.allocation import rule_by_name
 from swarm.model import Mission, Plan
 from tests.unit.sim.study.policies.play import StillClock
@@ -23,7 +23,7 @@ LATER_S = 0.5
 """Agents that were idle may wait for each other's word."""
 
 
-def visits(flight: Flight) -> list[tuple[str, str, bool]]:
+def visits(flight: FlightOutcome) -> list[tuple[str, str, bool]]:
     return [(visit.uav, visit.task, visit.done) for visit in flight.visits]
 
 
@@ -50,8 +50,8 @@ def test_agents_do_the_same(
         return plan
 
     by_agents = policy.fly(fate, planner, CLOCK)
-    chooser = RuleChooser(rule_by_name(policy.method), Account(CLOCK))
-    as_team = fly_team(fate, chooser, sequence=plan.sequence)
+    dispatcher = RuleDispatcher(rule_by_name(policy.method), Account(CLOCK))
+    as_team = fly_team(fate, dispatcher, sequence=plan.sequence)
     assert visits(as_team) == visits(by_agents)
     ends_s = [visit.completed_s for visit in as_team.visits]
     assert ends_s == pytest.approx([v.completed_s for v in by_agents.visits], abs=LATER_S)

@@ -1,4 +1,4 @@
-"""Nobody exceeds the clairvoyant bound, however much of the fate he knows."""
+"""Nobody exceeds the clairvoyant bound, however much of the realization he knows."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.planner.bound import upper_bound
-from coordinator.planner.routes import guided_plan
-from sim.fate import Fate
-from sim.study.flight import Visit, value_of
+from coordinator.planner.plan import guided_plan
 from sim.study.generator import mission_of, random_mission
 from sim.study.policies.agents import GUIDED, GUIDED_ALONE
 from sim.study.policies.clairvoyant import Clairvoyant, clairvoyant_bound
-from sim.uncertainty import Uncertainty
+from sim.world.outcome import TaskVisit, value_of
+from sim.world.uncertainty import Realization, Uncertainty
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
 from tests.unit.sim.study.policies.test_policies import CLOCK, POLICIES, drawn, planned
 
@@ -59,7 +58,7 @@ def tiny_mission(rng: np.random.Generator, n_uav: int, n_task: int) -> Mission:
     )
 
 
-def tiny_fate(seed: int, n_uav: int, n_task: int) -> Fate:
+def tiny_fate(seed: int, n_uav: int, n_task: int) -> Realization:
     """Everything that may be uncertain is so in some of them."""
     rng = np.random.default_rng(seed)
 
@@ -95,8 +94,8 @@ def combinations_with_ends(length: int, inner: int) -> Iterator[tuple[int, ...]]
 
 
 def flown(
-    fate: Fate, lists: Sequence[Sequence[int]], detours: np.random.Generator | None = None
-) -> list[Visit]:
+    fate: Realization, lists: Sequence[Sequence[int]], detours: np.random.Generator | None = None
+) -> list[TaskVisit]:
     """Fly lists, waiting at tasks that have not appeared, and trying again where that is done.
 
     With ``detours`` UAVs begin some legs towards other tasks and turn off on the way, and may do
@@ -109,8 +108,8 @@ def flown(
 
 
 def flown_by(
-    fate: Fate, uav: Uav, route: Sequence[Task], detours: np.random.Generator | None
-) -> Iterator[Visit]:
+    fate: Realization, uav: Uav, route: Sequence[Task], detours: np.random.Generator | None
+) -> Iterator[TaskVisit]:
     now_s, place = 0.0, uav.position_enu_m
     lost_s = fate.lost_at_s.get(uav.id, math.inf)
     route, attempts = list(route), Counter[TaskId]()
@@ -130,7 +129,7 @@ def flown_by(
             return
         attempts[task.id] += 1
         done = fate.succeeds(uav, task, attempts[task.id])
-        yield Visit(uav.id, task.id, now_s, done)
+        yield TaskVisit(uav.id, task.id, now_s, done)
         if not fate.survives(uav, task, attempts[task.id]):
             return
         if not done and fate.mission.reattempt_failed and attempts[task.id] < 30:

@@ -10,33 +10,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.planner.plan import make_plan
-from sim.fate import Fate
 from sim.study.baselines.cbba import cbba
-from sim.study.baselines.nearest import nearest_first
-from sim.study.baselines.value_per_time import value_per_time
-from sim.study.flight import Flight, score, value_of
+from sim.study.baselines.index_rules import nearest_first, value_per_time
 from sim.study.generator import mission_of
-from sim.study.policies.auction import Cbba
-from sim.study.policies.central import Central, CentralDivert, Interval, Optimiser
-from sim.study.policies.lists import Frozen
-from sim.study.policies.rules import NEAREST_FIRST, VALUE_PER_TIME_ONLINE, RuleChooser
-from sim.study.policies.situation import Account, News, Situation
-from sim.study.policies.team import fly_team
-from sim.study.policy import Policy
-from sim.uncertainty import Uncertainty
-from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
-from swarm.allocation.guided import GuidedRule
-from swarm.model import Mission, Plan
-from tests.builders import mission, task, uav
-from tests.problems import random_problem
-from tests.unit.sim.study.policies.play import (
-    StillClock,
-    calm,
-    fate_of,
-    flown,
-    planner_of,
-    times_s,
+from sim.study.policies.dispatchers import (
+    NEAREST_FIRST,
+    VALUE_PER_TIME_ONLINE,
+    Frozen,
+    RuleDispatcher,
 )
+from sim.study.policies.replanning import Cbba, Central, CentralDivert, CentralOptimiser, Interval
+from sim.study.policies.roster import Policy
+from sim.study.policies.situation import Account, TeamNews, TeamSituation
+from sim.study.policies.team import fly_team
+from sim.world.outcome import FlightOutcome, score, value_of
+from sim.world.uncertainty import Realization, Uncertainty
+from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
+from swarm.allocation.rules import GuidedRule
+from swarm.model import Mission, Plan
+from tests.support.builders import mission, task, uav
+from tests.support.problems import random_problem
+from tests.unit.sim.study.policies.play import StillClock, calm, fate_of, flown, planner_of, times_s
 from tests.unit.sim.study.policies.test_team import random_lists
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -68,7 +62,7 @@ def planned(mission: Mission, method: str) -> Plan:
     return make_plan(mission, method, clock=CLOCK)
 
 
-def drawn(seed: int, uncertainty: Uncertainty = ROUGH) -> Fate:
+def drawn(seed: int, uncertainty: Uncertainty = ROUGH) -> Realization:
     rng = np.random.default_rng(seed)
     problem = random_problem(rng, 4, 10, lowest_survival=0.7, incapable_frac=0.2, horizon_s=12.0)
     scenario = replace(mission_of(problem, "drawn"), reattempt_failed=bool(rng.integers(2)))
@@ -123,9 +117,9 @@ def test_rules_of_the_paper_fly_the_lower_level(rule: str, seed: int) -> None:
     problem = random_problem(rng, 3, 8, lowest_survival=0.5)
     order = rng.permutation(3).tolist()
     expected, _ = run(problem, TeamState.at_start(problem), rank_of(order), rule_by_name(rule))
-    chooser = RuleChooser(rule_by_name(rule), Account(CLOCK))
+    dispatcher = RuleDispatcher(rule_by_name(rule), Account(CLOCK))
     sequence = [problem.uav_ids[row] for row in order]
-    assert flown(problem, fly_team(calm(problem), chooser, sequence=sequence)) == expected
+    assert flown(problem, fly_team(calm(problem), dispatcher, sequence=sequence)) == expected
 
 
 @settings(max_examples=10, deadline=None)
@@ -137,7 +131,7 @@ def test_those_who_improve_a_plan_are_never_worse(seed: int) -> None:
     plan, worth = planner_of(problem, routes), evaluate(problem, routes)[0]
     fate = calm(problem)
     lists = {str(uav): tasks for uav, tasks in plan(fate.mission, "guided").routes.items()}
-    guided = fly_team(fate, RuleChooser(GuidedRule(lists), Account(CLOCK)))
+    guided = fly_team(fate, RuleDispatcher(GuidedRule(lists), Account(CLOCK)))
     flights = [p.fly(fate, plan, CLOCK) for p in (Central(), CentralDivert(), Interval(1.0))]
     for flight in (guided, *flights):
         assert value_of(fate, flight.visits) >= worth - 1e-9 * abs(worth)
@@ -146,13 +140,13 @@ def test_those_who_improve_a_plan_are_never_worse(seed: int) -> None:
 # -- something happens -------------------------------------------------------------------
 
 
-class Recorder(Optimiser):
+class Recorder(CentralOptimiser):
     """Remembers where the team stood when a UAV was lost."""
 
     at_loss: tuple[Problem, TeamState] | None = None
 
-    def hear(self, situation: Situation, news: Collection[News]) -> Collection[int]:
-        if News.LOST in news:
+    def hear(self, situation: TeamSituation, news: Collection[TeamNews]) -> Collection[int]:
+        if TeamNews.LOST in news:
             self.at_loss = situation.problem, situation.state.copy()
         return super().hear(situation, news)
 
@@ -192,7 +186,7 @@ def test_central_makes_the_best_of_what_a_loss_leaves(seed: int) -> None:
     assert value_of(fate, flight.visits) == pytest.approx(expected)
 
 
-def diversion() -> tuple[Fate, list[list[int]]]:
+def diversion() -> tuple[Realization, list[list[int]]]:
     """On the way to a far task, something worth much more appears behind."""
     far = mission(
         [uav("u1")], [task("a", 100.0), task("b", -20.0, 50.0, appears_s=10.0)], horizon_s=500.0
@@ -280,7 +274,7 @@ def test_every_task_is_accounted_for_whatever_happens(policy: Policy, seed: int)
     assert score(fate, flight).duplicate_visits == 0
 
 
-def require_order(fate: Fate, flight: Flight) -> None:
+def require_order(fate: Realization, flight: FlightOutcome) -> None:
     """Nobody is at two places, does what is not there, or goes on after its end."""
     uavs = {uav.id: uav for uav in fate.mission.uavs}
     tasks = {task.id: task for task in fate.mission.tasks}

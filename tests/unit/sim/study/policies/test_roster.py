@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sim.study.policies import ROSTER
+from sim.study.policies.roster import ROSTER
 
 
 @pytest.mark.parametrize("name", ROSTER.policies)
@@ -42,8 +42,9 @@ def test_unknown_name_has_a_fault_and_no_policy(name: str) -> None:
 
 def test_policies_are_imported_only_when_they_are_asked_for() -> None:
     code = (
-        "import sys, sim.study.study_cli, sim.study.policies\n"
-        "print([m for m in sys.modules if m in ('numpy', 'agent.core', 'distributed', 'rich')])"
+        "import sys, sim.study.cli, sim.study.policies.roster\n"
+        "heavy = {'numpy', 'agent.core.agent_core', 'distributed', 'rich'}\n"
+        "print([m for m in sys.modules if m in heavy])"
     )
     ended = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True

@@ -8,16 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.fate import Fate
 from sim.study.generator import mission_of
-from sim.study.policies.situation import News, Situation
+from sim.study.policies.situation import TeamNews, TeamSituation
 from sim.study.policies.team import fly_team
-from sim.uncertainty import Uncertainty
-from sim.wind import Wind
+from sim.world.uncertainty import Realization, Uncertainty
+from sim.world.wind import Wind
 from swarm.allocation import evaluate
 from swarm.model import Mission, UavId
-from tests.builders import mission, task, uav
-from tests.problems import random_problem
+from tests.support.builders import mission, task, uav
+from tests.support.problems import random_problem
 from tests.unit.sim.study.policies.play import Script, calm, fate_of, times_s
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -56,7 +55,7 @@ def test_lost_uav_leaves_its_task_to_others_at_once() -> None:
     flight = fly_team(fate, script)
     assert [(v.uav, v.task, v.completed_s) for v in flight.visits] == [("u2", "a", 14.0)]
     assert flight.lost_uavs == ("u1",)
-    assert script.heard[1] == (4.0, {News.LOST})
+    assert script.heard[1] == (4.0, {TeamNews.LOST})
 
 
 def test_uav_lost_while_idle_is_asked_no_more() -> None:
@@ -75,7 +74,7 @@ def test_idle_uav_takes_what_appears() -> None:
     late = mission([uav("u1")], [task("a", 2.0), task("b", 5.0, appears_s=7.5)])
     script = Script([[0, 1]])
     assert times_s(fly_team(fate_of(late), script)) == {"a": 2.0, "b": 10.5}
-    assert (7.5, {News.APPEARED}) in script.heard
+    assert (7.5, {TeamNews.APPEARED}) in script.heard
 
 
 def test_tasks_are_unknown_before_they_appear() -> None:
@@ -86,7 +85,7 @@ def test_tasks_are_unknown_before_they_appear() -> None:
     known: list[tuple[float, tuple[str, ...]]] = []
 
     class Onlooker(Script):
-        def choose(self, situation: Situation, uav: int) -> int | None:
+        def choose(self, situation: TeamSituation, uav: int) -> int | None:
             known.append((situation.now_s, situation.problem.task_ids))
             return super().choose(situation, uav)
 
@@ -134,7 +133,7 @@ def test_failed_task_is_tried_until_it_succeeds_where_the_mission_says_so(seed: 
     flight = fly_team(fate, script)
     draws = [fate.succeeds(poor.uavs[0], poor.tasks[0], n) for n in range(1, 101)]
     assert [v.done for v in flight.visits] == draws[: draws.index(True) + 1]
-    assert all(News.REOPENED in news for _, news in script.heard[1:-1])
+    assert all(TeamNews.REOPENED in news for _, news in script.heard[1:-1])
 
 
 def test_uav_that_does_not_survive_its_task_flies_no_more() -> None:
@@ -151,7 +150,7 @@ def test_survival_so_far_counts_unless_it_is_drawn(drawn: bool, expected: float)
     seen: list[float] = []
 
     class Onlooker(Script):
-        def hear(self, situation: Situation, news: object) -> tuple[int, ...]:
+        def hear(self, situation: TeamSituation, news: object) -> tuple[int, ...]:
             if situation.now_s == 4.0:
                 seen.append(float(situation.state.survived[0]))
             return ()
@@ -183,9 +182,9 @@ def test_interval_passes_until_nothing_else_is_to_come() -> None:
     script = Script([[0]])
     fly_team(fate_of(line(10.0, u1=0.0)), script, every_s=4.0)
     assert script.heard == [
-        (0.0, {News.BEGUN}),
-        (4.0, {News.TIME}),
-        (8.0, {News.TIME}),
+        (0.0, {TeamNews.BEGUN}),
+        (4.0, {TeamNews.TIME}),
+        (8.0, {TeamNews.TIME}),
     ]
 
 
@@ -219,7 +218,7 @@ def test_uav_stops_where_it_really_is_and_believes_to_be_on_its_way() -> None:
     places: list[tuple[float, ...]] = []
 
     class Onlooker(Script):
-        def choose(self, situation: Situation, uav: int) -> int | None:
+        def choose(self, situation: TeamSituation, uav: int) -> int | None:
             places.append(situation.place_enu_m(uav))
             return super().choose(situation, uav)
 
@@ -234,7 +233,7 @@ def test_uav_stops_where_it_really_is_and_believes_to_be_on_its_way() -> None:
 
 def test_chooser_cannot_have_what_is_not_open_or_beyond_the_uav() -> None:
     class Greedy(Script):
-        def choose(self, situation: Situation, uav: int) -> int | None:
+        def choose(self, situation: TeamSituation, uav: int) -> int | None:
             return 0
 
     with pytest.raises(ValueError, match="u2 cannot take task a"):
@@ -246,7 +245,7 @@ def test_chooser_cannot_have_what_is_not_open_or_beyond_the_uav() -> None:
 
 def test_who_serves_or_waits_gives_nothing_up() -> None:
     class Impatient(Script):
-        def hear(self, situation: Situation, news: object) -> tuple[int, ...]:
+        def hear(self, situation: TeamSituation, news: object) -> tuple[int, ...]:
             return (0,)
 
     with pytest.raises(ValueError, match="u1 is not in flight"):
@@ -262,7 +261,7 @@ def test_interval_must_be_positive_and_finite(every_s: float) -> None:
 def test_mission_ends_when_nobody_living_can_do_what_is_left() -> None:
     unable = mission([uav("u1", a=0.0), uav("u2")], [task("a", 10.0), task("b", 1.0)])
     script = Script([[1], [0]])
-    fate: Fate = fate_of(unable, lost_at_s={"u2": 5.0, "u1": 1e9})
+    fate: Realization = fate_of(unable, lost_at_s={"u2": 5.0, "u1": 1e9})
     flight = fly_team(fate, script, every_s=1.0)
     assert flight.lost_uavs == ("u2",)
     assert script.heard[-1][0] == 4.0

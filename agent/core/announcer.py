@@ -1,0 +1,120 @@
+"""What one agent says: its registers and status, when first and when again.
+
+Leaves out: what there is to say (agent.core.agent_core) and keys and bytes (swarm.protocol).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from swarm.protocol.events import Publish
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import REVOKED_INCARNATION, Body, Message
+from swarm.protocol.register_writer import RegisterWriter
+from swarm.protocol.registers import Replica
+from swarm.protocol.timing import Timing, earliest
+from swarm.protocol.uav_messages import Claim, Outcome, Status
+
+__all__ = ["Announcer"]
+
+
+_OUTCOMES_AT_ONCE = 4
+"""Outcomes in one announcement; others that missed more ask when they are back."""
+
+
+class Announcer:
+    """States and repeats the registers and status of one UAV's agent.
+
+    Args:
+        voice: stamps them.
+        replica: holds the own registers among all others.
+        timing: how often registers and status are repeated.
+    """
+
+    def __init__(self, register_writer: RegisterWriter, replica: Replica, timing: Timing) -> None:
+        self.note = ""
+        """What the status tells a reader about the state of affairs."""
+        self._register_writer = register_writer
+        self._replica = replica
+        self._timing = timing
+        self._claim_key = KeySpace(register_writer.mission).claim(register_writer.writer)
+        self._turn = 0
+        self._announce_at_s: float | None = None
+        self._status_at_s: float | None = None
+
+    @property
+    def incarnation(self) -> int:
+        """Of this life of the agent."""
+        return self._register_writer.incarnation
+
+    @property
+    def claimed(self) -> Message | None:
+        """The own claim register."""
+        return self._replica.register(self._claim_key)
+
+    def say(self, body: Body) -> Publish:
+        """State the new content of an own register, or what is none: status and choice."""
+        message = self._register_writer.say(body)
+        self._replica.join(message)
+        return Publish(message)
+
+    def remember(self, message: Message) -> None:
+        """An earlier life said so, and this one has claimed nothing yet."""
+        self._register_writer.observe(message.stamp)
+        self._replica.join(message)
+
+    def is_foreign(self, message: Message) -> bool:
+        """Whether words in this writer's name are newer than any it has said."""
+        said = self._replica.known(message)
+        return said is None or message.stamp > said.stamp
+
+    def hear_echo(self, message: Message) -> list[Publish]:
+        """Learn what others remember of this writer: it must never say less than that."""
+        outdone = self._register_writer.observe(message.stamp)
+        if isinstance(message.body, Outcome):
+            self._replica.join(message)
+            return []
+        said = self._replica.known(message)
+        if said is None:
+            return []
+        self._replica.stale += message.stamp < said.stamp
+        return [self.say(said.body)] if outdone and said.stamp < message.stamp else []
+
+    def announce(self, now_s: float) -> list[Publish]:
+        """Repeat the own registers, so that what got lost on the way arrives after all.
+
+        Outcomes take turns, so that the bus stays quiet however many there are.
+        """
+        own = list(self._replica.messages({self._register_writer.writer}))
+        said = [message for message in own if isinstance(message.body, Claim)]
+        outcomes = [message for message in own if isinstance(message.body, Outcome)]
+        for _ in range(min(_OUTCOMES_AT_ONCE, len(outcomes))):
+            self._turn = (self._turn + 1) % len(outcomes)
+            said.append(outcomes[self._turn])
+        self._announce_at_s = now_s + self._timing.announce_s
+        return [
+            self.say(message.body)
+            if message.stamp.incarnation == REVOKED_INCARNATION
+            else Publish(message)
+            for message in said
+        ]
+
+    def repeat(self, status: Callable[[], Status], now_s: float, *, learned: bool) -> list[Publish]:
+        """What is due again by now.
+
+        Args:
+            status: makes the status.
+            now_s: now.
+            learned: whether the own registers are known to be news at all.
+        """
+        said: list[Publish] = []
+        if learned and (self._announce_at_s is None or self._announce_at_s <= now_s):
+            said += self.announce(now_s)
+        if self._status_at_s is None or self._status_at_s <= now_s:
+            self._status_at_s = now_s + self._timing.status_s
+            said.append(self.say(status()))
+        return said
+
+    def next_deadline_s(self) -> float | None:
+        """When `repeat` will next have something to say."""
+        return earliest(self._announce_at_s, self._status_at_s)

@@ -1,0 +1,242 @@
+"""What goes into the agent's core and what comes out of it.
+
+Its shell tells it of the bus and of the vehicle, and carries out what it wants: statements on
+the bus, and orders to the vehicle. The MAVLink bridge (agent.vehicle) and the simulator's
+virtual vehicle both speak this; the core knows nothing else of flying. Leaves out: how any of
+it is done.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from swarm.protocol.events import CommonAction, CommonEvent
+
+__all__ = [
+    "Action",
+    "Arrived",
+    "AttemptFailed",
+    "Caution",
+    "Event",
+    "GoTo",
+    "HandOverExplained",
+    "HandedOver",
+    "HeardAgain",
+    "Held",
+    "Hold",
+    "Home",
+    "NotReady",
+    "OrderVehicle",
+    "Prepare",
+    "Refused",
+    "Return",
+    "ReturnAdvised",
+    "ReturnBegun",
+    "Telemetry",
+    "VehicleOrder",
+    "VehicleReady",
+    "VehicleReport",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Prepare:
+    """Get airborne and under command: wait until ready, arm, take off, reach the place."""
+
+    position_enu_m: tuple[float, float, float]
+    """Where to hover before the mission starts [m; mission origin, height included]."""
+    speed_m_s: float
+    """Cruise ground speed to set [m/s]."""
+    resume: bool = False
+    """A vehicle that flies already is ready where it is, and flies on meanwhile."""
+    ground_up_m: float | None = None
+    """Height of the ground on which the vehicle stands [m; mission origin]; None if not known."""
+    left_in_air: bool = False
+    """An earlier life of this agent had it in the air: one that stands on the ground now came
+    down with nobody watching, and is not started."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoTo:
+    """Fly to a place, at once, in place of whatever was being flown to."""
+
+    leg: int
+    """Number of this order; `Arrived` repeats it, so that late news is recognised."""
+    position_enu_m: tuple[float, float, float]
+    """Target [m; mission origin, height included]."""
+    stay_s: float = 0.0
+    """How long the UAV is going to stay there [s]; a return home that stands on the vehicle
+    waits at least that long."""
+    idled: bool = False
+    """Whether the UAV had found nothing to fly to before; no vehicle minds."""
+    task: str | None = field(default=None, compare=False)
+    """Id of the task there, for a payload; None for any other place."""
+    attempt: int = field(default=1, compare=False)
+    """How many times this UAV will then have tried that task."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Stop and hover where the vehicle is, in place of whatever it does; on the ground, stay there.
+
+    Targets are taken again afterwards; an unfinished preparation or return begins anew with
+    a new order.
+    """
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Return:
+    """Return to launch and land.
+
+    Ordered again without `via_enu_m`, a vehicle on its way there returns from where it is.
+    """
+
+    reason: str
+    resume: bool = False
+    """An earlier life of this agent flew the vehicle: look whether it is in the air."""
+    via_enu_m: tuple[float, float, float] | None = None
+    """Where to fly first [m; mission origin, height included], if nothing is in the way of it:
+    return modes fly at a height of the vehicle's own. None to return at once."""
+
+
+VehicleOrder = Prepare | GoTo | Hold | Return
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleReady:
+    """The vehicle is airborne and takes targets; unless it was resumed, it hovers at its start."""
+
+
+@dataclass(frozen=True, slots=True)
+class NotReady:
+    """What the vehicle still waits for, in words a person understands; may change often."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Caution:
+    """What a person should know of the vehicle; nothing else follows from it."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Arrived:
+    """The vehicle is at the target of that leg and has stopped there."""
+
+    leg: int
+
+
+@dataclass(frozen=True, slots=True)
+class AttemptFailed:
+    """The attempt at the task of that leg fails, said before the UAV's stay there is over.
+
+    It stays to the end of it all the same. Simulated vehicles say so; the MAVLink bridge does
+    not, since it knows no payload that could tell.
+    """
+
+    leg: int
+
+
+@dataclass(frozen=True, slots=True)
+class Telemetry:
+    """Where the vehicle is and how it does."""
+
+    position_enu_m: tuple[float, float, float]
+    """[m; mission origin]."""
+    velocity_enu_m_s: tuple[float, float, float]
+    battery_frac: float | None
+    """Remaining charge, 0..1; None when the vehicle does not say."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """An order could not be carried out; the vehicle keeps what it did before."""
+
+    order: VehicleOrder
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class HandedOver:
+    """The vehicle is no longer ours to command (pilot took over, rebooted, link lost)."""
+
+    reason: str
+    silent: bool = field(default=False, compare=False)
+    """Nobody is known to have taken it: it is not heard, and looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandOverExplained:
+    """More is known of a vehicle that was handed over: why, or what it has done since."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class HeardAgain:
+    """A vehicle handed over for its silence flies as it was left, and should go home now.
+
+    It obeys again; nobody else would bring it down.
+    """
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnAdvised:
+    """The vehicle is in the air and obeys, but should go home now.
+
+    Its battery is low, it left its fence, its autopilot is alarmed, or it could not be
+    prepared to the end.
+    """
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """The vehicle stands where it was told to by `Hold`: in the air, or on the ground."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnBegun:
+    """The vehicle was seen to return by itself: it lands at home whoever is there to see it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """The vehicle is on the ground and disarmed: it has landed, or has not taken off."""
+
+
+VehicleReport = (
+    VehicleReady
+    | NotReady
+    | Caution
+    | Arrived
+    | AttemptFailed
+    | Telemetry
+    | Refused
+    | HandedOver
+    | HandOverExplained
+    | HeardAgain
+    | ReturnAdvised
+    | ReturnBegun
+    | Held
+    | Home
+)
+
+
+@dataclass(frozen=True, slots=True)
+class OrderVehicle:
+    """Command the vehicle."""
+
+    order: VehicleOrder
+
+
+Event = CommonEvent | VehicleReport
+
+Action = CommonAction | OrderVehicle

@@ -1,0 +1,404 @@
+"""Keep what one agent knows in step with the others: what it hears, and when it asks.
+
+Its knowledge is old at the start, when its link is back and after it was itself held up. Until
+everyone has been asked since, and has had the time to answer, it goes on with the task it has
+and decides nothing new. What an earlier life kept counts when the others speak of the same
+flight, or when nobody knows of any. Leaves out: what follows for the vehicle
+(agent.core.agent_core) and for tasks (agent.core.tasking), and where memory is kept (swarm).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Sequence
+from statistics import median_high
+
+from agent.core.announcer import Announcer
+from agent.core.interface import Action
+from agent.core.mission_view import MissionChange, MissionView, Peers
+from agent.core.tasking import Tasking
+from swarm.model.ids import COORDINATOR
+from swarm.protocol.events import Ask, LogLine
+from swarm.protocol.messages import Body, Message, MissionConfig, MissionPhase, PlanEpoch, Snapshot
+from swarm.protocol.registers import Replica, snapshot_without, without_signers
+from swarm.protocol.sync import QuestionTimer
+from swarm.protocol.timing import Timing, earliest
+from swarm.protocol.uav_messages import ClaimPhase
+
+__all__ = ["RecoveredState", "StateQueries", "StateSync"]
+
+
+_WORTH_TELLING_S = 0.1
+"""A correction of the mission clock by less is the network's."""
+
+
+class StateSync:
+    """What the agent of ``uav`` takes from the bus.
+
+    Args:
+        uav: id of the UAV.
+        replica: the shared registers.
+        mission_view: the mission.
+        peers: the others.
+        announcer: says what this agent says.
+        tasking: hears of it when a task may have opened.
+        timing: timers.
+    """
+
+    def __init__(
+        self,
+        uav: str,
+        replica: Replica,
+        mission_view: MissionView,
+        peers: Peers,
+        announcer: Announcer,
+        tasking: Tasking,
+        timing: Timing,
+    ) -> None:
+        self.queries = StateQueries(timing)
+        self.at_work = False
+        """Whether this life has begun to act; until then, words in its name are of an earlier."""
+        self._uav = uav
+        self._replica = replica
+        self._mission_view = mission_view
+        self._peers = peers
+        self._announcer = announcer
+        self._tasking = tasking
+        self._timing = timing
+        self._answered: set[str] = set()
+        self._insisted = False
+        self._insists_until_s = -math.inf
+        self._left_open = False
+        """Whether somebody was lost, and what it leaves open is not known for sure yet."""
+        self._echoes: list[Message] = []
+        """Heard in the own name, though this life has not said so."""
+
+    def demote_revoked(self, signers: Collection[str]) -> None:
+        """See `Replica.demote_revoked`."""
+        self._replica.demote_revoked(signers)
+        self._echoes = without_signers(signers, self._echoes)
+
+    # -- what is said -----------------------------------------------------------------
+
+    def hear(self, message: Message, now_s: float) -> list[Action]:
+        """Somebody says so just now."""
+        writer, body = message.writer, message.body
+        if writer == self._uav:
+            if self._announcer.is_foreign(message):
+                # A twin lives, or word of an earlier life was long under way: ask which.
+                if not self._echoes:
+                    self.queries.doubt(now_s)
+                self._echoes.append(message)
+            elif message != self._replica.known(message):
+                self._replica.stale += 1
+            return []
+        actions = (
+            self._greet(writer, now_s) if self._peers.heard(message, self._replica, now_s) else []
+        )
+        if not self.at_work and self._is_first(body):
+            # Whoever answered before did not know the mission; now somebody may know more.
+            self.queries.doubt(now_s)
+        known = self._replica.epoch_stamp
+        actions += self._take_in(message, now_s)
+        # What was said before tells what time it is only to whom nothing else does.
+        is_word = self._replica.epoch_stamp != known or not self._mission_view.knows_time
+        if is_word and isinstance(body, PlanEpoch) and body.phase is MissionPhase.RUNNING:
+            actions += self._set_clock(body.mission_s, now_s)
+        return actions
+
+    def learn(self, snapshots: Sequence[Snapshot], now_s: float) -> list[Action]:
+        """The answers to a question."""
+        actions, told = list[Action](), list[Message]()
+        for snapshot in snapshots:
+            told += snapshot.messages
+        for message in told + self._echoes:
+            if self._replica.known(message) is not message:
+                actions += self._take_in(message, now_s)
+        self._expect_claimants(now_s)
+        self._echoes.clear()
+        self._learn_clock(snapshots, now_s)
+        somebody_knows = any(isinstance(message.body, MissionConfig) for message in told)
+        self.queries.take(enough=somebody_knows and not self.at_work)
+        answered = {snapshot.writer for snapshot in snapshots}
+        self._answered |= answered & self._peers.membership.present
+        if self._left_open:
+            self._left_open = False
+            self._tasking.consider_diversion()
+        if self.queries.current:
+            self._insist(now_s)
+        return actions
+
+    def _insist(self, now_s: float) -> None:
+        """Ask again while somebody is there who has not answered: it may know the newest.
+
+        At the start once; after a link came back until the others' had the time to.
+        """
+        silent = self._peers.membership.present - self._answered - {self._uav}
+        if not silent:
+            return
+        if not self.at_work and not self._insisted:
+            self._insisted = True
+            self.queries.doubt(now_s)
+        elif self.at_work and now_s < self._insists_until_s:
+            self.queries.doubt(now_s + 2.0 * self._timing.ask_gap_s)
+
+    def _catch_up(self, now_s: float) -> None:
+        """What the others did meanwhile is unknown, and they may be back later than this one."""
+        self._answered.clear()
+        self._insists_until_s = now_s + self._timing.relink_grace_s
+        self.queries.doubt(now_s)
+
+    def remember(self, memory: Snapshot, now_s: float) -> list[Action]:
+        """An earlier life of this agent knew so."""
+        actions = [a for message in memory.messages for a in self._take_in(message, now_s)]
+        self._expect_claimants(now_s)
+        self._learn_clock([memory], now_s)
+        return actions
+
+    def yields_to(self, snapshots: Iterable[Snapshot]) -> bool:
+        """Whether one of them is of a twin, another process under this name, that keeps the UAV.
+
+        One at work comes before one that learns, which has nothing to tell; of two at work
+        the newer stays, of two that learn the older.
+        """
+        return any(self._yields_to(twin) for twin in snapshots if twin.writer == self._uav)
+
+    def _yields_to(self, twin: Snapshot) -> bool:
+        newer = twin.incarnation > self._announcer.incarnation
+        if self.at_work:
+            return bool(twin.messages) and newer
+        return bool(twin.messages) or not newer
+
+    def _is_first(self, body: Body) -> bool:
+        """Whether nothing was known of the mission in that respect."""
+        return (isinstance(body, MissionConfig) and self._replica.brief is None) or (
+            isinstance(body, PlanEpoch) and self._replica.epoch is None
+        )
+
+    def _take_in(self, message: Message, now_s: float) -> list[Action]:
+        if message.writer == self._uav:
+            if self.at_work:
+                return [*self._announcer.hear_echo(message)]
+            self._announcer.remember(message)
+            return []
+        news = self._mission_view.take_in(message)
+        if news is None:
+            return []
+        self._peers.stated(message.writer, message.body, now_s)
+        if news is MissionChange.APPEARANCE:
+            self._tasking.consider_diversion()
+        if news in (MissionChange.APPEARANCE, MissionChange.OPENING):
+            self._awake(now_s)
+        elif news is MissionChange.CLAIM:
+            self._tasking.peer_claimed(now_s)
+        return []
+
+    def _expect_claimants(self, now_s: float) -> None:
+        """Whose claim is known by hearsay must speak: it may hang since, with a living token."""
+        self._peers.membership.expect(self._replica.claims.keys() - {self._uav}, now_s)
+
+    def _set_clock(self, mission_s: float, now_s: float) -> list[Action]:
+        """The coordinator has just said that it is ``mission_s``."""
+        change_s = self._mission_view.hear_time(mission_s, now_s)
+        if change_s is None:
+            self._awake(now_s)
+            return [LogLine("mission runs", {"mission_s": mission_s})]
+        if abs(change_s) < _WORTH_TELLING_S:
+            return []
+        return [LogLine("mission clock corrected", {"by_s": change_s, "mission_s": mission_s})]
+
+    def _learn_clock(self, told: Iterable[Snapshot], now_s: float) -> None:
+        """The coordinator's word counts; else one odd clock among many must not set the time.
+
+        The others may all have it of an odd one, so their word sets only what is not known.
+        """
+        known_s = {each.writer: each.mission_s for each in told if each.mission_s is not None}
+        if not known_s or self._replica.epoch is None:
+            return
+        if (mission_s := known_s.get(COORDINATOR)) is not None:
+            self._mission_view.hear_time(mission_s, now_s)
+        elif not self._mission_view.knows_time:
+            self._mission_view.hear_time(median_high(known_s.values()), now_s)
+
+    # -- who is there -----------------------------------------------------------------
+
+    def see(self, writer: str, now_s: float) -> list[Action]:
+        """The token of ``writer`` is there."""
+        if writer == self._uav or not self._peers.membership.seen(writer, now_s):
+            return []
+        return self._greet(writer, now_s)
+
+    def miss(self, writer: str, now_s: float) -> None:
+        """The token of ``writer`` has disappeared."""
+        if writer != self._uav:
+            self._peers.membership.gone(writer, now_s)
+
+    def link(self, up: bool, now_s: float) -> list[Action]:
+        """The own link came up or went down."""
+        self._peers.membership.link(up, now_s)
+        if not up or not self.queries.ever:
+            return []
+        self._catch_up(now_s)
+        return self._announce(now_s)
+
+    def held_up(self, now_s: float) -> list[Action]:
+        """This process was stopped or starved; what the others did meanwhile is unread."""
+        self._peers.membership.held_up(now_s)
+        self._catch_up(now_s)
+        return [LogLine("held up")]
+
+    def lose(self, now_s: float) -> list[Action]:
+        """Give up those who have been missing for long enough."""
+        actions: list[Action] = []
+        for writer, why in self._peers.lost(now_s):
+            claim = self._replica.claims.get(writer)
+            left = claim is not None and claim.phase is ClaimPhase.OUT
+            actions.append(LogLine("left" if left else "lost", {"writer": writer, "why": why}))
+            self._awake(now_s)
+            self.queries.want(now_s)  # others may have heard its last words
+            self._left_open = True
+        return actions
+
+    def _greet(self, writer: str, now_s: float) -> list[Action]:
+        """Somebody is there anew: tell it the own registers, and hear what it may know."""
+        actions, back = list[Action](), self._peers.back(writer)
+        if back:
+            actions.append(LogLine("back", {"writer": writer}))
+        if self.queries.ever:
+            actions += self._announce(now_s)
+            if back or writer == COORDINATOR:
+                self.queries.want(now_s)
+        return actions
+
+    def _announce(self, now_s: float) -> list[Action]:
+        """Repeat the own registers; what an earlier life said is not this one's to repeat."""
+        return [*self._announcer.announce(now_s)] if self.at_work else []
+
+    def _awake(self, now_s: float) -> None:
+        """A task may have opened: everyone who is free decides anew, in sequence order."""
+        self._peers.awake(now_s)
+        self._tasking.wake(now_s)
+
+
+class StateQueries:
+    """Whether what one agent knows is up to date, and when it asks everyone for more."""
+
+    def __init__(self, timing: Timing) -> None:
+        self.ever = False
+        """Whether any question has been answered, be it by nobody."""
+        self.current = False
+        """Whether one has that was asked since the last doubt."""
+        self._asking = QuestionTimer(timing.ask_gap_s)
+        self._ask_s = timing.ask_s
+        self._again_at_s: float | None = None
+        self._open = 0
+        """Questions without an answer."""
+        self._outdated = 0
+        """Those of them that were asked before the last doubt."""
+
+    def want(self, now_s: float) -> None:
+        """Others may have news."""
+        self._asking.want(now_s)
+
+    def doubt(self, now_s: float) -> None:
+        """What is known is old: nothing is decided before everyone has been asked."""
+        self.current, self._outdated = False, self._open
+        self._asking.want(now_s)
+
+    def take(self, *, enough: bool) -> None:
+        """Answers have come.
+
+        Args:
+            enough: whether they are up to date whenever they were asked for.
+        """
+        self.ever = True
+        self.current |= enough or self._open > self._outdated == 0
+        self._open, self._outdated = max(0, self._open - 1), max(0, self._outdated - 1)
+
+    def questions(self, now_s: float, *, lacking: bool) -> list[Ask]:
+        """The question that is due, if any.
+
+        Args:
+            now_s: now.
+            lacking: whether something is missing that only others can tell; like a doubt,
+                that is asked again and again.
+        """
+        if self.current and not lacking:
+            self._again_at_s = None
+        elif self._again_at_s is not None and self._again_at_s <= now_s:
+            self._asking.want(now_s)
+            self._again_at_s = None  # until that question has been asked
+        if not self._asking.due(now_s):
+            return []
+        self._open += 1
+        if lacking or not self.current:
+            self._again_at_s = now_s + self._ask_s
+        return [Ask()]
+
+    def next_deadline_s(self) -> float | None:
+        """When `questions` will next have one."""
+        return earliest(self._asking.next_deadline_s(), self._again_at_s)
+
+
+class RecoveredState:
+    """The memory of an earlier life of the agent of ``uav``, until it is taken or dropped.
+
+    Args:
+        uav: id of the UAV.
+        memory: every register it knew, and the mission time of now as far as it knew; None
+            if there was no earlier life.
+        age_s: how long ago that was kept.
+        timing: how old a memory is trusted, and how long the others get to contradict it.
+    """
+
+    def __init__(self, uav: str, memory: Snapshot | None, age_s: float, timing: Timing) -> None:
+        self.unconfirmed = False
+        """Whether it was taken because nobody came who knows better."""
+        self._memory = memory
+        self._known = Replica()
+        self._known.join_all(() if memory is None else memory.messages)
+        claim = self._known.claims.get(uav)
+        self._took_part = claim is not None and claim.phase is not ClaimPhase.OUT
+        epoch = self._known.epoch
+        begun = epoch is not None and epoch.phase is not MissionPhase.PREPARING
+        self._fresh = begun and age_s <= timing.recall_s
+        self._patience_s = timing.abandon_s
+        self._began_s = 0.0
+
+    def begin(self, now_s: float) -> None:
+        """The new life begins."""
+        self._began_s = now_s
+
+    def demote_revoked(self, signers: Collection[str]) -> None:
+        """See `Replica.demote_revoked`."""
+        if self._memory is not None:
+            self._memory = snapshot_without(signers, self._memory)
+
+    def fitting(
+        self, brief: MissionConfig | None, now_s: float, *, last_chance: bool
+    ) -> Snapshot | None:
+        """The memory, once it is known to count; given once.
+
+        Args:
+            brief: what others have told; None as long as nobody has.
+            now_s: now.
+            last_chance: the agent is about to end.
+        """
+        if self._memory is None:
+            return None
+        if brief is not None:
+            remembered = self._known.brief
+            return self._take(remembered is not None and remembered.run == brief.run)
+        self.unconfirmed = self._took_part and now_s >= self._began_s + self._patience_s
+        if self.unconfirmed or (self._took_part and (self._fresh or last_chance)):
+            return self._take(True)
+        return None
+
+    def next_deadline_s(self) -> float | None:
+        """When an old memory will count for want of a better one."""
+        waits = self._memory is not None and self._took_part
+        return self._began_s + self._patience_s if waits else None
+
+    def _take(self, counts: bool) -> Snapshot | None:
+        memory, self._memory = self._memory, None
+        return memory if counts else None

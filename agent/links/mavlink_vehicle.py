@@ -1,0 +1,264 @@
+"""The bridge with a link and a clock: the only place of it where time passes.
+
+Everything happens in the loop's thread and without waiting: an order is on its way to the
+autopilot before `order` returns. Ground stations may be shown the vehicle, one way only: its
+frames as they came, one datagram each. Two who command one vehicle undo each other's orders, so
+what they say is not read. Leaves out: every decision (agent.vehicle.bridge).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter, deque
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+
+from agent.core.interface import HandedOver, VehicleOrder, VehicleReport
+from agent.links.link import ByteLink, open_link
+from agent.vehicle.bridge import Bridge
+from agent.vehicle.config import BridgeConfig, UdpOutAddress, parse_forward, parse_link
+from agent.vehicle.session import (
+    BridgeEvent,
+    BytesReceived,
+    LinkClosed,
+    LinkOpened,
+    SendBytes,
+    TimePassed,
+)
+from agent.vehicle.signing import Signing, SigningKey
+from agent.vehicle.turnaround import TurnaroundMeter
+from swarm.runtime.clock import Clock, unix_s
+from swarm.runtime.log import get_logger
+
+__all__ = ["TURNAROUNDS", "FrameForwarder", "MavlinkVehicle"]
+
+
+TURNAROUNDS = "next targets sent"
+"""Event in whose log line a vehicle tells how long each next target took."""
+
+
+_SHORTEST_WAIT_S = 0.001
+
+_REDIAL_TIMEOUTS = 2.0
+"""A link that has been silent for that many of the bridge's timeouts is dialled again, if the
+vehicle was not ours to hand over, which does so at once."""
+
+
+class MavlinkVehicle:
+    """A vehicle behind a MAVLink link. Close it in ``finally``.
+
+    Args:
+        config: how to treat it.
+        url: where the autopilot is; see `agent.links.link`.
+        clock: vehicle time; a scaled one when the vehicle is simulated faster.
+        on_report: hears every report, in order, in the loop's thread. It may give
+            orders from inside the call.
+        key: shared with the autopilot: everything is signed, nothing unsigned believed.
+        forward: URLs of ground stations that are shown the vehicle; see
+            `agent.links.mavlink_vehicle`.
+
+    Raises:
+        InputError: a URL is wrong, or this machine cannot open such a link.
+    """
+
+    def __init__(
+        self,
+        config: BridgeConfig,
+        url: str,
+        clock: Clock,
+        on_report: Callable[[VehicleReport], None],
+        *,
+        key: SigningKey | None = None,
+        forward: Sequence[str] = (),
+    ) -> None:
+        self.bridge = Bridge(config, None if key is None else Signing(key, unix_s))
+        redial_s = clock.wall_delay_s(_REDIAL_TIMEOUTS * config.silence_timeout_s)
+        self.link: ByteLink = open_link(parse_link(url), self, silence_s=redial_s)
+        self._forwarding = FrameForwarder([parse_forward(each) for each in forward])
+        self.bridge.codec.keep_frames = bool(self._forwarding)
+        self._log = get_logger(__name__, link=self.link.url)
+        self._told_dropped: set[str] = set()
+        self._told_unchecked = False
+        self._meter = TurnaroundMeter()
+        self._clock = clock
+        self._on_report = on_report
+        self._reports: deque[VehicleReport] = deque()
+        self._reporting = False
+        self._closed = False
+        self._timer: asyncio.TimerHandle | None = None
+        self._timer_due_s = float("inf")
+
+    async def start(self) -> None:
+        """Open the link and go to work, in the running loop."""
+        self.link.start()
+        self._forwarding.start()
+        self._happen(TimePassed())
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Frames dropped so far, by reason."""
+        dropped = self._disbelieved()
+        dropped["not forwarded"] = self._forwarding.dropped
+        return +dropped
+
+    def _disbelieved(self) -> Counter[str]:
+        """What was not listened to, by reason."""
+        dropped = Counter(self.bridge.codec.distrusted)
+        dropped["from strangers"] = self.bridge.codec.strangers
+        return +dropped
+
+    def order(self, order: VehicleOrder) -> None:
+        """Give the vehicle an order; what comes of it is reported."""
+        self._happen(order)
+
+    async def close(self) -> None:
+        """Leave the vehicle as it is and close the link; closing twice is fine."""
+        self._closed = True
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        await self.link.close()
+        await self._forwarding.close()
+        self._tell_turnarounds()
+
+    def link_up(self) -> None:
+        """Called by the link."""
+        self._happen(LinkOpened())
+
+    def link_down(self) -> None:
+        """Called by the link."""
+        self._happen(LinkClosed())
+
+    def received(self, data: bytes, source: Hashable | None = None) -> None:
+        """Called by the link."""
+        self._meter.received(self._clock.now_s())
+        self._happen(BytesReceived(data, source))
+        self._forwarding.show(self.bridge.codec.take_frames())
+        self._tell_of_dropped()
+
+    def _tell_of_dropped(self) -> None:
+        """Tell people of every reason once: a hostile peer must not fill the log."""
+        for reason, count in self._disbelieved().items():
+            if reason not in self._told_dropped:
+                self._told_dropped.add(reason)
+                self._log.warning("frames are dropped", reason=reason, count=count)
+        if self.bridge.codec.unchecked_frames and not self._told_unchecked:
+            self._told_unchecked = True
+            self._log.warning(
+                "the vehicle signs, and may obey nobody who does not; give --signing-key"
+            )
+
+    def _tell_turnarounds(self) -> None:
+        """Log how long each next target took, in wall time; once."""
+        done, self._meter.turnarounds = self._meter.turnarounds, []
+        idled, self._meter.idled = self._meter.idled, 0
+        if done or idled:
+            targets_ms = [self._wall_ms(each.target_s) for each in done]
+            in_force_ms = [self._wall_ms(each.in_force_s) for each in done if each.in_force_s]
+            self._log.info(TURNAROUNDS, target_ms=targets_ms, in_force_ms=in_force_ms, idled=idled)
+
+    def _wall_ms(self, duration_s: float) -> float:
+        return round(1e3 * self._clock.wall_delay_s(duration_s), 3)
+
+    def _happen(self, event: BridgeEvent) -> None:
+        """Step the bridge and send what it says; what it reports follows.
+
+        An order from inside a report is sent before the next report, and before whatever
+        else the hearer makes of its own: to publish or log may take longer than to decide.
+        """
+        if self._closed:
+            return
+        if isinstance(event, VehicleOrder):
+            self._meter.ordered(event)
+        actions = self.bridge.step(event, self._clock.now_s())
+        self.link.answer(self.bridge.codec.peer)
+        for action in actions:
+            if isinstance(action, SendBytes):
+                self.link.send(action.data)
+                self._meter.sent(action.data, self._clock.now_s())
+            else:
+                if isinstance(action, HandedOver):
+                    self._let_go()
+                self._reports.append(action)
+        if not self._reporting:
+            self._report()
+            self._set_timer()
+
+    def _report(self) -> None:
+        self._reporting = True
+        try:
+            while self._reports:
+                report = self._reports.popleft()
+                self._meter.reported(report)
+                self._on_report(report)
+        finally:
+            self._reporting = False
+
+    def _let_go(self) -> None:
+        """No order may reach a vehicle that was handed over, however late its link delivers."""
+        if self.bridge.silent:
+            self.link.give_up()
+        else:
+            self.link.discard()
+
+    def _set_timer(self) -> None:
+        loop = asyncio.get_running_loop()
+        wait_s = self._clock.wall_delay_s(self.bridge.next_deadline_s() - self._clock.now_s())
+        due_s = loop.time() + max(wait_s, _SHORTEST_WAIT_S)
+        if self._timer is not None:
+            if self._timer_due_s <= due_s:
+                return  # it will ring early enough, and look again
+            self._timer.cancel()
+        self._timer_due_s = due_s
+        self._timer = loop.call_at(due_s, self._ring)
+
+    def _ring(self) -> None:
+        self._timer = None
+        self._happen(TimePassed())
+
+
+class FrameForwarder:
+    """Ground stations that watch one vehicle. Close it in ``finally``.
+
+    Args:
+        addresses: where they listen.
+    """
+
+    def __init__(self, addresses: Iterable[UdpOutAddress]) -> None:
+        self._links = [open_link(address, _Deaf()) for address in addresses]
+
+    def __bool__(self) -> bool:
+        return bool(self._links)
+
+    @property
+    def dropped(self) -> int:
+        """Frames that did not reach the network, or that it refused."""
+        return sum(link.counts.unsent for link in self._links)
+
+    def start(self) -> None:
+        """Open the sockets, in the running loop."""
+        for link in self._links:
+            link.start()
+
+    def show(self, frames: Iterable[bytes]) -> None:
+        """Send every frame to everybody."""
+        for frame in frames:
+            for link in self._links:
+                link.send(frame)
+
+    async def close(self) -> None:
+        """Close the sockets; closing twice is fine."""
+        for link in self._links:
+            await link.close()
+
+
+class _Deaf:
+    """Takes no notice of a link."""
+
+    def link_up(self) -> None:
+        pass
+
+    def link_down(self) -> None:
+        pass
+
+    def received(self, data: bytes, source: Hashable | None = None) -> None:
+        pass

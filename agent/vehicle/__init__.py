@@ -1,0 +1,1 @@
+"""Fly one vehicle through MAVLink: the bridge, its activities, and data on firmwares; pure."""

@@ -1,0 +1,343 @@
+"""Settings of one vehicle's bridge, and the URLs of its links."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from agent.vehicle.commands import CommandPolicy
+from swarm.model.frames import Origin
+from swarm.runtime.errors import Fault, InputError
+
+__all__ = [
+    "ONBOARD_COMPUTER",
+    "BridgeConfig",
+    "CommandStyle",
+    "LinkAddress",
+    "SerialAddress",
+    "TcpAddress",
+    "UdpInAddress",
+    "UdpOutAddress",
+    "parse_forward",
+    "parse_link",
+]
+
+
+ONBOARD_COMPUTER = 191
+"""Component id of a companion (MAV_COMP_ID_ONBOARD_COMPUTER, MAV_COMPONENT of common.xml)."""
+
+
+_INSIDE = 0.999
+"""Of the fence: rounding must not lead out of it again."""
+
+
+class CommandStyle(StrEnum):
+    """How a vehicle is told where to fly."""
+
+    REPOSITION = "reposition"
+    """Each target by MAV_CMD_DO_REPOSITION: in force within one message."""
+    MISSION = "mission"
+    """Each target as a mission that ends in a return home: the vehicle comes home by itself
+    if nobody commands it any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class BridgeConfig:
+    """How the bridge treats its vehicle; every duration is in vehicle seconds.
+
+    Raises:
+        ValueError: an id, rate, limit or duration is out of range.
+    """
+
+    system_id: int
+    """MAVLink system id of the vehicle; any other vehicle is never commanded."""
+    origin: Origin
+    """Zero of the mission's local frame."""
+    command: CommandStyle = CommandStyle.REPOSITION
+    ground_system_id: int = 255
+    """Our own MAVLink system id: the one to which failsafes of both firmwares listen."""
+    ground_component_id: int = ONBOARD_COMPUTER
+    """Our own MAVLink component id: an onboard computer's. Not a ground station's 190, which
+    QGroundControl has on the same system id: its answers would be taken for ours."""
+    acceptance_radius_m: float = 1.0
+    """Distance to the target, height included, within which the vehicle has arrived."""
+    arrival_speed_m_s: float = 0.5
+    """Speed below which the vehicle counts as having stopped."""
+    position_rate_hz: float = 10.0
+    """Rate of GLOBAL_POSITION_INT that is asked for."""
+    status_rate_hz: float = 2.0
+    """Rate of the other streams that are asked for."""
+    heartbeat_interval_s: float = 1.0
+    """Interval of our own heartbeat."""
+    silence_timeout_s: float = 5.0
+    """Without any message for that long, or a heartbeat for three times as long, the vehicle is
+    no longer ours."""
+    peer_silence_s: float = 3.0
+    """On a link to which anybody can send: after so long without a frame of the vehicle from
+    where it was heard last it may be heard from elsewhere."""
+    stream_timeout_s: float = 3.0
+    """A stream that does not come for that long, or three intervals, is asked for again."""
+    commands: CommandPolicy = field(default_factory=CommandPolicy)
+    mode_tries: int = 5
+    """Times a mode is set without being seen before giving up."""
+    arm_tries: int = 15
+    """Times arming is asked for, refusals and automatic disarming included."""
+    takeoff_tries: int = 8
+    """Times takeoff is asked for, refusals included."""
+    retry_delay_s: float = 2.0
+    """Pause after a refused mode, arming or takeoff."""
+    effect_timeout_s: float = 4.0
+    """Wait for the effect of an accepted command to be seen."""
+    climb_timeout_s: float = 15.0
+    """A takeoff that gains no height for that long has failed."""
+    takeoff_min_m: float = 0.5
+    """Lowest height above home at which a start is accepted."""
+    home_tolerance_m: float = 10.0
+    """How far the vehicle's home may lie above or below the ground that the scenario tells."""
+    stall_timeout_s: float = 5.0
+    """A vehicle that stands still elsewhere than at its target for that long is told again."""
+    stall_tries: int = 3
+    """Times it is told again before the order is given up."""
+    mission_patience_s: float = 60.0
+    """Commanded by missions: how long the vehicle waits at its target, beyond its stay there,
+    for the next one before it returns home by itself."""
+    mission_reply_timeout_s: float = 1.5
+    """Wait for the vehicle's next message of a mission transfer before repeating one's own."""
+    mission_tries: int = 6
+    """Transmissions of one message of a transfer without progress before giving up."""
+    reached_radius_m: float = 5.0
+    """Where the vehicle says itself that it reached its target, it must be at least that near,
+    or within the acceptance radius if that is wider."""
+    accept_no_failsafe: bool = False
+    """Whether a vehicle is flown that would not come home by itself if its agent dies."""
+    battery_reserve_frac: float | None = 0.2
+    """Charge below which the vehicle should go home, 0..1; None leaves that to the autopilot."""
+    position_timeout_s: float = 5.0
+    """A vehicle in the air that has told no position for that long is no longer commanded."""
+    raises_jerk: bool = True
+    """The vehicle's limit of jerk is raised for the flight where that spares time, and put back
+    after it (agent.vehicle.parameter_override)."""
+    fence_radius_m: float = 20_000.0
+    """Targets farther from the origin are refused [m, horizontally]."""
+    fence_height_m: float = 1_000.0
+    """Targets higher above the origin, or lower below it, are refused [m]."""
+
+    def __post_init__(self) -> None:
+        for name in ("system_id", "ground_system_id", "ground_component_id"):
+            value = getattr(self, name)
+            if not (isinstance(value, int) and 1 <= value <= 255):
+                raise ValueError(f"{name} must be a whole number within 1..255, not {value}")
+        for name in (
+            "acceptance_radius_m",
+            "arrival_speed_m_s",
+            "position_rate_hz",
+            "status_rate_hz",
+            "heartbeat_interval_s",
+            "silence_timeout_s",
+            "peer_silence_s",
+            "stream_timeout_s",
+            "mode_tries",
+            "arm_tries",
+            "takeoff_tries",
+            "retry_delay_s",
+            "effect_timeout_s",
+            "climb_timeout_s",
+            "takeoff_min_m",
+            "home_tolerance_m",
+            "stall_timeout_s",
+            "stall_tries",
+            "mission_patience_s",
+            "mission_reply_timeout_s",
+            "mission_tries",
+            "reached_radius_m",
+            "position_timeout_s",
+            "fence_radius_m",
+            "fence_height_m",
+        ):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be a number > 0, not {value}")
+
+        reserve_frac = self.battery_reserve_frac
+        if reserve_frac is not None and not 0.0 < reserve_frac < 1.0:
+            raise ValueError(f"battery_reserve_frac must be within 0..1, not {reserve_frac}")
+
+    def out_of_bounds(self, position_enu_m: tuple[float, float, float]) -> str | None:
+        """Why a target must not be sent to the vehicle, in words; None if it may be."""
+        east_m, north_m, up_m = position_enu_m
+        if not all(math.isfinite(c) for c in position_enu_m):
+            return f"target {position_enu_m} is not three finite numbers"
+        if math.hypot(east_m, north_m) > self.fence_radius_m:
+            return f"target is farther than {self.fence_radius_m:g} m from the origin"
+        if abs(up_m) > self.fence_height_m:
+            return f"target height {up_m:g} m is beyond {self.fence_height_m:g} m"
+        return None
+
+    def within_fence(
+        self, position_enu_m: tuple[float, float, float]
+    ) -> tuple[float, float, float]:
+        """The nearest place that may be a target: that one itself, or a little inside the fence."""
+        east_m, north_m, up_m = position_enu_m
+        away_m, radius_m = math.hypot(east_m, north_m), self.fence_radius_m
+        share = 1.0 if away_m <= radius_m else _INSIDE * radius_m / away_m
+        height_m = self.fence_height_m
+        if abs(up_m) > height_m:
+            up_m = math.copysign(_INSIDE * height_m, up_m)
+        return (share * east_m, share * north_m, up_m)
+
+    def for_speedup(self, speedup: float) -> BridgeConfig:
+        """The same, but with patience for a vehicle whose time runs ``speedup`` times as fast.
+
+        Answers still take wall time to compute and travel: every wait for one lasts at
+        least half a wall second, and silence at least three.
+
+        Raises:
+            ValueError: ``speedup`` is not a number > 0.
+        """
+        if not (math.isfinite(speedup) and speedup > 0.0):
+            raise ValueError(f"speedup must be a number > 0, not {speedup}")
+        answer_s = 0.5 * speedup
+        return replace(
+            self,
+            silence_timeout_s=max(self.silence_timeout_s, 3.0 * speedup),
+            peer_silence_s=max(self.peer_silence_s, 3.0 * speedup),
+            stream_timeout_s=max(self.stream_timeout_s, answer_s),
+            effect_timeout_s=max(self.effect_timeout_s, answer_s),
+            climb_timeout_s=max(self.climb_timeout_s, 2.0 * answer_s),
+            stall_timeout_s=max(self.stall_timeout_s, answer_s),
+            position_timeout_s=max(self.position_timeout_s, 3.0 * speedup),
+            mission_reply_timeout_s=max(self.mission_reply_timeout_s, answer_s),
+            # Renewing the wait takes a transfer, and half the patience is left for it.
+            mission_patience_s=max(self.mission_patience_s, 20.0 * answer_s),
+            commands=replace(
+                self.commands,
+                ack_timeout_s=max(self.commands.ack_timeout_s, answer_s),
+                progress_timeout_s=max(self.commands.progress_timeout_s, 2.0 * answer_s),
+            ),
+        )
+
+
+_LINK_REMEDY = (
+    "give tcp:HOST:PORT, udpout:HOST:PORT, udpin:HOST:PORT or serial:DEVICE:BAUD, "
+    "such as tcp:127.0.0.1:5760"
+)
+
+_FORWARD_REMEDY = "give udp:HOST:PORT, such as udp:192.168.1.5:14550"
+
+_HOST = re.compile(
+    r"\[[0-9A-Fa-f:.]+(%[A-Za-z0-9._-]+)?\]|[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63})*"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TcpAddress:
+    """A TCP server to connect to."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"tcp:{_bracketed(self.host)}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class UdpOutAddress:
+    """A UDP peer to speak to."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"udpout:{_bracketed(self.host)}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class UdpInAddress:
+    """A local UDP address to wait at."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"udpin:{_bracketed(self.host)}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class SerialAddress:
+    """A serial device and its speed [baud]."""
+
+    device: str
+    baud: int
+
+    def __str__(self) -> str:
+        return f"serial:{self.device}:{self.baud}"
+
+
+LinkAddress = TcpAddress | UdpOutAddress | UdpInAddress | SerialAddress
+
+
+def parse_link(url: str, source: str = "--mavlink") -> LinkAddress:
+    """The address that ``url`` names.
+
+    Args:
+        url: see the module `agent.links.link`.
+        source: where the URL came from, for the message.
+
+    Raises:
+        InputError: the URL is none of the four kinds.
+    """
+    scheme, place, value = _parts(url, ("tcp", "udpout", "udpin", "serial"), source, _LINK_REMEDY)
+    if scheme == "serial":
+        if value == 0:
+            raise _fault(source, url, "0 is no baud rate", _LINK_REMEDY)
+        return SerialAddress(place, value)
+    host = _host(url, place, value, source, _LINK_REMEDY)
+    if scheme == "tcp":
+        return TcpAddress(host, value)
+    return UdpOutAddress(host, value) if scheme == "udpout" else UdpInAddress(host, value)
+
+
+def parse_forward(url: str, source: str = "--forward") -> UdpOutAddress:
+    """Where a ground station listens that ``url`` names.
+
+    Args:
+        url: ``udp:HOST:PORT``.
+        source: where the URL came from, for the message.
+
+    Raises:
+        InputError: the URL is no such address.
+    """
+    _, place, value = _parts(url, ("udp",), source, _FORWARD_REMEDY)
+    return UdpOutAddress(_host(url, place, value, source, _FORWARD_REMEDY), value)
+
+
+def _parts(url: str, schemes: tuple[str, ...], source: str, remedy: str) -> tuple[str, str, int]:
+    """Scheme, place and number of ``url``."""
+    scheme, _, rest = url.partition(":")
+    place, _, number = rest.rpartition(":")
+    if scheme not in schemes:
+        raise _fault(source, url, f"{scheme!r} is no kind of link", remedy)
+    if not place:
+        raise _fault(source, url, "a part is missing", remedy)
+    if not (number.isascii() and number.isdigit() and len(number) < 9):
+        raise _fault(source, url, f"{number!r} is not a whole number", remedy)
+    return scheme, place, int(number)
+
+
+def _host(url: str, place: str, port: int, source: str, remedy: str) -> str:
+    """The host of ``place``, with its brackets taken off."""
+    if not 1 <= port <= 65_535:
+        raise _fault(source, url, f"port {port} is not within 1..65535", remedy)
+    if _HOST.fullmatch(place) is None:
+        raise _fault(source, url, f"{place!r} is no host", remedy)
+    return place.strip("[]")
+
+
+def _fault(source: str, url: str, problem: str, remedy: str) -> InputError:
+    return InputError(Fault(source, url, problem, remedy))
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host

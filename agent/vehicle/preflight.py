@@ -1,0 +1,235 @@
+"""What is read from a vehicle and set on it before it flies.
+
+Read: what it does when its agent falls silent and when its battery is low, from its parameters,
+by all the names they have had. Simulated autopilots of ours say that they are, and are flown as
+they are. Set: the cruise speed, by command, or by the parameter if the command is refused.
+Leaves out: what the parameters mean (agent.vehicle.firmware), and when either is done
+(agent.vehicle.preparation).
+"""
+
+from __future__ import annotations
+
+from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue
+from agent.vehicle.config import BridgeConfig, CommandStyle
+from agent.vehicle.firmware.failsafes import Failsafes
+from agent.vehicle.firmware.profile import Firmware
+from agent.vehicle.messages import (
+    Inbound,
+    Outbound,
+    ParameterMissing,
+    ParameterRead,
+    ParameterSet,
+    ParameterValue,
+)
+
+__all__ = ["CruiseSpeedSetting", "FailsafeCheck", "FailsafeReading"]
+
+
+_SIMULATED = "SWARM_SIMULATED"
+"""Parameter of the autopilots that `swarm autopilot` simulates; no firmware has it."""
+
+_PAUSE_TIMEOUTS = 0.5
+"""A parameter is asked for again after that many timeouts of a command: reading does no harm..."""
+
+_TRIES = 20
+"""...and so often before it counts as not known: one that a poor link loses keeps the vehicle on
+the ground, and older firmware does not say that it has none of that name."""
+
+
+class FailsafeReading:
+    """The parameters of one vehicle that say what it does without its agent.
+
+    Args:
+        firmware: what flies it.
+        own_system_id: the agent's, to which the vehicle should listen.
+        may_be_simulated: whether it matters that it is.
+    """
+
+    def __init__(
+        self, firmware: Firmware, own_system_id: int, *, may_be_simulated: bool = True
+    ) -> None:
+        self._firmware = firmware
+        self._own_system_id = own_system_id
+        self._may_be_simulated = may_be_simulated
+        self._values: dict[str, float] = {}
+        self._missing: set[str] = set()
+        self.names = (*(name for names in firmware.failsafe_names for name in names), _SIMULATED)
+        """All that may be read."""
+
+    @property
+    def unread(self) -> tuple[str, ...]:
+        """Names that have been neither told nor denied; none of a parameter that is told."""
+        if self.simulated:
+            return ()
+        return tuple(
+            name
+            for names in self._wanted
+            if not any(each in self._values for each in names)
+            for name in names
+            if name not in self._missing
+        )
+
+    @property
+    def failsafes(self) -> Failsafes:
+        """What the vehicle does, as far as it has told."""
+        return self._firmware.failsafes(self._values, self._own_system_id)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether it is one of our simulated autopilots."""
+        return bool(self._values.get(_SIMULATED))
+
+    def on_message(self, message: Inbound) -> None:
+        """Take a parameter's value, or that there is none."""
+        if isinstance(message, ParameterValue) and message.name in self.names:
+            self._values[message.name] = self._firmware.value_of(message)
+        elif isinstance(message, ParameterMissing) and message.name in self.names:
+            self._missing.add(message.name)
+
+    @property
+    def _wanted(self) -> tuple[tuple[str, ...], ...]:
+        """What is to be read; whether it is simulated only where something is amiss."""
+        own = self._firmware.failsafe_names
+        told = self._firmware.failsafes(self._values, self._own_system_id)
+        fine = told.comes_home and told.battery is None
+        return (*own, (_SIMULATED,)) if self._may_be_simulated and not fine else own
+
+
+class FailsafeCheck:
+    """Reads one vehicle's failsafes while it stands on the ground.
+
+    Args:
+        firmware: what flies it.
+        config: patience, and whether it may be flown whatever they are.
+    """
+
+    def __init__(self, firmware: Firmware, config: BridgeConfig) -> None:
+        accepted = config.accept_no_failsafe
+        self._reading = FailsafeReading(
+            firmware, config.ground_system_id, may_be_simulated=not accepted
+        )
+        self._config = config
+        self._tries = 0
+        self._next_s = 0.0
+        self._settled = False
+
+    def on_message(self, message: Inbound) -> None:
+        """Take a parameter's value, or that there is none."""
+        self._reading.on_message(message)
+
+    def ask(self, now_s: float) -> list[Outbound]:
+        """What to read now."""
+        names = self._reading.unread
+        self._settled |= not names
+        if now_s < self._next_s:
+            return []
+        self._settled |= self._tries >= _TRIES
+        self._tries += 1
+        if not self._settled:
+            self._next_s = now_s + _PAUSE_TIMEOUTS * self._config.commands.ack_timeout_s
+            return [ParameterRead(name) for name in names]
+        # What keeps the vehicle on the ground may still come, or be set meanwhile.
+        self._next_s = now_s + self._config.retry_delay_s
+        return [ParameterRead(name) for name in self._reading.names] if self.objection else []
+
+    @property
+    def objection(self) -> str | None:
+        """Why the vehicle is not armed, in words; None if it may be."""
+        if self._by_missions or self._config.accept_no_failsafe:
+            return None
+        if not self._settled:
+            return "reading what it does if its agent dies"
+        told = self._reading.failsafes
+        if not self._matters(told):
+            return None
+        return (
+            f"if its agent dies it {told.agent_lost}: {told.remedy}, "
+            "fly it with --command mission, or accept it with --accept-no-failsafe"
+        )
+
+    @property
+    def caution(self) -> str | None:
+        """What people should know of a vehicle that is armed; None if there is nothing."""
+        told = self._reading.failsafes
+        if self._reading.simulated or not self._settled:
+            return None
+        lost = f"if its agent dies it {told.agent_lost}" if self._matters(told) else None
+        return "; ".join(part for part in (lost, told.battery) if part is not None) or None
+
+    def _matters(self, told: Failsafes) -> bool:
+        """Whether nobody would bring the vehicle home."""
+        return not (told.comes_home or self._by_missions or self._reading.simulated)
+
+    @property
+    def _by_missions(self) -> bool:
+        """Whether every mission ends at home."""
+        return self._config.command is CommandStyle.MISSION
+
+
+_SPEED_TAG = "speed"
+
+_TOLERANCE_FRAC = 0.01
+
+
+class CruiseSpeedSetting:
+    """One cruise speed on its way into one vehicle."""
+
+    def __init__(self, speed_m_s: float, firmware: Firmware, config: BridgeConfig) -> None:
+        self._command = firmware.change_speed(speed_m_s)
+        self._values = {p.name: speed_m_s * p.units_per_m_s for p in firmware.speed_parameters}
+        self._config = config
+        self._name: str | None = None
+        self._asking_parameters = False
+        self._tries = 0
+        self._deadline_s = 0.0
+        self.begun = False
+        self.done = False
+        """The vehicle took the speed."""
+        self.failure: str | None = None
+
+    def start(self, commands: CommandQueue, now_s: float) -> list[Outbound]:
+        """Tell the vehicle."""
+        self.begun = True
+        return [*commands.send(_SPEED_TAG, self._command, now_s)]
+
+    def on_ended(self, ended: CommandEnded, now_s: float) -> list[Outbound]:
+        """Take the outcome of the command; refused, turn to the parameter."""
+        if ended.tag != _SPEED_TAG or self.done:
+            return []
+        if ended.ending is CommandOutcome.ACCEPTED:
+            self.done = True
+            return []
+        self._asking_parameters = True
+        return self._ask(now_s)
+
+    def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
+        """A parameter's value: set it, or see that it is set."""
+        if not self._asking_parameters or self.done or not isinstance(message, ParameterValue):
+            return []
+        wanted = self._values.get(message.name)
+        if wanted is None:
+            return []
+        if abs(message.value - wanted) <= _TOLERANCE_FRAC * wanted:
+            self.done = True
+            return []
+        if self._name is not None:
+            return []  # asked to change it already: the repetition is timed
+        self._name = message.name
+        return self._ask(now_s)
+
+    def on_time(self, now_s: float) -> list[Outbound]:
+        """Ask again, or give up."""
+        if not self._asking_parameters or self.done or self.failure or now_s < self._deadline_s:
+            return []
+        if self._tries >= self._config.commands.tries:
+            names = " or ".join(self._values)
+            self.failure = f"the cruise speed cannot be set, neither by command nor by {names}"
+            return []
+        return self._ask(now_s)
+
+    def _ask(self, now_s: float) -> list[Outbound]:
+        self._tries += 1
+        self._deadline_s = now_s + self._config.commands.ack_timeout_s
+        if self._name is None:
+            return [ParameterRead(name) for name in self._values]
+        return [ParameterSet(self._name, self._values[self._name])]

@@ -1,0 +1,317 @@
+"""When a mission starts, and when it is over.
+
+Waiting costs nothing on the ground, and energy in the air. As soon as somebody is airborne,
+whoever was lost is waited for only as long as a restart of its agent takes, whoever else is not
+ready (preparing, or never seen) only as long as the first in the air may hover, and whom the
+operator does not want waited for not at all. Who gets ready later joins the mission that runs.
+Leaves out: saying so (coordinator.core.active).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+from enum import Enum
+
+from coordinator.core.events import CoordinatorAction, MakePlan
+from swarm.model import Mission, Plan, UavId
+from swarm.protocol.board import TaskBoard, TaskState, doable, mission_of
+from swarm.protocol.events import LogLine
+from swarm.protocol.membership import Membership
+from swarm.protocol.messages import MissionPhase, PlanEpoch
+from swarm.protocol.operator_commands import dispensable
+from swarm.protocol.registers import Replica
+from swarm.protocol.timing import Timing, earliest
+from swarm.protocol.uav_messages import ClaimPhase
+
+__all__ = ["MissionEndCondition", "StartDecision", "StartGate"]
+
+
+EVERYBODY = "every UAV is airborne"
+
+
+class StartDecision(Enum):
+    """Whether a mission may begin."""
+
+    WAIT = "the plan is not made, or somebody may yet get airborne"
+    START = "everybody is airborne, held by the operator or given up, and planned for"
+    NOBODY = "everybody is given up"
+
+
+class StartGate:
+    """The beginning of one mission.
+
+    Args:
+        mission: the scenario.
+        method: planning method.
+        seed: of the planner.
+        replica: brief, board and claims.
+        membership: who is there.
+        start_timeout_s: UAVs that are not airborne by then are given up, whatever the others
+            do [s].
+        timing: how long to wait for whom while others hover.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        method: str,
+        seed: int,
+        replica: Replica,
+        membership: Membership,
+        start_timeout_s: float,
+        timing: Timing,
+    ) -> None:
+        self.reason = EVERYBODY
+        """Why the mission starts, in words."""
+        self.plan: Plan | None = None
+        """The plan that the mission starts with; None while there is none for those who fly."""
+        self._mission = mission
+        self._method = method
+        self._seed = seed
+        self._replica = replica
+        self._membership = membership
+        self._start_timeout_s = start_timeout_s
+        self._timing = timing
+        self._start_by_s: float | None = None
+        self._wake_at_s: float | None = None
+        self._hovers_since_s: dict[UavId, float] = {}
+        """UAVs that are ready, and since when."""
+        self._lost_since_s: dict[UavId, float] = {}
+        """UAVs that have been there and are not, and since when."""
+        self._seen: set[UavId] = set()
+        self._planned_for: tuple[UavId, ...] = ()
+        self._planned_tasks: set[str] = set()
+        self._request = 0
+
+    def begin(self, now_s: float) -> list[CoordinatorAction]:
+        """The fleet is briefed: wait for it, and plan for all of it."""
+        self._start_by_s = now_s + self._start_timeout_s
+        self.reason = EVERYBODY
+        return self._make_plan(self._fleet)
+
+    def leave(self) -> None:
+        """There is nothing to begin any more; a plan under way is for nothing."""
+        self._start_by_s = self._wake_at_s = None
+        self._request += 1
+
+    def expects(self, request: int) -> bool:
+        """Whether that is the plan that was wanted last."""
+        return request == self._request
+
+    @property
+    def is_forestalled(self) -> bool:
+        """Whether the fleet is at work already, so that its mission runs: find it, begin none."""
+        at_work = any(claim.task is not None for claim in self._replica.claims.values())
+        return at_work or bool(self._replica.outcomes)
+
+    def advance(self, now_s: float) -> tuple[StartDecision, list[CoordinatorAction]]:
+        """Whether to start by now, and what is to do before."""
+        self._wake_at_s = None
+        if self.is_forestalled:
+            self._start_by_s = None
+            return StartDecision.WAIT, []
+        if self._start_by_s is not None and self._start_by_s <= now_s:
+            self._start_by_s = None
+        uavs = self._fleet
+        phases = {uav: self._phase_of(uav) for uav in uavs}
+        ready = tuple(uav for uav in uavs if phases[uav] is ClaimPhase.IDLE)
+        paused = [uav for uav in uavs if phases[uav] is ClaimPhase.PAUSED]
+        settled = (ClaimPhase.IDLE, ClaimPhase.OUT, ClaimPhase.PAUSED)
+        missing = [uav for uav in uavs if phases[uav] not in settled]
+        self._look(uavs, ready, now_s)
+        if missing and self._start_by_s is not None:
+            given_up = dispensable(self._replica)
+            needed = [uav for uav in missing if uav not in given_up]
+            until_s = self._waits_until_s(needed, now_s) if ready else self._start_by_s
+            if now_s < until_s:
+                self._wake_at_s = until_s
+                return StartDecision.WAIT, []
+        if not ready:  # whom the operator has stopped may yet be told to go on
+            return StartDecision.WAIT if paused else StartDecision.NOBODY, []
+        if self._planned_for != ready:
+            # Somebody is missing: the sequence must be one of those who fly.
+            without = [uav for uav in sorted(uavs) if uav not in ready]
+            why = "; ".join(f"{uav}: {self._why_not(uav, phases[uav])}" for uav in without)
+            self.reason = f"without {why}" if without else EVERYBODY
+            note = LogLine("starting without", {"uavs": ", ".join(without), "because": why})
+            return StartDecision.WAIT, [note, *self._make_plan(ready)]
+        if self._planned_tasks != self._open_tasks:
+            note = LogLine("plans anew", {"because": "the operator has added or withdrawn tasks"})
+            return StartDecision.WAIT, [note, *self._make_plan(ready)]
+        if self.plan is None:
+            return StartDecision.WAIT, []
+        self._start_by_s = None
+        return StartDecision.START, []
+
+    def _look(self, uavs: Iterable[UavId], ready: Collection[UavId], now_s: float) -> None:
+        """Take note of who hovers, and who is lost."""
+        hovers, lost, claims = self._hovers_since_s, self._lost_since_s, self._replica.claims
+        present = self._membership.present
+        self._seen.update(uav for uav in uavs if uav in present or uav in claims)
+        self._hovers_since_s = {uav: hovers.get(uav, now_s) for uav in ready}
+        gone = self._seen - present
+        self._lost_since_s = {uav: lost.get(uav, now_s) for uav in gone}
+
+    def _waits_until_s(self, missing: Iterable[UavId], now_s: float) -> float:
+        """Until when those in the air wait for ``missing``; not after now if no longer."""
+        timing, lost_s = self._timing, self._lost_since_s
+        hovered_s = min(self._hovers_since_s.values()) + timing.hover_s
+        latest_s = earliest(hovered_s, self._start_by_s) or now_s
+        ends_s = (lost_s[uav] + timing.restart_s if uav in lost_s else latest_s for uav in missing)
+        return min(latest_s, max(ends_s, default=now_s))
+
+    def _why_not(self, uav: UavId, phase: ClaimPhase | None) -> str:
+        """Why the mission starts without ``uav``, in words."""
+        if phase is ClaimPhase.OUT:
+            return "takes no part"
+        if phase is ClaimPhase.PAUSED:
+            return "held by the operator"
+        if (start := dispensable(self._replica).get(uav)) is not None:
+            return "the operator does not wait for it" + (f" ({start.reason})" * bool(start.reason))
+        if uav in self._lost_since_s:
+            return "its agent is lost"
+        what = "not airborne" if uav in self._seen else "its agent was never seen"
+        if self._start_by_s is None:
+            return f"{what} within {self._start_timeout_s:g} s"
+        return f"{what}, and others have waited {self._timing.hover_s:g} s in the air"
+
+    def epoch(self, phase: MissionPhase, reason: str) -> PlanEpoch:
+        """The first epoch, by the plan."""
+        sequence = () if self.plan is None else self.plan.sequence or ()
+        lists = {} if self.plan is None else self.plan.routes
+        routes = {str(uav): tuple(map(str, tasks)) for uav, tasks in lists.items()}
+        return PlanEpoch(1, phase, self._method, tuple(sequence), 0.0, reason[:200], routes)
+
+    @property
+    def completion_s(self) -> dict[str, float]:
+        """When the plan has each task done [s mission time]."""
+        return {} if self.plan is None else {str(t): s for t, s in self.plan.completion_s.items()}
+
+    def next_deadline_s(self) -> float | None:
+        """When `advance` waits no longer for somebody who is not airborne."""
+        return self._wake_at_s
+
+    @property
+    def _fleet(self) -> tuple[UavId, ...]:
+        brief = self._replica.brief
+        return () if brief is None else tuple(UavId(uav.id) for uav in brief.uavs)
+
+    @property
+    def _open_tasks(self) -> set[str]:
+        return {task for task, entry in self._replica.board.items() if not entry.withdrawn}
+
+    def _phase_of(self, uav: str) -> ClaimPhase | None:
+        """Phase of its claim; None while it has none, or is absent without having left."""
+        claim = self._replica.claims.get(uav)
+        if claim is None:
+            return None
+        left = claim.phase is ClaimPhase.OUT
+        return claim.phase if left or uav in self._membership.present else None
+
+    def _make_plan(self, uavs: tuple[UavId, ...]) -> list[CoordinatorAction]:
+        self._request += 1
+        self._planned_for, self._planned_tasks, self.plan = uavs, self._open_tasks, None
+        brief = self._replica.brief
+        if brief is None:
+            return []
+        mission = mission_of(self._replica, self._mission.name, brief)
+        fleet = tuple(uav for uav in mission.uavs if uav.id in uavs)
+        tasks = tuple(task for task in mission.tasks if task.id in self._planned_tasks)
+        mission = replace(mission, uavs=fleet, tasks=tasks, origin=self._mission.origin)
+        return [MakePlan(self._request, mission, self._method, self._seed)]
+
+
+ALL_ENDED = "every task has ended"
+
+NOBODY_LEFT = "nobody is left who could go on"
+
+NOBODY_WILL = "nobody takes what is left"
+
+
+class MissionEndCondition:
+    """The end of one mission.
+
+    Args:
+        board: its tasks.
+        membership: who is there.
+        timing: how long to wait for those who may come back, or change their minds.
+    """
+
+    def __init__(self, board: TaskBoard, membership: Membership, timing: Timing) -> None:
+        self._board = board
+        self._membership = membership
+        self._timing = timing
+        self._grace_until_s = 0.0
+        self._ignorant_until_s = 0.0
+        self._prospect: str | None = None
+        self._over_at_s: float | None = None
+
+    def wait_until(self, grace_until_s: float, *, was_away: bool = False) -> None:
+        """Nobody is missed before then: they need the time to show themselves.
+
+        Args:
+            grace_until_s: when.
+            was_away: whether the operator may have added tasks of which is not known here, and
+                will not be before then.
+        """
+        if was_away:
+            self._ignorant_until_s = max(self._ignorant_until_s, grace_until_s)
+        self._grace_until_s = max(self._grace_until_s, grace_until_s)
+        if self._over_at_s is not None:
+            self._over_at_s = max(self._over_at_s, grace_until_s)
+
+    def reason(self, now_s: float, *, more_to_come: bool) -> str | None:
+        """Why the mission is over; None while it is not.
+
+        Args:
+            now_s: now.
+            more_to_come: whether tasks will yet be posted.
+        """
+        prospect, patience_s = self._outlook(more_to_come=more_to_come)
+        if prospect is None:
+            self._prospect = self._over_at_s = None
+            return None
+        grace_s = self._ignorant_until_s if prospect == ALL_ENDED else self._grace_until_s
+        at_s = max(now_s + patience_s, grace_s)
+        if prospect != self._prospect or self._over_at_s is None:
+            self._prospect, self._over_at_s = prospect, at_s
+        self._over_at_s = min(self._over_at_s, at_s)
+        return prospect if self._over_at_s <= now_s else None
+
+    @property
+    def somebody_knows_more(self) -> bool:
+        """Whether a UAV of the fleet that is there claims a task that is not known here."""
+        replica, present = self._board.replica, self._membership.present
+        fleet = () if replica.brief is None else (uav.id for uav in replica.brief.uavs)
+        claimed = (replica.claims[u].task for u in fleet if u in present and u in replica.claims)
+        return any(task is not None and task not in replica.board for task in claimed)
+
+    def settle(self) -> None:
+        """The mission has ended: nothing more to find out."""
+        self._over_at_s = None
+
+    def next_deadline_s(self) -> float | None:
+        """When `reason` may find that it has waited long enough."""
+        return self._over_at_s
+
+    def _outlook(self, *, more_to_come: bool) -> tuple[str | None, float]:
+        """How the mission will end if nothing changes, and how long that may yet change [s]."""
+        claims, problem = self._board.replica.claims, self._board.problem
+        fleet = () if problem is None else problem.uav_ids
+        taking_part = {u for u in fleet if u in claims and claims[u].phase is not ClaimPhase.OUT}
+        here = taking_part & self._membership.present
+        if doable(self._board, here) or (more_to_come and here):
+            paused = {uav for uav in here if claims[uav].phase is ClaimPhase.PAUSED}
+            if doable(self._board, paused) or (more_to_come and paused):
+                return None, 0.0  # the operator has stopped whom it may take: it is for them to say
+            idle = all(claims[uav].phase is ClaimPhase.IDLE for uav in here - paused)
+            # Every UAV may refuse a task for reasons of its own, such as a geofence.
+            return (NOBODY_WILL if idle and not more_to_come else None), self._timing.stalemate_s
+        if self.somebody_knows_more:
+            return None, 0.0
+        if TaskState.OPEN not in self._board.states.values() and not more_to_come:
+            return ALL_ENDED, 0.0
+        # Who was lost and never said that it is out may have been cut off, and come back.
+        may_return = doable(self._board, taking_part) or (more_to_come and taking_part)
+        return NOBODY_LEFT, self._timing.abandon_s if may_return else 0.0

@@ -1,0 +1,272 @@
+"""A mission as the coordinator publishes it: brief, board and epoch.
+
+What a scenario looks like in these registers and how they differ from its file, when each task is
+released to the fleet, and when a register is said again. What the operator has ordered counts
+first: a task withdrawn before it appeared is not released any more. Leaves out: deciding on them
+(coordinator.core.active), and keys and bytes (swarm.wire).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from swarm.model import Mission, Origin, Task
+from swarm.model.frames import DEFAULT_ORIGIN
+from swarm.protocol.board import TaskBoard, TaskState
+from swarm.protocol.events import Publish
+from swarm.protocol.messages import Body, Message, MissionConfig, PlanEpoch, TaskEntry, UavSpec
+from swarm.protocol.register_writer import RegisterWriter
+from swarm.protocol.registers import Replica
+from swarm.protocol.timing import Timing
+
+__all__ = [
+    "FlightLayers",
+    "RegisterAnnouncer",
+    "TaskReleaser",
+    "exit_status",
+    "height_warning",
+    "mission_config_of",
+    "scenario_differences",
+    "task_entry_of",
+    "unreleased_tasks",
+]
+
+
+HIGHEST_M = 120.0
+"""Above it unmanned aircraft need a permit of their own in the EU, Britain and Switzerland; 122 m
+(400 ft) in the USA."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLayers:
+    """Heights at which the UAVs fly, each its own.
+
+    Raises:
+        ValueError: a height is not positive.
+    """
+
+    lowest_m: float = 10.0
+    """Height of the first UAV's layer above the places it visits [m]."""
+    spacing_m: float = 3.0
+    """Distance between neighbouring layers [m]."""
+
+    def __post_init__(self) -> None:
+        if not (self.lowest_m > 0.0 and self.spacing_m >= 0.0):
+            raise ValueError(f"layers need lowest_m > 0 and spacing_m >= 0, not {self}")
+
+    def layer_m(self, index: int) -> float:
+        """Layer of the UAV with that place in the scenario [m]."""
+        return self.lowest_m + index * self.spacing_m
+
+
+def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> MissionConfig:
+    """What the agents need to know of ``mission``."""
+    origin: Origin = mission.origin or DEFAULT_ORIGIN
+    return MissionConfig(
+        horizon_s=mission.horizon_s,
+        success_default=mission.success_default,
+        survival_default=mission.survival_default,
+        reattempt_failed=mission.reattempt_failed,
+        run=run,
+        origin=(origin.lat_deg, origin.lon_deg, origin.alt_m),
+        uavs=tuple(
+            UavSpec(
+                id=uav.id,
+                position_enu_m=uav.position_enu_m,
+                speed_m_s=uav.speed_m_s,
+                success=dict(uav.success),
+                survival=dict(uav.survival),
+                kind=uav.kind,
+                layer_m=layers.layer_m(index),
+            )
+            for index, uav in enumerate(mission.uavs)
+        ),
+    )
+
+
+def height_warning(mission: Mission, layers: FlightLayers) -> str | None:
+    """What to say of layers that reach too high, and what to do; None if they do not."""
+    count = len(mission.uavs)
+    above = sum(layers.layer_m(index) > HIGHEST_M for index in range(count))
+    if not above:
+        return None
+    who = "1 UAV flies" if above == 1 else f"{above} UAVs fly"
+    return (
+        f"the highest of {count} height layers is {layers.layer_m(count - 1):g} m up, and {who} "
+        f"above {HIGHEST_M:g} m, which many countries forbid: fly fewer UAVs, or let swarm "
+        "coordinator lower --layer-spacing-m or --lowest-layer-m"
+    )
+
+
+def task_entry_of(task: Task, number: int) -> TaskEntry:
+    """``task`` as an entry of the board, its ``number``-th."""
+    return TaskEntry(
+        task=task.id,
+        number=number,
+        position_enu_m=task.position_enu_m,
+        value=task.value,
+        service_s=task.service_s,
+        kind=task.kind,
+        withdrawn=False,
+    )
+
+
+def scenario_differences(mission: Mission, layers: FlightLayers, replica: Replica) -> list[str]:
+    """In what the mission that the registers describe is not the one of the scenario file.
+
+    What the operator has ordered about tasks is no difference, nor that a coordinator has
+    withdrawn some or posted others, which it does for an operator.
+    """
+    found = []
+    brief = replica.brief
+    if brief is not None and brief != mission_config_of(mission, layers, brief.run):
+        found.append("fleet, horizon or defaults")
+    for number, task in enumerate(mission.tasks):
+        entry = replica.posted.get(task.id)
+        if entry is not None and replace(entry, withdrawn=False) != task_entry_of(task, number):
+            found.append(f"task {task.id}")
+    return found
+
+
+class TaskReleaser:
+    """The tasks of one scenario on the board of one mission.
+
+    Args:
+        mission: the scenario, pop-ups included.
+        replica: holds the board.
+    """
+
+    def __init__(self, mission: Mission, replica: Replica) -> None:
+        self._mission = mission
+        self._replica = replica
+        self._numbers = {task.id: number for number, task in enumerate(mission.tasks)}
+
+    @property
+    def more_to_come(self) -> bool:
+        """Whether tasks have yet to appear."""
+        return bool(unreleased_tasks(self._replica, self._mission))
+
+    def due(self, zero_s: float | None, now_s: float) -> list[TaskEntry]:
+        """Entries to post by now; before the start, what has been there all along.
+
+        Args:
+            zero_s: when the mission began; None while it has not.
+            now_s: now.
+        """
+        return [
+            task_entry_of(task, self._numbers[task.id])
+            for task in unreleased_tasks(self._replica, self._mission)
+            # The same sum as the deadline's: another may round to just before it.
+            if task.appears_s == 0.0 or (zero_s is not None and zero_s + task.appears_s <= now_s)
+        ]
+
+    def merged(self, theirs: Iterable[Message]) -> list[TaskEntry]:
+        """What another coordinator of the mission has posted or withdrawn, and this one has not."""
+        entries = []
+        for message in theirs:
+            if isinstance(entry := message.body, TaskEntry):
+                known = self._replica.posted.get(entry.task)
+                if known is None or (entry.withdrawn and not known.withdrawn):
+                    entries.append(entry)
+        return entries
+
+    def next_deadline_s(self, zero_s: float) -> float | None:
+        """When the next task is due in a mission that began at ``zero_s``."""
+        times_s = (
+            zero_s + task.appears_s for task in unreleased_tasks(self._replica, self._mission)
+        )
+        return min(times_s, default=None)
+
+
+def exit_status(board: TaskBoard, mission: Mission) -> int:
+    """0 if every task of ``mission`` has appeared and was done or withdrawn, else 1."""
+    done = all(s in (TaskState.DONE, TaskState.WITHDRAWN) for s in board.states.values())
+    return 0 if done and not unreleased_tasks(board.replica, mission) else 1
+
+
+def unreleased_tasks(replica: Replica, mission: Mission) -> list[Task]:
+    """Tasks of ``mission`` that have not appeared yet."""
+    return [task for task in mission.tasks if task.id not in replica.board]
+
+
+ENTRIES_PER_ANNOUNCEMENT = 8
+"""Of brief and board, at most."""
+
+
+class RegisterAnnouncer:
+    """The statements of one coordinator.
+
+    Args:
+        voice: stamps them.
+        replica: holds the own registers among all others.
+        timing: how often they are repeated.
+    """
+
+    def __init__(self, register_writer: RegisterWriter, replica: Replica, timing: Timing) -> None:
+        self._register_writer = register_writer
+        self._replica = replica
+        self._announce_s = timing.announce_s
+        self._announce_at_s: float | None = None
+        self._announced = 0
+
+    @property
+    def incarnation(self) -> int:
+        """Of this life of the coordinator."""
+        return self._register_writer.incarnation
+
+    def say(self, body: Body) -> Publish:
+        """State the new content of an own register."""
+        message = self._register_writer.say(body)
+        self._replica.join(message)
+        return Publish(message)
+
+    def observe(self, theirs: Iterable[Message]) -> bool:
+        """Speak above ``theirs``, statements from this seat; whether the own were below them."""
+        before = self._register_writer.incarnation
+        for message in theirs:
+            self._register_writer.observe(message.stamp)
+        return self._register_writer.incarnation != before
+
+    def restate(self, others: Iterable[Body] = ()) -> list[Publish]:
+        """State every own register anew, ``others`` taking the place of the own.
+
+        The epoch comes first: by it others know who is in charge.
+        """
+        own = self._replica.messages({self._register_writer.writer})
+        bodies = {_register(body): body for body in (*(m.body for m in own), *others)}
+        ordered = sorted(bodies.values(), key=lambda body: not isinstance(body, PlanEpoch))
+        return [self.say(body) for body in ordered]
+
+    def repeat(self, now_s: float, mission_s: float) -> list[Publish]:
+        """What is due again by now: the epoch with its time, the brief and some of the board.
+
+        Whoever joins asks by itself; this is for what got lost on the way, so a few
+        entries at a time are enough and the bus stays quiet on large boards.
+        """
+        due = self._announce_at_s is not None and self._announce_at_s <= now_s
+        if due or self._announce_at_s is None:
+            self._announce_at_s = now_s + self._announce_s
+        if not due:
+            return []
+        epoch = self._replica.epoch
+        said = [] if epoch is None else [self.say(replace(epoch, mission_s=mission_s))]
+        own = list(self._replica.messages({self._register_writer.writer}))
+        rest = [message for message in own if not isinstance(message.body, PlanEpoch)]
+        count = min(ENTRIES_PER_ANNOUNCEMENT, len(rest))
+        turn = [rest[(self._announced + k) % len(rest)] for k in range(count)]
+        self._announced += count
+        return said + [Publish(message) for message in turn]
+
+    def hurry(self, now_s: float) -> None:
+        """Somebody should hear at once who is in charge."""
+        self._announce_at_s = now_s
+
+    def next_deadline_s(self) -> float | None:
+        """When `repeat` will next have something to say."""
+        return self._announce_at_s
+
+
+def _register(body: Body) -> tuple[type[Body], str | None]:
+    """Which of the coordinator's registers ``body`` is the content of."""
+    return type(body), body.task if isinstance(body, TaskEntry) else None

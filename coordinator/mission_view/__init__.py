@@ -1,0 +1,1 @@
+"""The read model of a running mission, for all who show, record or command it."""

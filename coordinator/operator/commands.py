@@ -1,0 +1,320 @@
+"""An operator's word to UAVs: hold, resume, return, abort, or start without one.
+
+What is to be said, and what has come of it. Leaves out: saying it
+(coordinator.operator.requests), and obeying (agent.core, coordinator.core).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from coordinator.mission_view.mission_state import MissionState
+from swarm.model.ids import COORDINATOR, FLEET
+from swarm.protocol.events import CommonEvent, SnapshotsReceived
+from swarm.protocol.messages import (
+    CommandKind,
+    Message,
+    MissionConfig,
+    MissionPhase,
+    OperatorCommand,
+    StartWithout,
+)
+from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD, dispensable
+from swarm.protocol.uav_messages import ClaimPhase, Status, StatusPhase
+
+__all__ = [
+    "CommandHandler",
+    "CommandRequest",
+    "RequestResult",
+    "RequestVerdict",
+    "StartHandler",
+    "StartRequest",
+]
+
+
+class RequestResult(Enum):
+    """What has come of a command or an order."""
+
+    OBEYED = "obeyed"
+    NOT_OBEYED = "not obeyed"
+    UNKNOWN_UAV = "no such UAV"
+    UNKNOWN_TASK = "no such task"
+    TAKEN_ID = "that id is taken"
+    UNKNOWN_MISSION = "nothing known of the mission"
+
+    @property
+    def is_wrong_input(self) -> bool:
+        """Whether it was never said, as what was asked for does not fit the mission."""
+        return self in (
+            RequestResult.UNKNOWN_UAV,
+            RequestResult.UNKNOWN_TASK,
+            RequestResult.TAKEN_ID,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class RequestVerdict:
+    """What has come of it, in words as well."""
+
+    result: RequestResult
+    text: str
+    """One line; of wrong input what would be right."""
+
+
+_ON_THE_WAY_HOME = (StatusPhase.RETURNING, StatusPhase.HOME)
+
+_NOT_COMMANDED = "takes no part, and its vehicle is not commanded"
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRequest:
+    """Hold, resume or return one UAV, or abort the mission."""
+
+    kind: CommandKind
+    target: str = FLEET
+    """Id of a UAV, or the name that stands for the fleet."""
+    reason: str = ""
+    """Why, in the operator's words."""
+
+    def __str__(self) -> str:
+        return self.kind.value if self.target == FLEET else f"{self.kind} {self.target}"
+
+
+class CommandHandler:
+    """One command, and what comes of it.
+
+    Args:
+        wish: what the operator wants.
+        mission_state: of the mission.
+        patience_s: how long to wait for the effect [s of ``now_s``].
+    """
+
+    asks = False
+    """What a UAV says by itself tells whether it obeys."""
+
+    def __init__(
+        self, wish: CommandRequest, mission_state: MissionState, patience_s: float
+    ) -> None:
+        self._target, self._kind, self._reason = wish.target, wish.kind, wish.reason
+        self._mission_state = mission_state
+        self._patience_s = patience_s
+        self._before: dict[str, Status] = {}
+        """Newest status of each UAV when the command was given."""
+
+    def body(self, brief: MissionConfig) -> OperatorCommand | RequestVerdict:
+        """What to say; or why it cannot be said."""
+        if self._target != FLEET and not self.concerned:
+            fleet = ", ".join(uav.id for uav in brief.uavs)
+            return RequestVerdict(RequestResult.UNKNOWN_UAV, f"the fleet is {fleet}")
+        self._before = dict(self._mission_state.statuses)
+        return OperatorCommand(self._target, self._kind, brief.run, self._reason)
+
+    def heed(self, fact: CommonEvent, said: Message) -> None:
+        """Nothing but what the observer makes of it counts."""
+
+    def next_deadline_s(self) -> float | None:
+        """Only news can change the judgement."""
+        return None
+
+    def judge(self, said: Message, now_s: float, *, late: bool) -> RequestVerdict | None:
+        """What has come of it by now; None as long as that is open, and it is not ``late``."""
+        del now_s  # it is as good later
+        stamp, command = self._mission_state.replica.commands[self._target]
+        if stamp != said.stamp:
+            text = f"another operator has said {command.kind} meanwhile"
+            return RequestVerdict(RequestResult.NOT_OBEYED, text)
+        found = [self._effect(uav) for uav in self.concerned]
+        if any(effect is None for effect in found):
+            if not late:
+                return None
+            open_still = zip(self.concerned, found, strict=True)
+            texts = [self._unseen(uav) for uav, effect in open_still if effect is None]
+            return RequestVerdict(RequestResult.NOT_OBEYED, "; ".join(texts))
+        effects = [effect for effect in found if effect is not None]
+        obeyed = all(effect.result is RequestResult.OBEYED for effect in effects)
+        text = _in_short({u: e.text for u, e in zip(self.concerned, effects, strict=True)})
+        return RequestVerdict(RequestResult.OBEYED if obeyed else RequestResult.NOT_OBEYED, text)
+
+    @property
+    def concerned(self) -> list[str]:
+        """UAVs of the fleet that the command is to."""
+        brief = self._mission_state.replica.brief
+        fleet = [] if brief is None else [str(uav.id) for uav in brief.uavs]
+        return fleet if self._target == FLEET else [uav for uav in fleet if uav == self._target]
+
+    def _effect(self, uav: str) -> RequestVerdict | None:
+        """What has come of it for ``uav``; None as long as that is open."""
+        mission_state = self._mission_state
+        status, claim = mission_state.statuses.get(uav), mission_state.replica.claims.get(uav)
+        if uav not in mission_state.present:
+            gone = claim is not None and claim.phase is ClaimPhase.OUT
+            if self._kind in (CommandKind.RETURN, CommandKind.ABORT) and gone:
+                return RequestVerdict(RequestResult.OBEYED, f"{uav} has left the mission")
+            if self._kind is CommandKind.ABORT and claim is None:
+                return RequestVerdict(RequestResult.OBEYED, f"nobody flies {uav}")
+            return None
+        if status is None or status is self._before.get(uav):
+            return None
+        if status.phase is StatusPhase.OUT:
+            # The mission is over for it at any rate.
+            result = (
+                RequestResult.OBEYED
+                if self._kind is CommandKind.ABORT
+                else RequestResult.NOT_OBEYED
+            )
+            return RequestVerdict(result, f"{uav} {_NOT_COMMANDED}: {status.note}")
+        return self._seen(uav, status)
+
+    def _seen(self, uav: str, status: Status) -> RequestVerdict | None:
+        """What a status tells that ``uav`` has said since."""
+        phase, obeyed = status.phase, RequestVerdict(RequestResult.OBEYED, _told(uav, status))
+        match self._kind:
+            case CommandKind.HOLD if phase is StatusPhase.HOLDING:
+                if status.note.startswith(CANNOT_HOLD):
+                    return RequestVerdict(RequestResult.NOT_OBEYED, _told(uav, status))
+                return None if status.note.startswith(BEING_STOPPED) else obeyed
+            case CommandKind.HOLD:
+                return None
+            case CommandKind.RETURN | CommandKind.ABORT:
+                return obeyed if phase in _ON_THE_WAY_HOME else None
+            case CommandKind.RESUME if phase in (StatusPhase.HOLDING, StatusPhase.LEARNING):
+                return None
+            case CommandKind.RESUME if phase in _ON_THE_WAY_HOME:
+                before = self._before.get(uav)
+                if before is not None and before.phase is StatusPhase.HOLDING:
+                    return obeyed  # it had been stopped on its way
+                return RequestVerdict(
+                    RequestResult.NOT_OBEYED, f"{_told(uav, status)}; it takes no further part"
+                )
+            case CommandKind.RESUME:
+                return obeyed
+
+    def _unseen(self, uav: str) -> str:
+        """Why nothing was seen to come of it."""
+        status, waited = self._mission_state.statuses.get(uav), f"within {self._patience_s:g} s"
+        if uav not in self._mission_state.present:
+            return (
+                f"nobody flies {uav}, or it is cut off; back again, it learns of it from those "
+                "who know"
+            )
+        if status is None or status is self._before.get(uav):
+            return f"{uav} has not been heard of {waited}"
+        return f"{_told(uav, status)} still, {self._kind} was not obeyed {waited}"
+
+
+def _in_short(texts: Mapping[str, str]) -> str:
+    """What came of it for each UAV; what is the same for several is said once."""
+    same: dict[str, list[str]] = {}
+    for uav, text in texts.items():
+        same.setdefault(text.removeprefix(uav), []).append(uav)
+    parts = []
+    for told, uavs in same.items():
+        more = f" and {len(uavs) - 3} more" if len(uavs) > 3 else ""
+        each = f"{', '.join(uavs[:3])}{more}: each{told}"
+        parts.append(texts[uavs[0]] if len(uavs) == 1 else each)
+    return "; ".join(parts)
+
+
+def _told(uav: str, status: Status) -> str:
+    task = "" if status.task is None else f" {status.task}"
+    note = f": {status.note}" if status.note else ""
+    return f"{uav} is {status.phase}{task}{note}"
+
+
+@dataclass(frozen=True, slots=True)
+class StartRequest:
+    """Start the mission without one UAV."""
+
+    target: str
+    """Its id."""
+    reason: str = ""
+    """Why, in the operator's words."""
+
+    def __str__(self) -> str:
+        return f"start without {self.target}"
+
+
+class StartHandler:
+    """One such word, and what comes of it.
+
+    Args:
+        wish: what the operator wants.
+        mission_state: of the mission.
+        patience_s: how long to wait for the effect [s of ``now_s``].
+    """
+
+    asks = True
+    """The coordinator's own answer tells whether it knows."""
+
+    def __init__(self, wish: StartRequest, mission_state: MissionState, patience_s: float) -> None:
+        self._wish = wish
+        self._mission_state = mission_state
+        self._patience_s = patience_s
+        self._confirmed = False
+
+    def body(self, brief: MissionConfig) -> StartWithout | RequestVerdict:
+        """What to say; or why it cannot be said."""
+        uav, fleet = self._wish.target, [str(uav.id) for uav in brief.uavs]
+        if uav not in fleet:
+            return RequestVerdict(RequestResult.UNKNOWN_UAV, f"the fleet is {', '.join(fleet)}")
+        phase = self._mission_state.phase
+        if phase is not MissionPhase.PREPARING:
+            past = "has started already" if phase is MissionPhase.RUNNING else "has ended"
+            return RequestVerdict(
+                RequestResult.NOT_OBEYED, f"the mission {past}: nobody waits for {uav}"
+            )
+        return StartWithout(uav, brief.run, self._wish.reason)
+
+    def heed(self, fact: CommonEvent, said: Message) -> None:
+        """See whether the coordinator knows of it."""
+        if isinstance(fact, SnapshotsReceived):
+            answers = (each for each in fact.snapshots if each.writer == COORDINATOR)
+            messages = (message for each in answers for message in each.messages)
+            self._confirmed |= any(m.key == said.key and m.stamp >= said.stamp for m in messages)
+
+    def next_deadline_s(self) -> float | None:
+        """Only news can change the judgement."""
+        return None
+
+    def judge(self, said: Message, now_s: float, *, late: bool) -> RequestVerdict | None:
+        """What has come of it by now; None as long as that is open, and it is not ``late``."""
+        del said, now_s  # whoever has said it since means the same
+        mission_state, uav, epoch = (
+            self._mission_state,
+            self._wish.target,
+            self._mission_state.replica.epoch,
+        )
+        if epoch is not None and epoch.phase is MissionPhase.RUNNING:
+            how = "with" if uav in epoch.sequence else "without"
+            return RequestVerdict(RequestResult.OBEYED, f"the mission has started {how} {uav}")
+        if epoch is not None and epoch.phase is MissionPhase.ENDED:
+            return RequestVerdict(
+                RequestResult.NOT_OBEYED, f"the mission has ended: {epoch.reason}"
+            )
+        waits_for = self._waits_for
+        if self._confirmed and (late or waits_for):
+            what = f"waits for {waits_for}" if waits_for else "starts as soon as it is planned"
+            return RequestVerdict(RequestResult.OBEYED, f"without {uav}; the mission {what}")
+        if not late:
+            return None
+        if COORDINATOR not in mission_state.present:
+            text = "there is no coordinator that could start the mission"
+        else:
+            text = f"the coordinator has not confirmed it within {self._patience_s:g} s"
+        return RequestVerdict(RequestResult.NOT_OBEYED, text)
+
+    @property
+    def _waits_for(self) -> str:
+        """What else the start waits for; empty if for nothing but its plan."""
+        replica, present = self._mission_state.replica, self._mission_state.present
+        fleet = [] if replica.brief is None else [str(uav.id) for uav in replica.brief.uavs]
+        phases = {u: c.phase for u, c in replica.claims.items() if u in present}
+        settled = (ClaimPhase.IDLE, ClaimPhase.OUT, ClaimPhase.PAUSED)
+        without = dispensable(replica)
+        missing = [u for u in fleet if phases.get(u) not in settled and u not in without]
+        if missing:
+            return ", ".join(missing)
+        nobody = ClaimPhase.IDLE not in phases.values()
+        return "the first UAV that is airborne" if nobody else ""

@@ -1,0 +1,334 @@
+"""An operator's requests, any number at once, each followed until it is known what came of it.
+
+For whoever observes already: a `RequestTracker` is given the `MissionState` of a mission, which
+somebody else feeds, says what the operator wants under the operator's name, repeats it, and
+judges from that state what comes of it. One command line's `OperatorClient` has one request, a
+dashboard many.
+
+    tracker = RequestTracker(mission_state, incarnation=…, timing=…, patience_s=10.0)
+    request = tracker.give(NewTask((10.0, 20.0, 0.0), value=3.0), now_s)
+    actions = tracker.step(event, now_s)  # after `mission_state.step`, for every event
+    request.verdict                       # None while it is open
+
+`step` gives what is to be published and asked, so step once (with a `Tick`) after `give`, and
+whenever `next_deadline_s` comes. The process behind it joins without a token, and its shell has
+the name `OPERATOR`: then answers to its questions always tell what is known of the operator's own
+registers, which is how a task edit is confirmed. It should have asked once before it gives
+anything, lest it speaks below what other operators have said. Leaves out: the requests themselves
+(coordinator.operator.commands, coordinator.operator.task_edits), and who may have them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Protocol
+
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.observation import MissionObserver
+from coordinator.operator.commands import (
+    CommandHandler,
+    CommandRequest,
+    RequestResult,
+    RequestVerdict,
+    StartHandler,
+    StartRequest,
+)
+from coordinator.operator.task_edits import NewTask, TaskEditHandler, TaskWithdrawal
+from swarm.model.ids import OPERATOR
+from swarm.protocol.events import Ask, CommonAction, CommonEvent, Finish, Publish, SnapshotsReceived
+from swarm.protocol.messages import Message, MissionConfig, OperatorCommand, StartWithout, TaskEdit
+from swarm.protocol.register_writer import RegisterWriter
+from swarm.protocol.timing import Timing, earliest
+
+__all__ = ["OperatorClient", "OperatorRequest", "RequestTracker", "TrackedRequest"]
+
+
+OperatorRequest = CommandRequest | StartRequest | NewTask | TaskWithdrawal
+
+OperatorStatement = OperatorCommand | StartWithout | TaskEdit
+
+
+class RequestHandler(Protocol):
+    """One kind of wish: what to say for it, and how its effect shows."""
+
+    asks: bool
+
+    def body(self, brief: MissionConfig) -> OperatorStatement | RequestVerdict:
+        """What to say; or why it cannot be said."""
+        ...
+
+    def heed(self, fact: CommonEvent, said: Message) -> None:
+        """Take note of a fact, which the observer has taken note of already."""
+        ...
+
+    def judge(self, said: Message, now_s: float, *, late: bool) -> RequestVerdict | None:
+        """What has come of it by now; None as long as that is open, and it is not ``late``."""
+        ...
+
+    def next_deadline_s(self) -> float | None:
+        """When `judge` may find something though nothing happens."""
+        ...
+
+
+class TrackedRequest:
+    """One wish under way.
+
+    Args:
+        wish: what the operator wants.
+        handler: does it.
+    """
+
+    def __init__(
+        self, wish: OperatorRequest, handler: CommandHandler | StartHandler | TaskEditHandler
+    ) -> None:
+        self.wish = wish
+        self.handler = handler
+        """Tells more than the verdict: whom a command concerns, who knows of a task order."""
+        self.said: Message | None = None
+        """What was said; None when it could not be."""
+        self.verdict: RequestVerdict | None = None
+        """What has come of it; None as long as that is open."""
+        self.leave_at_s = math.inf
+        self.again_at_s = math.inf
+        """When to repeat it."""
+        self.ask_at_s = math.inf
+
+    @property
+    def obeyed(self) -> bool:
+        """Whether it was seen to take effect."""
+        return self.verdict is not None and self.verdict.result is RequestResult.OBEYED
+
+    @property
+    def task(self) -> str | None:
+        """Id of the task that it is about, once there is one."""
+        return self.handler.task if isinstance(self.handler, TaskEditHandler) else None
+
+
+class RequestTracker:
+    """All of one operator's wishes in one mission.
+
+    Args:
+        mission_state: of the mission; somebody else feeds it.
+        incarnation: wall time in milliseconds.
+        timing: timers, in the seconds of ``now_s``.
+        patience_s: how long to wait for the effect of each [s of ``now_s``].
+    """
+
+    def __init__(
+        self, mission_state: MissionState, *, incarnation: int, timing: Timing, patience_s: float
+    ) -> None:
+        self.open: list[TrackedRequest] = []
+        """Those of which it is not known what came, oldest first."""
+        self._mission_state = mission_state
+        self._register_writer = RegisterWriter(mission_state.mission.name, OPERATOR, incarnation)
+        self._timing = timing
+        self._patience_s = patience_s
+
+    def give(self, wish: OperatorRequest, now_s: float) -> TrackedRequest:
+        """Say what the operator wants, from the next step on; at once with a verdict if it cannot.
+
+        Args:
+            wish: what they want.
+            now_s: now.
+        """
+        mission_state, brief = self._mission_state, self._mission_state.replica.brief
+        handler: CommandHandler | StartHandler | TaskEditHandler
+        if isinstance(wish, CommandRequest):
+            handler = CommandHandler(wish, mission_state, self._patience_s)
+        elif isinstance(wish, StartRequest):
+            handler = StartHandler(wish, mission_state, self._patience_s)
+        else:
+            handler = TaskEditHandler(wish, mission_state, self._timing, self._patience_s)
+        tracked_request = TrackedRequest(wish, handler)
+        if brief is None:
+            tracked_request.verdict = RequestVerdict(
+                RequestResult.UNKNOWN_MISSION, "nothing is known of the mission"
+            )
+            return tracked_request
+        body = handler.body(brief)
+        if isinstance(body, RequestVerdict):
+            tracked_request.verdict = body
+            return tracked_request
+        self._say(tracked_request, body, now_s)
+        tracked_request.leave_at_s = now_s + self._patience_s
+        if handler.asks:
+            tracked_request.ask_at_s = now_s + self._timing.ask_gap_s
+        self.open.append(tracked_request)
+        return tracked_request
+
+    def step(self, fact: CommonEvent, now_s: float) -> list[CommonAction]:
+        """Follow what has been given; call it after the observer has taken note of ``fact``."""
+        wishes: list[CommonAction] = []
+        asks = False
+        for tracked_request in self.open:
+            said = self._said_for_this_run(tracked_request, now_s)
+            if said is None:
+                continue
+            said = self._said_apart(tracked_request, said, now_s)
+            tracked_request.handler.heed(fact, said)
+            if tracked_request.again_at_s <= now_s:
+                tracked_request.again_at_s = now_s + self._timing.announce_s
+                wishes.append(Publish(said))
+            if tracked_request.ask_at_s <= now_s:
+                tracked_request.ask_at_s = now_s + self._timing.ask_s
+                asks = True
+            late = tracked_request.leave_at_s <= now_s
+            tracked_request.verdict = tracked_request.handler.judge(said, now_s, late=late)
+        self.open = [
+            tracked_request for tracked_request in self.open if tracked_request.verdict is None
+        ]
+        return [*wishes, Ask()] if asks else wishes
+
+    def _say(
+        self, tracked_request: TrackedRequest, body: OperatorStatement, now_s: float
+    ) -> Message:
+        """State ``body`` above all that is known of any operator."""
+        for message in self._mission_state.replica.messages({OPERATOR}):
+            self._register_writer.observe(message.stamp)
+        said = self._register_writer.say(body)
+        self._mission_state.take_note(said, now_s)
+        tracked_request.said, tracked_request.again_at_s = said, now_s
+        return said
+
+    def _said_for_this_run(self, tracked_request: TrackedRequest, now_s: float) -> Message | None:
+        """What was said; anew, if the brief turns out to be of another run than it was told of."""
+        said, brief = tracked_request.said, self._mission_state.replica.brief
+        if said is None or brief is None or not isinstance(said.body, OperatorStatement):
+            return said
+        if said.body.run == brief.run:
+            return said
+        return self._say(tracked_request, replace(said.body, run=brief.run), now_s)
+
+    def _said_apart(self, tracked_request: TrackedRequest, said: Message, now_s: float) -> Message:
+        """What was said; under another id, if another operator's task has come under the same."""
+        body = (
+            tracked_request.handler.apart(said)
+            if isinstance(tracked_request.handler, TaskEditHandler)
+            else None
+        )
+        return said if body is None else self._say(tracked_request, body, now_s)
+
+    def next_deadline_s(self) -> float | None:
+        """When `step` wants a tick; None while nothing is open."""
+        deadlines = [
+            min(tracked_request.leave_at_s, tracked_request.again_at_s, tracked_request.ask_at_s)
+            for tracked_request in self.open
+        ]
+        looks = (tracked_request.handler.next_deadline_s() for tracked_request in self.open)
+        return min([*deadlines, *(at_s for at_s in looks if at_s is not None)], default=None)
+
+
+class OperatorClient:
+    """A core that has one request, and ends when it knows what came of it.
+
+    Args:
+        mission: mission name.
+        wish: what the operator wants.
+        incarnation: wall time in milliseconds.
+        timing: timers, in the seconds of ``now_s``.
+        patience_s: how long to wait for the mission, and then for the effect [s of ``now_s``].
+    """
+
+    def __init__(
+        self,
+        mission: str,
+        wish: OperatorRequest,
+        *,
+        incarnation: int,
+        timing: Timing,
+        patience_s: float,
+    ) -> None:
+        self.tracked_request: TrackedRequest | None = None
+        """What it was told to do; None as long as it knows too little to begin."""
+        self._observer = MissionObserver(mission, timing, None)
+        self._wish = wish
+        self._request_tracker = RequestTracker(
+            self._observer.mission_state,
+            incarnation=incarnation,
+            timing=timing,
+            patience_s=patience_s,
+        )
+        self._ask_s = timing.ask_s
+        self._patience_s = patience_s
+        self._leave_at_s = math.inf
+        self._ask_at_s = math.inf
+        self._gave_up: RequestVerdict | None = None
+
+    @property
+    def verdict(self) -> RequestVerdict | None:
+        """What has come of it; None as long as that is open."""
+        return self._gave_up if self.tracked_request is None else self.tracked_request.verdict
+
+    def start(self, now_s: float) -> list[CommonAction]:
+        """Ask what there is to know."""
+        self._leave_at_s, self._ask_at_s = now_s + self._patience_s, now_s + self._ask_s
+        return self._observer.start(now_s)
+
+    def step(self, fact: CommonEvent, now_s: float) -> list[CommonAction]:
+        """Take note of one fact."""
+        if self.verdict is not None:
+            return []
+        wishes = self._observer.step(fact, now_s)
+        if self.tracked_request is None:
+            self._begin(fact, now_s)
+        wishes += self._request_tracker.step(fact, now_s)
+        if self.tracked_request is None and self._ask_at_s <= now_s:
+            self._ask_at_s = now_s + self._ask_s
+            wishes.append(Ask())
+        if self.tracked_request is None and self._leave_at_s <= now_s:
+            self._gave_up = RequestVerdict(RequestResult.UNKNOWN_MISSION, self._observer.lack)
+        if self.verdict is not None:
+            wishes.append(Finish(0 if self.obeyed else 1))
+        return wishes
+
+    def next_deadline_s(self) -> float | None:
+        """When `step` wants a tick; None when it has finished."""
+        if self.verdict is not None:
+            return None
+        own_s = min(self._leave_at_s, self._ask_at_s) if self.tracked_request is None else None
+        looks_s = self._observer.next_deadline_s()
+        return earliest(own_s, looks_s, self._request_tracker.next_deadline_s())
+
+    @property
+    def obeyed(self) -> bool:
+        """Whether it was seen to take effect."""
+        return self.verdict is not None and self.verdict.result is RequestResult.OBEYED
+
+    @property
+    def ordered(self) -> dict[str, object]:
+        """What a task order says of its task, who has confirmed it, and who has taken it."""
+        handler = None if self.tracked_request is None else self.tracked_request.handler
+        if not isinstance(handler, TaskEditHandler):
+            return {}
+        entry = handler.entry
+        told: dict[str, object] = {
+            "task": handler.task,
+            "uav": handler.uav,
+            "known_to": sorted(handler.known_to),
+        }
+        if entry is None:
+            return told
+        return told | {
+            "position": list(entry.position_enu_m),
+            "value": entry.value,
+            "service_s": entry.service_s,
+            "kind": entry.kind,
+        }
+
+    @property
+    def does(self) -> dict[str, str]:
+        """What each UAV does that a command concerns: `StatusPhase`, or absent."""
+        handler = None if self.tracked_request is None else self.tracked_request.handler
+        mission_state = self._observer.mission_state
+        statuses, present = mission_state.statuses, mission_state.present
+        return {
+            uav: statuses[uav].phase.value if uav in present and uav in statuses else "absent"
+            for uav in (handler.concerned if isinstance(handler, CommandHandler) else ())
+        }
+
+    def _begin(self, fact: CommonEvent, now_s: float) -> None:
+        """Once somebody has answered who knows the mission, the operator's other words too."""
+        answered = isinstance(fact, SnapshotsReceived) and bool(fact.snapshots)
+        if answered and self._observer.known:
+            self.tracked_request = self._request_tracker.give(self._wish, now_s)

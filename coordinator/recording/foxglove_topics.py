@@ -1,0 +1,286 @@
+"""What is drawn from the facts for people and their tools: map, scene, curves and story.
+
+Everything here follows from what is known of the mission; nothing of it is read back. Each scene
+message shows one kind of thing whole, so that a viewer may begin anywhere. Leaves out: the
+schemas (coordinator.recording.foxglove_schemas) and when to draw (coordinator.recording.recorder).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from pydantic import TypeAdapter
+
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.presentation import is_trouble, uav_colour
+from coordinator.mission_view.scene import LOST, Scene, TaskView, UavView, scene_of
+from coordinator.recording.foxglove_schemas import (
+    LOCATION_FIX,
+    LOG,
+    SCENE_UPDATE,
+    Colour,
+    Json,
+    Point,
+    arrow,
+    cube,
+    entity,
+    line_strip,
+    location_fix,
+    log,
+    scene_update,
+    sphere,
+    text,
+)
+from coordinator.recording.records import FileMessage
+from swarm.model import Origin
+from swarm.model.frames import wgs84_from_enu
+from swarm.protocol.board import TaskState
+
+__all__ = ["PROGRESS", "PROGRESS_SCHEMA", "FoxgloveTopics", "level_of", "log_line"]
+
+
+PROGRESS: Final = "peckorder.Progress"
+FRAME: Final = "mission"
+"""Name of the local frame: metres east, north and up of the mission's origin."""
+MOST_LABELS: Final = 150
+"""A scene of more tasks shows them without their names."""
+_SMALLEST_M: Final = 0.05
+_LEVEL: Final = re.compile(r"""\blevel["']?[=:] ?["']?(\w+)""")
+"""In lines of logfmt and in JSON."""
+_STILL_M_S: Final = 0.1
+"""Who is slower points nowhere."""
+_OF_MISSION: Final = 1.0 / 60.0
+"""Size of a task, as a part of the mission's extent."""
+_GREY: Final = (0.6, 0.6, 0.6, 0.5)
+_WHITE: Final = (1.0, 1.0, 1.0, 1.0)
+# Okabe and Ito's colours; states differ in shape and opacity, too.
+_STATE_COLOURS: Final = {
+    "open": (0.9, 0.62, 0.0, 1.0),
+    "taken": (0.34, 0.71, 0.91, 1.0),
+    "done": (0.0, 0.62, 0.45, 0.6),
+    "failed": (0.84, 0.37, 0.0, 1.0),
+    "withdrawn": _GREY,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Progress:
+    """How far the mission is, as numbers that can be plotted."""
+
+    now_s: float
+    mission_s: float | None
+    phase: str
+    epoch: int | None
+    rule: str | None
+    objective: float
+    """J so far [value·s]."""
+    plan_objective: float | None
+    """J of the lists it began with, flown without delay [value·s]."""
+    bound: float | None
+    """No lists have more than this J [value·s]."""
+    open: int
+    """Tasks nobody flies to."""
+    taken: int
+    """Open tasks that a UAV flies to or serves."""
+    done: int
+    failed: int
+    withdrawn: int
+    uavs: int
+    lost: int
+    """UAVs that disappeared while they took part."""
+    dropped: int
+    """Messages that all agents together have dropped."""
+
+
+_ADAPTER: Final = TypeAdapter(_Progress)
+
+
+def _progress_schema() -> bytes:
+    schema = _ADAPTER.json_schema()
+    schema["title"] = PROGRESS
+    return json.dumps(schema, separators=(",", ":")).encode()
+
+
+PROGRESS_SCHEMA: Final = _progress_schema()
+
+
+class FoxgloveTopics:
+    """Draws what has changed since the last time."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, Point] = {}
+        self._tasks: tuple[object, ...] = ()
+        self._lists: tuple[object, ...] = ()
+        self._told = 0
+        """Lines of the story that have been told."""
+
+    def draw(
+        self, mission_state: MissionState, now_s: float, time_ns: int
+    ) -> Iterator[FileMessage]:
+        """All that is worth showing at ``now_s``, as of wall time ``time_ns``."""
+        yield from self._story(mission_state, time_ns)
+        if mission_state.replica.brief is None:
+            return
+        scene = scene_of(mission_state, now_s)
+        layers_m = {uav.id: uav.layer_m for uav in mission_state.replica.brief.uavs}
+        yield _progress(mission_state, scene, now_s)
+        yield from self._fixes(
+            scene, Origin(*mission_state.replica.brief.origin), layers_m, time_ns
+        )
+        size_m = _size_m(scene)
+        uavs = []
+        for view in scene.uavs:
+            status = mission_state.statuses.get(view.id)
+            velocity_enu_m_s = None if status is None else status.velocity_enu_m_s
+            layer_m = layers_m.get(view.id, 0.0)
+            uavs.append(_uav(view, velocity_enu_m_s, layer_m, size_m, time_ns))
+        yield _scene("uavs", uavs)
+        tasks = tuple((task.id, task.position_enu_m, _state(task)) for task in scene.tasks)
+        if tasks != self._tasks:
+            self._tasks = tasks
+            yield _scene("tasks", _task_entities(scene.tasks, size_m, time_ns))
+        lists = _lists(scene)
+        if lists != self._lists:
+            self._lists = lists
+            entities = [
+                entity(uav, FRAME, time_ns, {}, lines=[line_strip(points, colour, 2.0)])
+                for uav, points, colour in lists
+            ]
+            yield _scene("lists", entities)
+
+    def _story(self, mission_state: MissionState, time_ns: int) -> Iterator[FileMessage]:
+        for happening in mission_state.told_since(self._told):
+            when = "" if happening.mission_s is None else f"[{happening.mission_s:.2f} s] "
+            level = "warning" if is_trouble(happening) else "info"
+            yield log_line("story", when + happening.text, level, time_ns)
+        self._told = mission_state.told
+
+    def _fixes(
+        self, scene: Scene, origin: Origin, layers_m: dict[str, float], time_ns: int
+    ) -> Iterator[FileMessage]:
+        for view in scene.uavs:
+            if self._places.get(view.id) == view.position_enu_m:
+                continue
+            self._places[view.id] = view.position_enu_m
+            at = _raised(view.position_enu_m, layers_m.get(view.id, 0.0))
+            fix = location_fix(
+                view.id, time_ns, *wgs84_from_enu(origin, at), _uav_colour(view.number)
+            )
+            yield FileMessage(f"/uav/{view.id}/fix", LOCATION_FIX, _bytes(fix))
+
+
+def level_of(line: str) -> str:
+    """Level of a line that one of our processes has logged; empty when it tells none."""
+    found = _LEVEL.search(line)
+    return "" if found is None else found[1].lower()
+
+
+def log_line(name: str, message: str, level: str, time_ns: int) -> FileMessage:
+    """A line of the story, or of a process's log."""
+    return FileMessage("/log", LOG, _bytes(log(name, message, level, time_ns)))
+
+
+def _progress(mission_state: MissionState, scene: Scene, now_s: float) -> FileMessage:
+    plan, epoch = mission_state.plan, mission_state.replica.epoch
+    progress = _Progress(
+        now_s=now_s,
+        mission_s=scene.mission_s,
+        phase=scene.phase,
+        epoch=None if epoch is None else epoch.number,
+        rule=scene.rule,
+        objective=scene.objective,
+        plan_objective=scene.planned_objective,
+        bound=plan.bound if scene.optimum is None and plan is not None else scene.optimum,
+        open=scene.count(TaskState.OPEN),
+        taken=scene.count(TaskState.OPEN, taken=True),
+        done=scene.count(TaskState.DONE),
+        failed=scene.count(TaskState.FAILED),
+        withdrawn=scene.count(TaskState.WITHDRAWN),
+        uavs=len(scene.uavs),
+        lost=len(mission_state.lost),
+        dropped=scene.dropped,
+    )
+    return FileMessage("/progress", PROGRESS, _ADAPTER.dump_json(progress))
+
+
+def _scene(name: str, entities: list[Json]) -> FileMessage:
+    return FileMessage(f"/scene/{name}", SCENE_UPDATE, _bytes(scene_update(entities)))
+
+
+def _uav(
+    view: UavView, velocity_enu_m_s: Point | None, layer_m: float, size_m: float, time_ns: int
+) -> Json:
+    colour = _GREY if view.troubled else _uav_colour(view.number)
+    at = _raised(view.position_enu_m, layer_m)
+    facts = {"does": str(view.does), "task": view.task or "", "note": view.note}
+    if view.battery_frac is not None:
+        facts["battery"] = f"{view.battery_frac:.0%}"
+    label = f"{view.id} {view.does.upper()}" if view.does == LOST else view.id
+    # Sphere and arrow: where it is, and where to, as far as that is known.
+    shapes: dict[str, list[Json]] = {
+        "spheres": [sphere(at, size_m, colour)],
+        "texts": [text(_raised(at, size_m), label, _WHITE)],
+    }
+    east_m_s, north_m_s, _ = velocity_enu_m_s or (0.0, 0.0, 0.0)
+    if math.hypot(east_m_s, north_m_s) > _STILL_M_S:
+        yaw_rad = math.atan2(north_m_s, east_m_s)
+        shapes["arrows"] = [arrow(at, yaw_rad, 2.0 * size_m, colour)]
+    return entity(view.id, FRAME, time_ns, facts, **shapes)
+
+
+def _task_entities(tasks: tuple[TaskView, ...], size_m: float, time_ns: int) -> list[Json]:
+    """One entity for each state: what nobody has touched is a ball, what is over a box."""
+    entities = []
+    for state, colour in _STATE_COLOURS.items():
+        mine = [task.position_enu_m for task in tasks if _state(task) == state]
+        shape, kind = (sphere, "spheres") if state in ("open", "taken") else (cube, "cubes")
+        solids = [shape(at, size_m, colour) for at in mine]
+        entities.append(entity(state, FRAME, time_ns, {"tasks": str(len(mine))}, **{kind: solids}))
+    if len(tasks) <= MOST_LABELS:
+        labels = [text(_raised(t.position_enu_m, -size_m), t.id, _WHITE) for t in tasks]
+        entities.append(entity("names", FRAME, time_ns, {}, texts=labels))
+    return entities
+
+
+def _lists(scene: Scene) -> tuple[tuple[str, tuple[Point, ...], Colour], ...]:
+    """What each UAV's list still holds: places in order."""
+    places = {task.id: task.position_enu_m for task in scene.tasks}
+    return tuple(
+        (
+            str(view.id),
+            tuple(places[task] for task in view.planned if task in places),
+            _uav_colour(view.number),
+        )
+        for view in scene.uavs
+    )
+
+
+def _state(task: TaskView) -> str:
+    return "taken" if task.taken and task.state is TaskState.OPEN else task.state.value
+
+
+def _size_m(scene: Scene) -> float:
+    places = [*(uav.start_enu_m for uav in scene.uavs), *(t.position_enu_m for t in scene.tasks)]
+    if not places:
+        return 1.0
+    spans_m = [max(axis) - min(axis) for axis in zip(*places, strict=True)]
+    return float(max(_SMALLEST_M, _OF_MISSION * max(spans_m)))
+
+
+def _raised(at: Point, up_m: float) -> Point:
+    return at[0], at[1], at[2] + up_m
+
+
+def _uav_colour(number: int) -> Colour:
+    code = uav_colour(number)
+    red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return round(red, 3), round(green, 3), round(blue, 3), 1.0
+
+
+def _bytes(message: Json) -> bytes:
+    return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()

@@ -1,1 +1,0 @@
-"""`swarm status`: a look at a mission that is being flown elsewhere."""

@@ -1,0 +1,1 @@
+"""A mission in a terminal: `swarm status`, the live picture and the report."""

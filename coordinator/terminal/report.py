@@ -1,0 +1,283 @@
+"""The report of a mission that is over: for people, for programs, and as a file.
+
+Leaves out: comparing (coordinator.mission_view.results) and laying out for the terminal
+(coordinator.terminal.report_text).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from coordinator.mission_view.presentation import (
+    StoryLine,
+    clean,
+    shown_s,
+    shown_value,
+    signs_for,
+    told_at,
+)
+from coordinator.mission_view.results import (
+    MissionResult,
+    ProtectionSummary,
+    ReportFact,
+    compare_quantities,
+    compare_routes,
+    deviations,
+    summary_line,
+)
+from coordinator.planner.plan_report import plan_as_json
+from coordinator.terminal.report_text import report_text
+from swarm.model import Mission, Plan, UavId
+from swarm.runtime.errors import Fault, InputError
+
+__all__ = ["REPORT_SUFFIXES", "MissionReport", "check_report_path", "mission_ok", "write_report"]
+
+
+REPORT_SUFFIXES = (".json", ".md")
+"""Kinds of report file."""
+_LISTS_KEY = (
+    "Each task @ its completion in s of mission time; `+` flown though not planned for this "
+    "UAV, `(…)` planned for it but not flown by it, `!` after the horizon."
+)
+_HINT = "More: --report FILE.md has the whole story; --json is for programs."
+
+
+def mission_ok(result: MissionResult) -> bool:
+    """Whether every task was done or withdrawn."""
+    return not result.failed and not result.open
+
+
+@dataclass(frozen=True, slots=True)
+class MissionReport:
+    """Everything there is to tell about one mission."""
+
+    mission: Mission
+    plan: Plan | None
+    """The offline plan; None if there never was one."""
+    result: MissionResult
+    story: tuple[StoryLine, ...]
+    takeoff_s: float | None = None
+    """From the first process to mission time 0 [s of the vehicles' clock]."""
+    wall_s: float | None = None
+    """Wall time from first to last [s]; None in virtual time."""
+    speedup: float | None = None
+    """Mission seconds per wall second; None in virtual time."""
+    fates: tuple[str, ...] = ()
+    """How processes ended that should not have, a line each."""
+    lost_because: Mapping[UavId, str] = field(default_factory=dict)
+    """When and why UAVs were lost, as far as that is known: in a simulation."""
+    value: float | None = None
+    """What was flown is worth by what was drawn in a simulation [value·s]; None if unknown."""
+    security: ProtectionSummary | None = None
+    """What protected it; None if nothing did, or nothing had to."""
+    hint: str = _HINT
+    """How to get more; the last line of `render`."""
+
+    @property
+    def verdict(self) -> str:
+        """The whole result in one line."""
+        return summary_line(self.mission, self.plan, self.result)
+
+    def as_json(self) -> dict[str, object]:
+        """The report as `swarm run --json` prints it, ready for `json.dumps`.
+
+        Holds the keys of `plan_as_json` (null or empty without a plan) and what was executed.
+        Every number is finite; what is unknown is null.
+        """
+        result = self.result
+        flown: dict[str, object] = {
+            "executed_routes": {uav: list(tasks) for uav, tasks in result.executed_routes.items()},
+            "executed_completion_s": dict(result.executed_completion_s),
+            "executed_objective": result.executed_objective,
+            "done": list(result.done),
+            "failed": list(result.failed),
+            "open": list(result.open),
+            "duplicate_visits": result.duplicate_visits,
+            "makespan_s": result.makespan_s,
+            "lost_uavs": list(result.lost_uavs),
+            "epochs": result.epochs,
+            "added": list(result.added),
+            "takeoff_s": self.takeoff_s,
+            "wall_s": self.wall_s,
+            "speedup": self.speedup,
+            "processes": list(self.fates),
+            "security": None if self.security is None else self.security.as_json(),
+            "story": [{"mission_s": line.mission_s, "text": line.text} for line in self.story],
+            "lost_because": dict(self.lost_because),
+            "value": self.value,
+        }
+        planned = _no_plan(self.mission) if self.plan is None else plan_as_json(self.plan)
+        found: dict[str, object] = _finite({**planned, **flown})
+        return found
+
+    def as_markdown(self) -> str:
+        """The report as a document, with the whole story."""
+        parts = [
+            f"# {self.mission.name}: mission report",
+            f"**{self.verdict}.**",
+            self._worth_as_markdown(),
+            "\n".join(f"- {_escaped(line)}" for line in self._lines()),
+            "## Lists",
+            _LISTS_KEY,
+            self._lists_as_markdown(),
+            "## Story",
+            self._story_as_markdown(),
+        ]
+        return "\n\n".join(part for part in parts if part) + "\n"
+
+    def render(self, console: Console) -> None:
+        """Print the report for people, in the width of ``console``."""
+        signs = signs_for(console.options.ascii_only)
+        text = report_text(
+            self.mission,
+            self.plan,
+            self.result,
+            self.story,
+            notes=self.notes(),
+            hint=self.hint,
+            signs=signs,
+        )
+        console.print(text, highlight=False, markup=False)
+
+    def notes(self) -> list[ReportFact]:
+        """What went otherwise than planned, how long it took, and what became of processes."""
+        found = deviations(self.mission, self.result)
+        if self.lost_because:
+            why = tuple(f"{uav} {what}" for uav, what in self.lost_because.items())
+            found.insert(1, ReportFact("because", "", why))
+        if self.value is not None and not math.isclose(self.value, self.result.executed_objective):
+            text = f"{shown_value(self.value)} value·s: m·(D − t) of each success, failures nothing"
+            found.append(ReportFact("by outcomes", text))
+        spent = []
+        if self.takeoff_s is not None:
+            spent.append(f"take-off {shown_s(self.takeoff_s)} s")
+        if self.wall_s is not None:
+            fast = "" if self.speedup in (None, 1.0) else f" at speed-up {self.speedup:g}"
+            spent.append(f"whole run {shown_s(self.wall_s)} s of wall time{fast}")
+        if spent:
+            found.append(ReportFact("time", "; ".join(spent)))
+        if self.security is not None:
+            found.append(self.security.fact)
+        found += [ReportFact("process", clean(fate), bad=True) for fate in self.fates]
+        return found
+
+    def _lines(self) -> list[str]:
+        head = [] if self.plan is None else [_plan_line(self.plan)]
+        return [*head, *(f"{fact.name}: {fact.shown()}" for fact in self.notes())]
+
+    def _worth_as_markdown(self) -> str:
+        rows = ["| | flown | planned | flown / planned | optimum | flown / optimum |"]
+        rows.append("|---|---:|---:|---:|---:|---:|")
+        for each in compare_quantities(self.plan, self.result):
+            show = shown_s if each.unit == "s" else shown_value
+            cells = [f"{each.name} [{each.unit}]", show(each.flown)]
+            for other in (each.planned, each.optimum):
+                cells.append("" if other is None else show(other))
+                cells.append(f"{each.flown / other:.4f}" if other is not None and other > 0 else "")
+            rows.append("| " + " | ".join(cells) + " |")
+        return "\n".join(rows)
+
+    def _lists_as_markdown(self) -> str:
+        rows = ["| UAV | planned | flown | |", "|---|---|---|---|"]
+        for each in compare_routes(self.mission, self.plan, self.result):
+            planned = " ".join(stop.shown(planned=True) for stop in each.planned)
+            flown = " ".join(stop.shown(planned=False) for stop in each.flown)
+            said = "as planned" if each.same else "" if self.plan is None else "differs"
+            mark = ", ".join(part for part in (said, "**lost**" if each.lost else "") if part)
+            rows.append(f"| `{each.uav}` | {_code(planned)} | {_code(flown)} | {mark} |")
+        return "\n".join(rows)
+
+    def _story_as_markdown(self) -> str:
+        if not self.story:
+            return "Nothing was heard."
+        rows = ["| mission time | |", "|---:|---|"]
+        rows += [f"| {told_at(line)} | {_escaped(clean(line.text))} |" for line in self.story]
+        return "\n".join(rows)
+
+
+def check_report_path(path: Path) -> None:
+    """Refuse a report that could not be written, before there is anything to report.
+
+    Raises:
+        InputError: a wrong suffix, a directory, or a folder that is missing or closed to us.
+    """
+    suffixes = " or ".join(REPORT_SUFFIXES)
+    problem, remedy = "", "name a file that can be written"
+    if path.suffix.lower() not in REPORT_SUFFIXES:
+        problem = f"no report is called {path.suffix!r}" if path.suffix else "it has no suffix"
+        remedy = f"end it in {suffixes}"
+    elif path.is_dir():
+        problem = "it is a directory"
+    elif not path.parent.is_dir():
+        problem, remedy = f"there is no directory {path.parent}", "make it first"
+    elif not os.access(path if path.exists() else path.parent, os.W_OK):
+        problem = "it cannot be written"
+    if problem:
+        raise InputError(Fault("--report", str(path), problem, remedy))
+
+
+def write_report(report: MissionReport, path: Path) -> None:
+    """Write ``report`` to ``path``; its suffix says which kind.
+
+    Raises:
+        InputError: the suffix is not one of `REPORT_SUFFIXES`, or the file cannot be written.
+    """
+    check_report_path(path)
+    if path.suffix.lower() == ".json":
+        text = json.dumps(report.as_json(), allow_nan=False, indent=2) + "\n"
+    else:
+        text = report.as_markdown()
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        problem = f"cannot be written: {error.strerror or error}"
+        remedy = "name a file that can"
+        raise InputError(Fault("--report", str(path), problem, remedy)) from error
+
+
+def _no_plan(mission: Mission) -> dict[str, object]:
+    """The keys of a plan where there is none."""
+    return {
+        "scenario": mission.name,
+        "method": None,
+        "objective": None,
+        "sequence": None,
+        "routes": {},
+        "completion_s": {},
+        "optimum": None,
+        "gap": None,
+        "evaluations": 0,
+        "elapsed_s": 0.0,
+        "seed": None,
+    }
+
+
+def _plan_line(plan: Plan) -> str:
+    order = "" if plan.sequence is None else f", sequence {' > '.join(plan.sequence)}"
+    return f"planned by {plan.method}{order}, seed {plan.seed}"
+
+
+def _finite(value: Any) -> Any:
+    """``value`` with null for every number JSON has no form for."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _code(text: str) -> str:
+    return f"`{text}`" if text else "–"
+
+
+def _escaped(text: str) -> str:
+    """``text`` without anything that Markdown would obey."""
+    return "".join(f"\\{sign}" if sign in "\\`*_[]<>|#" else sign for sign in text)

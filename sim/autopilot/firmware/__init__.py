@@ -1,0 +1,1 @@
+"""What differs between autopilot firmwares, as models of them."""

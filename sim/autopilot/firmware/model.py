@@ -1,0 +1,282 @@
+"""What a firmware decides for the simulated vehicle; everything else is common.
+
+Leaves out: any firmware in particular.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from sim.autopilot.config import VehicleConfig
+from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
+from sim.autopilot.flight import FlightMode
+from sim.autopilot.parameters import (
+    ParameterBehaviour,
+    ParameterEntry,
+    ParameterRole,
+    ParameterTable,
+)
+from sim.autopilot.readiness import PowerUpStage
+
+__all__ = [
+    "FailsafeBehaviour",
+    "FirmwareModel",
+    "GcsFailsafe",
+    "MissionBehaviour",
+    "MissionProgress",
+    "ModeBehaviour",
+    "RefusalCodes",
+    "SensorBits",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class RefusalCodes:
+    """MAV_RESULT of what is refused; 0 (accepted) for what is ignored in silence."""
+
+    not_now: int
+    """The vehicle can't do it in its state."""
+    no_such_mode: int
+    reposition_without_flag: int
+    """DO_REPOSITION that may not change the mode, in another mode."""
+    no_such_stream: int
+    """SET_MESSAGE_INTERVAL of a message it doesn't stream."""
+    no_such_message: int
+    """REQUEST_MESSAGE of a message it doesn't have."""
+    outside_fence: int
+    """DO_REPOSITION to a place beyond the vehicle's own fence."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModeBehaviour:
+    """When modes change, by command and by themselves."""
+
+    at_boot: FlightMode
+    for_reposition: FlightMode
+    """Mode in which DO_REPOSITION is flown."""
+    for_take_off: FlightMode | None
+    """Mode that NAV_TAKEOFF enters, until the vehicle is up; None: it must be guided already."""
+    after_flight: FlightMode | None
+    """Mode entered by itself when the motors stop after an automatic flight."""
+    unarmable: frozenset[FlightMode]
+    """Modes in which a ground station can't arm."""
+    change_speed: frozenset[FlightMode]
+    """Modes in which DO_CHANGE_SPEED is obeyed."""
+    reposition_needs_flag: bool
+    """Whether DO_REPOSITION needs its flag also in the mode it is flown in."""
+    told_at_once: bool
+    """Whether a change of mode is followed by a heartbeat at once."""
+    flies_when_armed: bool
+    """Whether take-off and mission modes begin to fly as soon as the motors run."""
+    acknowledgements: int
+    """How often DO_SET_MODE is acknowledged."""
+    set_mode_acknowledged_as: int
+    """The command in the acknowledgement of the older message SET_MODE."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionBehaviour:
+    """How missions are taken, flown and ended."""
+
+    asks_for_int: bool
+    """Whether items are asked for by MISSION_REQUEST_INT."""
+    int_frames: bool
+    """Whether items are given back in the ``_INT`` variant of their frame."""
+    marks_current: bool
+    """Whether the current item says so when it is given back."""
+    first_item: int
+    """Number of the first item that is flown: 1 where item 0 is home."""
+    check_s: float
+    """Time after an upload [s] in which the mission mode is acknowledged but not entered."""
+    restarts: bool
+    """Whether a mission that is over begins again when its mode is entered again."""
+    upload_rewinds: bool
+    """Whether another mission is begun from its first item, and not from the current number."""
+    climbs_first: bool
+    """Whether the vehicle rises straight up before its first item, from the ground too."""
+    repeats_reached: int
+    """How many times more MISSION_ITEM_REACHED is sent, once a second."""
+    keeps_number: bool
+    """Whether MISSION_CURRENT goes on telling the last item after the motors stopped."""
+    gives_way: bool
+    """Whether an item may let targets be told for a time."""
+    forgets_mode: bool
+    """Whether the mode becomes another one at the end, or at an item that returns home."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionProgress:
+    """What MISSION_CURRENT is made from."""
+
+    mode: FlightMode
+    current: int | None
+    items: int
+    """Number of items that are flown."""
+    present: bool
+    running: bool
+    stopped: bool
+    over: bool
+    task_done: bool
+    """What the mode was entered for (a take-off, a mission, a landing) is done."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorBits:
+    """Bits of SYS_STATUS."""
+
+    present: int
+    enabled: int
+    health: int
+
+
+@dataclass(frozen=True, slots=True)
+class FailsafeBehaviour:
+    """How failsafes act, and what is said of them."""
+
+    hold_s: float
+    """It warns for so long, holding its place, before it returns [s]."""
+    words: tuple[TextTemplate, ...]
+    """Said whatever the cause, just before the mode changes; none: each cause has its own."""
+    hold_words: tuple[TextTemplate, ...]
+    """Said when it begins to hold."""
+    battery_words: tuple[TextTemplate, ...]
+    """Said of a low battery [level, volts, used_mah]."""
+    position_words: tuple[TextTemplate, ...]
+    """Said of a lost position."""
+    ground_regained: TextTemplate
+    """Said when a ground station is heard again."""
+    critical_when_disarmed: bool
+    """Whether the heartbeat says CRITICAL as long as there is a cause, motors or not; otherwise
+    from then until the motors stand, cause or not."""
+    deaf_after_s: float
+    """To who has not been heard for so long it says no texts any more [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class GcsFailsafe:
+    """What the firmware does when it hears no ground station any more."""
+
+    mode: FlightMode
+    after_s: float
+    """After so long without a heartbeat [s]."""
+    listens: range
+    """To the system ids of those."""
+    spared: frozenset[FlightMode] = frozenset()
+    """Modes in which it does nothing."""
+
+
+class FirmwareModel(Protocol):
+    """Numbers, names and habits of one firmware."""
+
+    autopilot: int
+    """MAV_AUTOPILOT."""
+    capabilities: int
+    """MAV_PROTOCOL_CAPABILITY."""
+    vtol_state: int
+    """MAV_VTOL_STATE of a multicopter."""
+    version: int
+    """``flight_sw_version`` of AUTOPILOT_VERSION."""
+    modes: ModeBehaviour
+    missions: MissionBehaviour
+    refusals: RefusalCodes
+    failsafe_behaviour: FailsafeBehaviour
+    parameter_habits: ParameterBehaviour
+
+    take_off_above_home: bool
+    """Whether NAV_TAKEOFF by command gives its height above home, rather than above the sea."""
+    reads_frames: bool
+    """Whether commands are read in their frame, rather than always above the sea."""
+    forgets_speed: bool
+    """Whether a speed ordered before the first target, after the commanded mode was entered
+    or after a take-off, is lost."""
+    obeys_leg_speed: bool
+    """Whether DO_REPOSITION may give the speed of its leg."""
+    pauses_anywhere: bool
+    """Whether DO_REPOSITION without a place, height and heading stops the vehicle."""
+    tells_origin_when_armed: bool
+    constant_position_at_rest: bool
+    """Whether the estimator says EKF_CONST_POS_MODE wherever the vehicle stands still, rather
+    than only where it has no position."""
+    coasting_s: float
+    """How long after a loss the estimator goes on without calling its position constant [s]."""
+
+    unasked_streams: Mapping[int, float]
+    """Messages and intervals [s] streamed on a new channel; heartbeats go without saying."""
+    fixed_streams: frozenset[int]
+    """Messages whose interval can't be changed."""
+    missing_messages: frozenset[int]
+    """Messages the firmware doesn't know."""
+
+    stage_texts: Mapping[PowerUpStage, TextTemplate]
+    """What is said to people when something has become ready."""
+    texts: Mapping[FirmwareEvent, TextTemplate]
+    """What is said to people otherwise."""
+    own_commands: Mapping[FirmwareEvent, OwnCommand]
+    """Commands it sends to other components, which ground stations hear too."""
+    numbers_texts: bool
+    """Whether texts end in a tab, are numbered, and are sent in pieces if they are long."""
+
+    def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
+        """The parameter table at power-up; it has every `ParameterRole` that has no default."""
+        ...
+
+    def ground_lost(self, parameters: ParameterTable) -> GcsFailsafe | None:
+        """What it does when its ground station falls silent; None if it flies on."""
+        ...
+
+    def disarm_delay(self, mode: FlightMode) -> ParameterRole | None:
+        """What says how long after landing the motors stop; None where that is at once."""
+        ...
+
+    def custom_mode(self, mode: FlightMode) -> int:
+        """Number of the mode in a heartbeat."""
+        ...
+
+    def mode_name(self, mode: FlightMode) -> str:
+        """What the firmware calls the mode when it talks to people."""
+        ...
+
+    def mode_of(self, custom_mode: int) -> FlightMode | None:
+        """The mode of that number; None where the firmware, or its simulation, has none."""
+        ...
+
+    def mode_commanded(self, main: float, sub: float) -> int | None:
+        """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE; None if they make no sense."""
+        ...
+
+    def base_mode(self, mode: FlightMode, *, armed: bool, on_ground: bool, booted: bool) -> int:
+        """MAV_MODE_FLAG bits of a heartbeat."""
+        ...
+
+    def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
+        """MAV_STATE of a heartbeat while no failsafe acts.
+
+        Args:
+            armed: the motors run.
+            on_ground: it stands.
+            booted: the autopilot is initialised.
+            ready: nothing keeps it from arming.
+        """
+        ...
+
+    def fence_radius_m(self, parameters: ParameterTable) -> float:
+        """Radius of the vehicle's own fence around home [m]; 0: it has none."""
+        ...
+
+    def sensors(self, mode: FlightMode, *, has_origin: bool, can_arm: bool) -> SensorBits:
+        """Bits of SYS_STATUS."""
+        ...
+
+    def mission_state(self, view: MissionProgress) -> int:
+        """MISSION_STATE of MISSION_CURRENT."""
+        ...
+
+    def mission_mode(self, view: MissionProgress) -> int:
+        """``mission_mode`` of MISSION_CURRENT."""
+        ...
+
+    def mission_total(self, view: MissionProgress) -> int:
+        """``total`` of MISSION_CURRENT."""
+        ...

@@ -1,0 +1,390 @@
+"""PX4 1.17 on a multicopter, as recorded.
+
+Sources: recordings of PX4 1.17 (SIH quadrotor), https://docs.px4.io/main/en/flight_modes_mc/,
+https://docs.px4.io/main/en/advanced_config/parameter_reference.html, and the behaviour of
+its modules `commander`, `navigator` and `mavlink`. Leaves out: OFFBOARD and ACRO, the
+cone in which it returns at a lower height, events (its newer way to give reasons),
+parameters that neither change the simulated vehicle nor are asked for by common
+ground stations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sim.autopilot.config import VehicleConfig
+from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
+from sim.autopilot.firmware.model import (
+    FailsafeBehaviour,
+    GcsFailsafe,
+    MissionBehaviour,
+    MissionProgress,
+    ModeBehaviour,
+    RefusalCodes,
+    SensorBits,
+)
+from sim.autopilot.flight import FlightMode
+from sim.autopilot.parameters import (
+    ParameterBehaviour,
+    ParameterEntry,
+    ParameterRole,
+    ParameterTable,
+)
+from sim.autopilot.readiness import PowerUpStage
+
+__all__ = ["Px4Model"]
+
+
+_REAL = mavlink.MAV_PARAM_TYPE_REAL32
+_INT32 = mavlink.MAV_PARAM_TYPE_INT32
+
+_MODES = {
+    (1, 0): (FlightMode.MANUAL, "Manual"),
+    (2, 0): (FlightMode.ALT_HOLD, "Altitude"),
+    (3, 0): (FlightMode.POSHOLD, "Position"),
+    (4, 2): (FlightMode.TAKEOFF, "Takeoff"),
+    (4, 3): (FlightMode.LOITER, "Hold"),
+    (4, 4): (FlightMode.AUTO, "Mission"),
+    (4, 5): (FlightMode.RTL, "Return"),
+    (4, 6): (FlightMode.LAND, "Land"),
+    (7, 0): (FlightMode.STABILIZE, "Stabilized"),
+}
+"""Main and sub mode -> the mode and what people read."""
+_NUMBERS = {mode: main << 16 | sub << 24 for (main, sub), (mode, _) in _MODES.items()}
+_NAMES = dict(_MODES.values())
+_AUTOMATIC = frozenset(
+    {FlightMode.TAKEOFF, FlightMode.LOITER, FlightMode.AUTO, FlightMode.RTL, FlightMode.LAND}
+)
+
+_HEALTH_AT_BOOT = 0x0321C83F
+_PRESENT = 0x0300402F
+_ENABLED = 0x0301402F
+_HEALTHY = 0x0320C83F
+_PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+"""Told in the health bits alone."""
+
+_GROUND_LOST_MODES = {2: FlightMode.RTL, 3: FlightMode.LAND}
+"""By NAV_DLL_ACT; it holds, and falls, in other ways than are simulated."""
+_GROUND_LOST_SPARED = {1: FlightMode.AUTO, 2: FlightMode.LOITER}
+"""By bit of COM_DLL_EXCEPT."""
+_FAILSAFE_HOLD_S = 5.0
+"""COM_FAIL_ACT_T."""
+_HEARTBEAT_MISSED_S = 2.5
+"""Without a heartbeat for so long a ground station is not connected any more."""
+_TEXTS_KEPT_S = 5.0
+"""Texts wait so long for a ground station that is connected; nobody hears them otherwise."""
+_UNKNOWN_TOTAL = 65535
+_MISSION_MODE_ACTIVE = 1
+_MISSION_MODE_SUSPENDED = 2
+
+_INFO = mavlink.MAV_SEVERITY_INFO
+_CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
+
+
+class Px4Model:
+    """Numbers, names and habits of PX4."""
+
+    autopilot: int = mavlink.MAV_AUTOPILOT_PX4
+    capabilities: int = (
+        mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+        | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+        | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    )
+    vtol_state: int = mavlink.MAV_VTOL_STATE_UNDEFINED
+    version: int = 1 << 24 | 17 << 16 | 255
+    modes: ModeBehaviour = ModeBehaviour(
+        at_boot=FlightMode.LOITER,
+        for_reposition=FlightMode.LOITER,
+        for_take_off=FlightMode.TAKEOFF,
+        after_flight=FlightMode.LOITER,
+        unarmable=frozenset({FlightMode.RTL, FlightMode.LAND}),
+        change_speed=frozenset(FlightMode),
+        reposition_needs_flag=True,
+        told_at_once=False,
+        flies_when_armed=True,
+        acknowledgements=2,
+        set_mode_acknowledged_as=mavlink.MAV_CMD_DO_SET_MODE,
+    )
+    missions: MissionBehaviour = MissionBehaviour(
+        asks_for_int=True,
+        int_frames=True,
+        marks_current=True,
+        first_item=0,
+        check_s=1.9,
+        restarts=False,
+        upload_rewinds=True,
+        climbs_first=True,
+        repeats_reached=10,
+        keeps_number=True,
+        gives_way=False,
+        forgets_mode=True,
+    )
+    refusals: RefusalCodes = RefusalCodes(
+        not_now=mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
+        no_such_mode=mavlink.MAV_RESULT_DENIED,
+        reposition_without_flag=mavlink.MAV_RESULT_UNSUPPORTED,
+        no_such_stream=mavlink.MAV_RESULT_FAILED,
+        no_such_message=mavlink.MAV_RESULT_DENIED,
+        outside_fence=mavlink.MAV_RESULT_ACCEPTED,
+    )
+    failsafe_behaviour: FailsafeBehaviour = FailsafeBehaviour(
+        hold_s=_FAILSAFE_HOLD_S,
+        words=(TextTemplate(_CRITICAL, "Failsafe activated"),),
+        hold_words=(
+            TextTemplate(
+                _CRITICAL, f"Failsafe activated: entering Hold for {_FAILSAFE_HOLD_S:.0f} seconds"
+            ),
+        ),
+        battery_words=(TextTemplate(_CRITICAL, "Critical battery"),),
+        position_words=(),
+        ground_regained=TextTemplate(_INFO, "GCS connection regained"),
+        critical_when_disarmed=False,
+        deaf_after_s=_HEARTBEAT_MISSED_S + _TEXTS_KEPT_S,
+    )
+    parameter_habits: ParameterBehaviour = ParameterBehaviour(
+        reports_errors=False,
+        integers_bytewise=True,
+        index_by_name=True,
+        tells_changes=True,
+        told_at_boot=(
+            "COM_DL_LOSS_T",
+            "COM_OBC_LOSS_T",
+            "COM_OF_LOSS_T",
+            "COM_RC_LOSS_T",
+            "SYS_AUTOSTART",
+        ),
+    )
+
+    take_off_above_home: bool = False
+    reads_frames: bool = False
+    forgets_speed: bool = False
+    obeys_leg_speed: bool = True
+    pauses_anywhere: bool = True
+    tells_origin_when_armed: bool = False
+    constant_position_at_rest: bool = True
+    coasting_s: float = math.inf
+
+    unasked_streams: Mapping[int, float] = MappingProxyType(
+        {
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0,
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
+            mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 0.2,
+            mavlink.MAVLINK_MSG_ID_HOME_POSITION: 2.0,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 1.0,
+            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: 0.25,  # slower than the firmware's 15 Hz
+            mavlink.MAVLINK_MSG_ID_VFR_HUD: 0.25,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 2.0,
+            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+        }
+    )
+    fixed_streams: frozenset[int] = frozenset({mavlink.MAVLINK_MSG_ID_MISSION_CURRENT})
+    missing_messages: frozenset[int] = frozenset({mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT})
+
+    stage_texts: Mapping[PowerUpStage, TextTemplate] = MappingProxyType({})
+    texts: Mapping[FirmwareEvent, TextTemplate] = MappingProxyType(
+        {
+            FirmwareEvent.ARMED: TextTemplate(_INFO, "Armed by external command"),
+            FirmwareEvent.ARMING_REFUSED: TextTemplate(
+                _CRITICAL, "Arming denied: Resolve system health failures first"
+            ),
+            FirmwareEvent.DISARMED: TextTemplate(_INFO, "Disarmed by external command"),
+            FirmwareEvent.DISARMED_UNUSED: TextTemplate(
+                _INFO, "Disarmed by auto preflight disarming"
+            ),
+            FirmwareEvent.DISARMED_LANDED: TextTemplate(_INFO, "Disarmed by landing"),
+            FirmwareEvent.DISARMING_REFUSED: TextTemplate(
+                _CRITICAL, "Disarming denied: not landed"
+            ),
+            FirmwareEvent.LIFTED_OFF: TextTemplate(_INFO, "Takeoff detected"),
+            FirmwareEvent.LANDED: TextTemplate(_INFO, "Landing detected"),
+            FirmwareEvent.TAKE_OFF_RAISED: TextTemplate(
+                _CRITICAL, "Using minimum takeoff altitude: {height_m:.2f} m"
+            ),
+            FirmwareEvent.NO_SUCH_MODE: TextTemplate(_CRITICAL, "Unsupported auto mode"),
+            FirmwareEvent.MODE_REFUSED: TextTemplate(
+                _CRITICAL, "Switching to mode '{mode}' is currently not available"
+            ),
+            FirmwareEvent.TARGET_OUTSIDE_FENCE: TextTemplate(
+                _CRITICAL, "Reposition is outside geofence"
+            ),
+            FirmwareEvent.MISSION_BEGUN: TextTemplate(_INFO, "Executing Mission"),
+            FirmwareEvent.MISSION_CLIMB: TextTemplate(
+                _INFO, "Climb to {height_m:.1f} meters above home"
+            ),
+            FirmwareEvent.MISSION_UNAVAILABLE: TextTemplate(
+                _CRITICAL, "No valid mission available, loitering"
+            ),
+            FirmwareEvent.MISSION_UNAVAILABLE_ON_GROUND: TextTemplate(
+                _CRITICAL, "No valid mission available, refusing takeoff"
+            ),
+            FirmwareEvent.MISSION_OVER: TextTemplate(_INFO, "Mission finished, loitering"),
+            FirmwareEvent.MISSION_OVER_ON_GROUND: TextTemplate(_INFO, "Mission finished, landed"),
+            FirmwareEvent.RETURN_ORDERED: TextTemplate(_INFO, "Returning to launch"),
+            FirmwareEvent.RETURN_BEGUN: TextTemplate(
+                _INFO,
+                "RTL: start return at {altitude_m:.0f} m ({above_home_m:.0f} m above destination)",
+            ),
+            FirmwareEvent.RETURN_LANDING: TextTemplate(_INFO, "RTL: land at destination"),
+        }
+    )
+    own_commands: Mapping[FirmwareEvent, OwnCommand] = MappingProxyType(
+        {
+            FirmwareEvent.MISSION_OVER: OwnCommand(
+                mavlink.MAV_CMD_DO_TRIGGER_CONTROL, (-1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+            ),
+            FirmwareEvent.RETURN_BEGUN: OwnCommand(
+                mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+                (1.0, 1.0, -1.0, -1.0, 0.0, 0.0, 0.0),
+            ),
+            FirmwareEvent.RETURN_LANDED: OwnCommand(0, (0.0, 2.0, 80.0, math.nan, 0.0, 0.0, 0.0)),
+        }
+    )
+    """The mission triggers cameras and the return takes over gimbals; number 0 is recorded so."""
+    numbers_texts: bool = True
+
+    def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
+        """The parameter table at power-up, by name as PX4 sorts it."""
+        return (
+            ParameterEntry("COM_DISARM_LAND", 2.0, _REAL, ParameterRole.DISARM_LANDED_S),
+            ParameterEntry("COM_DISARM_PRFLT", 10.0, _REAL, ParameterRole.DISARM_DELAY_S),
+            ParameterEntry("COM_DLL_EXCEPT", 0.0, _INT32, least=0.0),
+            ParameterEntry("COM_DL_LOSS_T", 30.0, _INT32, least=5.0),
+            ParameterEntry("COM_LOW_BAT_ACT", 3.0, _INT32, least=0.0),
+            ParameterEntry("COM_OBC_LOSS_T", 15.0, _REAL, least=0.0),
+            ParameterEntry("COM_OF_LOSS_T", 3.0, _REAL, least=0.0),
+            ParameterEntry("COM_RC_IN_MODE", 1.0, _INT32, least=0.0),
+            ParameterEntry("COM_RC_LOSS_T", 3.0, _REAL, least=0.0),
+            ParameterEntry("GF_ACTION", 2.0, _INT32, least=0.0),
+            ParameterEntry("GF_MAX_HOR_DIST", 0.0, _REAL, least=0.0),
+            ParameterEntry("MAV_SYS_ID", float(config.system_id), _INT32, read_only=True),
+            ParameterEntry("MAV_TYPE", float(mavlink.MAV_TYPE_QUADROTOR), _INT32, read_only=True),
+            ParameterEntry(
+                "MIS_TAKEOFF_ALT", 2.5, _REAL, ParameterRole.TAKE_OFF_HEIGHT_M, least=0.0
+            ),
+            ParameterEntry("MPC_ACC_HOR", 3.0, _REAL, least=2.0),
+            ParameterEntry("MPC_JERK_AUTO", 4.0, _REAL, least=1.0),
+            ParameterEntry(
+                "MPC_LAND_SPEED", config.land_m_s, _REAL, ParameterRole.LAND_M_S, least=0.6
+            ),
+            ParameterEntry(
+                "MPC_TKO_SPEED", config.climb_m_s, _REAL, ParameterRole.TAKE_OFF_M_S, least=0.1
+            ),
+            ParameterEntry(
+                "MPC_XY_CRUISE", config.cruise_m_s, _REAL, ParameterRole.CRUISE_M_S, least=0.1
+            ),
+            ParameterEntry("MPC_XY_VEL_MAX", max(12.0, config.cruise_m_s), _REAL, least=0.0),
+            ParameterEntry("MPC_Z_V_AUTO_UP", 3.0, _REAL, ParameterRole.CLIMB_M_S, least=0.1),
+            ParameterEntry("NAV_ACC_RAD", 2.0, _REAL, least=0.05),
+            ParameterEntry("NAV_DLL_ACT", 0.0, _INT32, least=0.0),
+            ParameterEntry("RTL_DESCEND_ALT", 10.0, _REAL, least=0.0),
+            ParameterEntry("RTL_LAND_DELAY", 0.0, _REAL, ParameterRole.RETURN_WAIT_S),
+            ParameterEntry("RTL_RETURN_ALT", 30.0, _REAL, ParameterRole.RETURN_HEIGHT_M, least=0.0),
+            ParameterEntry("SYS_AUTOSTART", 10040.0, _INT32, least=0.0),
+        )
+
+    def ground_lost(self, parameters: ParameterTable) -> GcsFailsafe | None:
+        """Returns, or lands; any ground station will do."""
+        mode = _GROUND_LOST_MODES.get(int(parameters.value("NAV_DLL_ACT")))
+        if mode is None:
+            return None
+        after_s = _HEARTBEAT_MISSED_S + parameters.value("COM_DL_LOSS_T")
+        excepted = int(parameters.value("COM_DLL_EXCEPT"))
+        spared = {each for bit, each in _GROUND_LOST_SPARED.items() if excepted & bit}
+        return GcsFailsafe(mode, after_s, range(1, 256), frozenset(spared))
+
+    def fence_radius_m(self, parameters: ParameterTable) -> float:
+        """A circle, unless it is 0."""
+        return parameters.value("GF_MAX_HOR_DIST")
+
+    def disarm_delay(self, mode: FlightMode) -> ParameterRole | None:
+        """The same after every landing."""
+        del mode
+        return ParameterRole.DISARM_LANDED_S
+
+    def custom_mode(self, mode: FlightMode) -> int:
+        """Number of the mode in a heartbeat."""
+        return _NUMBERS[mode]
+
+    def mode_name(self, mode: FlightMode) -> str:
+        """What people read."""
+        return _NAMES[mode]
+
+    def mode_of(self, custom_mode: int) -> FlightMode | None:
+        """The mode of that number, if the simulated vehicle has it."""
+        known = _MODES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
+        return None if known is None else known[0]
+
+    def mode_commanded(self, main: float, sub: float) -> int | None:
+        """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE."""
+        if not (0.0 <= main <= 255.0 and 0.0 <= sub <= 255.0):
+            return None
+        return int(main) << 16 | int(sub) << 24
+
+    def base_mode(self, mode: FlightMode, *, armed: bool, on_ground: bool, booted: bool) -> int:
+        """MAV_MODE_FLAG bits of a heartbeat."""
+        del on_ground, booted
+        bits: int = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        if mode in _AUTOMATIC:
+            bits |= (
+                mavlink.MAV_MODE_FLAG_AUTO_ENABLED
+                | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+                | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
+            )
+        else:
+            bits |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+            if mode is not FlightMode.MANUAL:
+                bits |= mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+        if armed:
+            bits |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+        return bits
+
+    def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
+        """MAV_STATE of a heartbeat: active once the motors run, uninitialised before they may.
+
+        What it checks before it arms it takes for part of its initialisation.
+        """
+        del on_ground
+        if armed:
+            return int(mavlink.MAV_STATE_ACTIVE)
+        ready = ready and booted
+        return int(mavlink.MAV_STATE_STANDBY if ready else mavlink.MAV_STATE_UNINIT)
+
+    def sensors(self, mode: FlightMode, *, has_origin: bool, can_arm: bool) -> SensorBits:
+        """Bits of SYS_STATUS, as recorded."""
+        del mode
+        if not has_origin:
+            return SensorBits(present=0, enabled=0, health=_HEALTH_AT_BOOT)
+        return SensorBits(
+            present=_PRESENT, enabled=_ENABLED, health=_HEALTHY | (_PREARM if can_arm else 0)
+        )
+
+    def mission_state(self, view: MissionProgress) -> int:
+        """MISSION_STATE of MISSION_CURRENT.
+
+        It speaks of the mode more than of the mission: a take-off or a landing that is
+        done completes it too, and one that was left half-way stays active.
+        """
+        if not view.present:
+            return int(mavlink.MISSION_STATE_NO_MISSION)
+        if view.task_done:
+            return int(mavlink.MISSION_STATE_COMPLETE)
+        if self.mission_mode(view) == _MISSION_MODE_ACTIVE or view.current:
+            return int(mavlink.MISSION_STATE_ACTIVE)
+        return int(mavlink.MISSION_STATE_NOT_STARTED)
+
+    def mission_mode(self, view: MissionProgress) -> int:
+        """Taking off and landing count as a mission."""
+        active = view.mode in (FlightMode.AUTO, FlightMode.TAKEOFF, FlightMode.LAND)
+        return _MISSION_MODE_ACTIVE if active else _MISSION_MODE_SUSPENDED
+
+    def mission_total(self, view: MissionProgress) -> int:
+        """Unknown where there is none."""
+        return view.items if view.items > 0 else _UNKNOWN_TOTAL

@@ -1,0 +1,211 @@
+"""How long one online decision takes, over a whole mission, and a batch of planned ones.
+
+Each decision is timed by itself, in the order of Fig. 1, from the shared state alone, as an agent
+makes it. Leaves out: the speed of the batch beside a loop tuned by hand, which needs a compiler
+(``python -m tests.benchmarks.lower_level`` in a source tree).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from itertools import islice
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from sim.bench.machine import MachineInfo, this_machine
+from sim.bench.solvers import MissionSource, problem_of
+from swarm.allocation import Problem, TeamState, rank_of, rule_by_name
+from swarm.allocation.lower_level import Decision, Rule, decisions
+from swarm.allocation.problem import IntArray
+from swarm.allocation.rules import GuidedRule, route_arrays
+from swarm.kernels.lower_level import GREEDY, default_threads, evaluate_sequences
+from swarm.kernels.routes import TeamArrays, optimise_routes
+from swarm.model import TaskId
+from swarm.runtime.clock import Clock
+
+__all__ = ["DecideBench", "DecisionTimes", "decide_as_json", "decide_as_rich", "measure_decisions"]
+
+
+_DISTURBED_FRAC = 0.3
+"""UAVs lost and tasks on no list, in the row after a disturbance."""
+_ITERATIONS_PER_TASK = 20
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionTimes:
+    """Decisions of one rule."""
+
+    name: str
+    decisions: int
+    median_s: float
+    p99_s: float
+    largest_s: float
+    first_s: float
+    """The first one on a new mission, which may have arrays to lay out."""
+
+
+@dataclass(frozen=True, slots=True)
+class DecideBench:
+    """Everything measured in one run."""
+
+    machine: MachineInfo
+    n_uav: int
+    n_task: int
+    seed: int
+    times: tuple[DecisionTimes, ...]
+    sequences: int
+    """Greedy sequences in the batch."""
+    sequences_per_s: float
+    """By one thread."""
+    threads: int
+    sequences_per_s_threaded: float
+    """By that many threads."""
+
+
+class _TimedRule:
+    """A rule that remembers how long its decisions took."""
+
+    def __init__(self, rule: Rule, clock: Clock) -> None:
+        self.name = rule.name
+        self.times_s: list[float] = []
+        self._rule = rule
+        self._clock = clock
+
+    def decide(
+        self, problem: Problem, state: TeamState, rank: IntArray, uav: int
+    ) -> Decision | None:
+        begin_s = self._clock.now_s()
+        decision = self._rule.decide(problem, state, rank, uav)
+        self.times_s.append(self._clock.now_s() - begin_s)
+        return decision
+
+
+def measure_decisions(
+    n_uav: int,
+    n_task: int,
+    seed: int,
+    clock: Clock,
+    *,
+    most_decisions: int | None = None,
+    sequences: int = 200,
+) -> DecideBench:
+    """Time decisions of each rule on one random mission.
+
+    Args:
+        n_uav: number of UAVs; >= 1.
+        n_task: number of tasks; >= 1.
+        seed: of the mission, the lists and what is disturbed.
+        clock: measures.
+        most_decisions: per rule; all of the mission when None.
+        sequences: size of the batch; >= 1.
+    """
+    machine = this_machine()
+    problem = problem_of(MissionSource(n_uav=n_uav, n_task=n_task, seed=seed))
+    rng = np.random.default_rng(seed)
+    times = []
+    for name, rule, state in _rules(problem, rng, seed):
+        timed = _TimedRule(rule, clock)
+        made = decisions(problem, state, rank_of(range(n_uav)), timed)
+        for _ in islice(made, most_decisions):
+            pass
+        times.append(_times(name, timed.times_s))
+    ranks = np.array([rng.permutation(n_uav) for _ in range(sequences)])
+    threads = default_threads()
+    return DecideBench(
+        machine=machine,
+        n_uav=n_uav,
+        n_task=n_task,
+        seed=seed,
+        times=tuple(times),
+        sequences=sequences,
+        sequences_per_s=_sequences_per_s(problem, ranks, 1, clock),
+        threads=threads,
+        sequences_per_s_threaded=_sequences_per_s(problem, ranks, threads, clock),
+    )
+
+
+def decide_as_rich(bench: DecideBench) -> RenderableType:
+    """Everything for a terminal."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("rule", no_wrap=True)
+    for heading in ("decisions", "median", "p99", "largest", "first"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for row in bench.times:
+        table.add_row(
+            row.name,
+            str(row.decisions),
+            *(_duration(s) for s in (row.median_s, row.p99_s, row.largest_s, row.first_s)),
+        )
+    return Group(
+        Text(str(bench.machine)),
+        Text(f"One online decision at {bench.n_uav} × {bench.n_task}, seed {bench.seed}:"),
+        table,
+        Text(
+            f"A batch of {bench.sequences} greedy sequences: {bench.sequences_per_s:.0f} per "
+            f"second by one thread, {bench.sequences_per_s_threaded:.0f} by {bench.threads}."
+        ),
+        Text(
+            f"disturbed: {_DISTURBED_FRAC:.0%} of the UAVs are lost and {_DISTURBED_FRAC:.0%} of "
+            "the tasks are on no list, so lists are repaired at every decision. first: the first "
+            "decision on a new mission."
+        ),
+    )
+
+
+def decide_as_json(bench: DecideBench) -> dict[str, object]:
+    """Everything for programs, ready for `json.dumps`."""
+    return asdict(bench)
+
+
+def _rules(
+    problem: Problem, rng: np.random.Generator, seed: int
+) -> Iterator[tuple[str, Rule, TeamState]]:
+    for name in ("greedy", "lookahead"):
+        yield name, rule_by_name(name), TeamState.at_start(problem)
+    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    iterations = _ITERATIONS_PER_TASK * problem.n_task
+    routes, _ = optimise_routes(team, seed=seed, iterations=iterations)
+    lists: dict[str, list[TaskId]] = {
+        uav: [problem.task_ids[task] for task in route]
+        for uav, route in zip(problem.uav_ids, routes, strict=True)
+    }
+    yield "guided", GuidedRule(lists), TeamState.at_start(problem)
+
+    # No list has the pop-ups, and the lists of those lost are still there.
+    popped_up = {problem.task_ids[task] for task in _some(rng, problem.n_task)}
+    known: dict[str, list[TaskId]] = {
+        uav: [task for task in tasks if task not in popped_up] for uav, tasks in lists.items()
+    }
+    state = TeamState.at_start(problem)
+    state.active[_some(rng, problem.n_uav)] = False
+    yield "guided, disturbed", GuidedRule(known), state
+
+
+def _some(rng: np.random.Generator, n: int) -> list[int]:
+    chosen: list[int] = rng.permutation(n)[: int(_DISTURBED_FRAC * n)].tolist()
+    return chosen
+
+
+def _times(name: str, times_s: list[float]) -> DecisionTimes:
+    return DecisionTimes(
+        name=name,
+        decisions=len(times_s),
+        median_s=float(np.median(times_s)),
+        p99_s=float(np.quantile(times_s, 0.99)),
+        largest_s=max(times_s),
+        first_s=times_s[0],
+    )
+
+
+def _sequences_per_s(problem: Problem, ranks: IntArray, threads: int, clock: Clock) -> float:
+    begin_s = clock.now_s()
+    evaluate_sequences(problem.kernel, TeamState.at_start(problem), ranks, GREEDY, threads)
+    return len(ranks) / max(clock.now_s() - begin_s, 1e-9)
+
+
+def _duration(time_s: float) -> str:
+    return f"{time_s * 1e6:.1f} µs" if time_s < 1e-3 else f"{time_s * 1e3:.2f} ms"

@@ -1,0 +1,252 @@
+"""Plans of several methods side by side: same missions, same time, one after another.
+
+Every list is scored here by eq. 1, whoever made it. Ratios are within this one run. Leaves out:
+how the figures are shown (`sim.bench.plan_report`, `sim.bench.plan_report`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim.bench.machine import MachineInfo, this_machine
+from sim.bench.solvers import (
+    METHODS,
+    MissionSource,
+    PlanningJob,
+    PlanningRun,
+    TracePoint,
+    problem_of,
+    run_in_subprocess,
+)
+from swarm.allocation import evaluate
+from swarm.allocation.problem import Problem
+from swarm.runtime.errors import SwarmError
+
+__all__ = [
+    "LONG_RUN",
+    "MethodSummary",
+    "PlanBench",
+    "PlanMeasurement",
+    "measure_plans",
+    "summaries",
+]
+
+
+LONG_RUN = "guided-long"
+"""Name of the long run of ``guided`` that others may be compared with."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanMeasurement:
+    """One method on one mission with one limit."""
+
+    case: str
+    """Size or scenario."""
+    seed: int
+    method: str
+    limit_s: float
+    objective: float | None
+    """J [value·s]; None if there are no lists."""
+    ratio: float | None
+    """J over the best J of all methods on this mission in this run, long run apart."""
+    ratio_long: float | None
+    """J over that of the long run; None without one."""
+    unassigned: int
+    """Tasks on no list though some UAV is capable of them."""
+    late: int
+    """Tasks completed after D, whose terms are negative."""
+    elapsed_s: float
+    cpu_s: float
+    peak_bytes: int
+    base_bytes: int
+    trace: tuple[TracePoint, ...]
+    note: str
+    """What to know of it, or why there are no lists."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanBench:
+    """Everything measured in one run."""
+
+    machine: MachineInfo
+    measured: tuple[PlanMeasurement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MethodSummary:
+    """One method over all seeds of a case and limit."""
+
+    case: str
+    limit_s: float
+    method: str
+    runs: int
+    """Seeds with lists."""
+    ratio: float | None
+    """Mean over the seeds; None without lists."""
+    worst_ratio: float | None
+    ratio_long: float | None
+    elapsed_s: float
+    """Mean."""
+    cpu_s: float
+    """Mean."""
+    peak_bytes: int
+    """Largest."""
+    unassigned: int
+    """Largest."""
+    late: int
+    """Largest."""
+    note: str
+    """Of the first seed."""
+
+
+Runner = Callable[[PlanningJob], PlanningRun]
+Progress = Callable[[str], None]
+
+
+def measure_plans(
+    sources: Sequence[tuple[str, MissionSource]],
+    methods: Sequence[str],
+    limits_s: Sequence[float],
+    seeds: Sequence[int],
+    *,
+    long_run_s: float | None = None,
+    run: Runner = run_in_subprocess,
+    on_progress: Progress | None = None,
+) -> PlanBench:
+    """Run everything, one job at a time.
+
+    Args:
+        sources: cases by name; random ones are drawn anew for every seed.
+        methods: names in `METHODS`.
+        limits_s: time limits [s]; > 0.
+        seeds: of random missions, and of methods that draw.
+        long_run_s: time for ``guided`` once more on every mission [s].
+        run: does one job.
+        on_progress: told what is about to run.
+    """
+    tell = _tell_nobody if on_progress is None else on_progress
+    machine = this_machine()
+    rows: list[PlanMeasurement] = []
+    for case, source in sources:
+        for seed in seeds:
+            drawn = source if source.scenario is not None else replace(source, seed=seed)
+            problem = problem_of(drawn)
+            drawn = replace(drawn, horizon_s=problem.horizon_s)
+            here: list[PlanMeasurement] = []
+            for limit_s in limits_s:
+                for name in methods:
+                    tell(f"{case}, seed {seed}: {name} for up to {limit_s:g} s")
+                    job = PlanningJob(drawn, name, limit_s, seed)
+                    here.append(_measured(case, problem, job, name, run))
+            if long_run_s is not None:
+                tell(f"{case}, seed {seed}: guided for {long_run_s:g} s")
+                job = PlanningJob(drawn, "guided", long_run_s, seed)
+                here.append(_measured(case, problem, job, LONG_RUN, run))
+            rows += _with_ratios(here)
+    return PlanBench(machine, tuple(rows))
+
+
+def summaries(bench: PlanBench) -> list[MethodSummary]:
+    """Per case, limit and method, in the order measured; the long run comes last of its case."""
+    groups: dict[tuple[str, float, str], list[PlanMeasurement]] = {}
+    for row in bench.measured:
+        groups.setdefault((row.case, row.limit_s, row.method), []).append(row)
+    return [_summary(rows) for rows in groups.values()]
+
+
+def _tell_nobody(what: str) -> None:
+    del what
+
+
+def _measured(
+    case: str, problem: Problem, job: PlanningJob, name: str, run: Runner
+) -> PlanMeasurement:
+    refusal = METHODS[job.method].refusal
+    refused = None if refusal is None else refusal(problem, job.limit_s)
+    blank = PlanMeasurement(
+        case=case,
+        seed=job.seed,
+        method=name,
+        limit_s=job.limit_s,
+        objective=None,
+        ratio=None,
+        ratio_long=None,
+        unassigned=0,
+        late=0,
+        elapsed_s=0.0,
+        cpu_s=0.0,
+        peak_bytes=0,
+        base_bytes=0,
+        trace=(),
+        note=refused or "",
+    )
+    if refused is not None:
+        return blank
+    try:
+        answer = run(job)
+    except SwarmError as error:
+        return replace(blank, note=str(error))
+    objective, completion_s = evaluate(problem, answer.routes)
+    wanted = problem.capable.any(axis=0)
+    if not any(answer.routes) and wanted.any():
+        return replace(blank, elapsed_s=answer.elapsed_s, note="no lists in time")
+    return replace(
+        blank,
+        objective=objective,
+        unassigned=int((wanted & np.isnan(completion_s)).sum()),
+        late=int((completion_s > problem.horizon_s).sum()),
+        elapsed_s=answer.elapsed_s,
+        cpu_s=answer.cpu_s,
+        peak_bytes=answer.peak_bytes,
+        base_bytes=answer.base_bytes,
+        trace=tuple(answer.trace),
+        note=answer.note,
+    )
+
+
+def _with_ratios(rows: Sequence[PlanMeasurement]) -> list[PlanMeasurement]:
+    """The rows of one mission, compared with each other."""
+    worths = [r.objective for r in rows if r.objective is not None and r.method != LONG_RUN]
+    long_runs = [r.objective for r in rows if r.method == LONG_RUN]
+    best = max(worths, default=None)
+    long_run = long_runs[0] if long_runs else None
+    return [
+        replace(row, ratio=_ratio(row.objective, best), ratio_long=_ratio(row.objective, long_run))
+        for row in rows
+    ]
+
+
+def _ratio(worth: float | None, best: float | None) -> float | None:
+    """Share of the best; None where the best is not positive and a share says nothing."""
+    if worth is None or best is None or best <= 0.0:
+        return None
+    return worth / best
+
+
+def _summary(rows: Sequence[PlanMeasurement]) -> MethodSummary:
+    done = [row for row in rows if row.objective is not None]
+    ratios = [row.ratio for row in done if row.ratio is not None]
+    long_ratios = [row.ratio_long for row in done if row.ratio_long is not None]
+    first = rows[0]
+    return MethodSummary(
+        case=first.case,
+        limit_s=first.limit_s,
+        method=first.method,
+        runs=len(done),
+        ratio=_mean(ratios),
+        worst_ratio=min(ratios, default=None),
+        ratio_long=_mean(long_ratios),
+        elapsed_s=_mean([row.elapsed_s for row in done]) or 0.0,
+        cpu_s=_mean([row.cpu_s for row in done]) or 0.0,
+        peak_bytes=max((row.peak_bytes for row in done), default=0),
+        unassigned=max((row.unassigned for row in rows), default=0),
+        late=max((row.late for row in rows), default=0),
+        note=next((row.note for row in rows if row.objective is None), first.note),
+    )
+
+
+def _mean(numbers: Sequence[float]) -> float | None:
+    return sum(numbers) / len(numbers) if numbers else None

@@ -1,0 +1,158 @@
+"""Lets a schedule come true in a world, and knows when the world is calm again.
+
+Leaves out: what must hold meanwhile and afterwards (sim.faults.message_log, sim.faults.invariants).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable
+from functools import partial
+
+from coordinator.operator.requests import OperatorClient
+from coordinator.operator.task_edits import NewTask, TaskWithdrawal
+from sim.faults.schedule import Disturbance, DisturbanceKind
+from sim.world.engine import Process
+from sim.world.rough_network import RoughNetwork
+from sim.world.settings import RestartMemory
+from sim.world.virtual_world import World
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import CommandKind
+
+__all__ = ["FaultInjector"]
+
+
+class FaultInjector:
+    """Plays one schedule.
+
+    Args:
+        world: not yet begun.
+        network: of that world.
+        schedule: what goes wrong.
+    """
+
+    def __init__(
+        self, world: World, network: RoughNetwork, schedule: Iterable[Disturbance]
+    ) -> None:
+        self.held_for_good: set[Process] = set()
+        """Processes that hang and never go on."""
+        self._world = world
+        self._network = network
+        self._disturbed_s = 0.0
+        self._in_force = 0
+        self._holds: Counter[Process] = Counter()
+        self._stops: Counter[Process] = Counter()
+        for disturbance in schedule:
+            world.queue.at(disturbance.at_s, partial(self._begin, disturbance))
+
+    @property
+    def calm_for_s(self) -> float:
+        """How long nothing has gone wrong that goes on or that has to be got over [s]."""
+        calm_s = self._world.queue.now_s() - self._disturbed_s
+        return -math.inf if self._in_force else calm_s
+
+    def _begin(self, what: Disturbance) -> None:
+        world, network, names = self._world, self._network, what.names
+        self._disturb()
+        match what.kind:
+            case DisturbanceKind.LOSE:
+                world.lose(names[0])
+            case DisturbanceKind.CRASH:
+                world.crash(names[0])
+                self._until(
+                    what, partial(world.restart, names[0], what.memory or RestartMemory.NONE)
+                )
+            case DisturbanceKind.HANG | DisturbanceKind.DEADLOCK:
+                self._hold(world.processes[names[0]], what)
+            case DisturbanceKind.CUT:
+                network.cut(names)
+                self._until(what, partial(network.heal, names))
+            case DisturbanceKind.UNPLUG:
+                network.unplug(names[0])
+                self._until(what, partial(network.plug, names[0]))
+            case DisturbanceKind.MUTE:
+                network.mute(*names)
+                self._until(what, partial(network.unmute, *names))
+            case DisturbanceKind.ROUTERS:
+                network.routers_down()
+                self._until(what, network.routers_up)
+            case DisturbanceKind.BLINK:
+                network.blink()
+            case DisturbanceKind.WEATHER:
+                network.worsen(what.amount or 0.0)
+                self._until(what, partial(network.worsen, -(what.amount or 0.0)))
+            case DisturbanceKind.SKEW:
+                world.skew(names[0], what.amount or 0.0)
+            case DisturbanceKind.SLOW:
+                world.slow(names[0], what.amount or 1.0)
+            case DisturbanceKind.REFUSE:
+                refusal = names[0], names[1]
+                world.refuses.add(refusal)
+                self._until(what, partial(world.refuses.discard, refusal))
+            case DisturbanceKind.WITHDRAW:
+                world.withdraw(names[0])
+            case DisturbanceKind.ADD:
+                world.operate(NewTask(self._place(what.amount or 0.0)))
+            case DisturbanceKind.RETRACT:
+                world.operate(TaskWithdrawal(names[0]))
+            case DisturbanceKind.HOLD:
+                held = world.command(CommandKind.HOLD, names[0])
+                self._until(what, partial(self._let_go_on, names[0], held))
+            case DisturbanceKind.RETURN:
+                world.command(CommandKind.RETURN, names[0])
+            case DisturbanceKind.ABORT:
+                world.command(CommandKind.ABORT)
+
+    def _place(self, along_frac: float) -> Point:
+        """As far between the scenario's outermost places [m; mission origin]."""
+        places = [task.position_enu_m for task in self._world.mission.tasks]
+        corners = [(min(axis), max(axis)) for axis in zip(*places, strict=True)]
+        east_m, north_m, up_m = (low + along_frac * (high - low) for low, high in corners)
+        return east_m, north_m, up_m
+
+    def _hold(self, process: Process, what: Disturbance) -> None:
+        """Hold one life of a process; several holds end with the last of them."""
+        stops = what.kind is DisturbanceKind.HANG
+        if process.over:
+            return
+        self._holds[process] += 1
+        self._stops[process] += stops
+        process.held = True
+        if stops and self._stops[process] == 1:
+            self._network.stop(process)
+        if what.lasts_s is None:
+            self.held_for_good.add(process)
+        self._until(what, partial(self._let_go, process, stops))
+
+    def _let_go(self, process: Process, stops: bool) -> None:
+        self._holds[process] -= 1
+        self._stops[process] -= stops
+        if process.over:
+            return
+        if stops and not self._stops[process]:
+            self._network.cont(process)
+        if not self._holds[process]:
+            process.resume()
+
+    def _let_go_on(self, uav: str, held: OperatorClient) -> None:
+        """Nobody takes a command back before they know what came of it."""
+        if held.verdict is None:
+            self._world.queue.after(0.5, partial(self._let_go_on, uav, held))
+        else:
+            self._world.command(CommandKind.RESUME, uav)
+
+    def _until(self, what: Disturbance, end: Callable[[], object]) -> None:
+        if what.lasts_s is None:
+            return
+        self._in_force += 1
+
+        def ends() -> None:
+            self._in_force -= 1
+            self._disturb()
+            end()
+
+        self._world.queue.after(what.lasts_s, ends)
+
+    def _disturb(self) -> None:
+        self._disturbed_s = self._world.queue.now_s()

@@ -1,0 +1,344 @@
+"""What must hold of a whole fleet in virtual time, after every step and at the end.
+
+Beside the invariants of the messages (sim.faults.message_log):
+
+- *raises*, *never rests*: no core raises, or is busy without time passing;
+- *suspects without link*: no process gives another up while its own link is down;
+- *claimed twice*: once everything has been calm for `SETTLED_S`, no two living UAVs that can
+  talk to each other claim one task for longer than that;
+- *disagree*: and each knows what the others claim, the epoch in force and the board;
+- *two coordinators*: and only one of them coordinates;
+- *winners differ*: whenever two have equal registers, they see the same states and winners;
+- *disobeys*: no agent that knows of it takes tasks in an aborted mission, or though the
+  operator's last word to its UAV was to hold or to come home;
+- *task lost*: in the end each task that was posted, or added by the operator, is done, failed,
+  withdrawn, or open with no UAV able to do it that knew of it before it left, and of a mission
+  that had begun, and came home of its own accord; or the operator added it too late, when the
+  coordinator ended the mission;
+- *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
+- *miscounted*: the observer knows the visits of every UAV that left in calm, invents none, and
+  counts as duplicates all that it knows of, and no more than there were.
+
+UAVs that were cut off or died may have done what nobody could hear of, and one that forgot
+it cannot tell of it later; nothing is claimed about the counting of that. Leaves out: how
+faults come about (sim.faults.injector).
+"""
+
+from __future__ import annotations
+
+import itertools
+import traceback
+from collections.abc import Iterator
+
+from agent.core.agent_core import AgentCore
+from agent.core.interface import GoTo
+from coordinator.core.active import CoordinatorCore
+from coordinator.core.standby import StandbyCore
+from coordinator.mission_view.mission_state import MissionState
+from sim.faults.injector import FaultInjector
+from sim.faults.message_log import MessageLog, Violation
+from sim.world.engine import Process
+from sim.world.rough_network import RoughNetwork
+from sim.world.virtual_world import World
+from swarm.model import Task, TaskId
+from swarm.protocol.board import TaskState, holders
+from swarm.protocol.events import LogLine
+from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoch
+from swarm.protocol.operator_commands import abort_command, newest_command
+from swarm.protocol.registers import Replica
+from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, StatusPhase
+
+__all__ = ["SETTLED_S", "InvariantChecker"]
+
+
+SETTLED_S = 5.0
+"""Calm for this long, the fleet must agree."""
+LOOK_EVERY_S = 0.5
+STEPS_AT_ONCE = 3000
+"""More steps of all processes without time passing are a loop."""
+_IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
+
+
+class InvariantChecker:
+    """Watches one world; see `sim.world.settings.WorldListener`.
+
+    The first breach ends the run.
+    """
+
+    def __init__(self) -> None:
+        self.message_log = MessageLog()
+        self._world: World | None = None
+        self._network: RoughNetwork | None = None
+        self._injector: FaultInjector | None = None
+        self._lives: dict[Process, int] = {}
+        self._changed_s: dict[str, float] = {}
+        self._steps = 0
+        self._steps_at_s = 0.0
+        self._left_in_calm: set[str] = set()
+        self._left_undone: dict[str, set[str]] = {}
+        """By UAV that takes no further part: the tasks it knew of that were on the board."""
+        self._known_at_the_end: dict[str, set[str]] = {}
+        """By coordinator's process: tasks that it knew of when it first said the mission over."""
+        self._shared_since_s: dict[tuple[Process, Process, str], float] = {}
+
+    @property
+    def broken(self) -> Violation | None:
+        """The first invariant that did not hold."""
+        return next(iter(self.message_log.broken), None)
+
+    def attend(self, world: World, network: RoughNetwork, injector: FaultInjector) -> None:
+        """Watch this world, which has not begun."""
+        self._world, self._network, self._injector = world, network, injector
+        world.queue.at(LOOK_EVERY_S, self._look)
+
+    # -- while it runs ----------------------------------------------------------------
+
+    def said(self, process: Process, message: Message) -> None:
+        """``process`` publishes ``message``."""
+        now_s, message_log = self._now_s, self.message_log
+        life = self._lives.setdefault(process, len(self._lives))
+        self._changed_s[process.name] = now_s
+        alone = self._network is not None and self._network.is_alone(process)
+        message_log.said(now_s, process.name, life, message, unheard=alone)
+        self._note_what_is_left(process, message)
+        self._stop_if_broken()
+
+    def _note_what_is_left(self, process: Process, message: Message) -> None:
+        """What somebody leaves undone whose word ends the mission, for itself or for all."""
+        core = process.core
+        match message.body:
+            case Claim(phase=ClaimPhase.OUT) if isinstance(core, AgentCore):
+                self._left_undone.setdefault(process.name, _on_board(core.replica))
+            case Claim():
+                self._left_undone.pop(process.name, None)
+            case PlanEpoch(phase=MissionPhase.ENDED) if isinstance(
+                core, CoordinatorCore | StandbyCore
+            ):
+                self._known_at_the_end.setdefault(process.name, _on_board(core.replica))
+            case _:
+                pass
+
+    def stepped(self, process: Process) -> None:
+        """``process`` has made a step."""
+        now_s = self._now_s
+        self._steps = self._steps + 1 if now_s == self._steps_at_s else 0
+        self._steps_at_s = now_s
+        if self._steps > STEPS_AT_ONCE:
+            self._break("never rests", f"{process.name} steps on and on without time passing")
+        if process.over and self._calm_for_s > SETTLED_S:
+            self._left_in_calm.add(process.name)
+
+    def raised(self, process: Process, fault: Exception) -> None:
+        """The core of ``process`` has raised."""
+        where = traceback.extract_tb(fault.__traceback__)[-1]
+        place = f"{where.filename.rpartition('/')[2]}:{where.lineno}"
+        self._break("raises", f"{process.name}: {type(fault).__name__}: {fault} ({place})")
+
+    def refused(self, process: Process, order: GoTo) -> None:
+        """The vehicle of ``process`` will not obey."""
+        for task in self._there.mission.tasks:
+            if task.position_enu_m[:2] == order.position_enu_m[:2]:
+                self.message_log.refused(process.name, task.id)
+
+    def noted(self, process: Process, note: LogLine) -> None:
+        """``process`` has written a line into its log."""
+        if note.text == "lost":
+            self.message_log.missed(process.name)
+        if note.text == "turns aside":
+            self.message_log.turned_aside(self._now_s, process.name, str(note.fields["task"]))
+            self._stop_if_broken()
+        if note.text == "lost" and not process.linked:
+            text = f"{process.name} gives {note.fields['writer']} up while its own link is down"
+            self._break("suspects without link", text)
+
+    def _look(self) -> None:
+        if self._there.alive:
+            self._there.queue.after(LOOK_EVERY_S, self._look)
+        agents = [(p, core) for p, core in self._living() if isinstance(core, AgentCore)]
+        self._look_for_disobedience(agents)
+        self._look_for_shared_tasks(agents)
+        self._look_for_equal_registers(agents)
+        if self._calm_for_s > SETTLED_S:
+            self._look_for_disagreement(agents)
+            self._look_for_two_coordinators()
+        self._stop_if_broken()
+
+    def _look_for_disobedience(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        for process, core in agents:
+            word = newest_command(core.replica, core.uav)
+            resumed = word is None or word[1].kind is CommandKind.RESUME
+            if core.claim is not None and (abort_command(core.replica) is not None or not resumed):
+                kind = "abort" if word is None else word[1].kind
+                self._break("disobeys", f"{process.name} is {core.phase} after {kind}")
+
+    def _look_for_shared_tasks(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        now_s, shared = self._now_s, set()
+        for (one, core), (other, rival) in itertools.combinations(agents, 2):
+            task = core.claim.task if core.claim is not None else None
+            same = rival.claim is not None and rival.claim.task == task
+            if task is not None and same and self._joined(one, other):
+                shared.add((one, other, task))
+        for key in shared:
+            since_s = self._shared_since_s.setdefault(key, now_s)
+            if min(now_s - since_s, self._calm_for_s) > SETTLED_S:
+                one, other, task = key
+                text = f"{one.name} and {other.name} both claim {task} since {since_s:.2f} s"
+                self._break("claimed twice", text)
+        for key in self._shared_since_s.keys() - shared:
+            del self._shared_since_s[key]
+
+    def _look_for_equal_registers(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        for (one, core), (other, peer) in itertools.combinations(agents, 2):
+            mine, its = core.replica, peer.replica
+            if mine.claims == its.claims and list(mine.messages()) == list(its.messages()):
+                states = _task_states(core), _task_states(peer)
+                if holders(mine.claims) != holders(its.claims) or states[0] != states[1]:
+                    text = f"{one.name} and {other.name} know the same and see it differently"
+                    self._break("winners differ", text)
+
+    def _look_for_disagreement(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        settled_s = self._now_s - SETTLED_S
+        for (one, core), (other, peer) in itertools.permutations(agents, 2):
+            quiet = self._changed_s.get(other.name, 0.0) < settled_s
+            if quiet and self._joined(one, other):
+                known = core.replica.claims.get(other.name)
+                if known != peer.replica.claims.get(other.name):
+                    self._break("disagree", f"{one.name} takes {other.name} to claim {known}")
+
+    def _look_for_two_coordinators(self) -> None:
+        at_work = [process for process, core in self._living() if _coordinates(core)]
+        for one, other in itertools.combinations(at_work, 2):
+            if self._joined(one, other):
+                self._break("two coordinators", f"{one.name} and {other.name} both coordinate")
+
+    # -- in the end -------------------------------------------------------------------
+
+    def conclude(self) -> None:
+        """Judge what has come of it."""
+        if self.broken is None:
+            self._look_for_the_missing()
+        if self.broken is None:
+            self._look_for_lost_tasks()
+        if self.broken is None:
+            self._look_at_the_count()
+
+    def _look_for_the_missing(self) -> None:
+        living = [(process, core) for process, core in self._living() if process.writer is not None]
+        left = [process.name for process, core in living if isinstance(core, AgentCore)]
+        # Who has forgotten all and finds nobody who knows of a mission waits for one.
+        if left and any(core.replica.brief is not None for _, core in living):
+            self._break("not home", f"{', '.join(left)} still there")
+
+    def _look_for_lost_tasks(self) -> None:
+        message_log, world = self.message_log, self._there
+        settled = message_log.done | message_log.failed | message_log.withdrawn
+        home = [
+            uav
+            for uav in world.mission.uavs
+            if world.finished.get(uav.id) == 0 and not message_log.sent_home(uav.id)
+        ]
+        to_do = {
+            uav: self._left_undone.get(uav, _on_board(core.replica))
+            for uav, core in world.agents.items()
+            if core.replica.epoch is not None
+        }
+        added = {
+            task: order
+            for task, order in message_log.ordered.items()
+            if task not in message_log.posted
+        }
+        known_at_the_end = set[str]().union(*self._known_at_the_end.values())
+        tasks = [task for task in world.mission.tasks if task.id in message_log.posted]
+        tasks += [Task(TaskId(task), added[task].position_enu_m, 0.0) for task in added]
+        for task in tasks:
+            unheard = task.id in added and task.id not in known_at_the_end
+            if task.id in settled or (message_log.ended and unheard):
+                continue
+            able = [
+                uav.id
+                for uav in home
+                if world.mission.success(uav, task) > 0.0
+                and task.id in to_do.get(uav.id, ())
+                and (uav.id, task.id) not in world.refuses
+            ]
+            if able:
+                text = f"{task.id} is open, though {', '.join(able)} could have done it"
+                self._break("task lost", text)
+
+    def _look_at_the_count(self) -> None:
+        mission_state, true = self._there.mission_state, self.message_log.visits
+        outcomes = mission_state.replica.outcomes.items()
+        known = {k: o.completed_s for k, o in outcomes if o.result is AttemptResult.DONE}
+        for key, completed_s in known.items():
+            if completed_s not in true[key]:
+                self._break("miscounted", f"{key[0]} never visited {key[1]} at {completed_s:.3f} s")
+        for uav, task in sorted(true.keys() - known.keys()):
+            if uav in self._left_in_calm and not self._is_forgotten(uav, task):
+                self._break("miscounted", f"nobody knows that {uav} visited {task}")
+        told = mission_state.result().duplicate_visits
+        least, most = len(known) - len({task for _, task in known}), self.message_log.duplicates
+        if not least <= told <= most:
+            self._break("miscounted", f"{told} duplicates told, not {least} to {most}")
+
+    def _is_forgotten(self, uav: str, task: str) -> bool:
+        """Whether an earlier life did ``task``, nobody heard of it, and the last does not know."""
+        last_life = self._lives.get(self._there.processes[uav])
+        return self.message_log.unheard.get((uav, task), last_life) != last_life
+
+    # -- pieces -----------------------------------------------------------------------
+
+    def _living(
+        self,
+    ) -> Iterator[tuple[Process, AgentCore | CoordinatorCore | StandbyCore | MissionState]]:
+        """Processes that run, or will go on, with their cores."""
+        for process in self._there.processes.values():
+            if not process.over and process not in self._directed.held_for_good:
+                core = process.core
+                if isinstance(core, AgentCore | CoordinatorCore | StandbyCore | MissionState):
+                    yield process, core
+
+    def _joined(self, one: Process, other: Process) -> bool:
+        return self._network is not None and self._network.joined(one, other)
+
+    @property
+    def _there(self) -> World:
+        if self._world is None:
+            raise ValueError("a judge must attend a world first")
+        return self._world
+
+    @property
+    def _directed(self) -> FaultInjector:
+        if self._injector is None:
+            raise ValueError("a judge must attend a world first")
+        return self._injector
+
+    @property
+    def _calm_for_s(self) -> float:
+        return self._directed.calm_for_s
+
+    @property
+    def _now_s(self) -> float:
+        return self._there.queue.now_s()
+
+    def _break(self, invariant: str, text: str) -> None:
+        self.message_log.broken.append(Violation(self._now_s, invariant, text))
+        self._stop_if_broken()
+
+    def _stop_if_broken(self) -> None:
+        if self.broken is not None:
+            self._there.queue.stop()
+
+
+def _task_states(core: AgentCore) -> dict[str, TaskState]:
+    """What the agent itself makes of its registers."""
+    return core._mission_view.board.states  # noqa: SLF001 - a look inside is the point
+
+
+def _on_board(replica: Replica) -> set[str]:
+    return {task for task, entry in replica.board.items() if not entry.withdrawn}
+
+
+def _coordinates(core: object) -> bool:
+    if isinstance(core, StandbyCore):
+        return core.coordinator is not None
+    return isinstance(core, CoordinatorCore)

@@ -1,0 +1,279 @@
+"""One child process: started with a lifeline, watched, and always ended.
+
+A child runs in a session of its own, so that Ctrl-C reaches only its parent, which
+then ends it in order. Its standard input is a pipe that nobody writes to: however
+the parent dies, the child sees the end of it and leaves. Leaves out: which
+children there are (sim.fleet.layout).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import sys
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sim.fleet import guard
+from swarm.runtime.errors import SwarmError
+
+__all__ = ["ChildFailedError", "ChildProcess", "ProgramEnvironment"]
+
+
+READY_TIMEOUT_S = 30.0
+"""Wall time a child may take to say that it is ready."""
+SETTLE_S = 1.0
+"""Wall time in which a foreign program that cannot run at all, as its port is taken, ends."""
+TERMINATE_TIMEOUT_S = 4.0
+"""Wall time a child may take to leave after SIGTERM; then it is killed."""
+RETURN_TIMEOUT_S = 17.0
+"""Wall time an agent may take to leave, if it has a real vehicle to send home."""
+KILL_TIMEOUT_S = 4.0
+"""Wall time the kernel may take to end it and close its pipes after SIGKILL; then it is left."""
+KEPT_LINES = 200
+"""Lines of a child's log that are kept to explain its end."""
+KEYS_VARIABLE = "SWARM_KEYS"
+"""Stands for `--keys` of a command; each child has keys of its own, or none."""
+LINE_LIMIT_BYTES = 4 * 1024 * 1024
+"""Longest line a child may write: a plan of a large mission on one line."""
+
+
+class ChildFailedError(SwarmError):
+    """A child ended, or stayed silent, before it was ready."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramEnvironment:
+    """In what a program runs that is not `swarm`."""
+
+    folder: Path
+    """Its working folder."""
+    environment: Mapping[str, str]
+    """Variables beside those of this process."""
+
+
+class ChildProcess:
+    """One `swarm` command, or another program under a guard, as a process.
+
+    Args:
+        name: what people call it.
+        arguments: of the `swarm` command; ``--lifeline`` is added. Of another program
+            its whole command line.
+        on_line: called with every JSON object the child prints on standard output.
+        on_log: called with every line of its standard error.
+        setting: of another program than `swarm`.
+        returns: it has a real vehicle to send home before it leaves.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        arguments: Sequence[str],
+        *,
+        on_line: Callable[[dict[str, Any]], None] | None = None,
+        on_log: Callable[[str, str], None] | None = None,
+        setting: ProgramEnvironment | None = None,
+        returns: bool = False,
+    ) -> None:
+        self.name = name
+        self.arguments = tuple(arguments)
+        self.setting = setting
+        self.log: deque[str] = deque(maxlen=KEPT_LINES)
+        """Newest lines of its standard error."""
+        self.stopped = False
+        """Whether we ended it, or told it to end, ourselves."""
+        self._returns = returns
+        self._on_line = on_line
+        self._on_log = on_log
+        self._process: asyncio.subprocess.Process | None = None
+        self._readers: list[asyncio.Task[None]] = []
+        self._lines: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._started.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """Exit status, negative for a signal; None while it runs."""
+        return self._started.returncode
+
+    @property
+    def fate(self) -> str:
+        """How it ended, in words."""
+        code = self.returncode
+        if code is None:
+            return "runs"
+        if code >= 0:
+            return f"ended with exit status {code}"
+        with contextlib.suppress(ValueError):
+            return f"killed by {signal.Signals(-code).name}"
+        return f"killed by signal {-code}"
+
+    async def start(self) -> None:
+        """Start it; returns at once."""
+        setting = self.setting
+        if setting is None:
+            command = [sys.executable, "-m", "swarm", *self.arguments, "--lifeline"]
+        else:
+            command = [sys.executable, "-I", guard.__file__, *self.arguments]
+        self._process = await asyncio.create_subprocess_exec(
+            *command,
+            cwd=None if setting is None else setting.folder,
+            env=self._environment(),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            start_new_session=True,
+            limit=LINE_LIMIT_BYTES,
+        )
+        loop = asyncio.get_running_loop()
+        self._readers = [loop.create_task(self._read_out()), loop.create_task(self._read_err())]
+
+    def _environment(self) -> dict[str, str]:
+        """Variables of this process, but for those that would speak to each child alike."""
+        inherited = {name: value for name, value in os.environ.items() if name != KEYS_VARIABLE}
+        return inherited if self.setting is None else {**inherited, **self.setting.environment}
+
+    async def ready(self, count: int = 1) -> list[dict[str, Any]]:
+        """The first ``count`` JSON objects it prints.
+
+        Raises:
+            ChildFailedError: it ended or said nothing in time.
+        """
+        said: list[dict[str, Any]] = []
+        ended = asyncio.get_running_loop().create_task(self.ended())
+        try:
+            async with asyncio.timeout(READY_TIMEOUT_S):
+                while len(said) < count:
+                    said.append(await self._next_line(ended))
+        except TimeoutError:
+            raise ChildFailedError(
+                f"{self.name} was not ready within {READY_TIMEOUT_S:g} s: {self.last_words()}"
+            ) from None
+        finally:
+            ended.cancel()
+            await asyncio.gather(ended, return_exceptions=True)
+        return said
+
+    async def settled(self) -> None:
+        """Wait a moment, in which a program that cannot run at all ends.
+
+        Raises:
+            ChildFailedError: it has ended.
+        """
+        # Unlike the process, the wait is cancelled at the end of that time.
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(SETTLE_S):
+                await self.ended()
+                raise ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
+
+    async def _next_line(self, ended: asyncio.Task[int]) -> dict[str, Any]:
+        line = asyncio.get_running_loop().create_task(self._lines.get())
+        try:
+            await asyncio.wait((line, ended), return_when=asyncio.FIRST_COMPLETED)
+            if line.done():
+                return line.result()
+            raise ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
+        finally:
+            line.cancel()
+            await asyncio.gather(line, return_exceptions=True)
+
+    async def ended(self) -> int:
+        """Wait for its end and for all it had to say; its exit status."""
+        code = await self._started.wait()
+        # Unlike a gathering, a wait that is cancelled lets the readers go on.
+        await asyncio.wait(self._readers)
+        return code
+
+    async def stop(self) -> None:
+        """End it: SIGTERM, and SIGKILL if it does not listen. Its log is complete then."""
+        if self._process is None:
+            return
+        if self.returncode is None:
+            self.stopped = True
+            self._signal(signal.SIGTERM)
+            try:
+                async with asyncio.timeout(
+                    RETURN_TIMEOUT_S if self._returns else TERMINATE_TIMEOUT_S
+                ):
+                    await self._process.wait()
+            except TimeoutError:
+                self._signal(signal.SIGKILL)
+        await self._gone()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+
+    async def kill(self) -> None:
+        """End it at once, by SIGKILL, as a crash would. Its log is complete then."""
+        if self.returncode is None:
+            self.stopped = True
+            self._signal(signal.SIGKILL)
+        await self._gone()
+
+    def pause(self) -> None:
+        """Stop it in its tracks, by SIGSTOP: it hangs, and all its connections stay open."""
+        self._signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let it go on after `pause`."""
+        self._signal(signal.SIGCONT)
+
+    def _signal(self, number: signal.Signals) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            self._started.send_signal(number)
+
+    async def _gone(self) -> None:
+        """Wait for its end and its last words, but not for ever.
+
+        What it has started itself may hold its pipes open; that ends with it. A process that
+        waits for a device in the kernel dies only when that answers: it is left.
+        """
+        for last_try in (False, True):
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(KILL_TIMEOUT_S):
+                    await self.ended()
+                    break
+            if not last_try:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(self.pid, signal.SIGKILL)
+        for reader in self._readers:
+            reader.cancel()
+        await asyncio.gather(*self._readers, return_exceptions=True)
+
+    def last_words(self) -> str:
+        """The last line of its log."""
+        return self.log[-1] if self.log else "it left no message"
+
+    @property
+    def _started(self) -> asyncio.subprocess.Process:
+        if self._process is None:
+            raise ValueError(f"{self.name} has not been started")
+        return self._process
+
+    async def _read_out(self) -> None:
+        stream = self._started.stdout
+        while stream is not None and (line := await stream.readline()):
+            try:
+                said = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(said, dict):
+                self._lines.put_nowait(said)
+                if self._on_line is not None:
+                    self._on_line(said)
+
+    async def _read_err(self) -> None:
+        stream = self._started.stderr
+        while stream is not None and (line := await stream.readline()):
+            text = line.decode(errors="replace").rstrip()
+            self.log.append(text)
+            if self._on_log is not None:
+                self._on_log(self.name, text)

@@ -1,0 +1,272 @@
+"""How real firmware is started in software-in-the-loop: a pure description, one process a UAV.
+
+ArduCopter is one binary: its options name model, instance, home place, speed-up and system
+id, its parameters come from a file, and instance n waits for its agent at TCP port
+5760 + 10 n; a ground station may connect to the port two above. It goes on booting once the
+agent is there (ArduPilot, ``libraries/AP_HAL_SITL/SITL_cmdline.cpp`` and
+``Tools/autotest/default_params/copter.parm``;
+https://ardupilot.org/dev/docs/sitl-serial-mapping.html).
+PX4 is a build folder with ``bin/px4`` and ``etc``: everything but the instance is said by
+environment variables, the vehicle is the quadrotor of its own simulator, which needs no
+other program, instance n has system id n + 1 and speaks to UDP port 14540 + n; a ground
+station is spoken to at 14550 (PX4-Autopilot, ``Tools/simulation/sitl_multiple_run.sh``,
+``ROMFS/px4fmu_common/init.d-posix/{rcS,px4-rc.mavlink,px4-rc.simulator}`` and
+``src/modules/simulation/simulator_sih/sih.cpp``;
+https://docs.px4.io/main/en/sim_sih/). Leaves out: starting it (sim.fleet.launcher).
+
+They work below a folder of their own, in whatever shell scripts they bring along: PX4's startup
+script names files below its working folder without quotes, and looks some up along PATH, so a
+space, a star or a colon in that name ends it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Final
+
+from swarm.model import Mission
+from swarm.model.frames import DEFAULT_ORIGIN, wgs84_from_enu
+from swarm.runtime.errors import Fault, InputError
+
+__all__ = ["FirmwareKind", "FirmwareProcess", "SitlFirmware", "find_firmware", "firmware_workplace"]
+
+
+_ARDUCOPTER_PORT: Final = 5760
+
+_ARDUCOPTER_PORTS_EACH: Final = 10
+
+_ARDUCOPTER_MOST: Final = 250
+"""System ids end at 255, which is customary for ground stations."""
+
+_PX4_PORT: Final = 14540
+
+_PX4_MOST: Final = 10
+"""From its eleventh instance on PX4 speaks to one and the same UDP port."""
+
+_PX4_DRAG_N_PER_M_S: Final = 0.3
+"""Of the simulator's quadrotor of 1 kg. Its own 1.0 lets nothing fall faster than 10 m/s and
+takes a tilt of 39° at 8 m/s, where a real one takes 10° to 15°: it creeps up to its speed for 15 s
+and overshoots its targets, and every leg takes 7 s longer."""
+
+_HEADING_DEG: Final = 0.0
+
+
+ARDUCOPTER_PARAMETERS: Final = {
+    # A quadrotor in "+" order, as the model is.
+    "FRAME_CLASS": 1,
+    "FRAME_TYPE": 0,
+    # What calibration of sensors and radio would have left; arming is refused without.
+    "INS_ACCOFFS_X": 0.001,
+    "INS_ACCOFFS_Y": 0.001,
+    "INS_ACCOFFS_Z": 0.001,
+    "INS_ACCSCAL_X": 1.001,
+    "INS_ACCSCAL_Y": 1.001,
+    "INS_ACCSCAL_Z": 1.001,
+    "INS_ACC2OFFS_X": 0.001,
+    "INS_ACC2OFFS_Y": 0.001,
+    "INS_ACC2OFFS_Z": 0.001,
+    "INS_ACC2SCAL_X": 1.001,
+    "INS_ACC2SCAL_Y": 1.001,
+    "INS_ACC2SCAL_Z": 1.001,
+    "COMPASS_OFS_X": 5,
+    "COMPASS_OFS_Y": 13,
+    "COMPASS_OFS_Z": -18,
+    "COMPASS_OFS2_X": 5,
+    "COMPASS_OFS2_Y": 13,
+    "COMPASS_OFS2_Z": -18,
+    "COMPASS_OFS3_X": 5,
+    "COMPASS_OFS3_Y": 13,
+    "COMPASS_OFS3_Z": -18,
+    **{f"RC{channel}_MIN": 1000 for channel in range(1, 9)},
+    **{f"RC{channel}_MAX": 2000 for channel in range(1, 9)},
+    **{f"RC{channel}_TRIM": 1500 for channel in range(1, 9)},
+    "FS_THR_ENABLE": 1,
+    # The model's battery and motors.
+    "BATT_MONITOR": 4,
+    # 3300 mAh unless told otherwise, which reach the agents' reserve of 20 % in six minutes;
+    # the model's voltage does not sag, as SIM_BATT_CAP_AH is 0.
+    "BATT_CAPACITY": 33_000,
+    "MOT_THST_EXPO": 0.65,
+    "MOT_THST_HOVER": 0.39,
+    "MOT_BAT_VOLT_MIN": 9.6,
+    "MOT_BAT_VOLT_MAX": 12.8,
+    "ATC_RAT_YAW_P": 0.09,
+    "ATC_RAT_YAW_I": 0.009,
+}
+"""What ArduPilot's own tests give the model; see ``copter.parm`` there."""
+
+_ARDUCOPTER_FILE: Final = "copter.parm"
+
+
+class FirmwareKind(StrEnum):
+    """Firmware that `swarm run` can start."""
+
+    ARDUPILOT = "ardupilot"
+    PX4 = "px4"
+
+    @property
+    def variable(self) -> str:
+        """Environment variable that says where it is."""
+        return _VARIABLES[self]
+
+    @property
+    def most(self) -> int:
+        """Instances that can run side by side on one machine."""
+        return _ARDUCOPTER_MOST if self is FirmwareKind.ARDUPILOT else _PX4_MOST
+
+
+_VARIABLES: Final = {
+    FirmwareKind.ARDUPILOT: "SWARM_SITL_ARDUCOPTER",
+    FirmwareKind.PX4: "SWARM_SITL_PX4",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FirmwareProcess:
+    """One instance: how to start it, and where its agent finds it."""
+
+    command: tuple[str, ...]
+    """Program and arguments; to be run in a folder of its own."""
+    folder: str
+    """Name of that folder: nothing in it that a shell would not take as it is."""
+    environment: Mapping[str, str]
+    """Variables beside those of this process."""
+    files: Mapping[str, str]
+    """Name and text of the files it needs in its folder."""
+    url: str
+    system_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class SitlFirmware:
+    """Real firmware in software-in-the-loop, one instance for each UAV."""
+
+    kind: FirmwareKind
+    program: Path
+    """Absolute path of the binary."""
+    workplace: Path
+    """Where its instances get folders of their own."""
+
+    def processes(self, mission: Mission, speedup: float) -> dict[str, FirmwareProcess]:
+        """Processes by UAV, each vehicle standing at its UAV's start."""
+        origin = mission.origin or DEFAULT_ORIGIN
+        make = self._arducopter if self.kind is FirmwareKind.ARDUPILOT else self._px4
+        return {
+            uav.id: make(number, wgs84_from_enu(origin, uav.position_enu_m), speedup)
+            for number, uav in enumerate(mission.uavs)
+        }
+
+    def _arducopter(
+        self, number: int, home: tuple[float, float, float], speedup: float
+    ) -> FirmwareProcess:
+        lat_deg, lon_deg, alt_m = home
+        port = _ARDUCOPTER_PORT + _ARDUCOPTER_PORTS_EACH * number
+        command = (
+            *(str(self.program), "--model", "+"),
+            *("--speedup", f"{speedup:g}"),
+            *("--home", f"{lat_deg:.7f},{lon_deg:.7f},{alt_m:.2f},{_HEADING_DEG:g}"),
+            *("--defaults", _ARDUCOPTER_FILE),
+            *("--instance", str(number)),
+            *("--sysid", str(number + 1)),
+        )
+        parameters = "".join(f"{name} {value}\n" for name, value in ARDUCOPTER_PARAMETERS.items())
+        url = f"tcp:127.0.0.1:{port}"
+        files = {_ARDUCOPTER_FILE: parameters}
+        return FirmwareProcess(command, self._folder(number), {}, files, url, number + 1)
+
+    def _px4(
+        self, number: int, home: tuple[float, float, float], speedup: float
+    ) -> FirmwareProcess:
+        lat_deg, lon_deg, alt_m = home
+        etc = self.program.parent.parent / "etc"
+        startup = "etc/init.d-posix/rcS"  # found through a link that px4 makes in its folder
+        environment = {
+            "PX4_SIM_MODEL": "sihsim_quadx",
+            "PX4_SIMULATOR": "sihsim",
+            "PX4_SIM_SPEED_FACTOR": f"{speedup:g}",
+            "PX4_HOME_LAT": f"{lat_deg:.7f}",
+            "PX4_HOME_LON": f"{lon_deg:.7f}",
+            "PX4_HOME_ALT": f"{alt_m:.2f}",
+            "PX4_PARAM_SIH_KDV": f"{_PX4_DRAG_N_PER_M_S:g}",
+        }
+        command = (str(self.program), "-i", str(number), "-d", "-s", startup, str(etc))
+        url = f"udpin:127.0.0.1:{_PX4_PORT + number}"
+        return FirmwareProcess(command, self._folder(number), environment, {}, url, number + 1)
+
+    def _folder(self, number: int) -> str:
+        return f"{self.kind}-{number + 1}"
+
+
+def find_firmware(
+    kind: FirmwareKind, n_uav: int, path: Path | None, environment: Mapping[str, str]
+) -> SitlFirmware:
+    """The firmware of that kind on this machine.
+
+    Args:
+        kind: which.
+        n_uav: how many instances are needed.
+        path: ArduCopter's binary, or a build folder of PX4; None: where the variable says.
+        environment: environment variables.
+
+    Raises:
+        InputError: it is not there, cannot serve so many, or has no place to work in.
+    """
+    source = "--firmware" if path is not None else kind.variable
+    what, example = (
+        ("ArduPilot's binary", "~/ardupilot/build/sitl/bin/arducopter")
+        if kind is FirmwareKind.ARDUPILOT
+        else ("a build folder of PX4", "~/PX4-Autopilot/build/px4_sitl_default")
+    )
+    remedy = f"give the path of {what}, such as {example}"
+    text = str(path) if path is not None else environment.get(kind.variable, "")
+    if not text:
+        where = f"by --firmware PATH or in {kind.variable}"
+        raise InputError(Fault("--autopilot", kind, "no firmware is known", f"{remedy}, {where}"))
+    place = Path(text).expanduser().absolute()
+    program = place / "bin" / "px4" if kind is FirmwareKind.PX4 else place
+    if not program.is_file():
+        raise InputError(Fault(source, text, f"there is no file {program}", remedy))
+    if not os.access(program, os.X_OK):
+        raise InputError(Fault(source, text, f"{program} cannot be executed", remedy))
+    if kind is FirmwareKind.PX4 and not (place / "etc" / "init.d-posix" / "rcS").is_file():
+        problem = f"there is no startup script {place}/etc/init.d-posix/rcS"
+        raise InputError(Fault(source, text, problem, remedy))
+    if kind is FirmwareKind.PX4 and os.pathsep in str(place):
+        problem = f"PX4 finds its programs along PATH, so not below a folder with {os.pathsep!r}"
+        raise InputError(Fault(source, text, problem, "give the build folder another name"))
+    if n_uav > kind.most:
+        problem = f"{n_uav} UAVs, but at most {kind.most} such vehicles run on one machine"
+        raise InputError(Fault("--autopilot", kind, problem, "fly a smaller scenario"))
+    return SitlFirmware(kind, program, firmware_workplace())
+
+
+_PLAIN: Final = re.compile(r"[A-Za-z0-9_./+-]+")
+"""Signs that mean nothing to a shell, quoted or not, nor in PATH."""
+
+_COMMON: Final = (Path("/tmp"), Path("/var/tmp"))  # noqa: S108 - files go into a private folder
+
+
+def firmware_workplace(folders: Sequence[Path] | None = None) -> Path:
+    """The first folder whose name a shell takes as it is, and in which files can be made.
+
+    Args:
+        folders: candidates; None: where temporary files go, then where they usually go.
+
+    Raises:
+        InputError: there is none.
+    """
+    candidates = folders or (Path(tempfile.gettempdir()), *_COMMON)
+    for folder in candidates:
+        # A shell that is started there calls it by its own name, not by that of a link.
+        place = folder.resolve()
+        if _PLAIN.fullmatch(str(place)) and place.is_dir() and os.access(place, os.W_OK | os.X_OK):
+            return place
+    problem = "firmware's scripts can work neither there nor in a common place"
+    remedy = "name a folder by letters, digits and _ . + - only, and let files be made in it"
+    raise InputError(Fault("TMPDIR", str(candidates[0]), problem, remedy))

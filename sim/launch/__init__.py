@@ -1,1 +1,0 @@
-"""`swarm run`: all processes of one mission on this machine."""

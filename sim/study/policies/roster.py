@@ -1,0 +1,170 @@
+"""What a policy looks like, and the policies that studies compare, by name.
+
+Each is imported when a study asks for it, and not before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any, Protocol
+
+from sim.world.outcome import FlightOutcome
+from sim.world.uncertainty import Realization
+from swarm.model import Mission, Plan
+from swarm.runtime.clock import Clock
+
+__all__ = ["ROSTER", "Bound", "Planner", "Policy", "PolicyEntry", "PolicyRoster"]
+
+
+Planner = Callable[[Mission, str], Plan]
+"""The offline plan of what is known of a mission at its start, by method; the same for all
+policies that meet the same realization, and worked out once."""
+
+
+class Policy(Protocol):
+    """A way to run a fleet."""
+
+    @property
+    def name(self) -> str:
+        """By which studies ask for it."""
+        ...
+
+    @property
+    def what(self) -> str:
+        """In a few words, for a table."""
+        ...
+
+    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
+        """Fly a mission to its end.
+
+        Args:
+            fate: what happens.
+            plan: offline planner.
+            clock: times decisions, and decides nothing.
+        """
+        ...
+
+
+class Bound(Protocol):
+    """A value that no policy can exceed."""
+
+    @property
+    def name(self) -> str:
+        """By which studies ask for it."""
+        ...
+
+    @property
+    def what(self) -> str:
+        """In a few words, for a table."""
+        ...
+
+    def value(self, fate: Realization, plan: Planner) -> float:
+        """The bound for that realization [value·s]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyEntry:
+    """Where a policy or a bound is made."""
+
+    module: str
+    what: str
+    """In that module: the policy, or a class of policies, which is called without arguments or
+    with the number behind the colon."""
+    parameter: str = ""
+    """What that number is, with its unit; empty for a policy without."""
+    ideal: bool = False
+    """Whether it is modelled with ideal communication only."""
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyRoster:
+    """Policies by name, and the bound."""
+
+    policies: Mapping[str, PolicyEntry]
+    bound: PolicyEntry
+
+    def fault(self, name: str) -> tuple[str, str] | None:
+        """What is wrong with ``name`` and what would be right; None for a policy's name."""
+        stem, colon, number = name.partition(":")
+        entry = self.policies.get(stem)
+        if entry is None:
+            close = get_close_matches(stem, self.policies, n=1)
+            names = ", ".join(self.policies)
+            remedy = f"did you mean {close[0]!r}?" if close else f"the policies are {names}"
+            return f"no such policy {name!r}", remedy
+        if not colon:
+            return None
+        if not entry.parameter:
+            return f"{name!r} has a number, and {stem} takes none", f"write {stem!r}"
+        if _positive(number) is None:
+            right = f"give {entry.parameter} > 0, such as {stem + ':60'!r}"
+            return f"{name!r} has no number > 0 behind the colon", right
+        return None
+
+    def policy(self, name: str) -> Policy:
+        """The policy of that name.
+
+        Raises:
+            ValueError: there is none.
+        """
+        stem, _, number = name.partition(":")
+        if self.fault(name) is not None:
+            raise ValueError(f"no such policy: {name!r}")
+        value = _positive(number)
+        policy: Policy = _made(self.policies[stem], *(() if value is None else (value,)))
+        return policy
+
+    def ideal(self, name: str) -> bool:
+        """Whether the policy of that name is modelled with ideal communication only."""
+        return self.policies[name.partition(":")[0]].ideal
+
+    def make_bound(self) -> Bound:
+        """The bound."""
+        bound: Bound = _made(self.bound)
+        return bound
+
+
+def _positive(text: str) -> float | None:
+    """The number > 0 that ``text`` is; None if it is none."""
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if 0.0 < number < math.inf else None
+
+
+def _made(entry: PolicyEntry, *arguments: float) -> Any:
+    what = getattr(import_module(entry.module), entry.what)
+    return what(*arguments) if isinstance(what, type) else what
+
+
+_PACKAGE = "sim.study.policies"
+
+_AGENTS = f"{_PACKAGE}.agents"
+
+ROSTER = PolicyRoster(
+    policies={
+        "guided": PolicyEntry(_AGENTS, "GUIDED"),
+        "guided-alone": PolicyEntry(_AGENTS, "GUIDED_ALONE"),
+        "greedy": PolicyEntry(_AGENTS, "GREEDY"),
+        "lookahead": PolicyEntry(_AGENTS, "LOOKAHEAD"),
+        "central": PolicyEntry(f"{_PACKAGE}.replanning", "Central", ideal=True),
+        "central-divert": PolicyEntry(f"{_PACKAGE}.replanning", "CentralDivert", ideal=True),
+        "interval": PolicyEntry(
+            f"{_PACKAGE}.replanning", "Interval", parameter="an interval [s]", ideal=True
+        ),
+        "frozen": PolicyEntry(f"{_PACKAGE}.dispatchers", "Frozen", ideal=True),
+        "cbba": PolicyEntry(f"{_PACKAGE}.replanning", "Cbba", ideal=True),
+        "nearest": PolicyEntry(f"{_PACKAGE}.dispatchers", "NEAREST_FIRST", ideal=True),
+        "value-per-time": PolicyEntry(
+            f"{_PACKAGE}.dispatchers", "VALUE_PER_TIME_ONLINE", ideal=True
+        ),
+    },
+    bound=PolicyEntry(f"{_PACKAGE}.clairvoyant", "Clairvoyant"),
+)
+"""Those of the project."""

@@ -1,0 +1,223 @@
+"""The command `swarm simulate`.
+
+Leaves out: what it does (sim.world.simulation, sim.faults, sim.world.redecision) and how missions
+are shown (coordinator.terminal).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coordinator.recording.options import RecordOption, check_new_recording
+from sim.options import (
+    CoordinatorLostOption,
+    DelayOption,
+    JitterOption,
+    LegSdOption,
+    LossOption,
+    MessageLossOption,
+    MethodOption,
+    OutcomesOption,
+    PartitionLengthOption,
+    PartitionRateOption,
+    PopupOption,
+    PopupRateOption,
+    PositionErrorOption,
+    ReattemptOption,
+    ReportOption,
+    SpeedSdOption,
+    SurvivalOption,
+    WindOption,
+    WithdrawRateOption,
+    asked_for,
+    print_report,
+    with_reattempts,
+)
+from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.options import JsonOption, OptionalScenarioArgument, SeedOption
+
+__all__ = ["simulate"]
+
+
+def simulate(
+    ctx: typer.Context,
+    scenario: OptionalScenarioArgument = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="FILE.mcap",
+            help="Instead of flying a scenario, make every decision in that recording again from "
+            "the same inputs, and tell of those that come out otherwise.",
+            show_default=False,
+        ),
+    ] = None,
+    method: MethodOption = "greedy",
+    seed: SeedOption = 0,
+    loss: LossOption = None,
+    popup: PopupOption = None,
+    popup_rate: PopupRateOption = None,
+    withdraw_rate: WithdrawRateOption = None,
+    outcomes: OutcomesOption = None,
+    reattempt: ReattemptOption = None,
+    survival: SurvivalOption = None,
+    speed_sd: SpeedSdOption = None,
+    leg_sd: LegSdOption = None,
+    wind: WindOption = None,
+    position_error_m: PositionErrorOption = None,
+    message_loss: MessageLossOption = None,
+    delay_s: DelayOption = None,
+    jitter_s: JitterOption = None,
+    partition_rate: PartitionRateOption = None,
+    partition_s: PartitionLengthOption = None,
+    coordinator_lost_s: CoordinatorLostOption = None,
+    faults: Annotated[
+        str | None,
+        typer.Option(
+            "--faults",
+            metavar="KINDS|FILE",
+            help="Let more go wrong: kinds of fault with commas between, all, or a file with a "
+            "schedule of them.",
+            show_default=False,
+        ),
+    ] = None,
+    report: ReportOption = None,
+    record: RecordOption = None,
+    json: JsonOption = False,
+) -> int:
+    """Fly a mission in virtual time, by the agents' real code.
+
+    The coordinator's code is the real one as well; there are no sockets. Unless told otherwise
+    nothing is uncertain: vehicles and network are ideal, and the lists flown are exactly those
+    planned. Each kind of uncertainty is drawn from the seed by itself, so asking for one leaves
+    what the others draw as it was. With --faults the network and the clocks are like real ones,
+    what goes wrong is told on standard error in lines that a file may hold, and the invariants of
+    a fleet are watched. Exit status 0: every task was done, and no invariant broken. With --from
+    FILE.mcap, which takes no scenario and no other option but --json, decisions that were recorded
+    are made again; exit status 0: none came out otherwise.
+
+    Examples:
+        swarm simulate table-1
+        swarm simulate valley-survey --loss 0.3 --popup 0.3 --seed 7
+        swarm simulate valley-survey --method guided --loss 0.3 --coordinator-lost-s 0
+        swarm simulate table-1 --outcomes --reattempt --seed 1
+        swarm simulate valley-survey --speed-sd 0.1 --leg-sd 0.1 --wind 5
+        swarm simulate valley-survey --message-loss 0.2 --delay-s 0.05 --jitter-s 0.05
+        swarm simulate valley-survey --faults cut,crash --seed 7
+        swarm simulate valley-survey --loss 0.3 --record flight.mcap
+        swarm simulate --from flight.mcap
+    """
+    if recording is not None:
+        _refuse_all_but(ctx, "recording", "json")
+        return _redecide(recording, json=json)
+    if scenario is None:
+        remedy = "name a scenario, such as table-1, or a recording with --from"
+        raise InputError(Fault("swarm simulate", "", "nothing to simulate", remedy))
+
+    from coordinator.planner.plan import check_online_method
+    from coordinator.terminal.report import MissionReport, check_report_path
+    from sim.faults.generator import fly_with_faults
+    from sim.faults.schedule import format_schedule
+    from sim.world.simulation import recording_simulation, simulate_mission
+    from sim.world.uncertainty import Uncertainty
+    from swarm.scenario import load_scenario
+
+    check_online_method(method)
+    if report is not None:
+        check_report_path(report)
+    if record is not None:
+        check_new_recording(record)
+    uncertainty = asked_for(Uncertainty(), loss=loss, popup=popup, popups_per_min=popup_rate)
+    beside_faults = uncertainty
+    uncertainty = asked_for(
+        uncertainty,
+        withdrawals_per_min=withdraw_rate,
+        outcomes=outcomes,
+        survival=survival,
+        speed_sd_frac=speed_sd,
+        leg_sd_frac=leg_sd,
+        wind_m_s=wind,
+        position_error_m=position_error_m,
+        message_loss=message_loss,
+        delay_s=delay_s,
+        jitter_s=jitter_s,
+        partitions_per_min=partition_rate,
+        partition_s=partition_s,
+    )
+    mission = with_reattempts(load_scenario(scenario), reattempt=reattempt)
+    if faults is None:
+        with recording_simulation(mission.name, str(scenario), record) as looks_on:
+            flown = simulate_mission(
+                mission,
+                method=method,
+                seed=seed,
+                uncertainty=uncertainty,
+                coordinator_lost_s=coordinator_lost_s,
+                make_observer=looks_on,
+            )
+            if not flown.in_time:
+                typer.echo("broken off: somebody would have waited for ever", err=True)
+            told = MissionReport(
+                mission=flown.world.mission,
+                plan=flown.world.mission_state.plan,
+                result=flown.result,
+                story=tuple(flown.world.mission_state.story),
+                lost_because=flown.lost_because,
+                value=flown.value,
+            )
+            return print_report(told, json=json, report=report)
+    if record is not None:
+        problem, remedy = "does not go with --faults", "leave one of them out"
+        raise InputError(Fault("--record", str(record), problem, remedy))
+    if uncertainty != beside_faults or coordinator_lost_s is not None:
+        problem = "goes with --loss, --popup and --popup-rate only"
+        remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"
+        raise InputError(Fault("--faults", faults, problem, remedy))
+    verdict = fly_with_faults(
+        mission, method=method, seed=seed, uncertainty=uncertainty, faults=faults
+    )
+    typer.echo(format_schedule(verdict.case.schedule), nl=False, err=True)
+    if verdict.broken is not None:
+        typer.echo(f"broken: {verdict.broken}", err=True)
+    world = verdict.world
+    told = MissionReport(
+        mission=world.mission_state.mission,
+        plan=world.mission_state.plan,
+        result=world.mission_state.result(),
+        story=tuple(world.mission_state.story),
+    )
+    status = print_report(told, json=json, report=report)
+    return status if verdict.broken is None else 1
+
+
+def _refuse_all_but(ctx: typer.Context, *names: str) -> None:
+    """What is said on the command line beside these parameters would have no effect."""
+    for parameter in ctx.command.params:
+        source = ctx.get_parameter_source(parameter.name or "")
+        if parameter.name in names or source is None or source.name != "COMMANDLINE":
+            continue
+        said = max(parameter.opts, key=len) if parameter.param_type_name == "option" else "SCENARIO"
+        problem, remedy = "has no meaning with --from, which flies nothing", "leave it out"
+        raise InputError(Fault(said, "", problem, remedy))
+
+
+def _redecide(path: Path, *, json: bool) -> int:
+    """Decide again what is recorded in ``path``; the exit status of the command."""
+    from json import dumps
+
+    from coordinator.recording.reader import read_recording
+    from sim.world.redecision import redecide, redecided_as_json, redecided_lines
+
+    recording = read_recording(path)
+    if recording.torn is not None:
+        typer.echo(recording.torn, err=True)
+    found = redecide(entry.fact for entry in recording.entries)
+    if json:
+        typer.echo(dumps(redecided_as_json(recording.mission, found), allow_nan=False))
+    else:
+        for line in redecided_lines(recording.mission, found):
+            typer.echo(line)
+    return 0 if found.ok else 1

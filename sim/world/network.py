@@ -1,0 +1,181 @@
+"""What joins the processes of a virtual world: messages, tokens and questions.
+
+`IdealNetwork` brings everything to everyone after one constant time. Leaves out: a network on which
+anything goes wrong (sim.world.rough_network; here is only what it is like at its best), and what
+the processes make of what they hear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from sim.world.engine import EventQueue
+from swarm.protocol.events import (
+    CommonEvent,
+    MessageReceived,
+    PeerGone,
+    PeerSeen,
+    SnapshotsReceived,
+)
+from swarm.protocol.messages import Message, Snapshot
+from swarm.protocol.timing import PRESETS, LinkKind
+from swarm.protocol.uav_messages import Choice, Status
+
+__all__ = ["IdealNetwork", "Network", "NetworkConditions", "Node", "Topology"]
+
+
+class Node(Protocol):
+    """One life of one process, as the network sees it."""
+
+    @property
+    def name(self) -> str:
+        """Of the process; the same in its next life."""
+        ...
+
+    writer: str | None
+    """Whose token it holds and for whom it answers; None for an observer."""
+
+    def receive(self, fact: CommonEvent) -> None:
+        """Something has arrived; nothing happens any more at the seat of one that ended."""
+        ...
+
+    def answer(self) -> Snapshot | None:
+        """What it answers when asked; None when it cannot."""
+        ...
+
+
+class Network(Protocol):
+    """Joins seats."""
+
+    def join(self, seat: Node) -> None:
+        """A process begins."""
+        ...
+
+    def leave(self, seat: Node) -> None:
+        """A process has ended, of itself or not."""
+        ...
+
+    def seat(self, seat: Node, writer: str) -> None:
+        """Who has been an observer shows the token of ``writer`` and answers for it."""
+        ...
+
+    def publish(self, sender: Node, message: Message) -> None:
+        """``sender`` says ``message``."""
+        ...
+
+    def ask(self, asker: Node) -> None:
+        """``asker`` asks all others; ends in its `SnapshotsReceived`."""
+        ...
+
+
+class IdealNetwork:
+    """Everyone hears everything after the same time, in order.
+
+    Args:
+        queue: virtual time.
+        latency_s: of everything that is told [s].
+    """
+
+    def __init__(self, queue: EventQueue, latency_s: float) -> None:
+        self._queue = queue
+        self._latency_s = latency_s
+        self._seats: list[Node] = []
+
+    def join(self, seat: Node) -> None:
+        """Show the tokens of both to the newcomer and the others."""
+        for other in self._seats:
+            if other.writer is not None:
+                self._later(self._telling(seat, PeerSeen(other.writer)))
+            if seat.writer is not None:
+                self._later(self._telling(other, PeerSeen(seat.writer)))
+        self._seats.append(seat)
+
+    def leave(self, seat: Node) -> None:
+        """Take the token away."""
+        self._seats.remove(seat)
+        if seat.writer is not None:
+            self._tell_all(PeerGone(seat.writer), seat)
+
+    def seat(self, seat: Node, writer: str) -> None:
+        """Show the token."""
+        seat.writer = writer
+        self._tell_all(PeerSeen(writer), seat)
+
+    def publish(self, sender: Node, message: Message) -> None:
+        """Tell everyone; status and choices go to observers only."""
+        for_onlookers = isinstance(message.body, Status | Choice)
+        self._tell_all(MessageReceived(message), sender, onlookers_only=for_onlookers)
+
+    def ask(self, asker: Node) -> None:
+        """All answer at one instant."""
+
+        def answer() -> None:
+            answers = [seat.answer() for seat in self._seats if seat is not asker]
+            learned = SnapshotsReceived(tuple(a for a in answers if a is not None))
+            self._later(lambda: asker.receive(learned))
+
+        self._later(answer)
+
+    def _tell_all(self, fact: CommonEvent, sender: Node, *, onlookers_only: bool = False) -> None:
+        def tell() -> None:
+            for seat in tuple(self._seats):
+                if seat is not sender and not (onlookers_only and seat.writer is not None):
+                    seat.receive(fact)
+
+        self._later(tell)
+
+    @staticmethod
+    def _telling(seat: Node, fact: CommonEvent) -> Callable[[], None]:
+        return lambda: seat.receive(fact)
+
+    def _later(self, callback: Callable[[], None]) -> None:
+        self._queue.after(self._latency_s, callback)
+
+
+class Topology(StrEnum):
+    """How processes reach each other."""
+
+    MESH = "mesh"
+    """Directly."""
+    ROUTER = "router"
+    """Through one router, which is never on the side that is cut off."""
+    ROUTERS = "routers"
+    """Through routers, one on each side of every cut."""
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkConditions:
+    """The network at its best."""
+
+    topology: Topology = Topology.ROUTER
+    latency_s: float = 0.005
+    """Least delay of a message [s]."""
+    spread_s: float = 0.02
+    """Mean of what comes on top of it, exponentially distributed; of each link up to twice that."""
+    lease_s: float = PRESETS[LinkKind.NORMAL].lease_s
+    answer_s: float = PRESETS[LinkKind.NORMAL].answer_s
+    """How long a question waits for the slowest answer."""
+    reconnect_s: float = 1.0
+    """A transport that could be there again is so within this time."""
+    weather_delay_s: float = 1.0
+    """In the worst weather, what may come on top of the delay."""
+    loss_frac: float = 0.0
+    """Share of messages that are lost in any weather; those that arrive do so in order."""
+
+
+@dataclass(eq=False, slots=True)
+class RouterNode:
+    """The seat of the routers, seen as one."""
+
+    name: str = "router"
+    writer: str | None = None
+
+    def receive(self, fact: CommonEvent) -> None:
+        """Routers take no part."""
+
+    def answer(self) -> Snapshot | None:
+        """Routers know nothing."""
+        return None

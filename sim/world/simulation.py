@@ -1,0 +1,124 @@
+"""One mission in virtual time, from a scenario and one seed, and its recording.
+
+Leaves out: the world itself (sim.world.stochastic_world) and studies of many missions.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.results import MissionResult
+from coordinator.planner.plan import make_plan
+from coordinator.recording.flight_recorder import recording_to, virtual_ns
+from coordinator.recording.recorder import RecordedCore, RecordingInfo
+from sim.world.outcome import Tally, value_of
+from sim.world.stochastic_world import ObserverMaker, StochasticWorld
+from sim.world.uncertainty import Uncertainty
+from sim.world.virtual_world import World
+from swarm.model import Mission, Plan, UavId
+from swarm.protocol.events import CommonAction
+from swarm.protocol.timing import Timing
+from swarm.runtime.clock import SystemClock
+from swarm.runtime.errors import SwarmError
+
+__all__ = ["SimulatedMission", "recording_simulation", "simulate_mission"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedMission:
+    """A mission that is over."""
+
+    world: World
+    result: MissionResult
+    """What was executed; the lost are those that really were."""
+    lost_because: dict[UavId, str]
+    """When and why, in the order of the losses."""
+    value: float
+    """Of what was flown: where outcomes are drawn only success counts [value·s]."""
+    in_time: bool
+    """Whether it ended by itself; else somebody would have waited for ever."""
+
+
+def simulate_mission(
+    mission: Mission,
+    *,
+    method: str,
+    seed: int,
+    uncertainty: Uncertainty,
+    coordinator_lost_s: float | None = None,
+    make_observer: ObserverMaker | None = None,
+) -> SimulatedMission:
+    """Fly ``mission`` in virtual time to its end.
+
+    Args:
+        mission: the scenario, pop-ups included.
+        method: planning method whose rule the agents use.
+        seed: of the planner and of all that is uncertain.
+        uncertainty: what may go wrong; moments are spread over the time the scenario's plan takes.
+        coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
+        make_observer: makes the core that looks on, as for a recording; nothing that is flown
+            depends on it.
+    """
+    clock = SystemClock()
+    made: list[tuple[Mission, Plan]] = []
+
+    def planner(what: Mission, how: str, with_seed: int) -> Plan:
+        known = what.known_at_start()
+        for earlier, plan in made:
+            if earlier == known:
+                return plan
+        plan = make_plan(known, how, clock=clock, seed=with_seed)
+        made.append((known, plan))
+        return plan
+
+    span_s = max(planner(mission, method, seed).completion_s.values(), default=0.0)
+    fate = uncertainty.draw(mission, span_s, seed)
+    tally = Tally()
+    flown = StochasticWorld(
+        fate,
+        planner,
+        method=method,
+        seed=seed,
+        coordinator_lost_s=coordinator_lost_s,
+        watch=tally,
+        make_observer=make_observer,
+    )
+    in_time = flown.run()
+    return SimulatedMission(
+        world=flown.world,
+        result=replace(flown.world.mission_state.result(), lost_uavs=tuple(flown.lost)),
+        lost_because=dict(flown.lost),
+        value=value_of(fate, tally.visits),
+        in_time=in_time,
+    )
+
+
+@contextlib.contextmanager
+def recording_simulation(
+    mission: str, scenario: str, path: Path | None
+) -> Iterator[ObserverMaker | None]:
+    """What makes an observer whose facts go into a new file; None if there is no path.
+
+    Raises:
+        SwarmError: in the end, if not everything could be written.
+    """
+    if path is None:
+        yield None
+        return
+    faults: list[str] = []
+    with contextlib.ExitStack() as open_files:
+
+        def look_on(mission_state: MissionState, timing: Timing) -> RecordedCore[CommonAction]:
+            about = RecordingInfo(mission, timing, scenario=scenario, virtual=True)
+            recorder = open_files.enter_context(
+                recording_to(path, about, virtual_ns, faults.append, patient=True)
+            )
+            return recorder.around(mission_state, mission_state)
+
+        yield look_on
+    if faults:
+        raise SwarmError(faults[0])

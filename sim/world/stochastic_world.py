@@ -1,0 +1,317 @@
+"""A world in which a realization comes true: who is lost, what appears, how far messages get.
+
+The agents and the coordinator are the real ones and know nothing of the realization; they meet it
+when it happens. When the coordinator is lost, an operator keeps the task board from then on, so
+tasks still appear and are withdrawn in time; the fleet stays out for as long as tasks may yet
+appear. A task that is withdrawn before it appears never does. Leaves out: drawing realizations
+(sim.world.uncertainty) and counting what came of them (sim.world.outcome).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from agent.core.agent_core import AgentCore
+from agent.core.interface import GoTo, VehicleReport
+from coordinator.mission_view.mission_state import MissionState
+from sim.world.engine import EventQueue, Process
+from sim.world.network import IdealNetwork, Network, NetworkConditions, Topology
+from sim.world.rough_network import RoughNetwork
+from sim.world.scripted_operator import ScriptedOperator
+from sim.world.settings import QUIET, Planner, WorldListener, WorldSettings
+from sim.world.uncertainty import FleetPartition, Realization, Uncertainty
+from sim.world.vehicles import IdealVehicle, SimulatedVehicle, StochasticVehicle
+from sim.world.virtual_world import World
+from swarm.model import Mission, Task, Uav, UavId
+from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.protocol.events import CommonAction, CommonEvent, LogLine
+from swarm.protocol.messages import Message, MissionPhase, PlanEpoch
+from swarm.protocol.timing import PRESETS, LinkKind, LinkPreset, Timing
+from swarm.protocol.uav_messages import Outcome
+from swarm.runtime.shell import Core
+
+__all__ = ["ObserverMaker", "StochasticWorld"]
+
+
+_HEARD_S = 0.1
+"""How often it is looked whether the start of the mission has been heard of."""
+_OPERATOR_SITS_DOWN_S = 1.0
+"""After the loss of a coordinator; until then everyone has noticed it."""
+_START_S = 600.0
+"""Until a mission starts whose UAVs do not all get airborne, be it because nobody tells them."""
+_REPEATS = 10
+"""How often an operator says each change of the board again."""
+_TAKEOFF_S = 20.0
+"""While the vehicles take off, the processes of a real fleet find each other."""
+_WIRED = replace(
+    PRESETS[LinkKind.CLEAN],
+    timing=replace(PRESETS[LinkKind.CLEAN].timing, announce_s=20.0, silence_s=60.0),
+)
+"""Where nothing is lost nothing need be said twice: who was cut off asks when it is back."""
+_STATUS_S = 60.0
+"""Nobody looks on while a mission is flown in virtual time..."""
+_WATCHED_STATUS_S = 0.5
+"""...unless it is recorded."""
+
+ObserverMaker = Callable[[MissionState, Timing], Core[CommonEvent, CommonAction]]
+"""Makes the core of an observer."""
+
+
+class StochasticWorld:
+    """One mission in virtual time, and all that befalls it.
+
+    Args:
+        fate: what happens.
+        make_plan: plans a mission by method and seed.
+        method: planning method.
+        seed: of the planner.
+        coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
+        watch: is told all that happens.
+        make_agent: makes the core of an agent.
+        make_onlooker: makes the core of the observer around its mission state, given the timers.
+    """
+
+    def __init__(
+        self,
+        fate: Realization,
+        make_plan: Planner,
+        *,
+        method: str,
+        seed: int,
+        coordinator_lost_s: float | None = None,
+        watch: WorldListener | None = None,
+        make_agent: Callable[..., AgentCore] = AgentCore,
+        make_observer: ObserverMaker | None = None,
+    ) -> None:
+        self.fate = fate
+        self.lost: dict[UavId, str] = {}
+        """UAVs lost on their mission, in that order, and why."""
+        self._coordinator_lost_s = coordinator_lost_s
+        self._uavs: dict[str, Uav] = {str(uav.id): uav for uav in fate.mission.uavs}
+        self._tasks: dict[str, Task] = {str(task.id): task for task in fate.mission.tasks}
+        self._mission = _without_never_seen(fate)
+        self._told_s = 0.0
+        """How long an operator repeats what they say."""
+        self._timing = self._timing_of(fate.uncertainty)
+        if make_observer is not None and fate.uncertainty.ideal_communication:
+            # There nobody's decision hangs on it, and nothing is drawn for each message.
+            self._timing = replace(self._timing, status_s=_WATCHED_STATUS_S)
+        timing = self._timing
+        self._next: WorldListener | None = watch
+        self._outcomes: set[tuple[str, str, int]] = set()
+        self._begun = False
+        self.world = World(
+            self._mission,
+            make_plan,
+            method=method,
+            seed=seed,
+            timing=self._timing,
+            setting=WorldSettings(
+                network=partial(_network, fate),
+                start_timeout_s=_START_S,
+                vehicle=partial(_vehicle, fate),
+                agent=make_agent,
+                observer=lambda mission_state: (
+                    mission_state if make_observer is None else make_observer(mission_state, timing)
+                ),
+            ),
+            watch=self,
+        )
+
+    def run(self) -> bool:
+        """Fly the mission; False if it had to be broken off, since somebody waits for ever."""
+        return self.world.run(_limit_s(self.fate, self._timing))
+
+    # -- what the world tells -----------------------------------------------------------
+
+    def said(self, process: Process, message: Message) -> None:
+        """A mission may have begun, or an attempt ended that its UAV does not survive."""
+        if self._next is not None:
+            self._next.said(process, message)
+        match message.body:
+            case Outcome() as outcome:
+                self._survive(process, outcome)
+            case PlanEpoch(phase=MissionPhase.RUNNING) if not self._begun:
+                self._begun = True
+                self._begin(self.world.queue.now_s())
+            case _:
+                pass
+
+    def stepped(self, process: Process) -> None:
+        """Nothing follows from a step."""
+        if self._next is not None:
+            self._next.stepped(process)
+
+    def raised(self, process: Process, fault: Exception) -> None:
+        """A core has raised.
+
+        Raises:
+            Exception: ``fault``, when nobody watches.
+        """
+        if self._next is None:
+            raise fault
+        self._next.raised(process, fault)
+
+    def refused(self, process: Process, order: GoTo) -> None:
+        """Nothing follows from a refusal."""
+        if self._next is not None:
+            self._next.refused(process, order)
+
+    def noted(self, process: Process, note: LogLine) -> None:
+        """Nothing follows from a note."""
+        if self._next is not None:
+            self._next.noted(process, note)
+
+    # -- what happens -------------------------------------------------------------------
+
+    def _begin(self, zero_s: float) -> None:
+        """Mission time has begun: schedule all that happens whatever anybody does."""
+        world, fate = self.world, self.fate
+        for uav, lost_s in fate.lost_at_s.items():
+            world.queue.at(zero_s + lost_s, partial(self._lose, uav, f"lost at {lost_s:.4g} s"))
+        for task, withdrawn_s in fate.withdrawn_at_s.items():
+            world.queue.at(zero_s + withdrawn_s, partial(world.withdraw, task))
+        for partition in fate.partitions:
+            if partition.group:
+                world.queue.at(zero_s + partition.at_s, partial(self._cut, partition))
+        if self._coordinator_lost_s is not None:
+            world.queue.at(zero_s + self._coordinator_lost_s, self._lose_coordinator)
+
+    def _lose(self, uav: UavId, why: str) -> None:
+        if not self.world.processes[uav].over:
+            self.lost[uav] = why
+            self.world.lose(uav)
+
+    def _lose_coordinator(self) -> None:
+        """It dies, but not before anybody has heard that the mission has begun."""
+        world = self.world
+        epochs = [agent.replica.epoch for agent in world.agents.values()]
+        if not any(epoch is not None and epoch.phase is MissionPhase.RUNNING for epoch in epochs):
+            if not world.processes[COORDINATOR].over:
+                world.queue.after(_HEARD_S, self._lose_coordinator)
+            return
+        world.lose(COORDINATOR)
+        if _last_change_s(self._mission, self.fate) > (self._coordinator_lost_s or 0.0):
+            world.queue.after(_OPERATOR_SITS_DOWN_S, self._seat_operator)
+
+    def _cut(self, partition: FleetPartition) -> None:
+        network = self.world.network
+        if isinstance(network, RoughNetwork):
+            network.cut(partition.group)
+            self.world.queue.after(partition.for_s, partial(network.heal, partition.group))
+
+    def _seat_operator(self) -> None:
+        world, timing = self.world, self._timing
+        zero_s, now_s = world.zero_s or 0.0, world.queue.now_s()
+        briefs = [agent.replica.brief for agent in world.agents.values()]
+        seat = ScriptedOperator(
+            self._mission,
+            self.fate.withdrawn_at_s,
+            since_s=self._coordinator_lost_s or 0.0,
+            mission_s=now_s - zero_s,
+            run=max((brief.run for brief in briefs if brief is not None), default=0),
+            incarnation=2_000_000 + round(1e3 * now_s),
+            timing=timing,
+            patience_s=self._told_s,
+        )
+        world.admit(OPERATOR, seat)
+
+    def _survive(self, process: Process, outcome: Outcome) -> None:
+        attempt = process.name, outcome.task, outcome.attempt
+        uav, task = self._uavs.get(process.name), self._tasks.get(outcome.task)
+        if uav is None or task is None or attempt in self._outcomes:
+            return  # said again
+        self._outcomes.add(attempt)
+        if not self.fate.survives(uav, task, outcome.attempt):
+            at_s = outcome.completed_s
+            self._lose(uav.id, f"did not survive {outcome.task} at {at_s:.4g} s")
+
+    # -- what the runtime is set to -----------------------------------------------------
+
+    def _timing_of(self, uncertainty: Uncertainty) -> Timing:
+        """Timers that fit the network, and a fleet that stays out while tasks may yet appear."""
+        timing = QUIET
+        if not uncertainty.ideal_communication:
+            timing = _preset(uncertainty).timing
+            self._told_s = _REPEATS * timing.announce_s
+        last_s = max((task.appears_s for task in self._mission.tasks), default=0.0)
+        if self._coordinator_lost_s is None or last_s == 0.0:
+            return timing
+        return replace(timing, linger_s=max(timing.linger_s, last_s + self._told_s))
+
+
+def _without_never_seen(fate: Realization) -> Mission:
+    gone_s = fate.withdrawn_at_s
+    tasks = fate.mission.tasks
+    seen = tuple(t for t in tasks if t.appears_s <= gone_s.get(t.id, math.inf))
+    return fate.mission if len(seen) == len(tasks) else replace(fate.mission, tasks=seen)
+
+
+def _last_change_s(mission: Mission, fate: Realization) -> float:
+    """When the last task appears or is withdrawn [s mission time]; -1 if none ever is."""
+    appear_s = [task.appears_s for task in mission.tasks if task.appears_s > 0.0]
+    return max([*appear_s, *fate.withdrawn_at_s.values()], default=-1.0)
+
+
+def _vehicle(
+    fate: Realization, queue: EventQueue, uav: str, report: Callable[[VehicleReport], None]
+) -> SimulatedVehicle:
+    """An ideal one where nothing can happen to it."""
+    what = fate.uncertainty
+    troubles = what.speed_sd_frac, what.leg_sd_frac, what.wind_m_s, what.position_error_m
+    takeoff_s = 0.0 if what.ideal_communication else _TAKEOFF_S
+    if not (what.outcomes or any(troubles)):
+        return IdealVehicle(queue, report, takeoff_s)
+    return StochasticVehicle(queue, uav, report, fate, takeoff_s)
+
+
+def _preset(uncertainty: Uncertainty) -> LinkPreset:
+    """Settings for a network that loses and delays so much, as a user would choose them.
+
+    Delays beyond those that any preset is for lengthen its timers in proportion.
+    """
+    delay_s = uncertainty.delay_s + uncertainty.jitter_s
+    lost = uncertainty.message_loss
+    longer = 1.0
+    if lost == 0.0 and delay_s <= 0.01:
+        chosen = _WIRED
+    elif lost <= 0.05 and delay_s <= 0.03:
+        chosen = PRESETS[LinkKind.NORMAL]
+    else:
+        chosen, longer = PRESETS[LinkKind.BAD], max(1.0, delay_s / 0.1)
+    timing = replace(chosen.timing.scaled(longer), status_s=_STATUS_S)
+    return LinkPreset(longer * chosen.lease_s, longer * chosen.answer_s, timing)
+
+
+def _network(fate: Realization, queue: EventQueue) -> Network:
+    what = fate.uncertainty
+    if not (what.message_loss or what.jitter_s or what.partitions_per_min):
+        return IdealNetwork(queue, what.delay_s)
+    preset = _preset(what)
+    conditions = NetworkConditions(
+        topology=Topology.ROUTERS,  # so that each side of a partition goes on by itself
+        latency_s=what.delay_s,
+        spread_s=what.jitter_s,
+        lease_s=preset.lease_s,
+        answer_s=preset.answer_s,
+        loss_frac=what.message_loss,
+    )
+    return RoughNetwork(queue, conditions, fate.seed)
+
+
+def _limit_s(fate: Realization, timing: Timing) -> float:
+    """Virtual time by which the slowest UAV alone would have done everything, and waited."""
+    mission = fate.mission
+    places = [uav.position_enu_m for uav in mission.uavs]
+    places += [task.position_enu_m for task in mission.tasks]
+    across_m = float(np.linalg.norm(np.ptp(np.array(places), axis=0))) if places else 0.0
+    slowest_m_s = min((uav.speed_m_s for uav in mission.uavs), default=1.0)
+    work_s = sum(task.service_s + across_m / slowest_m_s for task in mission.tasks)
+    appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
+    waits_s = timing.abandon_s + timing.stalemate_s + timing.linger_s + 2.0 * timing.silence_s
+    return _START_S + appears_s + 4.0 * work_s + 10.0 * waits_s

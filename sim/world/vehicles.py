@@ -1,0 +1,213 @@
+"""Vehicles in virtual time: one that flies ideally, and one that flies as a realization says.
+
+Both speak agent.core.interface, so that an agent's core cannot tell them from a MAVLink
+autopilot, and both outlive their agent: resumed by the next, they fly on to where they were sent.
+They are airborne at their start at once or after a given time, as take-off is no part of mission
+time. The second flies at its own speed, in wind, and not quite where it thinks; its telemetry tells
+where it believes to be, so its agent notices lateness and failures only. Leaves out: the
+autopilot's protocol (sim.autopilot), and losses (sim.world.stochastic_world).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+from agent.core.interface import (
+    Arrived,
+    AttemptFailed,
+    GoTo,
+    Held,
+    Hold,
+    Home,
+    Prepare,
+    Return,
+    Telemetry,
+    VehicleOrder,
+    VehicleReport,
+)
+from sim.world.engine import EventQueue
+from sim.world.motion import IdealMotion, Point
+from sim.world.uncertainty import Realization
+from swarm.model import UavId
+
+__all__ = ["IdealVehicle", "SimulatedVehicle", "StochasticVehicle", "VehicleFactory"]
+
+
+class SimulatedVehicle(Protocol):
+    """The vehicle of one UAV in virtual time, whatever lies between it and its agent."""
+
+    def order(self, order: VehicleOrder, ready: VehicleReport) -> None:
+        """Obey ``order``; ``ready`` is what an ideal vehicle says once it is prepared."""
+        ...
+
+    def leave(self) -> None:
+        """The process that commanded it has ended; it goes on with what it does."""
+        ...
+
+    def telemetry(self) -> Telemetry | None:
+        """Where it is now; None on the ground, and for one that reports that by itself."""
+        ...
+
+
+VehicleFactory = Callable[[EventQueue, str, Callable[[VehicleReport], None]], SimulatedVehicle]
+"""Makes the vehicle of a UAV in a queue's time; it says what it has to say by the callback."""
+
+
+class IdealVehicle:
+    """One ideal vehicle.
+
+    Args:
+        queue: virtual time.
+        report: called with everything the vehicle says, at the time it says it.
+        takeoff_s: until it is airborne once it is told to.
+    """
+
+    def __init__(
+        self, queue: EventQueue, report: Callable[[VehicleReport], None], takeoff_s: float = 0.0
+    ) -> None:
+        self.speed_frac = 1.0
+        """Share of the ordered speed at which it flies from its next order on."""
+        self._queue = queue
+        self._report = report
+        self._takeoff_s = takeoff_s
+        self._motion: IdealMotion | None = None
+        self._speed_m_s = 1.0
+        self._orders = 0
+
+    def order(self, order: VehicleOrder, ready: VehicleReport) -> None:
+        """Obey ``order``; ``ready`` is what it says once it is prepared."""
+        self._orders += 1
+        match order:
+            case Prepare():
+                self._prepare(order, ready)
+            case GoTo() if self._motion is not None:
+                self._fly(self._motion, order)
+            case Hold():
+                if self._motion is not None:
+                    self._motion.stop(self._queue.now_s())
+                self._later(self._queue.now_s(), Held())
+            case Return():
+                self._motion = None
+                self._later(self._queue.now_s(), Home())
+            case _:
+                pass
+
+    def _fly(self, motion: IdealMotion, order: GoTo) -> None:
+        speed_m_s = self._speed_m_s * self.speed_frac
+        motion.fly_to(order.position_enu_m, speed_m_s, self._queue.now_s())
+        if motion.arrives_s is not None:
+            self._later(motion.arrives_s, Arrived(order.leg))
+
+    def _prepare(self, order: Prepare, ready: VehicleReport) -> None:
+        now_s, motion = self._queue.now_s(), self._motion
+        self._speed_m_s = order.speed_m_s
+        if motion is None:
+            self._motion = IdealMotion(order.position_enu_m)
+            self._later(now_s + self._takeoff_s, ready)
+        elif order.resume:
+            self._later(now_s, self._telemetry(motion))
+            self._later(now_s, ready)
+        else:
+            motion.fly_to(order.position_enu_m, self._speed_m_s, now_s)
+            self._later(max(now_s, motion.arrives_s or now_s), ready)
+
+    def leave(self) -> None:
+        """Its agent has ended; it flies on."""
+
+    def telemetry(self) -> Telemetry | None:
+        """Where it is now; None on the ground."""
+        return None if self._motion is None else self._telemetry(self._motion)
+
+    def _telemetry(self, motion: IdealMotion) -> Telemetry:
+        now_s = self._queue.now_s()
+        return Telemetry(motion.position_enu_m(now_s), motion.velocity_enu_m_s(now_s), None)
+
+    def _later(self, time_s: float, report: VehicleReport) -> None:
+        """Say ``report`` then, unless another order has come in between."""
+        order = self._orders
+
+        def say() -> None:
+            if order == self._orders:
+                self._report(report)
+
+        self._queue.at(time_s, say)
+
+
+_NOWHERE_ELSE = 0.0, 0.0, 0.0
+
+
+class StochasticVehicle(IdealVehicle):
+    """One vehicle in a realization.
+
+    Args:
+        queue: virtual time.
+        uav: whose vehicle it is.
+        report: called with everything the vehicle says, at the time it says it.
+        fate: what happens to it.
+        takeoff_s: until it is airborne once it is told to.
+    """
+
+    def __init__(
+        self,
+        queue: EventQueue,
+        uav: str,
+        report: Callable[[VehicleReport], None],
+        fate: Realization,
+        takeoff_s: float = 0.0,
+    ) -> None:
+        super().__init__(queue, report, takeoff_s)
+        self._fate = fate
+        self._uav = next(each for each in fate.mission.uavs if each.id == UavId(uav))
+        self._tasks = {str(task.id): task for task in fate.mission.tasks}
+        self._astray_m: Point = _NOWHERE_ELSE
+        """From where it believes to be to where it is, when it last set off [m]."""
+        self._becomes_m: Point = _NOWHERE_ELSE
+        """The same at the end of its way."""
+        self._way_s = 0.0, 0.0
+        """When it set off and arrives."""
+
+    def order(self, order: VehicleOrder, ready: VehicleReport) -> None:
+        """Obey ``order``; ``ready`` is what it says once it is prepared."""
+        self._astray_m = self._becomes_m = self._astray_now_m()
+        super().order(order, ready)
+
+    def _fly(self, motion: IdealMotion, order: GoTo) -> None:
+        now_s, task = self._queue.now_s(), self._tasks.get(order.task or "")
+        believed = motion.position_enu_m(now_s)
+        if task is not None:
+            stop = self._fate.stop_enu_m(self._uav.id, task)
+            self._becomes_m = _from_to(task.position_enu_m, stop)
+        here = _moved(believed, self._astray_m)
+        there = _moved(order.position_enu_m, self._becomes_m)
+        name = None if task is None else task.id
+        true_m_s = self.speed_frac * self._fate.speed_m_s(self._uav, name, here, there)
+        length_m, believed_m = math.dist(here, there), math.dist(believed, order.position_enu_m)
+        arrives_s = now_s + length_m / true_m_s
+        # It believes to cover the way it believes in, in the time it really takes.
+        shown = believed_m / length_m if believed_m and length_m else 1.0
+        motion.fly_to(order.position_enu_m, true_m_s * shown, now_s)
+        self._way_s = now_s, arrives_s
+        if task is not None and not self._fate.succeeds(self._uav, task, order.attempt):
+            self._later(arrives_s, AttemptFailed(order.leg))
+        self._later(arrives_s, Arrived(order.leg))
+
+    def _astray_now_m(self) -> Point:
+        leaves_s, arrives_s = self._way_s
+        now_s = self._queue.now_s()
+        if now_s >= arrives_s:
+            return self._becomes_m
+        share = (now_s - leaves_s) / (arrives_s - leaves_s)
+        east_m, north_m, up_m = (
+            a + share * (b - a) for a, b in zip(self._astray_m, self._becomes_m, strict=True)
+        )
+        return east_m, north_m, up_m
+
+
+def _from_to(one: Point, other: Point) -> Point:
+    return other[0] - one[0], other[1] - one[1], other[2] - one[2]
+
+
+def _moved(place: Point, by: Point) -> Point:
+    return place[0] + by[0], place[1] + by[1], place[2] + by[2]

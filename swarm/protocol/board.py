@@ -1,0 +1,292 @@
+"""What the registers say about tasks: the state of each, who holds it, where the team stands.
+
+One UAV wins a task wherever the registers are equal. Held beats proposed. Proposed against
+proposed: earlier decision, then rank, then id. Held against held, which takes a partition:
+earlier predicted completion, then rank, then id. Leaves out: who is alive, which each process
+judges for itself and passes in by leaving the lost out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from enum import StrEnum
+from itertools import islice
+
+import numpy as np
+
+from swarm.allocation.lower_level import Rule, TeamState
+from swarm.allocation.problem import BoolArray, Problem
+from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
+from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.protocol.messages import MissionConfig, TaskEntry, UavSpec
+from swarm.protocol.registers import Replica
+from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
+
+__all__ = [
+    "TaskBoard",
+    "TaskState",
+    "after_outcomes",
+    "claim_strength",
+    "doable",
+    "finish_claim",
+    "holders",
+    "mission_of",
+    "ranks",
+    "rule_of",
+    "winner",
+]
+
+
+def claim_strength(uav: str, claim: Claim) -> tuple[bool, float, int, str]:
+    """Sort key of claims on one task: the smallest wins."""
+    proposed = claim.phase is ClaimPhase.PROPOSED
+    return (proposed, claim.decided_s if proposed else claim.completion_s, claim.rank, uav)
+
+
+def winner(claims: Sequence[tuple[str, Claim]]) -> str | None:
+    """The UAV that keeps the task all ``claims`` (UAV id, claim) name; None if there are none."""
+    if len(claims) == 1:
+        return claims[0][0]
+    strongest = min(claims, key=lambda item: claim_strength(*item), default=None)
+    return None if strongest is None else strongest[0]
+
+
+def holders(claims: Mapping[str, Claim]) -> dict[str, str]:
+    """Task id -> winning UAV id, for every task that any of ``claims`` names."""
+    rivals: dict[str, list[tuple[str, Claim]]] = {}
+    for uav, claim in claims.items():
+        if claim.task is not None:
+            rivals.setdefault(claim.task, []).append((uav, claim))
+    found = {task: winner(items) for task, items in rivals.items()}
+    return {task: uav for task, uav in found.items() if uav is not None}
+
+
+class TaskState(StrEnum):
+    """What became of a task so far."""
+
+    OPEN = "open"
+    DONE = "done"
+    FAILED = "failed"
+    WITHDRAWN = "withdrawn"
+
+
+def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
+    """Open tasks that some UAV taking part in the mission is capable of, in board order.
+
+    Args:
+        board: of the mission.
+        present: writers believed alive; the lost take no part.
+    """
+    problem = board.problem
+    if problem is None:
+        return []
+    claims = board.replica.claims
+    able = [
+        index
+        for index, uav in enumerate(problem.uav_ids)
+        if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
+    ]
+    can: BoolArray = np.any(problem.capable[able, :], axis=0)
+    states = board.states  # in board order, as the problem's tasks are
+    return [
+        task
+        for (task, state), somebody_can in zip(states.items(), can, strict=True)
+        if state is TaskState.OPEN and somebody_can
+    ]
+
+
+class TaskBoard:
+    """What the registers of one replica say about tasks, worked out once per change."""
+
+    def __init__(self, replica: Replica, mission: str) -> None:
+        self.replica = replica
+        self._name = mission
+        self._entries: list[TaskEntry] = []
+        """In board order."""
+        self._untried: dict[str, TaskState] = {}
+        """In board order, what each task would be if nobody had attempted any."""
+        self._entries_version = -1
+        self._brief: MissionConfig | None = None
+        self._fleet: Mission | None = None
+        """The mission of that brief, without any tasks."""
+        self._tasks: dict[str, tuple[TaskEntry, Task]] = {}
+        """By id, with the entry each was made from."""
+        self._states: dict[str, TaskState] = {}
+        self._unfinished = False
+        self._basis: tuple[int, int] | None = None
+        """Versions of brief and board, and of outcomes apart from further ones, of the states."""
+        self._attempts = 0
+        """How many outcomes the states take into account."""
+        self._columns: list[Task] = []
+        """Of the problem."""
+        self._problem: Problem | None = None
+        self._problem_version = -1
+
+    @property
+    def states(self) -> dict[str, TaskState]:
+        """State of every task on the board, in board order, until the replica changes."""
+        self._catch_up()
+        return self._states
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether any task on the board is open."""
+        self._catch_up()
+        return self._unfinished
+
+    @property
+    def problem(self) -> Problem | None:
+        """Every UAV of the brief and every task posted so far; None before the brief."""
+        if self._problem_version != self.replica.board_version:
+            self._problem = self._problem_now()
+            self._problem_version = self.replica.board_version
+        return self._problem
+
+    def _problem_now(self) -> Problem | None:
+        """Of `mission_of`; what nothing new was said of is not made anew."""
+        brief = self.replica.brief
+        if brief is None:
+            return None
+        if self._fleet is None or brief is not self._brief:
+            self._brief, self._problem = brief, None
+            self._fleet = _mission(self._name, brief, map(_uav_of, brief.uavs), ())
+        self._sort()
+        for entry in self._entries:
+            if (known := self._tasks.get(entry.task)) is None or known[0] is not entry:
+                self._tasks[entry.task] = entry, _task_of(entry)
+        tasks = [self._tasks[entry.task][1] for entry in self._entries]
+        before, had = self._problem, {id(task): column for column, task in enumerate(self._columns)}
+        columns = [had.get(id(task), -1) for task in tasks]
+        self._columns = tasks
+        if before is None:
+            return Problem.from_mission(self._fleet, tasks=tasks)
+        return before.with_tasks(self._fleet, tasks, columns)
+
+    def _sort(self) -> None:
+        if self._entries_version != self.replica.board_version:
+            self._entries = sorted(self.replica.board.values(), key=_order)
+            self._untried = {
+                entry.task: TaskState.WITHDRAWN if entry.withdrawn else TaskState.OPEN
+                for entry in self._entries
+            }
+            self._entries_version = self.replica.board_version
+
+    def _catch_up(self) -> None:
+        """Work the states out of brief, board and outcomes, or add what has come at their end.
+
+        An outcome makes of a task the same whatever others there are and whichever comes first.
+        """
+        replica, outcomes = self.replica, self.replica.outcomes
+        basis = replica.board_version, replica.reattempts
+        if basis == self._basis and len(outcomes) == self._attempts:
+            return
+        if basis != self._basis:
+            self._sort()
+            self._states, self._attempts = self._untried.copy(), 0
+        final = replica.brief is None or not replica.brief.reattempt_failed
+        states, further = self._states, len(outcomes) - self._attempts
+        for (_, task), outcome in islice(reversed(outcomes.items()), further):
+            if task not in states:
+                continue
+            if outcome.result is AttemptResult.DONE:
+                states[task] = TaskState.DONE
+            elif final and states[task] is TaskState.OPEN:
+                states[task] = TaskState.FAILED
+        self._attempts = len(outcomes)
+        self._unfinished = TaskState.OPEN in self._states.values()
+        self._basis = basis
+
+
+def mission_of(replica: Replica, name: str, brief: MissionConfig) -> Mission:
+    """The mission as the board shows it now: all posted tasks, in board order."""
+    entries = sorted(replica.board.values(), key=_order)
+    return _mission(name, brief, map(_uav_of, brief.uavs), map(_task_of, entries))
+
+
+def _mission(
+    name: str, brief: MissionConfig, uavs: Iterable[Uav], tasks: Iterable[Task]
+) -> Mission:
+    return Mission(
+        name=name,
+        horizon_s=brief.horizon_s,
+        uavs=tuple(uavs),
+        tasks=tuple(tasks),
+        success_default=brief.success_default,
+        survival_default=brief.survival_default,
+        reattempt_failed=brief.reattempt_failed,
+        origin=Origin(*brief.origin),
+    )
+
+
+def _uav_of(entry: UavSpec) -> Uav:
+    return Uav(
+        id=UavId(entry.id),
+        position_enu_m=entry.position_enu_m,
+        speed_m_s=entry.speed_m_s,
+        success=entry.success,
+        survival=entry.survival,
+        kind=entry.kind,
+    )
+
+
+def _task_of(entry: TaskEntry) -> Task:
+    return Task(
+        id=TaskId(entry.task),
+        position_enu_m=entry.position_enu_m,
+        value=entry.value,
+        service_s=entry.service_s,
+        kind=entry.kind,
+    )
+
+
+def _order(entry: TaskEntry) -> tuple[int, str]:
+    return entry.number, entry.task
+
+
+def rule_of(name: str, routes: Mapping[str, Sequence[str]]) -> Rule | None:
+    """The decision rule of an epoch, one instance for all its decisions; None if unknown here.
+
+    Rules keep what they worked out for one decision to be quicker at the next.
+    """
+    if name == GuidedRule.name:
+        return GuidedRule(routes)
+    return rule_by_name(name) if name in RULE_NAMES else None
+
+
+def ranks(sequence: Sequence[str], uavs: Sequence[str]) -> dict[str, int]:
+    """Rank of every UAV: place in the sequence; those not in it follow by id."""
+    listed = [uav for uav in sequence if uav in uavs]
+    return {uav: rank for rank, uav in enumerate([*listed, *sorted(set(uavs) - set(listed))])}
+
+
+def after_outcomes(problem: Problem, board: TaskBoard) -> TeamState:
+    """Where every UAV stands after the attempts it has ended, as if nobody claimed anything.
+
+    ``free_s`` and ``place_enu_m`` are of the last attempt, or 0 and the start before the first;
+    ``open`` is as on the board. All are active: who takes part is the caller's judgement.
+    """
+    state = TeamState.at_start(problem)
+    states = board.states
+    state.open[:] = [states.get(task) is TaskState.OPEN for task in problem.task_ids]
+    rows: dict[str, int] = {uav: index for index, uav in enumerate(problem.uav_ids)}
+    columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+    ended = sorted(
+        (outcome.completed_s, columns[task], rows[uav])
+        for (uav, task), outcome in board.replica.outcomes.items()
+        if uav in rows and task in columns
+    )
+    for completed_s, task, uav in ended:
+        _end_at(problem, state, uav, task, completed_s)
+    return state
+
+
+def finish_claim(problem: Problem, state: TeamState, uav: int, task: int, claim: Claim) -> None:
+    """Let ``uav`` end the ``task`` it claims: then it is free, there, and nobody else takes it."""
+    _end_at(problem, state, uav, task, claim.completion_s)
+    state.open[task] = False
+
+
+def _end_at(problem: Problem, state: TeamState, uav: int, task: int, completed_s: float) -> None:
+    state.free_s[uav] = completed_s
+    state.place_enu_m[uav] = problem.task_enu_m[task]
+    state.survived[uav] *= problem.survival[uav, task]

@@ -1,0 +1,236 @@
+"""Messages to MessagePack, and MessagePack from the network to plain values.
+
+Written: the bytes of a bus without keys, and what fits into them. Read: no more than the
+length of the bytes is worth. Leaves out: checking, and envelopes (swarm.protocol.codec).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import msgpack
+
+from swarm.protocol.messages import (
+    SCHEMA_VERSION,
+    Body,
+    Message,
+    MissionConfig,
+    OperatorCommand,
+    PlanEpoch,
+    SignedRoster,
+    Snapshot,
+    StartWithout,
+    TaskEdit,
+    TaskEntry,
+    UavSpec,
+)
+from swarm.protocol.seal import UnacceptableError
+from swarm.protocol.uav_messages import Candidate, Choice, ChoiceBasis, Claim, Outcome, Status
+
+__all__ = [
+    "FIELDS",
+    "KINDS",
+    "LARGE",
+    "LARGE_LIMIT_BYTES",
+    "NAMES",
+    "SMALL_LIMIT_BYTES",
+    "SNAPSHOT_LIMIT_BYTES",
+    "encode",
+    "encode_memory",
+    "fit",
+    "fit_memory",
+    "repacked",
+    "snapshot_bytes",
+    "unpacked",
+]
+
+
+SMALL_LIMIT_BYTES: Final = 4 * 1024
+
+LARGE_LIMIT_BYTES: Final = 1024 * 1024
+
+SNAPSHOT_LIMIT_BYTES: Final = 4 * 1024 * 1024
+"""As much as a bus carries at once."""
+
+
+KINDS: Final[dict[str, type[Body]]] = {
+    "brief": MissionConfig,
+    "epoch": PlanEpoch,
+    "board": TaskEntry,
+    "claim": Claim,
+    "outcome": Outcome,
+    "status": Status,
+    "choice": Choice,
+    "command": OperatorCommand,
+    "task": TaskEdit,
+    "start": StartWithout,
+    "roster": SignedRoster,
+}
+
+NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in KINDS.items()}
+
+FIELDS: Final[dict[type, tuple[str, ...]]] = {
+    part: tuple(field.name for field in dataclasses.fields(part))
+    for part in (*KINDS.values(), UavSpec, ChoiceBasis, Candidate)
+}
+"""Of everything that a message is made of."""
+
+LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
+
+
+def encode(what: Message | Snapshot) -> bytes:
+    """The bytes of a message or snapshot, as a bus without keys carries them.
+
+    A message that was heard gives the very bytes that were heard, and so does one that is kept.
+    Nothing is written into it, so any thread may encode what another one has.
+    """
+    if isinstance(what, Snapshot):
+        return snapshot_bytes(what, [encode(message) for message in what.messages])
+    return _message_bytes(what) if what.said is None else what.said
+
+
+def encode_memory(snapshot: Snapshot) -> bytes:
+    """``snapshot`` with the envelopes of its messages, for `decode_memory` of a later life."""
+    return snapshot_bytes(snapshot, [_remembered(message) for message in snapshot.messages])
+
+
+def fit_memory(snapshot: Snapshot) -> Snapshot:
+    """What of ``snapshot`` there is room for in a memory; see `fit`."""
+    return fit(snapshot, SNAPSHOT_LIMIT_BYTES, _remembered)
+
+
+def fit(
+    snapshot: Snapshot,
+    limit_bytes: int = SNAPSHOT_LIMIT_BYTES,
+    as_bytes: Callable[[Message], bytes] = encode,
+) -> Snapshot:
+    """``snapshot``, without some of the registers when there is no room for all.
+
+    Those of its own writer stay before those of others, for which others answer too.
+
+    Args:
+        snapshot: to be shortened.
+        limit_bytes: how long it may be.
+        as_bytes: what becomes of each message in it.
+    """
+    parts = [as_bytes(message) for message in snapshot.messages]
+    if len(snapshot_bytes(snapshot, parts)) <= limit_bytes:
+        return snapshot
+    room = limit_bytes - len(snapshot_bytes(snapshot, ())) - 4  # a longer array head
+    kept = []
+    for message, part in sorted(
+        zip(snapshot.messages, parts, strict=True),
+        key=lambda each: each[0].writer != snapshot.writer,
+    ):
+        if len(part) <= room:
+            room -= len(part)
+            kept.append(message)
+    return replace(snapshot, messages=tuple(kept))
+
+
+def _message_bytes(message: Message) -> bytes:
+    parts = [
+        SCHEMA_VERSION,
+        message.mission,
+        message.writer,
+        message.stamp.incarnation,
+        message.stamp.counter,
+        NAMES[type(message.body)],
+        message.body,
+    ]
+    packed: bytes = msgpack.packb(parts, default=_fields_of)
+    return packed
+
+
+def snapshot_bytes(snapshot: Snapshot, registers: Sequence[bytes]) -> bytes:
+    """``snapshot`` with these in the place of its messages."""
+    head = (
+        SCHEMA_VERSION,
+        snapshot.mission,
+        snapshot.writer,
+        snapshot.incarnation,
+        snapshot.mission_s,
+    )
+    packed: list[bytes] = [msgpack.packb(part) for part in head]
+    return _array([*packed, _array(registers)])
+
+
+def _array(parts: Sequence[bytes]) -> bytes:
+    """An array of what is MessagePack already."""
+    head: bytes = msgpack.Packer().pack_array_header(len(parts))
+    return head + b"".join(parts)
+
+
+def _remembered(message: Message) -> bytes:
+    if message.envelope is None:
+        return encode(message)
+    packed: bytes = msgpack.packb(message.envelope)
+    return packed
+
+
+def _fields_of(part: object) -> dict[str, object]:
+    """A body, or a dataclass within one, by the names of its fields."""
+    return {name: getattr(part, name) for name in FIELDS[type(part)]}
+
+
+BYTES_EACH: Final = 8
+"""Of an array or map in a large message, with its share of the rest, at least."""
+
+
+def unpacked(data: bytes, most: int | None = None) -> object:
+    """What ``data`` holds, with tuples for arrays; None when it is not MessagePack.
+
+    Args:
+        data: from the network.
+        most: of arrays and maps in it; by default as many as its length is worth.
+    """
+    hooks = {}
+    if len(data) > SMALL_LIMIT_BYTES:
+        budget = _Budget(1000 + len(data) // BYTES_EACH if most is None else most)
+        hooks = {"list_hook": budget.array, "object_pairs_hook": budget.map}
+    try:
+        return msgpack.unpackb(data, use_list=False, max_ext_len=0, **hooks)
+    except (ValueError, TypeError, msgpack.exceptions.UnpackException, RecursionError):
+        # ValueError covers msgpack's FormatError, StackError, ExtraData and bad UTF-8.
+        return None
+
+
+def repacked(register: object) -> bytes:
+    """The bytes of what `unpacked` gave.
+
+    Raises:
+        UnacceptableError: it is nested deeper than this MessagePack can write again.
+    """
+    try:
+        packed: bytes = msgpack.packb(register)
+    except (ValueError, RecursionError):
+        raise UnacceptableError("malformed") from None
+    return packed
+
+
+class _Budget:
+    """Counts the arrays and maps of one piece of MessagePack, until there are too many.
+
+    An empty map is one byte and takes 64 in memory, so that few bytes could fill all of it.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._left = most
+
+    def array(self, items: tuple[object, ...]) -> tuple[object, ...]:
+        """One more array."""
+        self._spend()
+        return items
+
+    def map(self, pairs: Sequence[tuple[object, object]]) -> dict[object, object]:
+        """One more map."""
+        self._spend()
+        return dict(pairs)
+
+    def _spend(self) -> None:
+        self._left -= 1
+        if self._left < 0:
+            raise ValueError("more arrays and maps than a message of that size has")

@@ -1,0 +1,144 @@
+"""What every core on the bus hears and what it wants done; shells translate both.
+
+Leaves out: what only one kind of process knows (agent.core.interface, coordinator.core.events).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from swarm.protocol.messages import Message, Snapshot
+
+__all__ = [
+    "Ask",
+    "CommonAction",
+    "CommonEvent",
+    "Finish",
+    "KeysReplaced",
+    "LinkChanged",
+    "LogLine",
+    "MessageReceived",
+    "PeerGone",
+    "PeerSeen",
+    "Publish",
+    "PublishLast",
+    "Save",
+    "SnapshotsReceived",
+    "Stop",
+    "Tick",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class MessageReceived:
+    """A checked message arrived while it was new."""
+
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class SnapshotsReceived:
+    """All answers to an `Ask`, maybe none."""
+
+    snapshots: tuple[Snapshot, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PeerSeen:
+    """The liveliness token of ``writer`` is there."""
+
+    writer: str
+
+
+@dataclass(frozen=True, slots=True)
+class PeerGone:
+    """The liveliness token of ``writer`` disappeared."""
+
+    writer: str
+
+
+@dataclass(frozen=True, slots=True)
+class KeysReplaced:
+    """A roster came into force by which these names have other keys, or none any more."""
+
+    names: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkChanged:
+    """The own link to the bus came up or went down."""
+
+    up: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Whoever runs this process wants it to end."""
+
+    reason: str
+    believed: bool = True
+    """Whether anybody still believes what it says: not once its keys are revoked or replaced."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """A deadline has come."""
+
+
+CommonEvent = (
+    MessageReceived
+    | SnapshotsReceived
+    | PeerSeen
+    | PeerGone
+    | KeysReplaced
+    | LinkChanged
+    | Stop
+    | Tick
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Publish:
+    """Say this on its key."""
+
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class PublishLast:
+    """Say what ``make`` gives, once all else that a step wants is done: nobody waits for it.
+
+    It is put together only then, and before the core's next step; nothing follows from leaving
+    it out.
+    """
+
+    make: Callable[[], Message]
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Ask everyone for the registers they answer for; ends in `SnapshotsReceived`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Save:
+    """Keep the core's `memory` where a new life of this process finds it."""
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    """A line for the log."""
+
+    text: str
+    fields: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Everything is done; the process may end with this exit status."""
+
+    status: int
+
+
+CommonAction = Publish | PublishLast | Ask | Save | LogLine | Finish

@@ -1,0 +1,58 @@
+"""Types of message fields, with the bounds that keep every computation finite.
+
+Leaves out: the messages that are made of such fields (swarm.protocol.messages).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from annotated_types import Ge, Gt, Le, Len, Predicate
+from pydantic import Strict
+
+from swarm.model import valid_id
+
+__all__ = [
+    "CHECKED",
+    "LATEST_S",
+    "MAX_COUNT",
+    "Count",
+    "Duration",
+    "Flag",
+    "Horizon",
+    "Id",
+    "Instant",
+    "Metres",
+    "Point",
+    "Probability",
+    "Reason",
+    "Score",
+    "Speed",
+    "Value",
+    "Words",
+]
+
+
+CHECKED: Final = {"extra": "ignore", "allow_inf_nan": False}
+"""How pydantic checks each message; fields that only a newer release knows are passed over."""
+
+MAX_COUNT: Final = 2**53
+"""Largest count; whoever counts on from what it heard stays within."""
+LATEST_S: Final = 1e15
+"""Farthest instant from mission time 0 [s]."""
+
+# The bounds admit whatever a scenario may hold and keep every computation finite.
+Id = Annotated[str, Strict(), Predicate(valid_id)]
+Flag = Annotated[bool, Strict()]
+Metres = Annotated[float, Strict(), Ge(-1e8), Le(1e8)]
+Point = tuple[Metres, Metres, Metres]
+Instant = Annotated[float, Strict(), Ge(-LATEST_S), Le(LATEST_S)]
+Duration = Annotated[float, Strict(), Ge(0.0), Le(1e9)]
+Horizon = Annotated[float, Strict(), Gt(0.0), Le(1e9)]
+Speed = Annotated[float, Strict(), Ge(1e-6), Le(1e6)]
+Value = Annotated[float, Strict(), Ge(0.0), Le(1e12)]
+Probability = Annotated[float, Strict(), Ge(0.0), Le(1.0)]
+Count = Annotated[int, Strict(), Ge(0), Le(MAX_COUNT)]
+Reason = Annotated[str, Strict(), Len(1, 40)]
+Words = Annotated[str, Strict(), Len(0, 200)]
+Score = Annotated[float, Strict(), Ge(-1e30), Le(1e30)]

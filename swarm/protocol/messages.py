@@ -1,0 +1,356 @@
+"""What is said on the bus: the messages, their bodies and their registers.
+
+Instants are mission time [s]; no machine's clock crosses the wire. Leaves out: what a UAV says
+(swarm.protocol.uav_messages), bytes and checking (swarm.protocol.codec), and what a reader
+makes of it (swarm.protocol.registers).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import lru_cache
+from typing import Annotated, ClassVar
+
+from annotated_types import Len
+from pydantic import Strict
+
+from swarm.model import Origin
+from swarm.model.ids import FLEET, RESERVED
+from swarm.protocol.fields import (
+    CHECKED,
+    MAX_COUNT,
+    Count,
+    Duration,
+    Flag,
+    Horizon,
+    Id,
+    Instant,
+    Metres,
+    Point,
+    Probability,
+    Speed,
+    Value,
+    Words,
+)
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
+
+__all__ = [
+    "REVOKED_INCARNATION",
+    "SCHEMA_VERSION",
+    "Body",
+    "CommandKind",
+    "Message",
+    "MissionConfig",
+    "MissionPhase",
+    "OperatorCommand",
+    "PlanEpoch",
+    "SignedRoster",
+    "Snapshot",
+    "Stamp",
+    "StartWithout",
+    "TaskEdit",
+    "TaskEntry",
+    "UavSpec",
+    "as_heard",
+    "demoted",
+]
+
+
+SCHEMA_VERSION = 1
+"""Grows only with what releases before cannot be mixed with; see swarm.protocol.codec."""
+LONGEST_ROSTER = 1 << 20
+"""Characters of a signed roster."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Stamp:
+    """Order of one writer's statements in one register: later beats earlier."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    incarnation: Count
+    """Grows whenever the writer's process starts anew."""
+    counter: Count
+    """Grows with every statement of one incarnation."""
+
+
+REVOKED_INCARNATION = 0
+"""Incarnation of what nobody stands for any more; processes number their own from 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class UavSpec:
+    """One UAV as the brief describes it."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    id: Id
+    position_enu_m: Point
+    """Start [m; mission origin], without the height layer."""
+    speed_m_s: Speed
+    success: Mapping[str, Probability]
+    survival: Mapping[str, Probability]
+    kind: Id | None
+    layer_m: Metres
+    """Height layer this UAV flies at [m], added to every place it flies to."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionConfig:
+    """Register ``brief``: what stays the same for a whole mission."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    horizon_s: Horizon
+    success_default: Probability
+    survival_default: Probability
+    reattempt_failed: Flag
+    run: Count
+    """Tells this flight of the mission from earlier ones: stays when a coordinator resumes it."""
+    origin: Point
+    """Latitude [deg], longitude [deg], height above mean sea level [m]."""
+    uavs: tuple[UavSpec, ...]
+
+    def __post_init__(self) -> None:
+        Origin(*self.origin)
+        ids = {uav.id for uav in self.uavs}
+        if len(ids) != len(self.uavs) or not ids.isdisjoint(RESERVED):
+            raise ValueError(f"UAV ids must differ, from each other and from {', '.join(RESERVED)}")
+
+
+class MissionPhase(StrEnum):
+    """How far the mission is."""
+
+    PREPARING = "preparing"
+    RUNNING = "running"
+    ENDED = "ended"
+
+
+@dataclass(frozen=True, slots=True)
+class PlanEpoch:
+    """Register ``plan``: the pecking order in force."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    number: Count
+    phase: MissionPhase
+    rule: Id
+    sequence: tuple[Id, ...]
+    """Best rank first."""
+    mission_s: Instant
+    """Mission time at which this statement was made [s]."""
+    reason: Words
+    """Why this epoch, in words."""
+    routes: Mapping[Id, tuple[Id, ...]]
+    """Planned task lists by UAV; what rules make of them is theirs."""
+
+
+@dataclass(frozen=True, slots=True)
+class TaskEntry:
+    """Register ``board/<task>``: one task of the task board."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    task: Id
+    number: Count
+    """Position on the board; ties between equally good tasks go to the smaller."""
+    position_enu_m: Point
+    value: Value
+    service_s: Duration
+    kind: Id | None
+    withdrawn: Flag
+
+
+class CommandKind(StrEnum):
+    """What an operator may want."""
+
+    HOLD = "hold"
+    """Stop where it is, give its task up and wait; on the ground, stay there."""
+    RESUME = "resume"
+    """Go on after a hold."""
+    RETURN = "return"
+    """Go home and take no further part."""
+    ABORT = "abort"
+    """Everybody goes home, and the mission is over."""
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorCommand:
+    """Register ``operator/<target>``: the operator's newest word to one UAV, or to the fleet."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    target: Id
+    """Id of a UAV, or the name that stands for the fleet."""
+    kind: CommandKind
+    run: Count
+    """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
+    reason: Words
+    """Why, in the operator's words; empty when there are none."""
+
+    def __post_init__(self) -> None:
+        if (self.target == FLEET) != (self.kind is CommandKind.ABORT):
+            raise ValueError(f"{self.kind} is no command to {self.target}")
+
+
+@dataclass(frozen=True, slots=True)
+class TaskEdit:
+    """Register ``operator/task/<task>``: a task that the operator adds, or takes off the board.
+
+    For a task that the coordinator has posted, too, the operator's word counts.
+    """
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    task: Id
+    number: Count
+    """Position on the board, as in `TaskEntry`."""
+    position_enu_m: Point
+    value: Value
+    service_s: Duration
+    kind: Id | None
+    withdrawn: Flag
+    run: Count
+    """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
+    reason: Words
+    """Why, in the operator's words; empty when there are none."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartWithout:
+    """Register ``operator/start/<uav>``: the operator lets the mission start without a UAV.
+
+    Apart from the commands to that UAV, which hold as they are: it is told nothing by this, and
+    takes part as soon as it is ready.
+    """
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    uav: Id
+    run: Count
+    """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
+    reason: Words
+    """Why, in the operator's words; empty when there are none."""
+
+
+@dataclass(frozen=True, slots=True)
+class SignedRoster:
+    """Register ``roster``: who belongs to the mission, in the words of its authority.
+
+    It bears the authority's signature inside, so anyone may repeat it.
+    """
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    signed: Annotated[str, Strict(), Len(1, LONGEST_ROSTER)]
+    """As `swarm.identity.roster.decode_roster` reads it; ASCII."""
+
+
+Body = (
+    MissionConfig
+    | PlanEpoch
+    | TaskEntry
+    | Claim
+    | Outcome
+    | Status
+    | Choice
+    | OperatorCommand
+    | TaskEdit
+    | StartWithout
+    | SignedRoster
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A statement with its author and place in that author's order.
+
+    Raises:
+        ValueError: the mission name is not a valid id.
+    """
+
+    mission: str
+    writer: str
+    stamp: Stamp
+    body: Body
+    key: str = field(init=False, repr=False, compare=False)
+    """The one key on which it may be said; names its register."""
+    said: bytes | None = field(init=False, default=None, repr=False, compare=False)
+    """The very bytes that were heard, what this release does not understand among them, or that
+    were made here of a register; None for what is said once. Copies made by
+    `dataclasses.replace` say something else: None."""
+    envelope: bytes | None = field(init=False, default=None, repr=False, compare=False)
+    """Those bytes with their writer's signature, where the bus has keys (swarm.protocol.seal)."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "key", _key_of(self.mission, self.writer, self.body))
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Answer of ``state/<id>``: registers, and the mission time of the one who answers."""
+
+    mission: str
+    writer: str
+    incarnation: Count
+    """Of the process that answers."""
+    mission_s: Instant | None
+    messages: tuple[Message, ...]
+
+
+def as_heard(message: Message, said: bytes, envelope: bytes | None = None) -> Message:
+    """``message``, just made of these bytes, so that it can be repeated exactly.
+
+    For who makes a message, before anybody else has it; and for the one thread that publishes,
+    which adds the envelope, whose bytes were there before.
+    """
+    object.__setattr__(message, "said", said)
+    object.__setattr__(message, "envelope", envelope)
+    return message
+
+
+def demoted(message: Message) -> Message:
+    """What ``message`` says, for which nobody stands any more: any later word outdoes it.
+
+    Of several such the later ones still come after the earlier, as far as numbers reach.
+    """
+    incarnation, counter = message.stamp.incarnation, message.stamp.counter
+    if incarnation == REVOKED_INCARNATION:
+        return message
+    place = incarnation * 4096 + min(counter, 4095)  # milliseconds since 1970 have room for that
+    return replace(message, stamp=Stamp(REVOKED_INCARNATION, min(place, MAX_COUNT)))
+
+
+def _key_of(mission: str, writer: str, body: Body) -> str:
+    keys = _keys_of(mission)
+    match body:
+        case MissionConfig():
+            return keys.brief
+        case PlanEpoch():
+            return keys.plan
+        case TaskEntry(task=task):
+            return keys.board(task)
+        case Claim():
+            return keys.claim(writer)
+        case Outcome(task=task):
+            return keys.outcome(writer, task)
+        case Status():
+            return keys.status(writer)
+        case Choice():
+            return keys.choice(writer)
+        case OperatorCommand(target=target):
+            return keys.operator(target)
+        case TaskEdit(task=task):
+            return keys.operator_task(task)
+        case StartWithout(uav=uav):
+            return keys.operator_start(uav)
+        case SignedRoster():
+            return keys.roster
+
+
+@lru_cache(maxsize=16)
+def _keys_of(mission: str) -> KeySpace:
+    return KeySpace(mission)

@@ -1,0 +1,78 @@
+"""What the operator has said about the flight that is on: which command counts for whom.
+
+A command names the run it was given for, so a new flight of the same mission inherits none.
+Of those to one UAV and those to the fleet the newest decides what the UAV does; that the
+mission is aborted holds whatever is said to a single UAV afterwards. Leaves out: obeying
+(agent.core.agent_core, coordinator.core.active).
+"""
+
+from __future__ import annotations
+
+from swarm.model.ids import FLEET
+from swarm.protocol.messages import CommandKind, OperatorCommand, Stamp, StartWithout
+from swarm.protocol.registers import Replica
+
+__all__ = [
+    "BEING_STOPPED",
+    "CANNOT_HOLD",
+    "abort_command",
+    "describe_command",
+    "dispensable",
+    "in_force",
+    "newest_command",
+]
+
+
+BEING_STOPPED = "being stopped, "
+"""Begins the note of a held UAV whose vehicle has not been seen to stand yet."""
+CANNOT_HOLD = "cannot hold: "
+"""Begins the note of a held UAV whose vehicle goes on."""
+
+_WORDS = {
+    CommandKind.HOLD: "held by the operator",
+    CommandKind.RESUME: "told by the operator to go on",
+    CommandKind.RETURN: "sent home by the operator",
+    CommandKind.ABORT: "aborted by the operator",
+}
+
+
+def in_force(replica: Replica) -> dict[str, OperatorCommand]:
+    """Target -> newest command to it; of the flight that the brief tells of, and no other."""
+    return {target: command for target, (_, command) in _of_this_run(replica).items()}
+
+
+def newest_command(replica: Replica, uav: str) -> tuple[Stamp, OperatorCommand] | None:
+    """The newest command that concerns ``uav``, with its stamp; None if there is none."""
+    if not replica.commands:
+        return None
+    commands = _of_this_run(replica)
+    concerning = [commands[target] for target in (uav, FLEET) if target in commands]
+    return max(concerning, key=lambda stamped: stamped[0], default=None)
+
+
+def abort_command(replica: Replica) -> OperatorCommand | None:
+    """The command that has ended this flight; None if there is none."""
+    return in_force(replica).get(FLEET) if replica.commands else None
+
+
+def dispensable(replica: Replica) -> dict[str, StartWithout]:
+    """UAV -> the operator's word that this flight may start without it."""
+    brief = replica.brief
+    if brief is None:
+        return {}
+    return {uav: start for uav, start in replica.starts.items() if start.run == brief.run}
+
+
+def describe_command(command: OperatorCommand) -> str:
+    """What has happened to whom it concerns, and why."""
+    said = _WORDS[command.kind]
+    return f"{said}: {command.reason}"[:200] if command.reason else said
+
+
+def _of_this_run(replica: Replica) -> dict[str, tuple[Stamp, OperatorCommand]]:
+    if not replica.commands or replica.brief is None:
+        return {}
+    run = replica.brief.run
+    return {
+        target: stamped for target, stamped in replica.commands.items() if stamped[1].run == run
+    }

@@ -1,0 +1,167 @@
+"""Synchronise state: when to ask everyone, what a question says, what an answer may omit.
+
+A question carries a digest, one number per writer, so that answers need not repeat what the
+asker knows: else, after a loss, each of N answers would hold all registers. Where the bus has
+keys a question bears a nonce too, and its answers are bound to it and to who asks. Leaves
+out: why to ask (the cores), and the asking itself (swarm.runtime.state_exchange).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from itertools import islice
+from operator import xor
+from typing import Any, Final
+
+import msgpack
+
+from swarm.protocol.encoding import encode
+from swarm.protocol.fields import MAX_COUNT
+from swarm.protocol.messages import Message
+from swarm.protocol.seal import QUESTION, Seal, UnacceptableError
+
+__all__ = [
+    "NONCE_BYTES",
+    "Question",
+    "QuestionTimer",
+    "bond",
+    "combined",
+    "decode_digest",
+    "decode_question",
+    "encode_digest",
+    "encode_question",
+    "fingerprint",
+    "unknown",
+]
+
+
+class QuestionTimer:
+    """Gathers wishes to ask into questions at least ``gap_s`` apart.
+
+    Args:
+        gap_s: shortest interval between two questions [s].
+    """
+
+    def __init__(self, gap_s: float) -> None:
+        self._gap_s = gap_s
+        self._free_at_s = -math.inf
+        self._ask_at_s: float | None = None
+
+    def want(self, now_s: float) -> None:
+        """There is a reason to ask; several before the next question are one."""
+        if self._ask_at_s is None:
+            self._ask_at_s = max(now_s, self._free_at_s)
+
+    def due(self, now_s: float) -> bool:
+        """Whether to ask now; True once for each question."""
+        if self._ask_at_s is None or now_s < self._ask_at_s:
+            return False
+        self._ask_at_s = None
+        self._free_at_s = now_s + self._gap_s
+        return True
+
+    def next_deadline_s(self) -> float | None:
+        """When `due` will next be true; None while there is nothing to ask."""
+        return self._ask_at_s
+
+
+MOST_WRITERS: Final = 10_000
+"""More than any fleet has, and what they take still travels as one question."""
+
+
+def fingerprint(message: Message) -> int:
+    """64 bits of a statement; those of a writer's registers are combined by exclusive or."""
+    return int.from_bytes(hashlib.blake2b(encode(message), digest_size=8).digest(), "big")
+
+
+def combined(numbers: Iterable[int]) -> int:
+    """Digests of several writers, or of any statements, as one; in any order."""
+    return reduce(xor, numbers, 0) % MAX_COUNT
+
+
+def unknown(
+    messages: Iterable[Message], mine: Mapping[str, int], theirs: Mapping[str, int]
+) -> tuple[Message, ...]:
+    """Those of ``messages`` that may be news to somebody.
+
+    Args:
+        messages: all registers of some writers.
+        mine: digest of the replica they are from.
+        theirs: digest of what the other one knows.
+    """
+    known = {writer for writer, number in theirs.items() if mine.get(writer) == number}
+    return tuple(message for message in messages if message.writer not in known)
+
+
+def encode_digest(known: Mapping[str, int]) -> bytes:
+    """The bytes of a digest; of very many writers some, since any may be left out."""
+    packed: bytes = msgpack.packb(dict(islice(known.items(), MOST_WRITERS)))
+    return packed
+
+
+def decode_digest(data: bytes) -> dict[str, int] | None:
+    """The digest in ``data``; None when it is none. No bytes at all say that nothing is known."""
+    if not data:
+        return {}
+    try:
+        found: Any = msgpack.unpackb(data, max_ext_len=0)
+    except (ValueError, TypeError, msgpack.exceptions.UnpackException, RecursionError):
+        return None
+    valid = isinstance(found, dict) and all(
+        isinstance(writer, str) and type(number) is int for writer, number in found.items()
+    )
+    return found if valid else None
+
+
+NONCE_BYTES: Final = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A question that was put."""
+
+    known: Mapping[str, int]
+    """Digest of what the asker knows."""
+    asker: str | None
+    """Who has signed it; None on a bus without keys."""
+    nonce: bytes
+
+    @property
+    def bond(self) -> bytes:
+        """What its answers are bound to."""
+        return bond(self.asker, self.nonce)
+
+
+def bond(asker: str | None, nonce: bytes) -> bytes:
+    """What answers are bound to, by who asks and the nonce of the question."""
+    return nonce + (asker or "").encode()
+
+
+def encode_question(known: Mapping[str, int], nonce: bytes, seal: Seal | None) -> bytes:
+    """The bytes of a question; its nonce counts only where there are keys."""
+    digest = encode_digest(known)
+    return digest if seal is None else seal.wrap(nonce + digest, QUESTION)
+
+
+def decode_question(data: bytes, seal: Seal | None) -> Question:
+    """The question in ``data``.
+
+    Raises:
+        UnacceptableError: it is none, or nobody of this mission has signed it.
+    """
+    asker, nonce = None, b""
+    if seal is not None:
+        envelope = seal.unwrap(data, QUESTION)
+        asker, nonce, data = (
+            envelope.signer,
+            envelope.said[:NONCE_BYTES],
+            envelope.said[NONCE_BYTES:],
+        )
+    known = decode_digest(data)
+    if known is None or (seal is not None and len(nonce) < NONCE_BYTES):
+        raise UnacceptableError("malformed")
+    return Question(known, asker, nonce)

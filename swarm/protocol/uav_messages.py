@@ -1,0 +1,218 @@
+"""What a UAV says: its claim, its outcomes, its status, and why it chose a task.
+
+A choice is said for those who look on and record; no agent listens, nothing is decided by it,
+and it may be lost. With its basis anyone who has the statements themselves can decide again
+and compare. Leaves out: deciding (agent.core).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated, ClassVar
+
+from annotated_types import Ge, Le, Len
+from pydantic import Strict
+
+from swarm.protocol.fields import (
+    CHECKED,
+    MAX_COUNT,
+    Count,
+    Duration,
+    Flag,
+    Id,
+    Instant,
+    Point,
+    Probability,
+    Reason,
+    Score,
+    Words,
+)
+
+__all__ = [
+    "MAX_CANDIDATES",
+    "MOST_REASONS",
+    "AttemptResult",
+    "Candidate",
+    "Choice",
+    "ChoiceBasis",
+    "Claim",
+    "ClaimPhase",
+    "Outcome",
+    "Status",
+    "StatusPhase",
+    "choice_id",
+]
+
+
+MAX_CANDIDATES = 5
+"""How many tasks a choice tells of, the one taken among them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A task that could have been taken."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    task: Id
+    score: Score
+    """By the rule in force, the higher the better."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChoiceBasis:
+    """What a choice rested on, beside the statements of others."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    decided_s: Instant
+    """Mission time at which the UAV became free [s]."""
+    place_enu_m: Point
+    """Where it was [m; mission origin], without the height layer."""
+    patience_s: Duration
+    """How late a UAV might be at its task and still be expected to decide in its turn."""
+    credible: tuple[Id, ...]
+    """Others whose claims counted."""
+    awaited: tuple[Id, ...]
+    """Free UAVs expected to decide in their turn."""
+    excluded: tuple[Id, ...]
+    """Tasks the UAV could not take, whatever their value."""
+    heads: Mapping[Id, tuple[Count, Count]]
+    """Writer -> incarnation and counter of its newest statement that was known."""
+    digest: Count
+    """Of all statements that were known; equal wherever they are. See swarm.protocol.sync."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Key ``uav/<id>/choice``: why that UAV took a task."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    number: Count
+    """Of the choices of this life of the agent, from 1; with UAV and incarnation its id in logs."""
+    task: Id
+    left: Id | None
+    """The task it turned aside from; None when it was free."""
+    chosen_s: Instant
+    """Mission time [s]."""
+    epoch: Count
+    rule: Id
+    rank: Count
+    score: Score
+    second_score: Score | None
+    """Of the best task it did not take; None when there was no other."""
+    certificate: Flag
+    """Whether Theorem 5 proves the choice optimal for this UAV."""
+    completion_s: Instant
+    """Predicted completion [s mission time]."""
+    candidates: Annotated[tuple[Candidate, ...], Len(0, MAX_CANDIDATES)]
+    """Best first, as far as the rule values them one by one; may be empty."""
+    basis: ChoiceBasis
+
+
+def choice_id(uav: str, number: int) -> str:
+    """What a choice is called in logs, where lines about its task name it.
+
+    Unique in one life of the agent.
+    """
+    return f"{uav}-{number}"
+
+
+MOST_REASONS = 20
+"""Reasons of which one status tells."""
+
+
+class ClaimPhase(StrEnum):
+    """How firmly a UAV holds its claim, or why it has none."""
+
+    PROPOSED = "proposed"
+    HELD = "held"
+    IDLE = "idle"
+    """Airborne and free to take a task."""
+    PAUSED = "paused"
+    """Stopped by the operator, in the air or on the ground: takes no task until told to go on."""
+    OUT = "out"
+    """Not taking part (any more)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """Register ``uav/<id>/claim``: the task a UAV has taken."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    phase: ClaimPhase
+    task: Id | None
+    """None exactly when idle, paused or out: the tombstone of an earlier claim."""
+    decided_s: Instant
+    """Mission time at which the UAV was free to decide [s]."""
+    rank: Count
+    completion_s: Instant
+    """Predicted completion [s mission time]."""
+    handed_over: Flag = False
+    """Out because somebody else has the vehicle: no later life of this agent commands it."""
+
+    def __post_init__(self) -> None:
+        if self.handed_over and self.phase is not ClaimPhase.OUT:
+            raise ValueError(f"handed over, but {self.phase}")
+        if (self.task is None) != (self.phase not in (ClaimPhase.PROPOSED, ClaimPhase.HELD)):
+            raise ValueError(f"a claim that is {self.phase} names {self.task}")
+
+
+class AttemptResult(StrEnum):
+    """How an attempt ended."""
+
+    DONE = "done"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Register ``uav/<id>/outcome/<task>``: how this UAV's last attempt ended."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    task: Id
+    result: AttemptResult
+    attempt: Annotated[int, Strict(), Ge(1), Le(MAX_COUNT)]
+    completed_s: Instant
+    """Mission time [s]."""
+
+
+class StatusPhase(StrEnum):
+    """What an agent is doing."""
+
+    LEARNING = "learning"
+    PREPARING = "preparing"
+    IDLE = "idle"
+    FLYING = "flying"
+    SERVING = "serving"
+    HOLDING = "holding"
+    """Stopped by the operator."""
+    RETURNING = "returning"
+    HOME = "home"
+    OUT = "out"
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Key ``uav/<id>/status``: news that may be dropped."""
+
+    __pydantic_config__: ClassVar = CHECKED
+
+    phase: StatusPhase
+    task: Id | None
+    position_enu_m: Point | None
+    """[m; mission origin], without the height layer."""
+    velocity_enu_m_s: Point | None
+    battery_frac: Probability | None
+    mission_s: Instant | None
+    dropped: Annotated[Mapping[Reason, Count], Len(0, MOST_REASONS)]
+    """Messages this process has dropped, by reason: those of `swarm.protocol.codec`, "too many"
+    where the inbox was full, "stale" for registers older than known, "no room" for those of which
+    there were too many."""
+    note: Words
+    """What it waits for, in words."""

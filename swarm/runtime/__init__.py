@@ -1,0 +1,1 @@
+"""What every process has: its shell, clock, log, memory, errors and common options."""

@@ -1,0 +1,403 @@
+"""The asyncio shell that all processes on the bus share: it runs one pure core.
+
+It decodes what the bus brings, steps the core, publishes what the core says, answers queries with
+the core's snapshot and ticks at the core's deadlines. On a bus with keys it says and believes only
+what is signed, and puts newer rosters in force. Leaves out: asking and answering
+(swarm.runtime.state_exchange), and actions that only one kind of process knows, which it carries
+out itself (``execute``; agent.runner, coordinator.daemon).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Generic, Protocol, TypeVar
+
+from swarm import __version__
+from swarm.bus.admission import TOO_MANY, AdmissionControl
+from swarm.bus.port import Bus, BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
+from swarm.model.ids import AUTHORITY
+from swarm.protocol.codec import Codec
+from swarm.protocol.events import (
+    Ask,
+    CommonEvent,
+    Finish,
+    KeysReplaced,
+    LinkChanged,
+    LogLine,
+    MessageReceived,
+    PeerGone,
+    PeerSeen,
+    Publish,
+    PublishLast,
+    Save,
+    SnapshotsReceived,
+    Stop,
+    Tick,
+)
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import Message, MissionConfig, SignedRoster, Snapshot, Stamp
+from swarm.protocol.registers import NO_ROOM
+from swarm.protocol.seal import Seal
+from swarm.protocol.timing import PRESETS, LinkKind
+from swarm.protocol.uav_messages import Choice, Status
+from swarm.runtime.clock import Clock
+from swarm.runtime.log import get_logger
+from swarm.runtime.state_exchange import StateExchange, draw_nonce
+
+__all__ = ["Core", "Shell", "join_mission"]
+
+
+TURN = 20
+"""Events from the bus between two looks at everything else."""
+
+E_contra = TypeVar("E_contra", contravariant=True)
+A_co = TypeVar("A_co", covariant=True)
+E = TypeVar("E")
+A = TypeVar("A")
+
+
+class Core(Protocol[E_contra, A_co]):
+    """What a shell asks of a core."""
+
+    def start(self, now_s: float) -> Sequence[A_co]:
+        """What to do first."""
+        ...
+
+    def step(self, event: E_contra, now_s: float) -> Sequence[A_co]:
+        """React to one event."""
+        ...
+
+    def next_deadline_s(self) -> float | None:
+        """When the core wants a tick at the latest."""
+        ...
+
+
+class Shell(Generic[E, A]):
+    """Runs one core on one bus until it finishes.
+
+    Args:
+        core: decides.
+        bus: open; closed by whoever opened it.
+        clock: gives ``now_s``.
+        mission: mission name.
+        name: writer id of this process.
+        from_bus: makes the core's event of a fact from the bus.
+        execute: carries out an action that is not common to all processes.
+        snapshot: answers a query; None for a process that answers none.
+        known: digest of the registers the core knows; answers to it leave those out, and
+            its own answers what the asker knows.
+        left_out: how many registers the core has had no room for so far.
+        save: keeps the core's memory, given ``now_s``; None to keep nothing.
+        answer_s: how long a question waits for the slowest answer [wall s].
+        context: what every note of the core is logged with, besides its own fields.
+        draw_nonce: makes the nonce of a question, see swarm.protocol.sync.
+    """
+
+    def __init__(
+        self,
+        core: Core[E, A],
+        bus: Bus,
+        clock: Clock,
+        *,
+        mission: str,
+        name: str,
+        from_bus: Callable[[CommonEvent], E],
+        execute: Callable[[A], None],
+        snapshot: Callable[[float], Snapshot] | None,
+        known: Callable[[], Mapping[str, int]] = dict,
+        left_out: Callable[[], int] = int,
+        save: Callable[[float], None] | None = None,
+        answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
+        context: Callable[[], Mapping[str, object]] = dict,
+        draw_nonce: Callable[[], bytes] = draw_nonce,
+    ) -> None:
+        self._core = core
+        self._bus = bus
+        self._clock = clock
+        self._mission = mission
+        self._keys = KeySpace(mission)
+        self._seal = bus.seal
+        self._codec = Codec(mission, bus.seal)
+        self._admission = AdmissionControl(self._keys, bus.seal, clock.now_s)
+        bus.inbox.admits = self._admission.admits
+        self._log = get_logger(name, mission=mission)
+        self._questions = StateExchange(
+            bus,
+            clock,
+            self._codec,
+            mission=mission,
+            name=name,
+            snapshot=snapshot,
+            known=known,
+            answer_s=answer_s,
+            draw_nonce=draw_nonce,
+        )
+        self._from_bus = from_bus
+        self._execute = execute
+        self._left_out = left_out
+        self._save = save
+        self._context = context
+        self._loop = asyncio.get_running_loop()
+        self._done: asyncio.Future[int] = self._loop.create_future()
+        self._timer: asyncio.TimerHandle | None = None
+        self._asking: set[asyncio.Task[None]] = set()
+        self._events: deque[E] = deque()
+        self._busy = False
+        self._told_newer: set[str] = set()
+        self._briefed: Stamp | None = None
+        """Of the newest brief that was heard."""
+        self._counted: Counter[str] = Counter()
+        """Of what others than the codec have dropped, what is counted there."""
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Messages dropped so far, by reason."""
+        self._count()
+        return self._codec.dropped
+
+    async def run(self) -> int:
+        """Run the core to its end; its exit status."""
+        reader = self._loop.create_task(self._hear())
+        reader.add_done_callback(self._fail)
+        try:
+            self._guard(self._start)
+            return await self._done
+        finally:
+            tasks = [reader, *self._asking]
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            if self._timer is not None:
+                self._timer.cancel()
+
+    def step(self, event: E) -> None:
+        """Step the core and carry out what it wants; call from the loop's thread.
+
+        An event that comes up while another is being dealt with follows it.
+        """
+        self._events.append(event)
+        if not self._busy:
+            self._guard(self._step_all)
+
+    def _step_all(self) -> None:
+        while self._events and not self._done.done():
+            for action in self._core.step(self._events.popleft(), self._clock.now_s()):
+                self._carry_out(action)
+
+    def fail(self, fault: BaseException) -> None:
+        """End `run` with ``fault``."""
+        if not self._done.done():
+            self._done.set_exception(fault)
+
+    def _start(self) -> None:
+        self._log.info("begins", release=__version__)
+        for action in self._core.start(self._clock.now_s()):
+            self._carry_out(action)
+        if self._seal is not None:  # what is in its folder is as if it had been heard
+            self._events.append(self._from_bus(MessageReceived(self._roster(self._seal))))
+        self._step_all()
+
+    def _roster(self, seal: Seal) -> Message:
+        body = SignedRoster(seal.signed_roster)
+        return Message(self._mission, AUTHORITY, Stamp(seal.roster.version, 0), body)
+
+    def _heed(self, messages: Iterable[Message], *, answers: bool = False) -> None:
+        """Put a newer roster in force; who told an older one is told the newer."""
+        seal, told = self._seal, False
+        if seal is None:
+            return
+        for message in messages:
+            if not isinstance(message.body, SignedRoster):
+                continue
+            behind = message.stamp.incarnation < seal.roster.version
+            if behind and answers and not told and seal.may_publish_roster:
+                self._publish(self._roster(seal))
+                told = True  # once, however often the answer repeats an old one
+            before = seal.roster
+            try:
+                news = seal.put_in_force(message.body.signed)
+            except OSError as fault:
+                news, reason = True, fault.strerror or str(fault)
+                self._log.warning(
+                    "cannot keep the newer roster", reason=reason, file=fault.filename
+                )
+            if not news:
+                continue
+            replaced = seal.roster.replaced_since(before)
+            gone = [name for name in sorted(replaced) if seal.roster.entry(name) is None]
+            self._log.info(
+                "newer roster in force", version=seal.roster.version, without=", ".join(gone)
+            )
+            if replaced:
+                self.step(self._from_bus(KeysReplaced(replaced)))
+            for name in gone:  # a token cannot be signed: it counts no longer
+                self.step(self._from_bus(PeerGone(name)))
+            if not seal.is_in_force:  # nobody believes it any more, so it takes no further part
+                self.step(self._from_bus(Stop("its keys were revoked or replaced", believed=False)))
+
+    def _guard(self, act: Callable[[], None]) -> None:
+        """Act and reschedule; a bug ends the process rather than half of it."""
+        self._busy = True
+        try:
+            act()
+            self._reschedule()
+        except Exception as fault:  # noqa: BLE001 - top of the process: run() raises it
+            self.fail(fault)
+        finally:
+            self._busy = False
+
+    def _carry_out(self, action: A) -> None:
+        match action:
+            case Publish(message):
+                self._publish(message)
+            case PublishLast(make):
+                self._publish(make())
+            case Ask():
+                task = self._loop.create_task(self._ask())
+                self._asking.add(task)
+                task.add_done_callback(self._asking.discard)
+                task.add_done_callback(self._fail)
+            case Save():
+                if self._save is not None:
+                    self._save(self._clock.now_s())
+            case LogLine(text, fields):
+                self._log.info(text, **{**self._context(), **fields})
+            case Finish(status):
+                if not self._done.done():
+                    self._done.set_result(status)
+            case _:
+                self._execute(action)
+
+    def _publish(self, message: Message) -> None:
+        reliable = not isinstance(message.body, Status | Choice)
+        packed = self._codec.pack(message)
+        if packed is not None:
+            self._bus.publish(message.key, packed, reliable=reliable)
+
+    def _reschedule(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        deadline_s = self._core.next_deadline_s()
+        if deadline_s is not None and not self._done.done():
+            delay_s = self._clock.wall_delay_s(deadline_s - self._clock.now_s())
+            tick = self._from_bus(Tick())
+            self._timer = self._loop.call_later(max(0.0, delay_s), self.step, tick)
+
+    def _fail(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (fault := task.exception()):
+            self.fail(fault)
+
+    async def _hear(self) -> None:
+        while True:
+            await self._bus.inbox.wait()
+            events = self._bus.inbox.take()
+            self._count()
+            for number, event in enumerate(events, 1):
+                fact = self._fact(event)
+                if fact is not None:
+                    self.step(self._from_bus(fact))
+                if number % TURN == 0:  # the vehicle must not wait for a flood of words
+                    await asyncio.sleep(0)
+
+    def _tell_newer(self) -> None:
+        """Tell people once of each kind: it is no fault to be of another release."""
+        if len(self._codec.newer) == len(self._told_newer):
+            return
+        for kind in self._codec.newer - self._told_newer:
+            self._told_newer.add(kind)
+            self._log.info("a newer release says more than this one understands", kind=kind)
+
+    def _count(self) -> None:
+        """Count what was dropped before anything was read of it, or has no room in the core."""
+        gone, refused, left_out = self._bus.inbox.dropped, self._admission.refused, self._left_out()
+        if gone or refused or left_out:
+            counts = Counter(dict(refused))  # copied at once: others may count on meanwhile
+            counts[TOO_MANY] += gone
+            counts[NO_ROOM] = max(left_out, self._counted[NO_ROOM])
+            news = counts - self._counted
+            if news[NO_ROOM] and not self._counted[NO_ROOM]:
+                self._log.warning("others say more than there is room for", left_out=left_out)
+            self._codec.dropped.update(news)
+            self._counted = counts
+
+    def _fact(self, event: BusEvent) -> CommonEvent | None:
+        match event:
+            case Sample(key, payload):
+                message = self._codec.decode(key, payload)
+                if message is None:
+                    return None
+                self._tell_newer()
+                self._heed([message])
+                self._expect([message])
+                return MessageReceived(message)
+            case TokenSeen(key):
+                writer = self._keys.writer_of_token(key)
+                return None if writer is None else PeerSeen(writer)
+            case TokenGone(key):
+                writer = self._keys.writer_of_token(key)
+                return None if writer is None else PeerGone(writer)
+            case LinkUp():
+                return LinkChanged(True)
+            case LinkDown():
+                return LinkChanged(False)
+            case Query(reply=reply, payload=payload):
+                self._questions.answer(reply, payload)
+                return None
+
+    def _expect(self, messages: Iterable[Message]) -> None:
+        """Let no made-up names shut out whom a brief names."""
+        for message in messages:
+            body, stamp = message.body, message.stamp
+            if isinstance(body, MissionConfig) and (self._briefed is None or stamp > self._briefed):
+                self._briefed = stamp
+                self._admission.fleet = frozenset(uav.id for uav in body.uavs)
+
+    async def _ask(self) -> None:
+        heed = partial(self._heed, answers=True)
+        learned = await self._questions.ask(heed)
+        self._expect(message for snapshot in learned for message in snapshot.messages)
+        self.step(self._from_bus(SnapshotsReceived(learned)))
+
+
+def join_mission(
+    bus: Bus, mission: str, name: str | None, *, status: bool, every_status: bool = False
+) -> None:
+    """Subscribe to what every process of a mission needs, and show that this one is there.
+
+    Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
+    ``operator/*``, ``operator/task/*`` and ``operator/start/*``, where there are keys ``roster``,
+    watches ``alive/*``.
+
+    Args:
+        bus: an open bus.
+        mission: mission name.
+        name: writer id: declares ``alive/<name>`` and serves ``state/<name>``; None for
+            an observer.
+        status: subscribe to ``uav/*/status`` too, newest first, and to ``uav/*/choice``.
+        every_status: of status keep all there is, for who records, not the newest alone.
+    """
+    keys = KeySpace(mission)
+    for key_expr in (
+        keys.brief,
+        keys.plan,
+        keys.board("*"),
+        keys.claim("*"),
+        keys.outcome("*", "*"),
+        keys.operator("*"),
+        keys.operator_task("*"),
+        keys.operator_start("*"),
+    ):
+        bus.subscribe(key_expr)
+    if status:
+        bus.subscribe(keys.status("*"), latest=not every_status)
+        bus.subscribe(keys.choice("*"))
+    if bus.seal is not None:
+        bus.subscribe(keys.roster)
+    bus.watch_tokens(keys.alive("*"))
+    if name is not None:
+        bus.serve(keys.state(name))
+        bus.declare_token(keys.alive(name))

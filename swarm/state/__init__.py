@@ -1,1 +1,0 @@
-"""The replicated state: registers that join, and who holds which task."""

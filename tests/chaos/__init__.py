@@ -1,0 +1,1 @@
+"""Real fleets under attack: processes killed at random moments, and insiders that lie."""

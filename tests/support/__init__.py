@@ -1,0 +1,1 @@
+"""What several tests share: builders, players of parts, and recordings."""

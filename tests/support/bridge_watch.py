@@ -1,0 +1,443 @@
+"""What must hold after every step of a bridge, whatever it hears: all of it in one place.
+
+1. It never raises (who steps it sees to that).
+2. All it sends are whole MAVLink frames of its own, addressed to the configured vehicle
+   and to nobody else.
+3. Of the commands there are only those of its phase, and those give what was ordered: a
+   mode of ours, motors, a takeoff and targets.
+4. A target lies within the fence and is one that was ordered, or, while the vehicle is
+   being stopped, where it said it was since the order, or the nearest place within the
+   fence; and that is in reach of another place that it told. What names no place is a
+   pause, only told to stop a vehicle.
+5. After a hand-over it says nothing but heartbeats and requests for messages, until it is
+   given a new order.
+6. What goes home, or is not known to be ours, is given no mission; one that was being given to
+   a vehicle on the ground is given whole, or cleared.
+7. It reports what was asked for: the leg under way, once; numbers that are numbers.
+8. It wants to be called again within a heartbeat's interval, and not at once for ever.
+9. It remembers no more for hearing more.
+
+Leaves out: whether it does anything useful.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from agent.core.interface import (
+    Arrived,
+    GoTo,
+    HandedOver,
+    HandOverExplained,
+    HeardAgain,
+    Hold,
+    Prepare,
+    Refused,
+    Return,
+    Telemetry,
+    VehicleReady,
+    VehicleReport,
+)
+from agent.vehicle.activity import FlightPhase
+from agent.vehicle.bridge import Bridge
+from agent.vehicle.config import BridgeConfig, CommandStyle
+from agent.vehicle.firmware.ardupilot import ArduCopter
+from agent.vehicle.firmware.px4 import Px4Copter
+from agent.vehicle.session import BridgeAction, BridgeEvent, SendBytes, TimePassed
+from swarm.model.frames import enu_from_wgs84
+from tests.support.fake_copter import (
+    ARM,
+    INTERVAL,
+    REPOSITION,
+    SET_MODE,
+    SPEED,
+    TAKEOFF,
+    FakeCopter,
+)
+from tests.support.fake_px4 import FakePx4
+
+__all__ = ["BridgeWatch", "BrokenError"]
+
+
+_MODE_ENABLED = 1.0
+_TOLERANCE_M = 0.1
+"""Of places on the wire: 1e-7 degrees, and heights of 24 bits."""
+_MOST_REMEMBERED = 4_000
+"""Entries of all collections that a bridge holds, its constants included."""
+_MOST_BUFFERED_BYTES = 280
+"""The longest frame there is."""
+_PLACES = 50
+_FASTEST_M_S = 50.0
+_RECENT = 20
+_LEAP_M = 25.0
+"""Two places that a vehicle told are farther apart only if it was somewhere else."""
+_FAKES: dict[type, type[FakeCopter]] = {ArduCopter: FakeCopter, Px4Copter: FakePx4}
+_MISSION_MESSAGES = {
+    "MISSION_COUNT",
+    "MISSION_ITEM_INT",
+    "MISSION_REQUEST_INT",
+    "MISSION_REQUEST_LIST",
+    "MISSION_ACK",
+    "MISSION_SET_CURRENT",
+    "MISSION_CLEAR_ALL",
+}
+_MISSION_READING = {"MISSION_REQUEST_INT", "MISSION_REQUEST_LIST", "MISSION_ACK"}
+_WITHOUT_MISSION = {FlightPhase.IDLE, FlightPhase.RETURNING}
+_WAYPOINT = 16
+_COMMANDS: dict[FlightPhase, set[int]] = {
+    FlightPhase.IDLE: {ARM},
+    FlightPhase.PREPARING: {SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED},
+    FlightPhase.HOVERING: {REPOSITION},
+    FlightPhase.FLYING: {REPOSITION},
+    FlightPhase.HOLDING: {SET_MODE, REPOSITION, ARM},
+    FlightPhase.RETURNING: {SET_MODE, REPOSITION},
+    FlightPhase.HANDED_OVER: set(),
+}
+"""What may be commanded in each phase, beside requests for messages; motors are started
+while preparing only."""
+_COMMANDS_OF_MISSIONS: dict[FlightPhase, set[int]] = {
+    FlightPhase.HOVERING: {SET_MODE, SPEED},
+    FlightPhase.FLYING: {SET_MODE, SPEED},
+}
+"""What else, if targets are missions."""
+_LIMITS, _GIVES_WAY = 222, 92
+_MISSION_ITEMS = {_WAYPOINT, 20, SPEED, _LIMITS, _GIVES_WAY}
+"""A place, and the speed, the time for targets and the way home around it."""
+
+
+Point = tuple[float, float, float]
+
+
+class BrokenError(AssertionError):
+    """A bridge did what it must not do."""
+
+
+def hold(condition: bool, what: str) -> None:
+    if not condition:
+        raise BrokenError(what)
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """What a bridge has been ordered to do."""
+
+    places_m: tuple[Point, ...] = ()
+    """Where the vehicle may be sent: the last places ordered. An older mission stays in force
+    if the vehicle does not take a newer one, and may be taken up again after a hand-over."""
+    leg: int | None = None
+    """Under way."""
+    told_m: list[tuple[Point, float]] = field(default_factory=list)
+    """Where the vehicle said it was when it was ordered, and since; and when."""
+
+
+class BridgeWatch:
+    """Watches one bridge from its beginning.
+
+    Args:
+        bridge: steps are taken through `step` only.
+        fake: the kind of vehicle it flies, for the numbers of modes; a heartbeat that says
+            otherwise is believed as long as the vehicle is not flown.
+    """
+
+    def __init__(self, bridge: Bridge, fake: type[FakeCopter]) -> None:
+        self.bridge = bridge
+        self.fake = fake
+        self.steps = 0
+        self._parser = mavlink.MAVLink(None)
+        self._heres_m: deque[tuple[Point, float]] = deque(maxlen=_RECENT)
+        """Where the vehicle last said it was, and when."""
+        self._now_s = 0.0
+        self._task = _Task()
+        self._task_before = self._task
+        """As it was before this step."""
+        self._ordered: object = None
+        """In this step."""
+        self._gave_mission = False
+        """Whether the vehicle has been given a mission since the last return."""
+        self._prepared = False
+        """Whether `Prepare` has been ordered and not been answered."""
+        self._silent = False
+        """Handed over, and nothing ordered since."""
+        self._lost = False
+        """Handed over for its silence, and neither heard again nor handed over otherwise since."""
+        self._heard_again = False
+        """Since it was handed over."""
+        self._mode_wanted: set[tuple[float, float]] = set()
+
+    def step(self, event: BridgeEvent, now_s: float) -> list[BridgeAction]:
+        """Step the bridge and look at what it does."""
+        self.steps += 1
+        self._now_s = now_s
+        before = self.bridge.phase
+        self._task_before, self._ordered = self._task, event
+        if isinstance(event, Prepare | GoTo | Hold | Return):
+            self._note(event)
+        self._gave_mission &= not isinstance(event, Return)
+        actions = self.bridge.step(event, now_s)
+        self.fake = _FAKES.get(type(self.bridge._session.firmware), self.fake)
+        after = self.bridge.phase
+        for action in actions:
+            if isinstance(action, SendBytes):
+                self._look_at(self._decoded(action.data), before, after)
+            else:
+                self._take(action)
+        actions += self._see_deadline(now_s)
+        self._see_size()
+        return actions
+
+    def _note(self, order: Prepare | GoTo | Hold | Return) -> None:
+        self._silent = False
+        places_m = self._task.places_m
+        match order:
+            case Prepare(position_enu_m):
+                self._prepared = True
+                self._task = _Task((*places_m[-_PLACES:], position_enu_m))
+            case GoTo(leg, position_enu_m):
+                self._task = _Task((*places_m[-_PLACES:], position_enu_m), leg)
+            case Return(via_enu_m=tuple() as via_enu_m):
+                self._task = _Task((*places_m[-_PLACES:], via_enu_m))
+            case Hold() | Return():
+                self._task = _Task(places_m)
+        self._task.told_m.extend(self._heres_m)
+
+    # What it sends.
+
+    def _decoded(self, data: bytes) -> Any:
+        messages = self._parser.parse_buffer(data) or []
+        hold(len(messages) == 1, f"sent {len(messages)} messages as one: {data.hex()}")
+        message = messages[0]
+        config = self.bridge.config
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        hold(sender == (config.ground_system_id, config.ground_component_id), f"sent as {sender}")
+        if message.get_type() != "HEARTBEAT":
+            target = (message.target_system, message.target_component)
+            hold(target == (config.system_id, 1), f"{message.get_type()} sent to {target}")
+        return message
+
+    def _look_at(self, message: Any, before: FlightPhase, after: FlightPhase) -> None:
+        name = message.get_type()
+        phases = {before, after}
+        missions = self.bridge.config.command is CommandStyle.MISSION
+        if name == "HEARTBEAT":
+            hold(message.type == mavlink.MAV_TYPE_GCS, f"heartbeat of type {message.type}")
+            return
+        if name == "COMMAND_LONG" and message.command == INTERVAL:
+            hold(message.param2 > 0.0, f"message interval {message.param2}")
+            return
+        if name in ("PARAM_REQUEST_READ", "PARAM_SET") and message.param_id in self.fake.jerk_names:
+            self._see_jerk(message)
+            return
+        hold(not self._silent, f"{name} after a hand-over: {message}")
+        if name in ("PARAM_REQUEST_READ", "PARAM_SET"):
+            hold(FlightPhase.PREPARING in phases, f"{name} while {before}, {after}")
+            read = self.fake.failsafe_names if name == "PARAM_REQUEST_READ" else frozenset()
+            known = message.param_id in read or message.param_id in self.fake.speed_names
+            hold(known, f"{name} of {message.param_id}")
+        elif name in _MISSION_MESSAGES:
+            hold(missions, f"{name}, though commanded by targets")
+            if name not in _MISSION_READING:
+                self._see_giving(name, phases)
+            if name == "MISSION_ITEM_INT":
+                hold(message.command in _MISSION_ITEMS, f"mission item {message.command}")
+                if message.command == _WAYPOINT:
+                    self._see_place(message, phases)
+                elif message.command in (_LIMITS, _GIVES_WAY):
+                    hold(self.fake is FakeCopter, "an item that it does not know")
+                    hold(message.param1 >= 1.0, f"gives way for {message.param1} s")
+        elif name in ("COMMAND_LONG", "COMMAND_INT"):
+            self._see_command(message, phases, missions=missions)
+        else:
+            hold(False, f"sends {name}")
+
+    def _see_jerk(self, message: Any) -> None:
+        """Raised in flight only; put back at any time, even after a hand-over: it moves nothing."""
+        firmware = self.bridge._session.firmware
+        override_spec = None if firmware is None else firmware.override_spec
+        hold(override_spec is not None, f"{message.param_id} of a vehicle that needs no other")
+        if message.get_type() == "PARAM_SET" and override_spec is not None:
+            raised = message.param_value > override_spec.value
+            hold(message.param_value <= 1.01 * override_spec.value, f"jerk {message.param_value}")
+            hold(not (raised and self._silent), "jerk raised after a hand-over")
+
+    def _see_giving(self, name: str, phases: set[FlightPhase]) -> None:
+        """What a vehicle that is no longer prepared was being given is given whole, or cleared."""
+        hold(not isinstance(self._ordered, Return), f"{name} in the step of a return")
+        if phases <= _WITHOUT_MISSION:
+            ends = self._gave_mission and name != "MISSION_SET_CURRENT"
+            hold(phases == {FlightPhase.IDLE} and ends, f"{name} {phases}")
+        self._gave_mission = True
+
+    def _see_command(self, message: Any, phases: set[FlightPhase], *, missions: bool) -> None:
+        allowed = set[int]().union(*(_COMMANDS[phase] for phase in phases))
+        if missions:
+            allowed |= set[int]().union(*(_COMMANDS_OF_MISSIONS.get(p, set()) for p in phases))
+        hold(message.command in allowed, f"commands {message.command} while {phases}")
+        match message.command:
+            case 192:
+                if message.get_type() == "COMMAND_INT":
+                    self._see_place(message, phases)
+                else:
+                    self._see_pause(message, phases)
+            case 22:
+                self._see_takeoff(message)
+            case 400:
+                hold(message.param1 in (0.0, 1.0), f"motors {message.param1}")
+                hold(message.param2 == 0.0, "motors by force")
+                if message.param1 == 1.0:
+                    hold(FlightPhase.PREPARING in phases, f"motors started while {phases}")
+            case 176:
+                hold(message.param1 == _MODE_ENABLED, f"mode of kind {message.param1}")
+                self._see_mode(message, phases, missions=missions)
+            case 178:
+                hold(0.0 < message.param2 < 100.0, f"speed {message.param2} m/s")
+
+    def _see_mode(self, message: Any, phases: set[FlightPhase], *, missions: bool) -> None:
+        """The guided mode, that of missions if there are, and that of the return for it."""
+        mode = int(message.param2)
+        if self.fake.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+            mode = mode << 16 | int(message.param3) << 24
+        if mode == self.fake.return_mode:
+            hold(FlightPhase.RETURNING in phases, f"sent home while {phases}")
+        elif mode != self.fake.own_mode:
+            hold(missions and mode == self.fake.mission_mode, f"mode {mode}")
+
+    def _see_place(self, message: Any, phases: set[FlightPhase]) -> None:
+        config = self.bridge.config
+        place_m = enu_from_wgs84(config.origin, message.x / 1e7, message.y / 1e7, message.z)
+        hold(math.isfinite(message.z), f"sent to height {message.z}")
+        fault = config.out_of_bounds(place_m)
+        hold(fault is None, f"sent beyond the fence, to {place_m}: {fault}")
+        if FlightPhase.HOLDING in phases and self._is_borne_out(place_m):
+            return
+        places_m = self._task.places_m
+        ordered = any(_near(place_m, place) for place in places_m)
+        hold(ordered, f"sent to {place_m}, not to {places_m[-3:]}")
+
+    def _is_borne_out(self, place_m: Point) -> bool:
+        """Whether the vehicle told it is there, and another place from which it can have come."""
+        told_m = self._task.told_m
+        return any(
+            _near(place_m, _fenced(there_m, self.bridge.config))
+            and any(
+                other is not told_m[place]
+                and math.dist(other[0], there_m) <= _LEAP_M + _FASTEST_M_S * abs(at_s - other[1])
+                for other in told_m
+            )
+            for place, (there_m, at_s) in enumerate(told_m)
+        )
+
+    def _see_pause(self, message: Any, phases: set[FlightPhase]) -> None:
+        named = [p for p in (message.param5, message.param6, message.param7) if not math.isnan(p)]
+        hold(not named, f"a place in a long command: {named}")
+        hold(self.fake.autopilot == mavlink.MAV_AUTOPILOT_PX4, "a pause that it does not know")
+        hold(FlightPhase.HOLDING in phases, f"paused while {phases}")
+
+    def _see_takeoff(self, message: Any) -> None:
+        """Above home on ArduPilot, above the sea on PX4: at most across the fence."""
+        config = self.bridge.config
+        height_m = message.param7
+        if self.fake.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+            height_m -= config.origin.alt_m
+            hold(abs(height_m) <= config.fence_height_m + 0.1, f"takeoff to {height_m} m")
+        else:
+            hold(0.0 < height_m <= 2.0 * config.fence_height_m, f"takeoff by {height_m} m")
+
+    # What it reports.
+
+    def _take(self, report: VehicleReport) -> None:
+        match report:
+            case HandedOver(_, silent):
+                hold(self._heard_again or not self._silent, "handed over twice")
+                self._silent, self._heard_again, self._lost = True, False, silent
+                self._prepared = False
+                self._task = _Task(self._task.places_m)
+            case HeardAgain():
+                hold(self._lost, "heard again, though it was not silent")
+                self._lost, self._heard_again = False, True
+            case HandOverExplained():
+                hold(self.bridge.phase is FlightPhase.HANDED_OVER, "explained, though it is ours")
+            case VehicleReady():
+                hold(self._prepared, "ready, though nobody asked")
+                self._prepared = False
+            case Arrived(leg):
+                under_way = self._task.leg
+                hold(leg == under_way, f"arrived on leg {leg}, under way is {under_way}")
+                self._task = replace(self._task, leg=None)
+            case Refused(order) if order is self._ordered:
+                self._task = self._task_before  # it changes nothing
+            case Refused():
+                self._task = replace(self._task, leg=None)
+            case Telemetry(position, velocity, battery_frac):
+                self._heres_m.append((position, self._now_s))
+                self._task.told_m.append((position, self._now_s))
+                numbers = (*position, *velocity, battery_frac or 0.0)
+                hold(all(math.isfinite(n) for n in numbers), f"telemetry {report}")
+            case _:
+                pass
+
+    # How it goes on.
+
+    def _see_deadline(self, now_s: float) -> list[BridgeAction]:
+        more: list[BridgeAction] = []
+        for _ in range(3):
+            deadline_s = self.bridge.next_deadline_s()
+            latest_s = now_s + self.bridge.config.heartbeat_interval_s
+            hold(deadline_s <= latest_s, f"wants to be called at {deadline_s}, now is {now_s}")
+            if deadline_s > now_s:
+                return more
+            before = self.bridge.phase
+            for action in self.bridge.step(TimePassed(), now_s):
+                more.append(action)
+                if isinstance(action, SendBytes):
+                    self._look_at(self._decoded(action.data), before, self.bridge.phase)
+                else:
+                    self._take(action)
+        raise BrokenError(f"wants to be called at {deadline_s} for ever, now is {now_s}")
+
+    def _see_size(self) -> None:
+        buffered = len(self.bridge.codec._framer._buffer)
+        hold(buffered <= _MOST_BUFFERED_BYTES, f"keeps {buffered} bytes")
+        if self.steps % 500 == 0:
+            size = sum(len(part) for part in _collections(self.bridge, set()))
+            hold(size <= _MOST_REMEMBERED, f"remembers {size} things")
+
+
+def _fenced(place_m: Point, config: BridgeConfig) -> Point:
+    """That place, or the one nearest to it that is a little within the fence."""
+    east_m, north_m, up_m = place_m
+    away_m = math.hypot(east_m, north_m)
+    if away_m > config.fence_radius_m:
+        scale = 0.999 * config.fence_radius_m / away_m
+        east_m, north_m = scale * east_m, scale * north_m
+    if abs(up_m) > config.fence_height_m:
+        up_m = math.copysign(0.999 * config.fence_height_m, up_m)
+    return (east_m, north_m, up_m)
+
+
+def _near(a: Point, b: Point) -> bool:
+    return math.dist(a[:2], b[:2]) <= _TOLERANCE_M and abs(a[2] - b[2]) <= _TOLERANCE_M
+
+
+def _collections(thing: Any, seen: set[int]) -> Iterator[Any]:
+    """Every collection that ``thing`` holds, however deep, text and bytes left out."""
+    if id(thing) in seen or isinstance(thing, str | bytes | int | float | type):
+        return
+    seen.add(id(thing))
+    if isinstance(thing, dict):
+        yield thing
+        parts: Any = [*thing.keys(), *thing.values()]
+    elif isinstance(thing, list | tuple | set | frozenset) or type(thing).__name__ == "deque":
+        yield thing
+        parts = list(thing)
+    elif is_dataclass(thing):
+        parts = [getattr(thing, each.name) for each in fields(thing)]
+    else:
+        parts = list(getattr(thing, "__dict__", {}).values())
+    for part in parts:
+        yield from _collections(part, seen)

@@ -1,0 +1,184 @@
+"""Hypothesis strategies for everything that may be said on the bus."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
+from swarm.protocol.fields import MAX_COUNT
+from swarm.protocol.messages import (
+    CommandKind,
+    Message,
+    MissionConfig,
+    MissionPhase,
+    OperatorCommand,
+    PlanEpoch,
+    Stamp,
+    StartWithout,
+    TaskEdit,
+    TaskEntry,
+    UavSpec,
+)
+from swarm.protocol.uav_messages import (
+    MAX_CANDIDATES,
+    AttemptResult,
+    Candidate,
+    Choice,
+    ChoiceBasis,
+    Claim,
+    ClaimPhase,
+    Outcome,
+    Status,
+    StatusPhase,
+)
+from tests.support.builders import MISSION
+
+ids = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", fullmatch=True)
+uav_ids = st.sampled_from(["u0", "u1", "u2", "quad-3"])
+task_ids = st.sampled_from(["t0", "t1", "t2"])
+numbers = st.floats(-1e6, 1e6)
+positives = st.floats(1e-3, 1e6)
+not_negatives = st.floats(0.0, 1e6)
+probabilities = st.floats(0.0, 1.0)
+points = st.tuples(numbers, numbers, numbers)
+tables = st.dictionaries(ids, probabilities, max_size=3)
+counts = st.integers(0, MAX_COUNT)
+notes = st.text(max_size=20) | st.just("x" * 200)
+stamps = st.builds(Stamp, counts, counts)
+
+fleets = st.builds(UavSpec, uav_ids, points, positives, tables, tables, st.none() | ids, numbers)
+origins = st.tuples(st.floats(-89, 89), st.floats(-180, 180), numbers)
+briefs = st.builds(
+    MissionConfig,
+    positives,
+    probabilities,
+    probabilities,
+    st.booleans(),
+    counts,
+    origins,
+    st.lists(fleets, max_size=4, unique_by=lambda fleet: fleet.id).map(tuple),
+)
+epochs = st.builds(
+    PlanEpoch,
+    counts,
+    st.sampled_from(MissionPhase),
+    st.sampled_from(["greedy", "lookahead"]),
+    st.lists(uav_ids, unique=True).map(tuple),
+    numbers,
+    notes,
+    st.dictionaries(uav_ids, st.lists(task_ids, unique=True, max_size=3).map(tuple), max_size=3),
+)
+boards = st.builds(
+    TaskEntry,
+    task_ids,
+    counts,
+    points,
+    not_negatives,
+    not_negatives,
+    st.none() | ids,
+    st.booleans(),
+)
+claims = st.one_of(
+    st.builds(
+        Claim,
+        st.sampled_from([ClaimPhase.PROPOSED, ClaimPhase.HELD]),
+        task_ids,
+        numbers,
+        counts,
+        numbers,
+    ),
+    st.builds(
+        Claim,
+        st.sampled_from([ClaimPhase.IDLE, ClaimPhase.PAUSED, ClaimPhase.OUT]),
+        st.none(),
+        numbers,
+        counts,
+        numbers,
+    ),
+)
+outcomes = st.builds(
+    Outcome, task_ids, st.sampled_from(AttemptResult), st.integers(1, MAX_COUNT), numbers
+)
+statuses = st.builds(
+    Status,
+    st.sampled_from(StatusPhase),
+    st.none() | task_ids,
+    st.none() | points,
+    st.none() | points,
+    st.none() | probabilities,
+    st.none() | numbers,
+    st.dictionaries(st.sampled_from(["malformed", "stale", "too many"]), counts),
+    notes,
+)
+scores = st.floats(-1e30, 1e30)
+choices = st.builds(
+    Choice,
+    number=counts,
+    task=task_ids,
+    left=st.none() | task_ids,
+    chosen_s=numbers,
+    epoch=counts,
+    rule=ids,
+    rank=counts,
+    score=scores,
+    second_score=st.none() | scores,
+    certificate=st.booleans(),
+    completion_s=numbers,
+    candidates=st.lists(
+        st.builds(Candidate, task_ids, scores), max_size=MAX_CANDIDATES, unique_by=lambda c: c.task
+    ).map(tuple),
+    basis=st.builds(
+        ChoiceBasis,
+        decided_s=numbers,
+        place_enu_m=points,
+        patience_s=not_negatives,
+        credible=st.lists(uav_ids, unique=True).map(tuple),
+        awaited=st.lists(uav_ids, unique=True).map(tuple),
+        excluded=st.lists(task_ids, unique=True).map(tuple),
+        heads=st.dictionaries(uav_ids, st.tuples(counts, counts)),
+        digest=counts,
+    ),
+)
+commands = st.one_of(
+    st.builds(
+        OperatorCommand,
+        uav_ids,
+        st.sampled_from([CommandKind.HOLD, CommandKind.RESUME, CommandKind.RETURN]),
+        counts,
+        notes,
+    ),
+    st.builds(OperatorCommand, st.just(FLEET), st.just(CommandKind.ABORT), counts, notes),
+)
+task_orders = st.builds(
+    TaskEdit,
+    task_ids,
+    counts,
+    points,
+    not_negatives,
+    not_negatives,
+    st.none() | ids,
+    st.booleans(),
+    counts,
+    notes,
+)
+starts = st.builds(StartWithout, uav_ids, counts, notes)
+by_coordinator = briefs | epochs | boards
+by_uav = claims | outcomes | statuses | choices
+by_operator = commands | task_orders | starts
+
+
+def messages(
+    stamped: st.SearchStrategy[Stamp] = stamps, *, all_kinds: bool = True
+) -> st.SearchStrategy[Message]:
+    """Statements of the mission `MISSION`, each by a writer who may say it.
+
+    Args:
+        stamped: their stamps.
+        all_kinds: also what is no register.
+    """
+    said = by_uav if all_kinds else claims | outcomes
+    return st.one_of(
+        st.builds(Message, st.just(MISSION), st.just(COORDINATOR), stamped, by_coordinator),
+        st.builds(Message, st.just(MISSION), uav_ids, stamped, said),
+        st.builds(Message, st.just(MISSION), st.just(OPERATOR), stamped, by_operator),
+    )

@@ -1,0 +1,513 @@
+"""A new life of an agent: what it takes over from the earlier one, and what it leaves alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from agent.core.interface import (
+    Action,
+    GoTo,
+    HandedOver,
+    Home,
+    Prepare,
+    Refused,
+    Return,
+    VehicleReady,
+)
+from swarm.model.ids import COORDINATOR
+from swarm.protocol.events import (
+    Ask,
+    KeysReplaced,
+    MessageReceived,
+    Publish,
+    SnapshotsReceived,
+    Stop,
+)
+from swarm.protocol.fields import MAX_COUNT
+from swarm.protocol.messages import Body, Message, MissionPhase, Snapshot, Stamp, TaskEntry, demoted
+from swarm.protocol.timing import Timing
+from swarm.protocol.uav_messages import ClaimPhase, Status, StatusPhase
+from tests.support.builders import MISSION, done, entry, epoch, held, message, proposed, uav
+from tests.support.lone_agent import (
+    ABOVE_START,
+    ZERO_S,
+    LoneAgent,
+    claims,
+    finishes,
+    notes,
+    orders,
+    outcomes,
+)
+
+NEAR, FAR = entry("near", east_m=10.0), entry("far", east_m=20.0, number=1)
+PREPARE = Prepare((0.0, 0.0, 10.0), 1.0, ground_up_m=0.0)
+RESUME = replace(PREPARE, resume=True)
+LEFT = replace(RESUME, left_in_air=True)
+"""What is ordered of a vehicle that an earlier life had in the air."""
+HELD = held("near", 0.0, 0, 10.0)
+AT_ONCE = Timing(announce_s=2.0, silence_s=5.0, pause_s=1e6)
+"""Timers as they are, but for a process that never hangs."""
+
+
+def crashed(
+    *tasks: TaskEntry, others: int = 0, at_s: float = 4.0, timing: Timing | None = None
+) -> LoneAgent:
+    """The earlier life of ``u0``, on its way to the first of ``tasks`` when it died."""
+    uavs = [uav(f"u{n}") for n in range(others + 1)]
+    agent = LoneAgent(*uavs) if timing is None else LoneAgent(*uavs, timing=timing)
+    agent.fly_to(*(tasks or (NEAR, FAR)))
+    agent.start_mission()
+    agent.run_until(at_s)
+    assert (agent.task, agent.phase) == ("near", ClaimPhase.HELD)
+    return agent
+
+
+def registers(actions: list[Action]) -> list[Message]:
+    """What was published, but for status."""
+    published = [action.message for action in actions if isinstance(action, Publish)]
+    return [message for message in published if not isinstance(message.body, Status)]
+
+
+# -- going on ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("from_peers", [True, False], ids=["peers' memory", "own memory"])
+def test_it_stands_by_its_claim_at_once_and_flies_on_to_its_task(from_peers: bool) -> None:
+    earlier = crashed()
+    agent = earlier.reborn(remembers=not from_peers)
+    agent.see(COORDINATOR)
+    if from_peers:
+        actions = agent.learn_what_was_known_to(earlier)
+    else:
+        actions = agent.learn(agent.statement(COORDINATOR, agent.brief), mission_s=6.0)
+
+    assert orders(actions) == [LEFT]
+    assert set(claims(actions)) == {HELD}
+    assert agent.core.phase is StatusPhase.FLYING
+    actions = agent.happen(VehicleReady())
+    assert orders(actions) == [GoTo(1, (10.0, 0.0, 10.0))]
+    assert claims(actions) == []
+    actions = agent.arrive(10.0)
+    assert outcomes(actions) == [done("near", 10.0)]
+    assert agent.task == "far"
+
+
+def test_everything_it_says_is_newer_than_what_others_remember() -> None:
+    earlier = crashed()
+    agent = earlier.reborn()
+    agent.learn_what_was_known_to(earlier)
+    agent.happen(VehicleReady())
+    agent.arrive(10.0)
+
+    newest = max(said.stamp for said in registers(earlier.log))
+    assert registers(agent.log)
+    assert all(said.stamp > newest for said in registers(agent.log))
+
+
+def test_it_says_anew_what_it_remembers_having_said_under_other_keys() -> None:
+    """Nobody stands for that any more, and others may have believed a thief instead."""
+    earlier = crashed(timing=AT_ONCE)
+    own = demoted(message("u0", done("gone", 3.0), 9, 9))
+    earlier.core.replica.join(own)
+    agent = earlier.reborn(remembers=True)
+
+    agent.learn_from_nobody()
+    agent.happen(VehicleReady())
+    agent.run_until(agent.now_s + 60.0)
+
+    told = [said for said in registers(agent.log) if said.key == own.key]
+    assert told
+    assert told[0].body == own.body
+    assert all(said.stamp.incarnation > 1 for said in told)
+
+
+def test_keys_that_change_before_it_remembers_change_what_it_remembers() -> None:
+    largest = Stamp(MAX_COUNT, MAX_COUNT)
+    earlier = crashed(others=1)
+    earlier.core.replica.join(Message(MISSION, "u1", largest, held("far", 0.0, 0, 10.0)))
+    agent = earlier.reborn(remembers=True)
+
+    agent.happen(KeysReplaced(frozenset({"u1"})))
+    agent.learn(agent.statement(COORDINATOR, agent.brief), mission_s=6.0)
+    honest = message("u1", proposed("far", 5.0), 1, 2000)
+    agent.happen(MessageReceived(honest))
+
+    assert agent.core.replica.known(honest) == honest
+
+
+def test_with_nobody_there_it_trusts_a_young_memory() -> None:
+    agent = crashed().reborn(remembers=True, down_s=20.0)
+    actions = agent.learn_from_nobody()
+
+    assert orders(actions) == [LEFT]
+    assert set(claims(actions)) == {HELD}
+    assert agent.core.snapshot(agent.now_s).mission_s == 24.0
+    agent.happen(VehicleReady())
+    assert outcomes(agent.arrive(30.0)) == [done("near", 30.0)]
+
+
+def test_a_claim_that_was_only_proposed_is_so_still_and_held_after_the_window() -> None:
+    earlier = LoneAgent(uav("u0"))
+    earlier.fly_to(NEAR)
+    earlier.start_mission()
+    agent = earlier.reborn(down_s=1.0)
+    actions = agent.learn_what_was_known_to(earlier)
+    assert set(claims(actions)) == {proposed("near", 0.0, 0, 10.0)}
+    agent.happen(VehicleReady())
+
+    assert claims(agent.run_until(1.1 + agent.timing.objection_window_s)) == [HELD]
+
+
+@pytest.mark.parametrize(
+    ("news", "reason"),
+    [(done("near"), "task is done"), (held("near", 0.0, 0, 3.0), "u1 has the stronger claim")],
+)
+def test_a_claim_that_counts_no_more_is_given_up_at_once(news: Body, reason: str) -> None:
+    earlier = crashed(others=1)
+    agent = earlier.reborn()
+    agent.see(COORDINATOR, "u1")
+    known = earlier.core.memory(0.0).messages
+    actions = agent.learn(*known, agent.statement("u1", news), mission_s=6.0)
+
+    assert {claim.phase for claim in claims(actions)} == {ClaimPhase.IDLE}
+    assert "released" in notes(actions)
+    assert reason in str(actions)
+    assert orders(actions) == [LEFT]
+    actions = agent.happen(VehicleReady())
+    assert agent.task == "far"
+
+
+def test_it_decides_from_where_the_vehicle_is() -> None:
+    earlier = crashed(others=1)
+    agent = earlier.reborn()
+    agent.see(COORDINATOR, "u1")
+    known = earlier.core.memory(0.0).messages
+    agent.learn(*known, agent.statement("u1", done("near")), mission_s=6.0)
+    agent.be_at((7.0, 0.0, 10.0))
+    agent.happen(VehicleReady(), 6.0)
+
+    assert agent.claim == proposed("far", 6.0, 0, 19.0)
+
+
+def test_a_vehicle_that_does_not_show_itself_keeps_its_task_from_others_only_so_long() -> None:
+    earlier = crashed(timing=AT_ONCE)
+    agent = earlier.reborn()
+    agent.see(COORDINATOR)
+    agent.learn_what_was_known_to(earlier)
+    mission_s = agent.now_s - ZERO_S
+
+    agent.run_until(mission_s + 0.9 * AT_ONCE.silence_s)
+    assert agent.task == "near"
+    agent.run_until(mission_s + 1.1 * AT_ONCE.silence_s)
+    assert agent.phase is ClaimPhase.IDLE
+
+    agent.happen(VehicleReady())
+    assert agent.task == "near"
+
+
+def test_a_service_that_was_cut_short_is_done_in_full() -> None:
+    earlier = crashed(entry("near", east_m=10.0, service_s=4.0))
+    earlier.arrive(10.0)
+    earlier.run_until(12.0)
+    assert earlier.core.phase is StatusPhase.SERVING
+    agent = earlier.reborn(down_s=1.0)
+    agent.learn_what_was_known_to(earlier)
+    agent.happen(VehicleReady(), 14.0)
+    agent.arrive(14.5)
+
+    assert outcomes(agent.run_until(18.25)) == []
+    assert outcomes(agent.run_until(18.75)) == [done("near", 18.5)]
+
+
+def test_it_knows_and_tells_again_what_it_has_done() -> None:
+    earlier = crashed()
+    earlier.arrive(10.0)
+    agent = earlier.reborn(remembers=True)
+    actions = agent.learn(agent.statement(COORDINATOR, agent.brief), mission_s=12.0)
+
+    assert outcomes(actions) == [done("near", 10.0)]
+    assert agent.task == "far"
+    answered = [message.body for message in agent.core.snapshot(agent.now_s).messages]
+    assert done("near", 10.0) in answered
+
+
+def test_one_that_was_idle_says_so_again_once_the_vehicle_is_ready() -> None:
+    earlier = crashed(NEAR)
+    earlier.arrive(10.0)
+    assert earlier.phase is ClaimPhase.IDLE
+    agent = earlier.reborn()
+    assert orders(agent.learn_what_was_known_to(earlier)) == [LEFT]
+
+    assert [claim.phase for claim in claims(agent.happen(VehicleReady()))] == [ClaimPhase.IDLE]
+
+
+def test_before_the_mission_runs_it_goes_on_from_where_it_hovers() -> None:
+    earlier = LoneAgent(uav("u0"))
+    earlier.fly_to(NEAR)
+    agent = earlier.reborn()
+    actions = agent.learn_what_was_known_to(earlier)
+
+    assert orders(actions) == [LEFT]
+    agent.happen(VehicleReady())
+    agent.start_mission()
+    assert agent.task == "near"
+
+
+# -- whom to believe --------------------------------------------------------------------
+
+
+def test_it_learns_before_it_believes_its_memory() -> None:
+    agent = crashed().reborn(remembers=True)
+
+    assert agent.log == [Ask()]
+    agent.now_s += 0.5
+    assert orders(agent.tick()) == []
+
+
+def test_a_memory_of_another_flight_means_nothing() -> None:
+    agent = crashed().reborn(remembers=True)
+    another = replace(agent.brief, run=agent.brief.run + 1)
+    actions = agent.learn(*agent.coordinators(another, NEAR))
+
+    assert orders(actions) == [PREPARE]
+    assert claims(agent.log) == []
+    assert set(agent.core.replica.board) == {"near"}
+
+
+def test_a_brief_heard_before_any_answer_is_no_answer_yet() -> None:
+    """Others may remember what this agent claimed, and whoever is briefed anew asks again."""
+    earlier = crashed()
+    agent = earlier.reborn()
+    agent.learn_from_nobody()
+    agent.now_s += agent.timing.ask_gap_s
+    heard = agent.hear(COORDINATOR, agent.brief)
+    assert (orders(heard), heard.count(Ask())) == ([], 1)
+
+    assert orders(agent.learn_what_was_known_to(earlier)) == [LEFT]
+    assert agent.task == "near"
+
+
+def test_whoever_is_there_and_has_not_answered_is_asked_once_more() -> None:
+    """The coordinator may have been parted from the others, and know less than they do."""
+    earlier = crashed(others=1)
+    agent = earlier.reborn()
+    agent.see(COORDINATOR, "u1")
+    known = earlier.core.memory(0.0).messages
+    agent.now_s += agent.timing.ask_gap_s
+    actions = agent.happen(SnapshotsReceived((Snapshot(MISSION, COORDINATOR, 1, 6.0, known),)))
+    assert (orders(actions), actions.count(Ask())) == ([], 1)
+
+    own = message("u0", done("near", 3.0), counter=99, incarnation=5)
+    agent.happen(SnapshotsReceived((Snapshot(MISSION, "u1", 1, 6.0, (own,)),)))
+    assert orders(agent.log) == [LEFT]
+    assert claims(agent.log) != [HELD]
+
+
+def test_one_who_never_answers_is_waited_for_no_longer() -> None:
+    earlier = crashed(others=1)
+    agent = earlier.reborn()
+    agent.see(COORDINATOR, "u1")
+    known = earlier.core.memory(0.0).messages
+    agent.now_s += agent.timing.ask_gap_s
+    for _ in range(2):
+        agent.happen(SnapshotsReceived((Snapshot(MISSION, COORDINATOR, 1, 6.0, known),)))
+
+    assert orders(agent.log) == [LEFT]
+
+
+def test_with_nobody_there_an_old_memory_is_not_trusted_but_the_vehicle_is_brought_home() -> None:
+    earlier = crashed()
+    agent = earlier.reborn(remembers=True, down_s=1.1 * earlier.timing.recall_s)
+    began_s = agent.now_s - ZERO_S
+    agent.learn_from_nobody()
+    assert orders(agent.run_until(began_s + 0.9 * agent.timing.abandon_s)) == []
+
+    actions = agent.run_until(began_s + 1.1 * agent.timing.abandon_s)
+    assert orders(actions) == [
+        Return("nobody knows of a mission", resume=True, via_enu_m=ABOVE_START)
+    ]
+    # Not a success: whoever runs it should start it again, in case a mission comes yet.
+    assert finishes(agent.happen(Home())) == [1]
+
+
+def test_an_old_memory_is_confirmed_by_whoever_comes_in_time() -> None:
+    earlier = crashed()
+    agent = earlier.reborn(remembers=True, down_s=1.1 * earlier.timing.recall_s)
+    agent.learn_from_nobody()
+    agent.now_s += 0.5 * agent.timing.abandon_s
+    agent.see(COORDINATOR)
+    actions = agent.learn(*agent.coordinators(agent.brief, NEAR, epoch("u0")), mission_s=99.0)
+
+    assert orders(actions) == [LEFT]
+    assert agent.task == "near"
+
+
+@pytest.mark.parametrize("how", ["not begun", "went home"])
+def test_with_nobody_there_it_waits_if_it_took_no_part(how: str) -> None:
+    earlier = LoneAgent(uav("u0"))
+    earlier.learn(earlier.statement(COORDINATOR, earlier.brief))
+    if how == "went home":
+        earlier.happen(VehicleReady())
+        earlier.start_mission()
+        earlier.end_mission(5.0)
+    agent = earlier.reborn(remembers=True)
+    agent.learn_from_nobody()
+    agent.run_until(agent.now_s - ZERO_S + 2.0 * agent.timing.abandon_s)
+
+    assert orders(agent.log) == []
+    another = replace(agent.brief, run=agent.brief.run + 1)
+    assert orders(agent.learn(*agent.coordinators(another))) == [PREPARE]
+
+
+# -- when there is nothing to go on with ------------------------------------------------
+
+
+@pytest.mark.parametrize("from_peers", [True, False], ids=["peers' memory", "own memory"])
+def test_a_mission_that_ended_meanwhile_brings_the_vehicle_home(from_peers: bool) -> None:
+    earlier = crashed()
+    agent = earlier.reborn(remembers=not from_peers)
+    ended = agent.coordinators(agent.brief, epoch("u0", phase=MissionPhase.ENDED, number=2))
+    known = earlier.core.memory(0.0).messages if from_peers else ()
+    actions = agent.learn(*known, *ended, mission_s=9.0)
+
+    assert orders(actions) == [Return("", resume=True, via_enu_m=ABOVE_START)]
+    assert agent.phase is ClaimPhase.OUT
+    assert finishes(agent.happen(Home())) == [0]
+
+
+def test_the_end_of_a_mission_heard_before_any_answer_is_asked_about_first() -> None:
+    """Somebody may remember that this vehicle is in the air."""
+    earlier = crashed()
+    agent = earlier.reborn()
+    agent.learn_from_nobody()
+    agent.now_s += agent.timing.ask_gap_s
+    actions = agent.end_mission(20.0)
+    assert (orders(actions), actions.count(Ask())) == ([], 1)
+
+    assert orders(agent.learn_what_was_known_to(earlier)) == [
+        Return("over", resume=True, via_enu_m=ABOVE_START)
+    ]
+
+
+def test_one_whose_vehicle_will_not_be_resumed_brings_it_home() -> None:
+    earlier = crashed()
+    agent = earlier.reborn()
+    (order,) = orders(agent.learn_what_was_known_to(earlier))
+    actions = agent.happen(Refused(order, "the cruise speed cannot be set"))
+
+    assert orders(actions) == [Return("the cruise speed cannot be set", resume=True)]
+    assert agent.phase is ClaimPhase.OUT
+    assert finishes(agent.happen(Home())) == [1]
+
+
+def test_one_that_was_returning_returns() -> None:
+    earlier = crashed()
+    earlier.happen(Stop("told"))
+    agent = earlier.reborn()
+    actions = agent.learn_what_was_known_to(earlier)
+
+    assert orders(actions) == [
+        Return("left the mission in an earlier life", resume=True, via_enu_m=ABOVE_START)
+    ]
+    assert finishes(agent.happen(Home())) == [0]
+
+
+def test_a_pilot_who_has_the_vehicle_by_then_keeps_it() -> None:
+    earlier = crashed()
+    earlier.happen(Stop("told"))
+    agent = earlier.reborn()
+    (order,) = orders(agent.learn_what_was_known_to(earlier))
+
+    assert finishes(agent.happen(HandedOver("its pilot flies it in LOITER"))) == [1]
+    assert orders(agent.log) == [order]
+    assert agent.claim is not None
+    assert agent.claim.handed_over
+
+
+@pytest.mark.parametrize("from_peers", [True, False], ids=["peers' memory", "own memory"])
+@pytest.mark.parametrize("returning", [True, False])
+def test_a_vehicle_that_was_handed_over_stays_so(returning: bool, from_peers: bool) -> None:
+    """It may be in the guided mode again, by its pilot's will: no order at all."""
+    earlier = crashed()
+    if returning:
+        earlier.happen(Stop("told"))
+    earlier.happen(HandedOver("its pilot switched it to LOITER"))
+    agent = earlier.reborn(remembers=not from_peers)
+    agent.see(COORDINATOR)
+    if from_peers:
+        agent.learn_what_was_known_to(earlier)
+    else:
+        agent.learn(*agent.coordinators(agent.brief, epoch("u0")), mission_s=9.0)
+    agent.happen(VehicleReady())
+    agent.run_until(30.0)
+
+    assert orders(agent.log) == []
+    assert agent.core.phase is StatusPhase.OUT
+    newest = max(said.stamp for said in registers(earlier.log))
+    assert [c.handed_over for c in claims(agent.log)][-1]
+    assert registers(agent.log)[-1].stamp > newest
+    assert finishes(agent.end_mission(31.0)) == [0]
+
+
+@pytest.mark.parametrize("returning", [True, False])
+def test_a_vehicle_that_was_only_silent_is_looked_for_and_brought_home(returning: bool) -> None:
+    """Nobody is known to have it; its new agent's heartbeats keep its own failsafe off."""
+    earlier = crashed()
+    if returning:
+        earlier.happen(Stop("told"))
+    earlier.happen(HandedOver("nothing heard for 5 s", silent=True))
+    agent = earlier.reborn()
+    actions = agent.learn_what_was_known_to(earlier)
+
+    assert orders(actions) == [
+        Return("left the mission in an earlier life", resume=True, via_enu_m=ABOVE_START)
+    ]
+
+
+def test_a_vehicle_handed_over_before_an_end_unheard_of_is_left_alone_then() -> None:
+    earlier = crashed()
+    earlier.happen(HandedOver("its pilot switched it to LOITER"))
+    agent = earlier.reborn()
+    ended = agent.coordinators(epoch("u0", phase=MissionPhase.ENDED, number=2))
+    actions = agent.learn(*earlier.core.memory(0.0).messages, *ended, mission_s=9.0)
+
+    assert orders(actions) == []
+    assert finishes(actions) == [0]
+
+
+@pytest.mark.parametrize("handed_over", [True, False])
+def test_it_takes_part_again_if_its_operator_says_so(handed_over: bool) -> None:
+    earlier = crashed()
+    earlier.happen(HandedOver("mode changed") if handed_over else Stop("told"))
+    agent = earlier.reborn(rejoin=True)
+    assert orders(agent.learn_what_was_known_to(earlier)) == [RESUME]
+    agent.happen(VehicleReady())
+
+    assert agent.task == "near"
+
+
+def test_one_whose_vehicle_would_not_get_ready_tries_again_before_the_mission() -> None:
+    earlier = LoneAgent(uav("u0"))
+    earlier.learn(earlier.statement(COORDINATOR, earlier.brief))
+    earlier.happen(Refused(PREPARE, "arming failed 15 times"))
+    agent = earlier.reborn()
+
+    assert orders(agent.learn_what_was_known_to(earlier)) == [PREPARE]
+
+
+def test_one_that_never_flew_needs_no_vehicle_to_go_home() -> None:
+    agent = LoneAgent(uav("u0"))
+    ended = epoch("u0", phase=MissionPhase.ENDED, reason="over")
+
+    assert orders(agent.learn(*agent.coordinators(agent.brief, ended))) == [
+        Return("over", via_enu_m=ABOVE_START)
+    ]
+
+
+@pytest.mark.parametrize("age_s", [1.0, 1e4])
+def test_told_to_stop_before_it_has_learned_it_brings_the_vehicle_home(age_s: float) -> None:
+    agent = crashed().reborn(remembers=True, down_s=age_s)
+
+    assert orders(agent.happen(Stop("told"))) == [Return("told", resume=True)]

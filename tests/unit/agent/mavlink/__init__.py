@@ -1,1 +1,0 @@
-"""Tests of the MAVLink bridge, in virtual time and without sockets."""

@@ -1,0 +1,477 @@
+"""The coordinator: brief, plan, start, pop-ups, the end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coordinator.core.events import PlanFailed, PlanMade, Withdraw
+from coordinator.core.publication import FlightLayers
+from swarm.model.ids import COORDINATOR
+from swarm.protocol.codec import Codec
+from swarm.protocol.encoding import encode
+from swarm.protocol.events import (
+    Ask,
+    LinkChanged,
+    MessageReceived,
+    PeerGone,
+    PeerSeen,
+    SnapshotsReceived,
+    Stop,
+    Tick,
+)
+from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch, Snapshot, TaskEntry
+from swarm.protocol.timing import Timing
+from tests.support.builders import (
+    IDLE,
+    MISSION,
+    OUT,
+    done,
+    failed,
+    held,
+    message,
+    mission,
+    task,
+    uav,
+)
+from tests.support.lone_coordinator import (
+    START_TIMEOUT_S,
+    TIMING,
+    LoneCoordinator,
+    finishes,
+    notes,
+    plan_of,
+    plans_wanted,
+    said,
+)
+
+U0, U1, U2 = uav("u0"), uav("u1"), uav("u2")
+T0, T1 = task("t0", 5.0), task("t1", 9.0, service_s=2.0)
+POPUP = task("popup", 7.0, appears_s=30.0)
+TRIO = mission([U0, U1, U2], [T0, T1])
+
+
+# -- before the start -------------------------------------------------------------------
+
+
+def test_it_briefs_posts_and_plans_at_once() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1, POPUP]))
+    (brief,) = said(coordinator.log, MissionConfig)
+    posted = said(coordinator.log, TaskEntry)
+    (wanted,) = plans_wanted(coordinator.log)
+
+    assert [fleet.id for fleet in brief.uavs] == ["u0", "u1"]
+    assert [fleet.layer_m for fleet in brief.uavs] == [10.0, 13.0]
+    assert [(entry.task, entry.number) for entry in posted] == [("t0", 0), ("t1", 1)]
+    assert posted[1].service_s == 2.0
+    assert said(coordinator.log, PlanEpoch) == []
+    assert (wanted.method, wanted.seed) == ("greedy", 7)
+    assert [t.id for t in wanted.mission.tasks] == ["t0", "t1"]
+
+
+def test_all_it_says_can_be_read() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0, POPUP])).started()
+    coordinator.run_until(200.0)
+    coordinator.happen(Stop("told"))
+    codec = Codec(MISSION)
+    for action in coordinator.log:
+        if hasattr(action, "message"):
+            assert codec.decode(action.message.key, encode(action.message)) == action.message
+
+
+def test_it_starts_as_soon_as_all_are_airborne_and_the_plan_is_made() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.answer_plan("u2", "u0", "u1")
+    coordinator.ready("u0", "u1")
+    assert coordinator.epoch is None
+
+    (epoch,) = said(coordinator.ready("u2"), PlanEpoch)
+    assert (epoch.number, epoch.phase, epoch.rule) == (1, MissionPhase.RUNNING, "greedy")
+    assert (epoch.sequence, epoch.mission_s) == (("u2", "u0", "u1"), 0.0)
+
+
+def test_it_waits_for_the_plan_when_all_are_airborne_first() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.ready("u0", "u1", "u2")
+    assert coordinator.epoch is None
+
+    assert len(said(coordinator.answer_plan("u0", "u1", "u2"), PlanEpoch)) == 1
+
+
+def test_whoever_is_airborne_but_not_there_is_not_ready() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.answer_plan("u0", "u1", "u2")
+    coordinator.hear("u2", IDLE)
+    coordinator.ready("u0", "u1")
+    assert coordinator.epoch is None
+
+    coordinator.see("u2")
+    assert coordinator.phase is MissionPhase.RUNNING
+
+
+def test_after_the_timeout_it_replans_for_those_who_are_airborne_and_starts() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.answer_plan("u0", "u1", "u2")
+    coordinator.ready("u2", "u0")
+    assert plans_wanted(coordinator.run_until(100.0 + 0.9 * START_TIMEOUT_S)) == []
+
+    actions = coordinator.run_until(100.0 + START_TIMEOUT_S)
+    (wanted,) = plans_wanted(actions)
+    assert [u.id for u in wanted.mission.uavs] == ["u0", "u2"]
+    why = f"u1: its agent was never seen within {START_TIMEOUT_S:g} s"
+    assert [n.fields for n in notes(actions)] == [{"uavs": "u1", "because": why}]
+    assert coordinator.epoch is None
+
+    coordinator.answer_plan("u2", "u0")
+    assert coordinator.epoch is not None
+    assert coordinator.epoch.sequence == ("u2", "u0")
+
+
+def test_it_does_not_wait_for_a_uav_that_has_said_it_is_out() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.answer_plan("u0", "u1", "u2")
+    coordinator.ready("u0", "u2")
+    coordinator.see("u1")
+
+    (wanted,) = plans_wanted(coordinator.hear("u1", OUT, 101.0))
+    assert [u.id for u in wanted.mission.uavs] == ["u0", "u2"]
+
+
+def test_who_gets_airborne_while_it_replans_is_planned_for_too() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.answer_plan("u0", "u1", "u2")
+    coordinator.ready("u0")
+    coordinator.run_until(100.0 + START_TIMEOUT_S)
+    coordinator.ready("u1")
+    late = plans_wanted(coordinator.log)[-2]
+    coordinator.happen(PlanMade(late.request, plan_of(late.mission, "u0")))
+    assert coordinator.epoch is None
+
+    coordinator.answer_plan("u1", "u0")
+    assert coordinator.epoch is not None
+    assert coordinator.epoch.sequence == ("u1", "u0")
+
+
+def test_it_sleeps_while_it_waits_for_a_plan_beyond_the_timeout() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.ready("u0", "u1", "u2")
+    coordinator.run_until(100.0 + 2 * START_TIMEOUT_S)
+
+    due_s = coordinator.core.next_deadline_s()
+    assert due_s is not None
+    assert due_s > coordinator.now_s
+
+
+def test_when_nobody_is_airborne_in_time_the_mission_ends() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.answer_plan("u0", "u1", "u2")
+    coordinator.see("u0")
+    coordinator.run_until(100.0 + START_TIMEOUT_S)
+
+    assert (coordinator.phase, coordinator.reason) == (MissionPhase.ENDED, "no UAV is airborne")
+    coordinator.leave("u0")
+    assert finishes(coordinator.run_until(300.0)) == [1]
+
+
+def test_without_a_plan_the_mission_ends() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.ready("u0", "u1", "u2")
+    coordinator.happen(PlanFailed(1, "too large"))
+
+    assert (coordinator.phase, coordinator.reason) == (MissionPhase.ENDED, "no plan: too large")
+    for name in coordinator.uavs:
+        coordinator.leave(name)
+    assert finishes(coordinator.run_until(300.0)) == [1]
+
+
+def test_answers_to_an_older_request_mean_nothing() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.ready("u0")
+    coordinator.run_until(100.0 + START_TIMEOUT_S)
+    coordinator.happen(PlanFailed(1, "too large"))
+    coordinator.happen(PlanMade(1, plan_of(TRIO, "u0", "u1", "u2")))
+
+    assert coordinator.epoch is None
+
+
+# -- while it runs ----------------------------------------------------------------------
+
+
+def test_a_pop_up_is_posted_on_time_and_once() -> None:
+    coordinator = LoneCoordinator(mission([U0], [POPUP, T0])).started()
+    assert said(coordinator.run_until(129.9), TaskEntry) == []
+
+    (entry,) = said(coordinator.run_until(130.1), TaskEntry)
+    assert (entry.task, entry.number) == ("popup", 0)
+    assert said(coordinator.run_until(200.0), TaskEntry) == []
+
+
+def test_a_pop_up_is_posted_at_its_deadline_whatever_the_rounding() -> None:
+    """0.1 + 0.7 - 0.1 < 0.7 in floating point: the deadline would stay past for ever."""
+    for begin_s in (0.1, 0.3, 1.1, 100.1, 1e6 + 0.1):
+        for appears_s in (0.7, 0.1, 30.3, 1e-3):
+            late = task("late", 7.0, appears_s=appears_s)
+            coordinator = LoneCoordinator(mission([U0], [T0, late]), begin_s=begin_s).started()
+            due_s = coordinator.core.next_deadline_s()
+            assert due_s is not None
+            assert len(said(coordinator.happen(Tick(), due_s), TaskEntry)) == 1
+
+
+def test_it_ends_when_every_task_has_ended() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+    coordinator.hear("u0", done("t0"))
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.hear("u1", failed("t1"))
+    assert coordinator.reason == "every task has ended"
+
+
+def test_it_waits_for_pop_ups_to_come() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0, POPUP])).started()
+    coordinator.hear("u0", done("t0"))
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.run_until(140.0)
+    coordinator.hear("u0", done("popup", 45.0))
+    assert coordinator.reason == "every task has ended"
+
+
+def test_it_ends_when_all_who_could_go_on_are_lost() -> None:
+    coordinator = LoneCoordinator(mission([uav("u0"), uav("u1", t1=0.0)], [T0, T1])).started()
+    coordinator.hear("u1", done("t0"))
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    actions = coordinator.lose("u0", 110.0)
+    assert next(n.text for n in notes(actions)) == "lost"
+    coordinator.run_until(110.0 + 0.9 * TIMING.abandon_s)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.run_until(111.0 + TIMING.abandon_s)
+    assert coordinator.reason == "nobody is left who could go on"
+
+
+def test_it_goes_on_with_those_who_were_only_cut_off() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0])).started()
+    coordinator.lose("u0", 110.0)
+    coordinator.run_until(110.0 + 0.9 * TIMING.abandon_s)
+    coordinator.see("u0")
+    coordinator.hear("u0", held("t0", 0.0))
+    coordinator.run_until(1000.0)
+
+    assert coordinator.phase is MissionPhase.RUNNING
+
+
+def test_the_wait_for_the_lost_begins_anew_after_each_return() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0])).started()
+    coordinator.hear("u0", held("t0", 0.0))
+    coordinator.lose("u0", 110.0)
+    coordinator.run_until(150.0)
+    coordinator.see("u0")
+    coordinator.lose("u0", 160.0)
+    coordinator.run_until(160.0 + 0.9 * TIMING.abandon_s)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.run_until(161.0 + TIMING.abandon_s)
+    assert coordinator.reason == "nobody is left who could go on"
+
+
+def test_it_asks_the_others_for_the_last_words_of_the_lost() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+    asked = coordinator.lose("u0", 110.0).count(Ask())
+    witness = Snapshot(MISSION, "u1", 1, 11.0, (message("u0", done("t0"), 9),))
+    coordinator.happen(SnapshotsReceived((witness,)))
+    coordinator.hear("u1", done("t1"))
+
+    assert asked == 1
+    assert coordinator.reason == "every task has ended"
+
+
+def test_it_has_nothing_to_ask_about_who_leaves() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+    coordinator.hear("u0", OUT)
+
+    assert Ask() not in coordinator.lose("u0", 110.0)
+
+
+def test_it_ends_when_all_who_could_go_on_are_out() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0, POPUP])).started()
+    coordinator.hear("u0", OUT)
+
+    assert coordinator.reason == "nobody is left who could go on"
+
+
+def test_a_token_that_blinks_ends_nothing() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0])).started()
+    coordinator.happen(PeerGone("u0"))
+    coordinator.happen(PeerSeen("u0"))
+    coordinator.run_until(120.0)
+
+    assert coordinator.phase is MissionPhase.RUNNING
+
+
+def test_a_cut_of_its_own_link_ends_nothing() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0])).started()
+    coordinator.hear("u0", held("t0", 0.0))
+    coordinator.happen(LinkChanged(False))
+    coordinator.happen(PeerGone("u0"))
+    coordinator.run_until(1000.0)
+
+    assert coordinator.phase is MissionPhase.RUNNING
+
+
+def test_a_task_that_every_uav_refuses_ends_the_mission_in_the_end() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0])).started()
+    coordinator.run_until(100.0 + 0.9 * TIMING.stalemate_s)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.run_until(101.0 + TIMING.stalemate_s)
+    assert coordinator.reason == "nobody takes what is left"
+
+
+def test_as_long_as_one_is_at_work_there_is_no_stalemate() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0])).started()
+    coordinator.run_until(110.0)
+    coordinator.hear("u1", held("t0", 0.0))
+    coordinator.run_until(900.0)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.hear("u1", IDLE)
+    coordinator.run_until(899.0 + TIMING.stalemate_s)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+
+def test_it_repeats_the_epoch_with_the_time_of_now_and_the_rest_in_turns() -> None:
+    tasks = [task(f"t{n}", float(n)) for n in range(20)]
+    coordinator = LoneCoordinator(
+        mission([U0], tasks), timing=Timing(announce_s=2.0, silence_s=1e6)
+    ).started()
+    actions = coordinator.run_until(100.0 + 6.0)
+
+    told_s = [e.mission_s for e in said(actions, PlanEpoch)]
+    assert np.diff(told_s) == pytest.approx([2.0, 2.0])
+    repeated = [e.task for e in said(actions, TaskEntry)]
+    assert len(set(repeated)) == 20
+    assert len(repeated) + len(said(actions, MissionConfig)) == 24
+
+
+# -- the end ----------------------------------------------------------------------------
+
+
+def ended(*tasks_done: str) -> LoneCoordinator:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+    for name in tasks_done:
+        coordinator.hear("u0", done(name))
+    coordinator.happen(Stop("told"))
+    return coordinator
+
+
+def test_when_nobody_believes_it_any_more_it_leaves_and_ends_no_mission() -> None:
+    """Also not in its memory, by which its next life would end it."""
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+
+    actions = coordinator.happen(Stop("its keys were revoked or replaced", believed=False))
+
+    assert coordinator.phase is MissionPhase.RUNNING
+    assert finishes(actions) == [1]
+    assert said(actions, PlanEpoch) == []
+    assert coordinator.core.next_deadline_s() is None
+
+
+def test_it_stays_until_all_have_left_and_then_ends_well_if_all_was_done() -> None:
+    coordinator = ended("t0", "t1")
+    assert coordinator.phase is MissionPhase.ENDED
+    coordinator.leave("u0")
+    assert finishes(coordinator.run_until(500.0)) == []
+
+    coordinator.leave("u1")
+    coordinator.run_until(600.0)
+    assert finishes(coordinator.log) == [0]
+    assert coordinator.core.next_deadline_s() is None
+
+
+def test_it_ends_badly_if_something_was_left_undone() -> None:
+    coordinator = ended("t0")
+    assert coordinator.reason == "told"
+    for name in coordinator.uavs:
+        coordinator.leave(name)
+
+    assert finishes(coordinator.run_until(600.0)) == [1]
+
+
+def test_it_ends_badly_if_a_pop_up_never_came() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0, POPUP])).started()
+    coordinator.hear("u0", done("t0"))
+    coordinator.happen(Stop("told"))
+    coordinator.leave("u0")
+
+    assert finishes(coordinator.run_until(600.0)) == [1]
+
+
+def test_after_the_end_nothing_is_posted_and_no_deadline_stays_behind() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, POPUP])).started()
+    coordinator.happen(Stop("told"))
+
+    assert said(coordinator.run_until(200.0), TaskEntry) == []
+
+
+def test_it_says_once_that_the_mission_ended() -> None:
+    coordinator = ended()
+    coordinator.happen(Stop("again"))
+    coordinator.happen(PlanFailed(1, "late"))
+
+    assert [e.reason for e in said(coordinator.log, PlanEpoch)][1:] == ["told"]
+
+
+# -- answering --------------------------------------------------------------------------
+
+
+def test_it_answers_with_its_own_registers_and_those_of_the_absent() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0, T1])).started()
+
+    def answered_for() -> set[str]:
+        return {m.writer for m in coordinator.core.snapshot(coordinator.now_s).messages}
+
+    assert answered_for() == {COORDINATOR}
+    coordinator.lose("u1", 110.0)
+    assert answered_for() == {COORDINATOR, "u1"}
+    coordinator.see("u1")
+    assert answered_for() == {COORDINATOR, "u1"}
+    coordinator.hear("u1", IDLE)
+    assert answered_for() == {COORDINATOR}
+
+
+def test_its_answer_tells_the_mission_time() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0]))
+    assert coordinator.core.snapshot(100.0).mission_s is None
+
+    coordinator.started()
+    assert coordinator.core.snapshot(112.5).mission_s == pytest.approx(12.5, abs=1e-3)
+
+
+def test_what_it_learns_counts_like_what_it_hears() -> None:
+    coordinator = LoneCoordinator(mission([U0], [T0])).started()
+    outcome = message("u0", done("t0"), 99)
+    coordinator.happen(SnapshotsReceived((Snapshot(MISSION, "u0", 1, None, (outcome,)),)))
+
+    assert coordinator.reason == "every task has ended"
+    assert coordinator.happen(MessageReceived(outcome)) == []
+
+
+@pytest.mark.parametrize(("lowest_m", "spacing_m"), [(0.0, 3.0), (-1.0, 3.0), (10.0, -1.0)])
+def test_layers_below_the_ground_are_refused(lowest_m: float, spacing_m: float) -> None:
+    with pytest.raises(ValueError, match="layers"):
+        FlightLayers(lowest_m, spacing_m)
+
+
+# -- withdrawals ------------------------------------------------------------------------
+
+
+def test_a_task_that_is_withdrawn_is_so_on_the_board_once_and_for_all() -> None:
+    coordinator = LoneCoordinator(TRIO)
+    coordinator.happen(Withdraw("t0"))
+    coordinator.happen(Withdraw("t0"))
+    coordinator.happen(Withdraw("unknown"))
+
+    posted = [entry for entry in said(coordinator.log, TaskEntry) if entry.withdrawn]
+    assert [entry.task for entry in posted] == ["t0"]
+    assert coordinator.core.replica.board["t0"].withdrawn

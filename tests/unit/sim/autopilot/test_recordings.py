@@ -1,0 +1,93 @@
+"""The simulated vehicle against what the real firmwares said, word for word where it matters.
+
+What ArduCopter says is compared in one order. PX4 tells of modes once a second and sends
+texts when it finds time, so what it says is compared in the order of each kind.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.support.autopilot_plays import (
+    PLAYS,
+    RECORDINGS,
+    REDUCTIONS,
+    STATES,
+    TELEMETRY,
+    message_of,
+    played,
+    recording,
+    states,
+    what_matters,
+)
+
+ARDUCOPTERS = ["ArduCopter's mission", "ArduCopter's retarget"]
+PX4S = ["PX4's mission", "PX4's boot", "PX4's retarget"]
+
+
+@pytest.mark.parametrize("name", ARDUCOPTERS)
+def test_arducopter_says_what_the_recorded_one_said_in_one_order(name: str) -> None:
+    real, simulated, asked = played(PLAYS[name])
+
+    assert list(what_matters(simulated, asked)) == list(what_matters(real, asked))
+
+
+@pytest.mark.parametrize("name", PX4S)
+def test_px4_says_what_the_recorded_one_said_in_the_order_of_each_kind(name: str) -> None:
+    real, simulated, asked = played(PLAYS[name])
+
+    conversation = {"COMMAND_ACK", "MISSION_REQUEST_INT", "MISSION_ACK"}
+    kinds = [conversation, *({kind} for kind in sorted(REDUCTIONS.keys() - conversation))]
+    for kind in kinds:
+        said, recorded = (
+            [key for message, key in what_matters(messages, asked) if message in kind]
+            for messages in (simulated, real)
+        )
+        assert said == recorded
+
+
+@pytest.mark.parametrize("name", ARDUCOPTERS)
+def test_arducopter_goes_through_the_recorded_states(name: str) -> None:
+    real, simulated, _ = played(PLAYS[name])
+
+    mission = STATES["MISSION_CURRENT"]
+    assert states(simulated, "MISSION_CURRENT", *mission) == states(
+        real, "MISSION_CURRENT", *mission
+    )
+    landed = states(real, "EXTENDED_SYS_STATE", "landed_state")
+    # A recording may end before the last state is reported.
+    assert states(simulated, "EXTENDED_SYS_STATE", "landed_state")[: len(landed)] == landed
+    # States that last less than a heartbeat may be missed on either side.
+    fields = ("HEARTBEAT", *STATES["HEARTBEAT"])
+    assert set(states(simulated, *fields)) <= set(states(real, *fields))
+    assert (4, 217, 3) in states(simulated, *fields)  # armed and spooling up
+    last = states(real, "SYS_STATUS", *STATES["SYS_STATUS"])[-1]
+    assert states(simulated, "SYS_STATUS", *STATES["SYS_STATUS"])[-1] == last
+    assert states(simulated, "EKF_STATUS_REPORT", "flags") == [(167,), (831,)]
+
+
+@pytest.mark.parametrize("name", PX4S)
+def test_px4_goes_through_the_recorded_states(name: str) -> None:
+    real, simulated, _ = played(PLAYS[name])
+
+    for message, fields in STATES.items():
+        assert states(simulated, message, *fields) == states(real, message, *fields)
+
+
+def test_everything_in_the_recordings_is_compared() -> None:
+    known = REDUCTIONS.keys() | STATES.keys() | TELEMETRY
+    for path in RECORDINGS.glob("*.jsonl"):
+        said = {each["msg"] for each in recording(path.name) if each["from"] == "vehicle"}
+        assert said <= known, f"{path.name} has messages that no comparison looks at"
+        assert path.name in {play.name for play in PLAYS.values()}
+
+
+def test_everything_the_recorded_ground_said_is_understood() -> None:
+    for play in PLAYS.values():
+        vehicle = play.vehicle()
+        for each in play.messages():
+            if each["from"] == "ground":
+                message = message_of(each)
+                assert message.get_msgId() in vehicle._handlers
+                if each["msg"].startswith("COMMAND"):
+                    assert message.command in vehicle._commands._handlers
