@@ -3,7 +3,7 @@
 What a scenario looks like in these registers and how they differ from its file, when each task is
 released to the fleet, and when a register is said again. What the operator has ordered counts
 first: a task withdrawn before it appeared is not released any more. Leaves out: deciding on them
-(coordinator.core.active), and keys and bytes (swarm.wire).
+(coordinator.core.active), and keys and bytes (swarm.protocol).
 """
 
 from __future__ import annotations

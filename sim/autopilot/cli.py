@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from swarm.runtime.errors import remedy_for_name
 from swarm.runtime.log import LogFormat, LogLevel, configure_logging, get_logger
 from swarm.runtime.options import (
@@ -234,7 +234,7 @@ async def _serve(
     import json
 
     from sim.autopilot.faulty_vehicle import FaultyAutopilot
-    from sim.autopilot.options import firmware_model
+    from sim.autopilot.firmware import firmware_model
     from sim.autopilot.server import ServedVehicle, VehicleServer
     from sim.autopilot.vehicle import SimulatedAutopilot
     from swarm.runtime.clock import ScaledClock

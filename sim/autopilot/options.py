@@ -1,4 +1,4 @@
-"""Reads what is said to `swarm autopilot` about firmware, addresses, physics and faults.
+"""Reads what is said to `swarm autopilot` about addresses, physics and faults.
 
 Leaves out: the options themselves (sim.autopilot.cli).
 """
@@ -9,43 +9,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 from sim.autopilot.config import FleetMember
 from sim.autopilot.faults import FAULT_RULE, VehicleFault, parse_fault
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-if TYPE_CHECKING:
-    from sim.autopilot.firmware.model import FirmwareModel
-
 __all__ = [
     "ENDPOINT_RULE",
     "Endpoint",
-    "FirmwareModelName",
     "Transport",
     "check_wind",
     "faults_by_uav",
-    "firmware_model",
     "parse_endpoint",
     "parse_wind",
     "require_finite",
 ]
-
-
-class FirmwareModelName(StrEnum):
-    """Firmwares as people name them."""
-
-    ARDUPILOT = "ardupilot"
-    PX4 = "px4"
-
-
-def firmware_model(name: FirmwareModelName) -> FirmwareModel:
-    """The firmware of that name, in its newest version."""
-    # Imported late: the command line knows the names without the dialect.
-    from sim.autopilot.firmware.ardupilot import ArduCopterModel
-    from sim.autopilot.firmware.px4 import Px4Model
-
-    return Px4Model() if name == FirmwareModelName.PX4 else ArduCopterModel()
 
 
 ENDPOINT_RULE = "write tcp:HOST:PORT, udpin:HOST:PORT or udpout:HOST:PORT"

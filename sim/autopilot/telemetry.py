@@ -1,7 +1,7 @@
 """What a vehicle reports about itself, message by message.
 
 Source: https://mavlink.io/en/messages/common.html. Leaves out: what firmwares say
-differently (sim.autopilot.options), attitude other than heading, raw sensors,
+differently (sim.autopilot.firmware), attitude other than heading, raw sensors,
 RC channels.
 """
 

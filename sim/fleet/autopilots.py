@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agent.vehicle.config import parse_link
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from sim.fleet.firmware import FirmwareKind, SitlFirmware, find_firmware
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 

@@ -24,7 +24,7 @@ from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.faults import VehicleFault
 from sim.autopilot.faulty_vehicle import FaultyAutopilot
-from sim.autopilot.options import FirmwareModelName, firmware_model
+from sim.autopilot.firmware import FirmwareModelName, firmware_model
 from sim.autopilot.pilot import Pilot
 from sim.autopilot.vehicle import COMPONENT_ID, SimulatedAutopilot
 from sim.world.engine import EventQueue, stream, uniforms

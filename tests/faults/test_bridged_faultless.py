@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agent.vehicle.config import CommandStyle
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
 from tests.support.bridged_fleet import KINDS, BridgedFleet
 from tests.support.fleet_builders import plan_for

@@ -21,7 +21,7 @@ from agent.core.interface import (
     VehicleReady,
 )
 from agent.vehicle.config import CommandStyle
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from sim.world.bridged_vehicle import Equipment
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.bridged_fleet import FIELD, KINDS, BridgedFleet, fenced

@@ -6,7 +6,7 @@ import pytest
 
 from agent.core.interface import HandedOver, VehicleReport
 from agent.vehicle.config import CommandStyle
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from sim.world.bridged_vehicle import LinkQuality
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.bridged_fleet import KINDS, BridgedFleet, Sent

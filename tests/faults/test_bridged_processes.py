@@ -10,7 +10,7 @@ from agent.core.interface import GoTo, HandedOver, Hold, Return
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.config import CommandStyle
 from coordinator.operator.commands import RequestResult
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from sim.world.settings import RestartMemory
 from swarm.protocol.messages import CommandKind
 from swarm.protocol.uav_messages import StatusPhase

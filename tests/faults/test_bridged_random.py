@@ -11,7 +11,7 @@ import pytest
 from agent.core.interface import GoTo, HandedOver, Refused, ReturnAdvised
 from agent.vehicle.config import CommandStyle
 from sim.autopilot.faults import FaultKind
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from sim.faults.injector import FaultInjector
 from sim.faults.invariants import InvariantChecker
 from sim.world.bridged_vehicle import LinkQuality

@@ -11,7 +11,7 @@ from agent.core.interface import VehicleReady
 from agent.vehicle.config import CommandStyle
 from coordinator.operator.commands import StartRequest
 from coordinator.operator.requests import OperatorClient
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from sim.world.settings import RestartMemory
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import StatusPhase

@@ -32,10 +32,11 @@ from agent.vehicle.session import BridgeEvent, BytesReceived, LinkOpened, SendBy
 from sim.autopilot import events as autopilot
 from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.config import VehicleConfig
+from sim.autopilot.firmware import FirmwareModelName, firmware_model
 from sim.autopilot.firmware.ardupilot import ArduCopterModel
 from sim.autopilot.firmware.model import FirmwareModel
 from sim.autopilot.flight import FlightMode
-from sim.autopilot.options import Endpoint, FirmwareModelName, Transport, firmware_model
+from sim.autopilot.options import Endpoint, Transport
 from sim.autopilot.server import VehicleServer
 from sim.autopilot.vehicle import COMPONENT_ID, SimulatedAutopilot
 from swarm.runtime.clock import ScaledClock

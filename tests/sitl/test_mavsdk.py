@@ -26,7 +26,8 @@ from mavsdk.plugins.mission_raw import MissionItem
 from mavsdk.plugins.telemetry import FlightMode, LandedState
 
 from sim.autopilot.config import Delays, VehicleConfig
-from sim.autopilot.options import FirmwareModelName, firmware_model, parse_endpoint
+from sim.autopilot.firmware import FirmwareModelName, firmware_model
+from sim.autopilot.options import parse_endpoint
 from sim.autopilot.server import VehicleServer
 from sim.autopilot.vehicle import SimulatedAutopilot
 from swarm.model.frames import wgs84_from_enu

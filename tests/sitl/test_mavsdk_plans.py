@@ -16,7 +16,7 @@ import pytest
 from mavsdk.plugins.mission_raw import MissionItem
 
 from sim.autopilot.config import Delays
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from swarm.cli import main
 from swarm.model.frames import Origin, enu_from_wgs84
 from tests.sitl.test_mavsdk import CONFIG, FLAVOURS, Pilot, connected, start_mission, until

@@ -36,7 +36,7 @@ from agent.vehicle.session import (
 from coordinator.operator.requests import OperatorClient
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.faults import VehicleFault, parse_fault
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from sim.world.bridged_vehicle import BridgedVehicle, Equipment, LinkQuality
 from sim.world.engine import EventQueue
 from sim.world.network import IdealNetwork, Network

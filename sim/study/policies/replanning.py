@@ -2,7 +2,7 @@
 
 The auction (CBBA) is held anew whenever tasks or UAVs come or go. The optimiser hears everything
 at once and searches the lists of all open tasks from those in force on, with the effort of a live
-coordinator (`coordinator.planner.live`). Leaves out: messages, and the time that planning takes.
+coordinator (`coordinator.planner.online`). Leaves out: messages, and the time that planning takes.
 """
 
 from __future__ import annotations

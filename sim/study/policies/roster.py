@@ -10,12 +10,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import import_module
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from sim.world.outcome import FlightOutcome
-from sim.world.uncertainty import Realization
 from swarm.model import Mission, Plan
-from swarm.runtime.clock import Clock
+
+if TYPE_CHECKING:
+    from sim.world.outcome import FlightOutcome
+    from sim.world.uncertainty import Realization
+    from swarm.runtime.clock import Clock
 
 __all__ = ["ROSTER", "Bound", "Planner", "Policy", "PolicyEntry", "PolicyRoster"]
 

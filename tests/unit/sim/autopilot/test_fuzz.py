@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.events import MavlinkReceived, Reboot, TimeAdvanced
-from sim.autopilot.options import FirmwareModelName, firmware_model
+from sim.autopilot.firmware import FirmwareModelName, firmware_model
 from tests.support.ground_station import GroundStation, ground_station, only
 
 UNDERSTOOD = [

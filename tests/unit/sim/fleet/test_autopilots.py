@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from agent.vehicle.config import CommandStyle
-from sim.autopilot.options import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName
 from sim.fleet.autopilots import (
     RunningVehicles,
     SimulatedAutopilots,
