@@ -209,7 +209,7 @@ def study(
         swarm study --random 10,50 --trials 20 --loss 0.3 --policies guided,central,cbba
         swarm study --random 5,25 --vary loss=0,0.1,0.3 --policies greedy,guided --out losses
         swarm study robustness --out robustness
-        swarm study readme --update README.md
+        swarm study readme --update sim/README.md
     """
     from rich.console import Console
 
