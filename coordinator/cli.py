@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coordinator.planner.options import METHODS, ONLINE_METHODS
+from coordinator.planner.options import method_names, online_method_names
 from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import Fault, InputError
@@ -32,7 +32,7 @@ from swarm.runtime.options import (
     SpeedupOption,
     StateOption,
     TimeLimitOption,
-    complete_among,
+    complete_from,
 )
 
 if TYPE_CHECKING:
@@ -55,9 +55,9 @@ def plan(
         str,
         typer.Option(
             metavar="METHOD",
-            autocompletion=complete_among(*METHODS),
-            help="greedy or lookahead: how UAVs decide; guided: optimised lists; exact: the proven "
-            "best lists.",
+            autocompletion=complete_from(method_names),
+            help="greedy, lookahead, nearest or value-per-time: how UAVs decide; guided: "
+            "optimised lists; exact: the proven best lists.",
         ),
     ] = "greedy",
     seed: SeedOption = 0,
@@ -222,8 +222,8 @@ def coordinator(
         typer.Option(
             "--method",
             metavar="METHOD",
-            help="Decision rule: greedy, lookahead or guided.",
-            autocompletion=complete_among(*ONLINE_METHODS),
+            help="Decision rule: guided, greedy, lookahead, nearest or value-per-time.",
+            autocompletion=complete_from(online_method_names),
         ),
     ] = "guided",
     seed: SeedOption = 0,
@@ -405,8 +405,9 @@ def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     from swarm.runtime.errors import remedy_for_name
 
     faults = []
-    if method not in METHODS:
-        remedy = remedy_for_name(method, METHODS)
+    methods = method_names()
+    if method not in methods:
+        remedy = remedy_for_name(method, methods)
         faults.append(Fault("--method", method, "no such method", remedy))
     if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from coordinator.planner.options import ONLINE_METHODS
-from swarm.runtime.options import complete_among
+from coordinator.planner.options import online_method_names
+from swarm.runtime.options import complete_from
 
 if TYPE_CHECKING:
     from coordinator.terminal.report import MissionReport
@@ -257,8 +257,8 @@ MethodOption = Annotated[
     typer.Option(
         "--method",
         metavar="METHOD",
-        help="Decision rule: greedy, lookahead or guided.",
-        autocompletion=complete_among(*ONLINE_METHODS),
+        help="Decision rule: guided, greedy, lookahead, nearest or value-per-time.",
+        autocompletion=complete_from(online_method_names),
     ),
 ]
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agent.core.announcer import Announcer
-from swarm.allocation.lower_level import CompiledRule, Decision, Rule, TeamState, decisions
+from swarm.allocation.lower_level import Decision, Rule, ScoringRule, TeamState, decisions
 from swarm.allocation.problem import IntArray, Problem
 from swarm.allocation.rules import GuidedRule
 from swarm.protocol.board import TaskBoard, after_outcomes, claim_strength, finish_claim, ranks
@@ -189,7 +189,7 @@ class RecordingRule:
     def valued(self, problem: Problem, decision: Decision) -> tuple[tuple[int, float], ...]:
         """Tasks that ``decision`` chose from, with their scores: what it took, then best first."""
         found = decision.valued[:MAX_CANDIDATES]
-        if not found and self._state is not None and isinstance(self._rule, CompiledRule):
+        if not found and self._state is not None and isinstance(self._rule, ScoringRule):
             found = self._rule.valued(problem, self._state, decision.uav, MAX_CANDIDATES)
         return found or ((decision.task, decision.score),)
 

@@ -13,22 +13,30 @@ from dataclasses import dataclass
 from swarm.runtime.clock import Clock
 
 __all__ = [
-    "METHODS",
-    "ONLINE_METHODS",
     "Limit",
     "ShouldStop",
     "after_evaluations",
     "after_time",
     "first_of",
+    "method_names",
     "never",
+    "online_method_names",
     "part_of",
 ]
 
 
-METHODS = ("greedy", "lookahead", "guided", "exact")
+def method_names() -> list[str]:
+    """Of all planning methods, for the completion of commands, which load no planner otherwise."""
+    from coordinator.planner.plan import METHODS
 
-ONLINE_METHODS = ("greedy", "lookahead", "guided")
-"""Those whose rule agents can follow by themselves."""
+    return list(METHODS)
+
+
+def online_method_names() -> list[str]:
+    """The same of those that agents can follow."""
+    from coordinator.planner.plan import ONLINE_METHODS
+
+    return list(ONLINE_METHODS)
 
 
 ShouldStop = Callable[[float], bool]

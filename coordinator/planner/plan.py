@@ -16,8 +16,6 @@ import numpy as np
 from coordinator.planner.bound import upper_bound
 from coordinator.planner.exact import Optimum, estimated_s, optimum_before
 from coordinator.planner.options import (
-    METHODS,
-    ONLINE_METHODS,
     Limit,
     ShouldStop,
     after_evaluations,
@@ -26,19 +24,32 @@ from coordinator.planner.options import (
     never,
     part_of,
 )
-from coordinator.planner.sequence_search import EXHAUSTIVE_UAVS, SearchLimits, best_sequence
-from swarm.allocation import evaluate, rule_by_name
+from coordinator.planner.order_search import search_sequence
+from coordinator.planner.sequence_search import EXHAUSTIVE_UAVS, SearchLimits
+from swarm.allocation import RULE_NAMES, evaluate, rule_by_name
 from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import Problem
-from swarm.allocation.rules import route_arrays, team_arrays
+from swarm.allocation.rules import GuidedRule, route_arrays, team_arrays
 from swarm.kernels.lower_level import EXACT_TASKS
 from swarm.kernels.routes import TeamArrays, optimise_routes
 from swarm.model import Mission, Plan
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-__all__ = ["GuidedPlan", "Progress", "check_online_method", "guided_plan", "make_plan"]
+__all__ = [
+    "METHODS",
+    "ONLINE_METHODS",
+    "GuidedPlan",
+    "Progress",
+    "check_online_method",
+    "guided_plan",
+    "make_plan",
+]
 
+ONLINE_METHODS = (*RULE_NAMES, GuidedRule.name)
+"""Those whose rule agents can follow by themselves."""
+
+METHODS = (*ONLINE_METHODS, "exact")
 
 Progress = Callable[[int, float], None]
 """Told the iterations spent and the best J to go so far [value·s]."""
@@ -237,7 +248,7 @@ def make_plan(
         routes, evaluations = guided.routes, guided.iterations
         sequence = guided.sequence if method == "guided" else None
     else:
-        search = best_sequence(
+        search = search_sequence(
             problem,
             rule_by_name(method),
             np.random.default_rng(seed),

@@ -127,10 +127,11 @@ def _load_guided() -> Solver:
 def _load_greedy() -> Solver:
     from coordinator.planner.options import after_time
     from coordinator.planner.sequence_search import best_sequence
-    from swarm.allocation import TeamState, rank_of, rule_by_name, run
+    from swarm.allocation import TeamState, rank_of, run
+    from swarm.allocation.rules import kernel_rule
 
     def solve(problem: Problem, limit_s: float, seed: int, clock: Clock) -> PlanningResult:
-        rule = rule_by_name("greedy")
+        rule = kernel_rule("greedy")
         trace = _Trace(clock, limit_s)
         stop = after_time(clock, limit_s)
         rng = np.random.default_rng(seed)

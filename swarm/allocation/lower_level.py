@@ -24,6 +24,7 @@ __all__ = [
     "CompiledRule",
     "Decision",
     "Rule",
+    "ScoringRule",
     "TeamState",
     "decisions",
     "next_decision",
@@ -133,18 +134,23 @@ class Rule(Protocol):
 
 
 @runtime_checkable
-class CompiledRule(Rule, Protocol):
-    """A rule that the kernels know, so that they can run the whole lower level by it."""
-
-    @property
-    def code(self) -> RuleCode:
-        """Its name to them."""
-        ...
+class ScoringRule(Rule, Protocol):
+    """A rule that can say what it makes of the tasks it does not take."""
 
     def valued(
         self, problem: Problem, state: TeamState, uav: int, most: int
     ) -> tuple[tuple[int, float], ...]:
         """`Decision.valued` of what it would decide; so many tasks at the most."""
+        ...
+
+
+@runtime_checkable
+class CompiledRule(ScoringRule, Protocol):
+    """A rule that the kernels know, so that they can run the whole lower level by it."""
+
+    @property
+    def code(self) -> RuleCode:
+        """Its name to them."""
         ...
 
 

@@ -1,6 +1,7 @@
 """Decision rules: how a UAV whose turn it is chooses its next task.
 
-Rules with a fixed formula run in a kernel. The rule `guided` keeps to the published routes
+Rules with a fixed formula run in a kernel, or rank the open tasks by an index
+(swarm.allocation.index_rules). The rule `guided` keeps to the published routes
 unless a fortified rollout shows something better.
 """
 
@@ -12,18 +13,28 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from swarm.allocation.index_rules import INDEX_RULES, IndexRule
 from swarm.allocation.lower_level import Decision, TeamState
 from swarm.allocation.problem import BoolArray, IntArray, Problem
 from swarm.kernels.lower_level import GREEDY, LOOKAHEAD, RuleCode, decide, valued
 from swarm.kernels.rollout import GuidedChoice, guided_choice
 from swarm.kernels.routes import RouteArrays, Routes, TeamArrays
 
-__all__ = ["RULE_NAMES", "GuidedRule", "KernelRule", "route_arrays", "rule_by_name", "team_arrays"]
+__all__ = [
+    "RULE_NAMES",
+    "GuidedRule",
+    "KernelRule",
+    "kernel_rule",
+    "route_arrays",
+    "rule_by_name",
+    "team_arrays",
+]
 
 
 _CODES: dict[str, RuleCode] = {"greedy": GREEDY, "lookahead": LOOKAHEAD}
 
-RULE_NAMES = tuple(_CODES)
+RULE_NAMES = (*_CODES, *INDEX_RULES)
+"""Of rules that need nothing but the shared state; `GuidedRule` needs lists."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +64,27 @@ class KernelRule:
         return tuple(valued(problem.kernel, state, uav, self.code, most))
 
 
-def rule_by_name(name: str) -> KernelRule:
+def rule_by_name(name: str) -> KernelRule | IndexRule:
     """The rule of this name.
 
     Raises:
         ValueError: there is no such rule.
     """
+    if name in INDEX_RULES:
+        return INDEX_RULES[name]
     if name not in _CODES:
         raise ValueError(f"rule must be one of {', '.join(RULE_NAMES)}, not {name!r}")
+    return KernelRule(name, _CODES[name])
+
+
+def kernel_rule(name: str) -> KernelRule:
+    """The compiled rule of this name.
+
+    Raises:
+        ValueError: there is no such rule.
+    """
+    if name not in _CODES:
+        raise ValueError(f"rule must be one of {', '.join(_CODES)}, not {name!r}")
     return KernelRule(name, _CODES[name])
 
 

@@ -11,7 +11,7 @@ Those by which a command finds the bus come together, by one parameter of the ki
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -43,14 +43,20 @@ __all__ = [
     "TimeLimitOption",
     "UnencryptedOption",
     "complete_among",
+    "complete_from",
 ]
 
 
 def complete_among(*words: str) -> Callable[[str], list[str]]:
     """Completes with those of ``words`` that continue what has been typed."""
+    return complete_from(lambda: words)
+
+
+def complete_from(words: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """The same for words that are asked for when something is completed, and not before."""
 
     def complete(incomplete: str) -> list[str]:
-        return [word for word in words if word.startswith(incomplete)]
+        return [word for word in words() if word.startswith(incomplete)]
 
     return complete
 

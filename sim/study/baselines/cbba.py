@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordinator.planner.options import ShouldStop, never
-from sim.study.baselines.index_rules import VALUE_PER_TIME, Routes
+from sim.study.baselines.index_rules import Routes
 from swarm.allocation import evaluate, rank_of, run
+from swarm.allocation.index_rules import VALUE_PER_TIME
 from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import BoolArray, FloatArray, IntArray, Problem
 

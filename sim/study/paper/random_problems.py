@@ -18,8 +18,9 @@ import numpy as np
 from coordinator.planner.plan import guided_plan
 from sim.study.generator import random_table_problem
 from sim.study.paper.tables import RULES, Check, Expectations, PaperFigures
-from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name
+from swarm.allocation import Problem, TeamState, evaluate, rank_of
 from swarm.allocation.problem import FloatArray
+from swarm.allocation.rules import kernel_rule
 from swarm.kernels import exact as kernel
 from swarm.kernels.lower_level import evaluate_sequences
 
@@ -222,7 +223,7 @@ def _solve(table: Problem, seed: int, index: int) -> ProblemResult:
         worst=kernel.optimum(problem.kernel, worst=True, threads=1)[0],
         sequences={
             rule: tuple(
-                evaluate_sequences(problem.kernel, team, ranks, rule_by_name(rule).code, threads=1)[
+                evaluate_sequences(problem.kernel, team, ranks, kernel_rule(rule).code, threads=1)[
                     0
                 ].tolist()
             )

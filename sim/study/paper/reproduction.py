@@ -19,7 +19,8 @@ from sim.study.generator import random_table_problem
 from sim.study.paper.random_problems import RandomResults, reproduce_random
 from sim.study.paper.tables import RULES, Check, Expectations, TableResults, reproduce_tables
 from sim.study.paper.theorems import TheoremResult, check_theorems
-from swarm.allocation import Problem, TeamState, rank_of, rule_by_name
+from swarm.allocation import Problem, TeamState, rank_of
+from swarm.allocation.rules import kernel_rule
 from swarm.kernels import exact
 from swarm.kernels.lower_level import default_threads, evaluate_sequences
 from swarm.runtime.clock import Clock
@@ -123,7 +124,7 @@ def _work(problem: Problem, method: str) -> Callable[[], object]:
     if method == "optimum":
         return lambda: exact.optimum(problem.kernel, threads=1)
     ranks = np.array([rank_of(order) for order in permutations(range(problem.n_uav))])
-    team, code = TeamState.at_start(problem), rule_by_name(method).code
+    team, code = TeamState.at_start(problem), kernel_rule(method).code
     return lambda: evaluate_sequences(problem.kernel, team, ranks, code, threads=1)
 
 

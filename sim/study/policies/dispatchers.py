@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from sim.study.baselines.index_rules import NEAREST, VALUE_PER_TIME, Routes
+from sim.study.baselines.index_rules import Routes
 from sim.study.policies.roster import Planner
 from sim.study.policies.situation import Account, TeamNews, TeamSituation
 from sim.study.policies.team import fly_team
 from sim.world.outcome import FlightOutcome
 from sim.world.uncertainty import Realization
 from swarm.allocation import Problem, Rule
+from swarm.allocation.index_rules import NEAREST, VALUE_PER_TIME
 from swarm.model import TaskId, UavId
 from swarm.runtime.clock import Clock
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from coordinator.planner.exact import ProblemTooLargeError
-from coordinator.planner.options import METHODS, after_evaluations, after_time
-from coordinator.planner.plan import make_plan
+from coordinator.planner.options import after_evaluations, after_time
+from coordinator.planner.plan import METHODS, make_plan
 from sim.study.generator import mission_of, random_mission
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from tests.support.problems import table_1_mission

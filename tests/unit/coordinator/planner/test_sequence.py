@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.sequence_search import SearchLimits, best_sequence
-from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
+from swarm.allocation import Problem, TeamState, evaluate, rank_of, run
 from swarm.allocation.problem import FloatArray
+from swarm.allocation.rules import kernel_rule
 from tests.support.problems import any_problem, random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -22,7 +23,7 @@ def rng() -> np.random.Generator:
 
 
 def objective_of(problem: Problem, sequence: tuple[int, ...], rule: str) -> float:
-    routes, _ = run(problem, TeamState.at_start(problem), rank_of(sequence), rule_by_name(rule))
+    routes, _ = run(problem, TeamState.at_start(problem), rank_of(sequence), kernel_rule(rule))
     return evaluate(problem, routes)[0]
 
 
@@ -43,7 +44,7 @@ def test_small_fleets_get_the_best_of_all_sequences(
 ) -> None:
     problem = any_problem(seed, n_uav, n_task)
 
-    found = best_sequence(problem, rule_by_name(rule), rng())
+    found = best_sequence(problem, kernel_rule(rule), rng())
 
     assert found.exhaustive
     assert found.objective == pytest.approx(best_of_all(problem, rule), abs=1e-9)
@@ -78,20 +79,20 @@ def grid_problem(seed: int, n_uav: int, n_task: int) -> Problem:
 def test_ties_and_equal_uavs_hide_no_better_sequence(seed: int, n_uav: int, n_task: int) -> None:
     problem = grid_problem(seed, n_uav, n_task)
 
-    found = best_sequence(problem, rule_by_name("greedy"), rng())
+    found = best_sequence(problem, kernel_rule("greedy"), rng())
 
     assert found.exhaustive
     assert found.objective == pytest.approx(best_of_all(problem, "greedy"))
 
 
 def test_each_distinct_first_round_is_evaluated_once() -> None:
-    found = best_sequence(table_1(), rule_by_name("greedy"), rng())
+    found = best_sequence(table_1(), kernel_rule("greedy"), rng())
 
     assert found.evaluations == 4  # of six sequences, two pairs of which begin alike
 
 
 def test_equal_objectives_go_to_the_first_sequence_in_scenario_order() -> None:
-    assert best_sequence(table_1(), rule_by_name("greedy"), rng()).sequence == (0, 2, 1)
+    assert best_sequence(table_1(), kernel_rule("greedy"), rng()).sequence == (0, 2, 1)
 
 
 def test_equal_uavs_need_one_evaluation() -> None:
@@ -109,7 +110,7 @@ def test_equal_uavs_need_one_evaluation() -> None:
         horizon_s=30.0,
     )
 
-    found = best_sequence(equal, rule_by_name("greedy"), rng())
+    found = best_sequence(equal, kernel_rule("greedy"), rng())
 
     assert found.exhaustive
     assert (found.sequence, found.evaluations) == (tuple(range(7)), 1)
@@ -125,7 +126,7 @@ def test_state_on_the_way_is_searched_exhaustively_too(seed: int) -> None:
     state.survived[:] = random.uniform(0.2, 1.0, 4)
     state.open[:2] = False
     state.active[int(random.integers(4))] = False
-    rule = rule_by_name("greedy")
+    rule = kernel_rule("greedy")
 
     found = best_sequence(problem, rule, rng(), state=state)
 
@@ -150,7 +151,7 @@ def test_state_on_the_way_is_searched_exhaustively_too(seed: int) -> None:
 def test_local_search_finds_the_best_of_a_small_fleet(seed: int) -> None:
     problem = random_problem(np.random.default_rng(seed), 4, 10)
 
-    found = best_sequence(problem, rule_by_name("greedy"), rng(), limits=NO_LISTING)
+    found = best_sequence(problem, kernel_rule("greedy"), rng(), limits=NO_LISTING)
 
     assert not found.exhaustive
     assert found.objective == pytest.approx(best_of_all(problem, "greedy"))
@@ -161,7 +162,7 @@ def test_local_search_is_repeatable_and_keeps_to_its_evaluations() -> None:
 
     first, second = (
         best_sequence(
-            problem, rule_by_name("greedy"), rng(), after_evaluations(60), limits=NO_LISTING
+            problem, kernel_rule("greedy"), rng(), after_evaluations(60), limits=NO_LISTING
         )
         for _ in range(2)
     )
@@ -175,7 +176,7 @@ def test_more_work_never_makes_it_worse() -> None:
 
     values = [
         best_sequence(
-            problem, rule_by_name("greedy"), rng(), after_evaluations(limit), limits=NO_LISTING
+            problem, kernel_rule("greedy"), rng(), after_evaluations(limit), limits=NO_LISTING
         ).objective
         for limit in (1, 20, 100, 300)
     ]
@@ -187,7 +188,7 @@ def test_more_work_never_makes_it_worse() -> None:
 def test_stopped_at_once_still_gives_a_sequence(n_uav: int) -> None:
     problem = random_problem(np.random.default_rng(1), n_uav, 15)
 
-    found = best_sequence(problem, rule_by_name("greedy"), rng(), lambda _: True)
+    found = best_sequence(problem, kernel_rule("greedy"), rng(), lambda _: True)
 
     assert sorted(found.sequence) == list(range(n_uav))
     assert found.evaluations == 1
@@ -198,7 +199,7 @@ def test_no_uav_and_no_task_are_searched_without_complaint() -> None:
     for n_uav, n_task in ((0, 3), (3, 0), (10, 0)):
         problem = random_problem(np.random.default_rng(1), n_uav, n_task)
 
-        found = best_sequence(problem, rule_by_name("greedy"), rng())
+        found = best_sequence(problem, kernel_rule("greedy"), rng())
 
         assert found.sequence == tuple(range(n_uav))
         assert found.objective == 0.0
@@ -224,7 +225,7 @@ def one_depot_problem(n_uav: int, n_task: int) -> Problem:
 def test_many_first_rounds_are_climbed_and_then_all_tried() -> None:
     problem = one_depot_problem(6, 10)
 
-    found = best_sequence(problem, rule_by_name("greedy"), rng())
+    found = best_sequence(problem, kernel_rule("greedy"), rng())
 
     assert found.exhaustive
     assert 200 < found.evaluations <= 720
@@ -233,7 +234,7 @@ def test_many_first_rounds_are_climbed_and_then_all_tried() -> None:
 
 def test_stopped_among_many_first_rounds_the_climb_has_paid() -> None:
     problem = one_depot_problem(6, 10)
-    rule = rule_by_name("greedy")
+    rule = kernel_rule("greedy")
 
     found = best_sequence(problem, rule, rng(), after_evaluations(150))
 
@@ -245,7 +246,7 @@ def test_stopped_among_many_first_rounds_the_climb_has_paid() -> None:
 def test_stopped_in_the_first_evaluation_the_lists_are_whole_and_their_end_is_greedy() -> None:
     problem = random_problem(np.random.default_rng(3), 9, 40)
 
-    found = best_sequence(problem, rule_by_name("lookahead"), rng(), lambda _: True)
+    found = best_sequence(problem, kernel_rule("lookahead"), rng(), lambda _: True)
 
     assert found.evaluations == 0
     assert not found.exhaustive
@@ -259,8 +260,8 @@ def test_stopped_in_the_first_evaluation_the_lists_are_whole_and_their_end_is_gr
 def test_lists_are_those_the_sequence_leads_to(rule: str) -> None:
     problem = random_problem(np.random.default_rng(8), 10, 20)
 
-    found = best_sequence(problem, rule_by_name(rule), rng(), after_evaluations(40))
+    found = best_sequence(problem, kernel_rule(rule), rng(), after_evaluations(40))
 
     state = TeamState.at_start(problem)
-    routes, _ = run(problem, state, rank_of(found.sequence), rule_by_name(rule))
+    routes, _ = run(problem, state, rank_of(found.sequence), kernel_rule(rule))
     assert [list(route) for route in found.routes] == routes

@@ -7,7 +7,8 @@ import pytest
 
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.sequence_search import SearchLimits, SequenceSearch, best_sequence
-from swarm.allocation import TeamState, evaluate, rank_of, rule_by_name, run
+from swarm.allocation import TeamState, evaluate, rank_of, run
+from swarm.allocation.rules import kernel_rule
 from tests.support.problems import random_problem
 
 NO_LISTING = SearchLimits(first_rounds=0, first_rounds_large_fleet=0)
@@ -16,7 +17,7 @@ NO_LISTING = SearchLimits(first_rounds=0, first_rounds_large_fleet=0)
 def search(rule: str, threads: int, limit: int = 200, n_task: int = 40) -> SequenceSearch:
     return best_sequence(
         random_problem(np.random.default_rng(11), 14, n_task),
-        rule_by_name(rule),
+        kernel_rule(rule),
         np.random.default_rng(0),
         after_evaluations(limit),
         limits=NO_LISTING,
@@ -40,7 +41,7 @@ def test_objective_is_that_of_the_sequence() -> None:
     found = search("greedy", 2)
 
     rank = rank_of(found.sequence)
-    routes, _ = run(problem, TeamState.at_start(problem), rank, rule_by_name("greedy"))
+    routes, _ = run(problem, TeamState.at_start(problem), rank, kernel_rule("greedy"))
     assert evaluate(problem, routes)[0] == pytest.approx(found.objective, abs=1e-9)
 
 
@@ -49,7 +50,7 @@ def test_progress_is_told_and_never_falls() -> None:
 
     found = best_sequence(
         random_problem(np.random.default_rng(11), 14, 40),
-        rule_by_name("greedy"),
+        kernel_rule("greedy"),
         np.random.default_rng(0),
         after_evaluations(200),
         limits=NO_LISTING,
@@ -70,7 +71,7 @@ def test_ctrl_c_gives_the_best_so_far() -> None:
 
     found = best_sequence(
         random_problem(np.random.default_rng(11), 14, 40),
-        rule_by_name("greedy"),
+        kernel_rule("greedy"),
         np.random.default_rng(0),
         limits=NO_LISTING,
         progress=interrupt,
@@ -89,7 +90,7 @@ def test_ctrl_c_before_anything_is_known_is_passed_on() -> None:
     with pytest.raises(KeyboardInterrupt):
         best_sequence(
             random_problem(np.random.default_rng(11), 14, 40),
-            rule_by_name("greedy"),
+            kernel_rule("greedy"),
             np.random.default_rng(0),
             interrupt,
         )

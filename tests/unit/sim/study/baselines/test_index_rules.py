@@ -7,16 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.study.baselines.index_rules import (
-    NEAREST,
-    VALUE_PER_TIME,
-    IndexRule,
-    Routes,
-    makespan_s,
-    nearest_first,
-    value_per_time,
-)
+from sim.study.baselines.index_rules import Routes, makespan_s, nearest_first, value_per_time
 from swarm.allocation import Problem, TeamState, rank_of
+from swarm.allocation.index_rules import NEAREST, VALUE_PER_TIME, IndexRule
 from swarm.allocation.reference import completion_s
 from tests.support.problems import random_problem, table_1
 
