@@ -167,73 +167,11 @@ async def run_agent(
     Returns:
         Exit status.
     """
-    loop = asyncio.get_running_loop()
-    vehicle: Vehicle | None = None
-    starting: asyncio.Task[None] | None = None
-    returns = asyncio.Event()
-
-    def execute(action: Action) -> None:
-        nonlocal vehicle, starting
-        if not isinstance(action, OrderVehicle):
-            return
-        brief, order = core.replica.brief, action.order
-        if not isinstance(order, Return):
-            returns.clear()
-        flown = not isinstance(order, Return) or order.resume
-        if vehicle is None and brief is not None and flown:
-            vehicle = make_vehicle(Origin(*brief.origin), report)
-            core.dropped = _Dropped(shell, vehicle)
-            starting = loop.create_task(vehicle.start())
-            starting.add_done_callback(failed)
-        if vehicle is not None:
-            vehicle.order(order)
-        elif isinstance(order, Return):
-            loop.call_soon(report, Home())
-
-    def report(news: VehicleReport) -> None:
-        if isinstance(news, ReturnBegun):
-            returns.set()
-        shell.step(news)
-
-    def failed(task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and (fault := task.exception()):
-            shell.fail(fault)
-
-    def as_event(fact: Event) -> Event:
-        return fact
-
-    def keep(now_s: float) -> None:
-        if save is not None:
-            save(core.memory(now_s))
-
-    async def farewell() -> int:
-        status = await stop.wait()
-        shell.step(Stop("the agent was told to stop"))
-        seen = loop.create_task(returns.wait())
-        try:
-            first = asyncio.FIRST_COMPLETED
-            await asyncio.wait((flying, seen), timeout=FAREWELL_S, return_when=first)
-        finally:
-            seen.cancel()
-        return status
-
-    shell: Shell[Event, Action] = Shell(
-        core,
-        bus,
-        clock,
-        mission=mission,
-        name=core.uav,
-        from_bus=as_event,
-        execute=execute,
-        snapshot=core.snapshot,
-        known=core.replica.digest,
-        left_out=lambda: core.replica.overfull,
-        save=keep,
-        answer_s=answer_s,
-    )
-    core.dropped = _Dropped(shell)
+    flight = _Flight(core, bus, clock, mission, make_vehicle, save=save, answer_s=answer_s)
     join_mission(bus, mission, core.uav, status=False)
-    flying, leaving = loop.create_task(shell.run()), loop.create_task(farewell())
+    loop = asyncio.get_running_loop()
+    flying = loop.create_task(flight.shell.run())
+    leaving = loop.create_task(_farewell(flight, flying, stop))
     try:
         await asyncio.wait((flying, leaving), return_when=asyncio.FIRST_COMPLETED)
         if stop.exit_status is None:
@@ -243,9 +181,100 @@ async def run_agent(
             flying.result()  # raises what went wrong while leaving
         return told
     finally:
-        tasks = [task for task in (flying, leaving, starting) if task is not None]
+        tasks = [task for task in (flying, leaving, flight.starting) if task is not None]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        if vehicle is not None:
-            await vehicle.close()
+        if flight.vehicle is not None:
+            await flight.vehicle.close()
+
+
+class _Flight:
+    """An agent's shell and, once the mission's origin is known, its vehicle.
+
+    Args:
+        core: the agent.
+        bus: open.
+        clock: gives the core's time.
+        mission: mission name.
+        make_vehicle: as for `run_agent`.
+        save: keeps what the core knows for its next life.
+        answer_s: how long a question waits for the slowest answer [wall s].
+    """
+
+    def __init__(
+        self,
+        core: AgentCore,
+        bus: Bus,
+        clock: Clock,
+        mission: str,
+        make_vehicle: Callable[[Origin, Callable[[VehicleReport], None]], Vehicle],
+        *,
+        save: Callable[[Snapshot], None] | None,
+        answer_s: float,
+    ) -> None:
+        self.vehicle: Vehicle | None = None
+        self.starting: asyncio.Task[None] | None = None
+        self.returns = asyncio.Event()
+        """Set while the vehicle is seen to fly home."""
+        self._core = core
+        self._make_vehicle = make_vehicle
+        self._save = save
+        self.shell: Shell[Event, Action] = Shell(
+            core,
+            bus,
+            clock,
+            mission=mission,
+            name=core.uav,
+            from_bus=lambda fact: fact,
+            execute=self._execute,
+            snapshot=core.snapshot,
+            known=core.replica.digest,
+            left_out=lambda: core.replica.overfull,
+            save=self._keep,
+            answer_s=answer_s,
+        )
+        core.dropped = _Dropped(self.shell)
+
+    def _execute(self, action: Action) -> None:
+        if not isinstance(action, OrderVehicle):
+            return
+        brief, order = self._core.replica.brief, action.order
+        if not isinstance(order, Return):
+            self.returns.clear()
+        flown = not isinstance(order, Return) or order.resume
+        if self.vehicle is None and brief is not None and flown:
+            self.vehicle = self._make_vehicle(Origin(*brief.origin), self._report)
+            self._core.dropped = _Dropped(self.shell, self.vehicle)
+            self.starting = asyncio.get_running_loop().create_task(self.vehicle.start())
+            self.starting.add_done_callback(self._failed)
+        if self.vehicle is not None:
+            self.vehicle.order(order)
+        elif isinstance(order, Return):
+            asyncio.get_running_loop().call_soon(self._report, Home())
+
+    def _report(self, news: VehicleReport) -> None:
+        if isinstance(news, ReturnBegun):
+            self.returns.set()
+        self.shell.step(news)
+
+    def _failed(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (fault := task.exception()):
+            self.shell.fail(fault)
+
+    def _keep(self, now_s: float) -> None:
+        if self._save is not None:
+            self._save(self._core.memory(now_s))
+
+
+async def _farewell(flight: _Flight, flying: asyncio.Task[int], stop: StopRequest) -> int:
+    """Told to stop: have the vehicle return, and see it do so; the exit status."""
+    status = await stop.wait()
+    flight.shell.step(Stop("the agent was told to stop"))
+    seen = asyncio.get_running_loop().create_task(flight.returns.wait())
+    try:
+        first = asyncio.FIRST_COMPLETED
+        await asyncio.wait((flying, seen), timeout=FAREWELL_S, return_when=first)
+    finally:
+        seen.cancel()
+    return status

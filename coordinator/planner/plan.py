@@ -226,44 +226,25 @@ def make_plan(
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop
     proven = _proven(problem, method, ends, threads)
-    bounded = proven is None and bound_s is not None
-    search_ends = part_of(ends, 1.0 - bound_frac) if bounded and bound_frac > 0.0 else ends
-    sequence: tuple[int, ...] | None = None
-    evaluations = 0
-    routes: Sequence[Sequence[int]]
-    if method == "exact" and proven is not None:
-        routes = proven.routes
-    elif method in ("exact", "guided"):
-        guided = guided_plan(
-            problem,
-            seed=seed,
-            stop=after_evaluations(_INSTEAD_OF_PROOF)
-            if method == "exact"
-            else None
-            if stop is None
-            else search_ends,
-            progress=progress,
-            threads=threads,
-        )
-        routes, evaluations = guided.routes, guided.iterations
-        sequence = guided.sequence if method == "guided" else None
-    else:
-        search = search_sequence(
-            problem,
-            rule_by_name(method),
-            np.random.default_rng(seed),
-            search_ends,
-            limits=_limits(problem, method, stopped=isinstance(stop, Limit), modest=modest),
-            progress=progress,
-            threads=threads,
-        )
-        routes, sequence, evaluations = search.routes, search.sequence, search.evaluations
+    keeps = proven is None and bound_s is not None and bound_frac > 0.0
+    search_ends = part_of(ends, 1.0 - bound_frac) if keeps else ends
+    routes, sequence, evaluations = _searched(
+        problem,
+        method,
+        proven,
+        search_ends,
+        seed=seed,
+        limited=stop is not None,
+        by_share=isinstance(stop, Limit),
+        progress=progress,
+        threads=threads,
+        modest=modest,
+    )
     objective, completion_s = evaluate(problem, routes)
-    best: float | None = None
+    best = bound = None
     if proven is not None:  # the same lists summed in another order may be 1e-15 off
         best = max(evaluate(problem, proven.routes)[0], objective)
-    bound: float | None = None
-    if bounded and bound_s is not None:
+    elif bound_s is not None:
         bound_ends = first_of(after_time(clock, bound_s), ends)
         bound = upper_bound(problem, routes, bound_ends, threads=threads).objective
     return Plan(
@@ -284,6 +265,54 @@ def make_plan(
         seed=seed,
         bound=bound,
     )
+
+
+def _searched(
+    problem: Problem,
+    method: str,
+    proven: Optimum | None,
+    ends: ShouldStop,
+    *,
+    seed: int,
+    limited: bool,
+    by_share: bool,
+    progress: Progress | None,
+    threads: int | None,
+    modest: bool,
+) -> tuple[Sequence[Sequence[int]], tuple[int, ...] | None, int]:
+    """Lists, the sequence that leads to them if there is one, and the work spent; see `make_plan`.
+
+    Args:
+        problem: the mission.
+        method: one of `METHODS`.
+        proven: the optimum, where it is known.
+        ends: the limit of the search.
+        seed: of all that is drawn.
+        limited: whether the caller has set a limit.
+        by_share: whether that limit tells which share of it is spent.
+        progress: told how far the search is.
+        threads: at most so many.
+        modest: spend little on the search for a sequence.
+    """
+    if method == "exact" and proven is not None:
+        return proven.routes, None, 0
+    if method in ("exact", GuidedRule.name):
+        stop: ShouldStop | None = ends if limited else None
+        if method == "exact":
+            stop = after_evaluations(_INSTEAD_OF_PROOF)
+        guided = guided_plan(problem, seed=seed, stop=stop, progress=progress, threads=threads)
+        sequence = guided.sequence if method == GuidedRule.name else None
+        return guided.routes, sequence, guided.iterations
+    search = search_sequence(
+        problem,
+        rule_by_name(method),
+        np.random.default_rng(seed),
+        ends,
+        limits=_limits(problem, method, stopped=by_share, modest=modest),
+        progress=progress,
+        threads=threads,
+    )
+    return search.routes, search.sequence, search.evaluations
 
 
 def _proven(problem: Problem, method: str, ends: ShouldStop, threads: int | None) -> Optimum | None:
