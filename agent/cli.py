@@ -198,7 +198,7 @@ def agent(
     from agent.core.agent_core import AgentCore
     from agent.core.interface import VehicleReport
     from agent.links.mavlink_vehicle import MavlinkVehicle
-    from agent.runner import Vehicle, pause_between_lives, run_agent, seat_or_stop
+    from agent.runner import Vehicle, live_once
     from agent.vehicle.config import BridgeConfig, parse_forward, parse_link
     from agent.vehicle.signing import load_signing_key
     from swarm.bus.zenoh_bus import open_zenoh_bus
@@ -206,8 +206,8 @@ def agent(
     from swarm.model import Origin
     from swarm.runtime.clock import ScaledClock, incarnation
     from swarm.runtime.log import configure_logging, get_logger
-    from swarm.runtime.process import SERVICE_NOTIFIER, stop_requests
-    from swarm.runtime.store import Store
+    from swarm.runtime.process import SERVICE_NOTIFIER
+    from swarm.runtime.store import Memory, Store
 
     # A life begins with its process: of two agents of one UAV the one started last counts.
     life = incarnation()
@@ -232,67 +232,55 @@ def agent(
         log.warning("no bus yet", reason=reason)
         SERVICE_NOTIFIER.waiting(f"{uav}: no bus yet: {reason}")
 
-    async def run() -> int:
-        clock = ScaledClock(speedup)
+    def vehicle(origin: Origin, report: Callable[[VehicleReport], None]) -> Vehicle:
+        settings = BridgeConfig(
+            system_id=system_id,
+            origin=origin,
+            ground_system_id=own_system_id,
+            ground_component_id=own_component_id,
+            command=command,
+            accept_no_failsafe=accept_no_failsafe,
+            acceptance_radius_m=acceptance_radius_m,
+            position_rate_hz=position_rate_hz,
+            battery_reserve_frac=battery_reserve or None,
+            raises_jerk=not keep_jerk,
+            fence_radius_m=fence_radius_m,
+            fence_height_m=fence_height_m,
+        ).for_speedup(speedup)
+        return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
 
-        def vehicle(origin: Origin, report: Callable[[VehicleReport], None]) -> Vehicle:
-            settings = BridgeConfig(
-                system_id=system_id,
-                origin=origin,
-                ground_system_id=own_system_id,
-                ground_component_id=own_component_id,
-                command=command,
-                accept_no_failsafe=accept_no_failsafe,
-                acceptance_radius_m=acceptance_radius_m,
-                position_rate_hz=position_rate_hz,
-                battery_reserve_frac=battery_reserve or None,
-                raises_jerk=not keep_jerk,
-                fence_radius_m=fence_radius_m,
-                fence_height_m=fence_height_m,
-            ).for_speedup(speedup)
-            return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
+    def core(memory: Memory | None) -> AgentCore:
+        return AgentCore(
+            mission,
+            uav,
+            life,
+            network.timing.scaled(speedup),
+            None if memory is None else memory.snapshot,
+            0.0 if memory is None else memory.age_s,
+            rejoin=rejoin,
+            without_bus_s=None if without_bus_s is None else without_bus_s * speedup,
+        )
 
-        async with stop_requests(lifeline=lifeline) as stop:
-            SERVICE_NOTIFIER.waiting(f"{uav}: looks for the bus")
-            place = await seat_or_stop(lambda: open_zenoh_bus(config), stop, no_seat_yet)
-            if place is None:
-                return stop.exit_status or 0
-            SERVICE_NOTIFIER.ready(f"{uav}: on the bus, in mission {mission}")
-            # Only now: waiting for a seat may have taken long.
-            memory = None if store is None else store.load(place.seal)
-            core = AgentCore(
-                mission,
-                uav,
-                life,
-                network.timing.scaled(speedup),
-                None if memory is None else memory.snapshot,
-                0.0 if memory is None else memory.age_s,
-                rejoin=rejoin,
-                without_bus_s=None if without_bus_s is None else without_bus_s * speedup,
-            )
-            save = None if store is None else store.save
-            try:
-                status = await run_agent(
-                    core,
-                    mission,
-                    place,
-                    clock,
-                    vehicle,
-                    stop,
-                    save=save,
-                    answer_s=network.answer_s,
-                )
-            finally:
-                place.close()
-            await pause_between_lives(stop)
-            return status
-
+    clock = ScaledClock(speedup)
     store = None if state is None else Store(state, mission, uav, speedup=speedup)
     # What has been imported stays: a full collection would look through all of it for tens of
     # milliseconds, in which a vehicle may wait for its next target.
     gc.freeze()
     try:
-        return asyncio.run(run())
+        return asyncio.run(
+            live_once(
+                lambda: open_zenoh_bus(config),
+                core,
+                vehicle,
+                clock,
+                mission=mission,
+                uav=uav,
+                store=store,
+                answer_s=network.answer_s,
+                lifeline=lifeline,
+                on_wait=no_seat_yet,
+            )
+        )
     finally:
         if store is not None:
             store.close()

@@ -32,10 +32,11 @@ from swarm.protocol.messages import Snapshot
 from swarm.protocol.timing import PRESETS, LinkKind
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import BusError
-from swarm.runtime.process import SERVICE_NOTIFIER, ServiceNotifier, StopRequest
+from swarm.runtime.process import SERVICE_NOTIFIER, ServiceNotifier, StopRequest, stop_requests
 from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.store import Memory, Store
 
-__all__ = ["Vehicle", "pause_between_lives", "run_agent", "seat_or_stop"]
+__all__ = ["Vehicle", "live_once", "pause_between_lives", "run_agent", "seat_or_stop"]
 
 
 RETRY_S = 0.5
@@ -138,6 +139,52 @@ async def _seat(open_bus: Callable[[], Awaitable[Bus]], on_wait: Callable[[str],
             on_wait(str(fault))
         # A try may fail at once, such as when the endpoint to listen on is taken.
         await asyncio.sleep(RETRY_S)
+
+
+async def live_once(
+    open_bus: Callable[[], Awaitable[Bus]],
+    make_core: Callable[[Memory | None], AgentCore],
+    make_vehicle: Callable[[Origin, Callable[[VehicleReport], None]], Vehicle],
+    clock: Clock,
+    *,
+    mission: str,
+    uav: str,
+    store: Store | None,
+    answer_s: float,
+    lifeline: bool,
+    on_wait: Callable[[str], None],
+) -> int:
+    """One life of an agent's process, from its seat on the bus to its end; the exit status.
+
+    Args:
+        open_bus: tries once to get a seat.
+        make_core: makes the agent, given what its earlier life has kept.
+        make_vehicle: as for `run_agent`.
+        clock: gives the core's time.
+        mission: mission name.
+        uav: id of its UAV.
+        store: keeps what the core knows for its next life; None: nothing is kept.
+        answer_s: how long a question waits for the slowest answer [wall s].
+        lifeline: whether the end of standard input ends the process.
+        on_wait: called with the reason whenever there was no seat.
+    """
+    async with stop_requests(lifeline=lifeline) as stop:
+        SERVICE_NOTIFIER.waiting(f"{uav}: looks for the bus")
+        seat = await seat_or_stop(open_bus, stop, on_wait)
+        if seat is None:
+            return stop.exit_status or 0
+        SERVICE_NOTIFIER.ready(f"{uav}: on the bus, in mission {mission}")
+        # Only now: waiting for a seat may have taken long.
+        core = make_core(None if store is None else store.load(seat.seal))
+        save = None if store is None else store.save
+        try:
+            status = await run_agent(
+                core, mission, seat, clock, make_vehicle, stop, save=save, answer_s=answer_s
+            )
+        finally:
+            seat.close()
+        await pause_between_lives(stop)
+        return status
 
 
 async def run_agent(

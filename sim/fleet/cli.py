@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coordinator.recording.options import RecordOption, check_new_recording
-from sim.options import MethodOption, ReportOption, print_report
+from sim.options import MethodOption, ReportOption
 from swarm.protocol.timing import LinkKind
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 from swarm.runtime.options import (
@@ -277,31 +277,22 @@ def run(
         swarm run table-1 --json
     """
     import asyncio
-    import contextlib
     import os
-    import sys
 
-    from rich.console import Console
-
-    from coordinator.core.publication import FlightLayers, height_warning
     from coordinator.dashboard.access import parse_serve_address
     from coordinator.planner.plan import check_online_method
-    from coordinator.recording.flight_recorder import recording_or_none, wall_ns
-    from coordinator.recording.recorder import RecordingInfo
-    from coordinator.terminal.live_view import LiveView
-    from coordinator.terminal.report import MissionReport, check_report_path
+    from coordinator.terminal.report import check_report_path
     from sim.fleet.autopilots import check_speedup, parse_autopilots
     from sim.fleet.firmware import SitlFirmware
     from sim.fleet.layout import LaunchOptions, defaults_for
-    from sim.fleet.log_files import LogFiles
     from sim.fleet.passthrough import (
         PassthroughOptions,
         check_passthrough,
         fence_around,
         parse_command_styles,
     )
-    from sim.fleet.run import fly
-    from sim.fleet.security import protected, security_of
+    from sim.fleet.security import protected
+    from sim.fleet.shown_run import Outputs, ShownRun
     from swarm.protocol.timing import preset
     from swarm.runtime.log import LogFormat, LogLevel, configure_logging
     from swarm.runtime.process import run_until_stopped
@@ -347,62 +338,16 @@ def run(
         log_format=LogFormat.AUTO if logs is None else LogFormat.JSON,
     )
     configure_logging(LogLevel.WARNING)
-    # With every process's log on the screen, a picture would only be torn apart.
-    console = Console(stderr=True, force_terminal=False if verbose else None)
-
-    kept = None if logs is None else LogFiles(logs, console.print)
-
-    def log(name: str, line: str) -> None:
-        if kept is not None:
-            kept.write(name, line)
-        if verbose:
-            print(f"{name}: {line}", file=sys.stderr)
-
-    def say(line: str) -> None:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
-
-    for line in () if plain.dashboard is None else plain.dashboard.lines:
-        say(line)
-    if (warning := height_warning(mission, FlightLayers())) is not None:
-        say(f"warning: {warning}")
-
-    async def work(options: LaunchOptions) -> int:
-        about = RecordingInfo(
-            mission.name, preset(link).timing.scaled(speedup), speedup, str(scenario)
-        )
-        try:
-            with (
-                kept or contextlib.nullcontext(),
-                recording_or_none(record, about, wall_ns(), say) as recorder,
-                LiveView(console, speedup=speedup, secure=options.keys is not None) as view,
-            ):
-                flight = await fly(
-                    mission,
-                    options,
-                    on_frame=view.update,
-                    on_log=log if verbose or kept else None,
-                    recorder=recorder,
-                    on_private=lambda fault: say(f"commands do not find this run: {fault}"),
-                )
-        except asyncio.CancelledError:
-            console.print("interrupted: the mission was given up and every process ended")
-            raise
-        told = MissionReport(
-            mission=flight.mission_state.mission,
-            plan=flight.plan,
-            result=flight.result,
-            story=tuple(flight.mission_state.story),
-            takeoff_s=flight.takeoff_s,
-            wall_s=flight.wall_s,
-            speedup=speedup,
-            fates=flight.fates,
-            security=security_of(options, mission, flight.dropped),
-        )
-        status = print_report(told, json=json, report=report)
-        return status or int(recorder is not None and recorder.fault is not None)
-
+    shown = ShownRun(
+        mission,
+        Path(scenario),
+        speedup,
+        preset(link).timing.scaled(speedup),
+        Outputs(json=json, report=report, record=record, logs=logs, verbose=verbose),
+    )
+    shown.warn(plain)
     with protected(mission, plain, secure=secure, keys=keys) as options:
-        return asyncio.run(run_until_stopped(work(options)))
+        return asyncio.run(run_until_stopped(shown.fly(options)))
 
 
 def _bus_kind(text: str) -> BusKind:

@@ -1,0 +1,120 @@
+"""Fly one run in front of a person: its picture, log lines, recording and report.
+
+Leaves out: the flight itself (sim.fleet.run) and the options (sim.fleet.cli).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from coordinator.core.publication import FlightLayers, height_warning
+from coordinator.recording.flight_recorder import recording_or_none, wall_ns
+from coordinator.recording.recorder import RecordingInfo
+from coordinator.terminal.live_view import LiveView
+from coordinator.terminal.report import MissionReport
+from sim.fleet.layout import LaunchOptions
+from sim.fleet.log_files import LogFiles
+from sim.fleet.run import fly
+from sim.fleet.security import security_of
+from sim.options import print_report
+from swarm.model import Mission
+from swarm.protocol.timing import Timing
+
+__all__ = ["Outputs", "ShownRun"]
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Where what is told goes."""
+
+    json: bool
+    """The report as one JSON object."""
+    report: Path | None
+    """A file for the report, too."""
+    record: Path | None
+    """A new recording."""
+    logs: Path | None
+    """A folder for what every process logs."""
+    verbose: bool
+    """What every process logs goes to standard error."""
+
+
+class ShownRun:
+    """One run on this machine, and the screen.
+
+    Args:
+        mission: what is flown.
+        scenario: its file or shipped name.
+        speedup: mission seconds per wall second.
+        timing: timers of the run, in mission seconds.
+        outputs: where what is told goes.
+    """
+
+    def __init__(
+        self, mission: Mission, scenario: Path, speedup: float, timing: Timing, outputs: Outputs
+    ) -> None:
+        self._mission = mission
+        self._about = RecordingInfo(mission.name, timing, speedup, str(scenario))
+        self._speedup = speedup
+        self._outputs = outputs
+        # With every process's log on the screen, a picture would only be torn apart.
+        self._console = Console(stderr=True, force_terminal=False if outputs.verbose else None)
+        self._kept = None if outputs.logs is None else LogFiles(outputs.logs, self._console.print)
+
+    def warn(self, options: LaunchOptions) -> None:
+        """Say what a person should know before the start."""
+        for line in () if options.dashboard is None else options.dashboard.lines:
+            self._say(line)
+        if (warning := height_warning(self._mission, FlightLayers())) is not None:
+            self._say(f"warning: {warning}")
+
+    async def fly(self, options: LaunchOptions) -> int:
+        """Fly it to its end; the exit status."""
+        outputs = self._outputs
+        try:
+            with (
+                self._kept or contextlib.nullcontext(),
+                recording_or_none(outputs.record, self._about, wall_ns(), self._say) as recorder,
+                LiveView(
+                    self._console, speedup=self._speedup, secure=options.keys is not None
+                ) as view,
+            ):
+                flight = await fly(
+                    self._mission,
+                    options,
+                    on_frame=view.update,
+                    on_log=self._log if outputs.verbose or self._kept else None,
+                    recorder=recorder,
+                    on_private=lambda fault: self._say(f"commands do not find this run: {fault}"),
+                )
+        except asyncio.CancelledError:
+            self._console.print("interrupted: the mission was given up and every process ended")
+            raise
+        told = MissionReport(
+            mission=flight.mission_state.mission,
+            plan=flight.plan,
+            result=flight.result,
+            story=tuple(flight.mission_state.story),
+            takeoff_s=flight.takeoff_s,
+            wall_s=flight.wall_s,
+            speedup=self._speedup,
+            fates=flight.fates,
+            security=security_of(options, self._mission, flight.dropped),
+        )
+        status = print_report(told, json=outputs.json, report=outputs.report)
+        return status or int(recorder is not None and recorder.fault is not None)
+
+    def _log(self, name: str, line: str) -> None:
+        if self._kept is not None:
+            self._kept.write(name, line)
+        if self._outputs.verbose:
+            sys.stderr.write(f"{name}: {line}\n")
+
+    def _say(self, line: str) -> None:
+        self._console.print(line, highlight=False, markup=False, soft_wrap=True)
