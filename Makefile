@@ -9,12 +9,13 @@ unexport PYTHONDONTWRITEBYTECODE
 
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
-.PHONY: demo test browser lint audit format kernels sanitize soak chaos fuzz clean help
+.PHONY: demo test test-all browser lint audit format kernels sanitize soak chaos fuzz clean help
 .PHONY: dist check-dist sbom wheels check-units
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
-	@echo "make test    checks and the whole test suite"
+	@echo "make test    checks and the test suite"
+	@echo "make test-all  the same with the slow tests, which guard what is rare"
 	@echo "make lint    the checks alone: ruff, mypy, import-linter, known weaknesses of packages"
 	@echo "make audit   ask whether weaknesses of what is installed are known"
 	@echo "make format  put the sources into shape"
@@ -33,9 +34,14 @@ help:
 demo: $(VENV)/.installed
 	$(BIN)/swarm run table-1 --method greedy
 
+# What the marker `slow` says (pyproject.toml) is for the night: `make test-all`.
+TESTED := -m "not slow"
 test: lint browser
-	$(BIN)/python -m pytest -n 2 tests/unit tests/contract tests/faults
-	$(BIN)/python -m pytest -n 3 --dist worksteal tests/process tests/sitl
+	$(BIN)/python -m pytest -n 2 $(TESTED) tests/unit tests/contract tests/faults
+	$(BIN)/python -m pytest -n 4 --dist worksteal $(TESTED) tests/process tests/sitl
+
+test-all: TESTED :=
+test-all: test
 
 # The dashboard is tested in a real browser: Chromium under one of these names.
 CHROMIUM := chromium chromium-browser google-chrome

@@ -3,7 +3,7 @@
 A child runs in a session of its own, so that Ctrl-C reaches only its parent, which
 then ends it in order. Its standard input is a pipe that nobody writes to: however
 the parent dies, the child sees the end of it and leaves. Leaves out: which
-children there are (sim.fleet.layout).
+children there are (sim.fleet.layout), and what forks them (sim.fleet.fork_server).
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ import sys
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from sim.fleet import guard
+from sim.fleet.fork_server import ForkServer, ForkServerLostError
 from swarm.runtime.errors import SwarmError
 
 __all__ = ["ChildFailedError", "ChildProcess", "ProgramEnvironment"]
@@ -36,6 +38,8 @@ RETURN_TIMEOUT_S = 17.0
 """Wall time an agent may take to leave, if it has a real vehicle to send home."""
 KILL_TIMEOUT_S = 4.0
 """Wall time the kernel may take to end it and close its pipes after SIGKILL; then it is left."""
+UNKNOWN_STATUS = 255
+"""Of a child whose end only the kernel has seen."""
 KEPT_LINES = 200
 """Lines of a child's log that are kept to explain its end."""
 KEYS_VARIABLE = "SWARM_KEYS"
@@ -58,6 +62,83 @@ class ProgramEnvironment:
     """Variables beside those of this process."""
 
 
+class _Forked:
+    """A process that the fork server has made for us, as asyncio shows those it has started."""
+
+    def __init__(self, pid: int, stdin: int) -> None:
+        self.pid = pid
+        self.returncode: int | None = None
+        self.stdin = os.fdopen(stdin, "wb", buffering=0)
+        self.stdout = asyncio.StreamReader(limit=LINE_LIMIT_BYTES)
+        self.stderr = asyncio.StreamReader(limit=LINE_LIMIT_BYTES)
+        self._pipes: list[asyncio.ReadTransport] = []
+        self._ended = asyncio.Event()
+
+    @classmethod
+    async def start(
+        cls, server: ForkServer, arguments: Sequence[str], environment: Mapping[str, str]
+    ) -> _Forked:
+        """Have one made.
+
+        Raises:
+            ForkServerLostError: that cannot be.
+        """
+        (stdin, near_in), (near_out, stdout), (near_err, stderr) = (os.pipe() for _ in range(3))
+        try:
+            with server.fork(arguments, (stdin, stdout, stderr), environment=environment) as answer:
+                answer.setblocking(False)
+                said = await asyncio.get_running_loop().sock_recv(answer, 32)
+            pid = server.pid_from(said)
+        except BaseException:
+            for descriptor in (near_in, near_out, near_err):
+                os.close(descriptor)
+            raise
+        finally:
+            for descriptor in (stdin, stdout, stderr):
+                os.close(descriptor)
+        forked = cls(pid, near_in)
+        await forked._watch(near_out, near_err)
+        return forked
+
+    async def _watch(self, *outputs: int) -> None:
+        loop = asyncio.get_running_loop()
+        end = os.pidfd_open(self.pid)
+        loop.add_reader(end, self._note_end, end)
+        for output, reader in zip(outputs, (self.stdout, self.stderr), strict=True):
+            pipe, _ = await loop.connect_read_pipe(
+                partial(asyncio.StreamReaderProtocol, reader),
+                os.fdopen(output, "rb", buffering=0),
+            )
+            self._pipes.append(pipe)
+
+    def _note_end(self, end: int) -> None:
+        asyncio.get_running_loop().remove_reader(end)
+        os.close(end)
+        try:
+            _, status = os.waitpid(self.pid, 0)
+            self.returncode = os.waitstatus_to_exitcode(status)
+        except ChildProcessError:  # where SIGCHLD is ignored nobody learns more, as in asyncio
+            self.returncode = UNKNOWN_STATUS
+        self._ended.set()
+
+    async def wait(self) -> int:
+        """Wait for its end; its exit status, negative for a signal."""
+        await self._ended.wait()
+        assert self.returncode is not None  # noqa: S101 - set together with the event
+        return self.returncode
+
+    def send_signal(self, number: signal.Signals) -> None:
+        """Send it a signal, unless it has ended."""
+        if self.returncode is None:
+            os.kill(self.pid, number)
+
+    def close(self) -> None:
+        """Give up its pipes, which others may hold open."""
+        self.stdin.close()
+        for pipe in self._pipes:
+            pipe.close()
+
+
 class ChildProcess:
     """One `swarm` command, or another program under a guard, as a process.
 
@@ -69,6 +150,7 @@ class ChildProcess:
         on_log: called with every line of its standard error.
         setting: of another program than `swarm`.
         returns: it has a real vehicle to send home before it leaves.
+        server: forks a `swarm` command, as long as it can.
     """
 
     def __init__(
@@ -80,6 +162,7 @@ class ChildProcess:
         on_log: Callable[[str, str], None] | None = None,
         setting: ProgramEnvironment | None = None,
         returns: bool = False,
+        server: ForkServer | None = None,
     ) -> None:
         self.name = name
         self.arguments = tuple(arguments)
@@ -89,9 +172,10 @@ class ChildProcess:
         self.stopped = False
         """Whether we ended it, or told it to end, ourselves."""
         self._returns = returns
+        self._server = server
         self._on_line = on_line
         self._on_log = on_log
-        self._process: asyncio.subprocess.Process | None = None
+        self._process: asyncio.subprocess.Process | _Forked | None = None
         self._readers: list[asyncio.Task[None]] = []
         self._lines: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
 
@@ -119,12 +203,25 @@ class ChildProcess:
 
     async def start(self) -> None:
         """Start it; returns at once."""
+        self._process = await self._forked() or await self._executed()
+        loop = asyncio.get_running_loop()
+        self._readers = [loop.create_task(self._read_out()), loop.create_task(self._read_err())]
+
+    async def _forked(self) -> _Forked | None:
+        if self._server is None or self.setting is not None:
+            return None
+        with contextlib.suppress(ForkServerLostError):
+            words = [*self.arguments, "--lifeline"]
+            return await _Forked.start(self._server, words, self._environment())
+        return None
+
+    async def _executed(self) -> asyncio.subprocess.Process:
         setting = self.setting
         if setting is None:
             command = [sys.executable, "-m", "swarm", *self.arguments, "--lifeline"]
         else:
             command = [sys.executable, "-I", guard.__file__, *self.arguments]
-        self._process = await asyncio.create_subprocess_exec(
+        return await asyncio.create_subprocess_exec(
             *command,
             cwd=None if setting is None else setting.folder,
             env=self._environment(),
@@ -134,8 +231,6 @@ class ChildProcess:
             start_new_session=True,
             limit=LINE_LIMIT_BYTES,
         )
-        loop = asyncio.get_running_loop()
-        self._readers = [loop.create_task(self._read_out()), loop.create_task(self._read_err())]
 
     def _environment(self) -> dict[str, str]:
         """Variables of this process, but for those that would speak to each child alike."""
@@ -247,13 +342,15 @@ class ChildProcess:
         for reader in self._readers:
             reader.cancel()
         await asyncio.gather(*self._readers, return_exceptions=True)
+        if isinstance(self._process, _Forked):
+            self._process.close()
 
     def last_words(self) -> str:
         """The last line of its log."""
         return self.log[-1] if self.log else "it left no message"
 
     @property
-    def _started(self) -> asyncio.subprocess.Process:
+    def _started(self) -> asyncio.subprocess.Process | _Forked:
         if self._process is None:
             raise ValueError(f"{self.name} has not been started")
         return self._process

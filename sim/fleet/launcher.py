@@ -17,6 +17,7 @@ import numpy as np
 from sim.fleet.autopilots import RunningVehicles, SimulatedAutopilots, VehiclePlace
 from sim.fleet.child_process import ChildProcess, ProgramEnvironment
 from sim.fleet.firmware import SitlFirmware
+from sim.fleet.fork_server import PRELOADED, PRELOADED_FOR_KEYS, ForkServer
 from sim.fleet.layout import DASHBOARD, DialedLink, LaunchOptions, Layout, autopilot_groups
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
@@ -75,6 +76,7 @@ class Launcher:
         self._through = through
         self._current: dict[str, ChildProcess] = {}
         self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._server: ForkServer | None = None
 
     async def start(self) -> None:
         """Start everything, in the order in which one needs the other.
@@ -85,6 +87,8 @@ class Launcher:
             ChildFailedError: a router, the dashboard or an autopilot did not come up.
         """
         layout = self.layout
+        more = () if self.options.keys is None else PRELOADED_FOR_KEYS
+        self._server = ForkServer.open((*PRELOADED, *more))
         # A process's memory is for its next life in this run, and for nobody after that.
         self._folder = tempfile.TemporaryDirectory(
             prefix="peckorder-", dir=self._place(), ignore_cleanup_errors=True
@@ -165,6 +169,8 @@ class Launcher:
         agents = [child for child in self.lives if _is_agent(child)]
         await asyncio.gather(*(child.stop() for child in agents))
         await asyncio.gather(*(child.stop() for child in self.lives))
+        if self._server is not None:
+            self._server.close()
         if self._folder is not None:
             self._folder.cleanup()
 
@@ -230,6 +236,7 @@ class Launcher:
             setting=setting,
             returns=arguments[0] == "agent"
             and not isinstance(self.options.autopilots, SimulatedAutopilots),
+            server=self._server,
         )
         await child.start()
         self.lives.append(child)

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from coordinator.mission_view.results import MissionResult
-from sim.fleet.faults.flood import STATUS, long_mission, watched
+from sim.fleet.faults.flood import STATUS, hold_back, let_go, long_mission, watched
 from sim.fleet.keys import RunKeys, fresh_keys
 from sim.fleet.layout import BusKind, LaunchOptions, default_position_rate_hz
 from sim.fleet.run import Run, open_run
@@ -93,13 +93,10 @@ async def fly_unguarded(times: float, *, speedup: float = 1.0, seed: int = 0) ->
             router_file=_router_file(Path(folder), keys),
         )
         async with open_run(mission, options, observers=(LIAR, STATUS)) as run:
+            hold_back(run)
             async with watched(run, mission.name) as watch:
-                await run.until(
-                    lambda: len(run.mission_state.statuses) == len(mission.uavs),
-                    limit_s=READY_S,
-                    what="all agents there",
-                )
                 async with _liar(run, mission, seed) as liar:
+                    let_go(run)
                     await run.until(
                         lambda: len(run.mission_state.result().done) >= len(mission.tasks) - 2,
                         limit_s=READY_S + 10.0 * times,
@@ -175,9 +172,15 @@ class _Liar:
 
 @contextlib.asynccontextmanager
 async def _liar(run: Run, mission: Mission, seed: int) -> AsyncIterator[_Liar]:
-    """A liar at work until the context is left."""
+    """A liar at work, once all agents are there, until the context is left."""
+    # Its seat is open by then, or else a busy machine would leave it no time to lie.
     bus = await open_zenoh_bus(run.launch.layout.observer_seat(LIAR))
     try:
+        await run.until(
+            lambda: len(run.mission_state.statuses) == len(mission.uavs),
+            limit_s=READY_S,
+            what="all agents there",
+        )
         if bus.seal is None:
             raise SwarmError("a liar needs keys")
         uavs, tasks = [uav.id for uav in mission.uavs], [task.id for task in mission.tasks]

@@ -13,6 +13,7 @@ from sim.world.virtual_world import World
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.protocol.timing import Timing
 from tests.support.fleet_builders import plan_for, random_mission
+from tests.support.seeds import seeds
 
 FAR_M, SPEED_M_S = 200.0, 4.0
 TIMING = Timing(status_s=60.0)
@@ -98,10 +99,10 @@ def flown(seed: int) -> World:
     return world
 
 
-SEEDS = range(40)
+QUICK, THOROUGH = 16, 40
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", seeds(QUICK, THOROUGH))
 def test_when_every_agent_is_restarted_every_task_is_done(seed: int) -> None:
     world = flown(seed)
 
@@ -111,8 +112,9 @@ def test_when_every_agent_is_restarted_every_task_is_done(seed: int) -> None:
     assert set(world.finished) == {"coordinator", *(str(uav.id) for uav in world.mission.uavs)}
 
 
-def test_and_hardly_any_is_visited_twice() -> None:
-    results = [flown(seed).mission_state.result() for seed in SEEDS]
+@pytest.mark.parametrize("n_seed", [QUICK, pytest.param(THOROUGH, marks=pytest.mark.slow)])
+def test_and_hardly_any_is_visited_twice(n_seed: int) -> None:
+    results = [flown(seed).mission_state.result() for seed in range(n_seed)]
 
     visits = sum(len(result.done) + result.duplicate_visits for result in results)
     assert sum(result.duplicate_visits for result in results) <= 0.02 * visits

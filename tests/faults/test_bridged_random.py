@@ -19,6 +19,7 @@ from sim.world.engine import EventQueue
 from sim.world.network import NetworkConditions
 from sim.world.rough_network import RoughNetwork
 from tests.support.bridged_fleet import FIELD, BridgedFleet
+from tests.support.seeds import seeds
 
 LASTING = sorted(set(FaultKind) - {FaultKind.REBOOT, FaultKind.BATTERY_LOW, FaultKind.FAILSAFE_RTL})
 LIMIT_S = 500.0
@@ -35,7 +36,7 @@ def random_faults(rng: np.random.Generator) -> str:
     return " ".join(words)
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", seeds(8, 24))
 def test_whatever_befalls_two_vehicles_the_third_one_does_the_rest(seed: int) -> None:
     rng = np.random.default_rng([seed, 23])
     flavour = list(FirmwareModelName)[seed % 2]

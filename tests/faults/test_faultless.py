@@ -6,13 +6,20 @@ import numpy as np
 import pytest
 
 from tests.support.fleet_builders import WatchedWorld, plan_for, random_mission
-
-CASES = [("greedy", seed, 8, 25) for seed in range(200)]
-CASES += [("lookahead", seed, 4, 9) for seed in range(40)]
+from tests.support.seeds import seeds
 
 
-@pytest.mark.parametrize(("method", "seed", "most_uavs", "most_tasks"), CASES)
-def test_executed_lists_equal_the_offline_plan(
+@pytest.mark.parametrize("seed", seeds(60, 200))
+def test_greedy_lists_are_executed_as_planned(seed: int) -> None:
+    executed_lists_equal_the_offline_plan("greedy", seed, 8, 25)
+
+
+@pytest.mark.parametrize("seed", seeds(15, 40))
+def test_lookahead_lists_are_executed_as_planned(seed: int) -> None:
+    executed_lists_equal_the_offline_plan("lookahead", seed, 4, 9)
+
+
+def executed_lists_equal_the_offline_plan(
     method: str, seed: int, most_uavs: int, most_tasks: int
 ) -> None:
     rng = np.random.default_rng([seed, most_tasks])

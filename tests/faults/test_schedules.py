@@ -11,9 +11,11 @@ from sim.faults.case import format_case
 from sim.faults.generator import random_case
 from sim.faults.schedule import DisturbanceKind
 from sim.faults.soak import Breach, first_breach, shrunk
+from tests.support.seeds import seeds
 
 BLOCK = 20
-BLOCKS = 15
+QUICK, BLOCKS = 4, 15
+"""Blocks of every run of the tests, and of those of the night."""
 
 
 def told(breach: Breach | None) -> str:
@@ -24,7 +26,7 @@ def told(breach: Breach | None) -> str:
     return f"seed {breach.case.seed}: {small.broken}\n{format_case(small.case)}"
 
 
-@pytest.mark.parametrize("block", range(BLOCKS))
+@pytest.mark.parametrize("block", seeds(QUICK, BLOCKS))
 def test_every_kind_of_fault_is_survived(block: int) -> None:
     breach = first_breach(range(block * BLOCK, (block + 1) * BLOCK), tuple(DisturbanceKind))
 

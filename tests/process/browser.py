@@ -13,6 +13,8 @@ from playwright.sync_api import BrowserContext, ConsoleMessage, Page, Request, s
 __all__ = ["Watched", "open_page"]
 
 
+LOAD_MS = 120_000.0
+"""Only bounds how long a test hangs: a browser takes its time on a busy machine."""
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -34,7 +36,7 @@ class Watched:
         self.page.on("console", self._hear)
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("request", self._see)
-        self.page.goto(url)
+        self.page.goto(url, timeout=LOAD_MS)
 
     def _hear(self, message: ConsoleMessage) -> None:
         if message.type == "error" and "/feed' failed" not in message.text:

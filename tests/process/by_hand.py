@@ -8,7 +8,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from swarm.scenario.write import format_scenario
 from tests.process.kept_open import KEEPER
 from tests.process.mission import wait_until
 from tests.process.pace import pace
+from tests.process.programs import Swarm
 
 __all__ = ["LIMIT_S", "ByHand"]
 
@@ -83,15 +83,22 @@ class ByHand:
 
     def start(self, name: str, arguments: list[str]) -> subprocess.Popen[str]:
         log = self._stack.enter_context((self.folder / f"{name}.log").open("w"))
-        program = self._programs.get(name, (sys.executable, "-m", "swarm"))
-        process = subprocess.Popen(
-            [*program, *arguments],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=log,
-            text=True,
-            env={**os.environ, "NO_COLOR": "1", "SWARM_LOG_FORMAT": "lines"},
-        )
+        nothing, pipe = subprocess.DEVNULL, subprocess.PIPE
+        environment = {**os.environ, "NO_COLOR": "1", "SWARM_LOG_FORMAT": "lines"}
+        program = self._programs.get(name)
+        if program is None:
+            process: subprocess.Popen[str] = Swarm(
+                arguments, stdin=nothing, stdout=pipe, stderr=log, env=environment
+            )
+        else:
+            process = subprocess.Popen(
+                [*program, *arguments],
+                stdin=nothing,
+                stdout=pipe,
+                stderr=log,
+                env=environment,
+                text=True,
+            )
         self._stack.callback(_end, process)
         return process
 

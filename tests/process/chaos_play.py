@@ -13,6 +13,7 @@ from sim.fleet.layout import BusKind, LaunchOptions
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.protocol.timing import LinkKind
 from swarm.scenario.write import format_scenario
+from tests.process.mission import POSITION_RATE_HZ
 
 __all__ = ["all_done", "logged_done", "play", "story", "survey", "told"]
 
@@ -68,7 +69,7 @@ def play(
         seed=0,
         speedup=speedup,
         bus=bus,
-        position_rate_hz=50.0,
+        position_rate_hz=POSITION_RATE_HZ,
         acceptance_radius_m=1.0,
         start_timeout_s=60.0,
         routers=routers,

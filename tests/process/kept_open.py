@@ -6,11 +6,10 @@ a death, which may be longer than the flight; a flight with a keeper waits for i
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 
 from swarm.model import Mission, Task, TaskId
+from tests.process.programs import run_swarm
 
 __all__ = ["KEEPER", "kept_open", "let_end"]
 
@@ -31,12 +30,5 @@ def let_end(*seat: str) -> None:
     Args:
         seat: where the bus is; not needed beside a `swarm run`, which is found.
     """
-    words = ["task", "withdraw", KEEPER, *seat, "--timeout-s", "60"]
-    done = subprocess.run(
-        [sys.executable, "-m", "swarm", *words],
-        check=False,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-    )
+    done = run_swarm("task", "withdraw", KEEPER, *seat, "--timeout-s", "60")
     assert done.returncode == 0, done.stderr

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -14,7 +14,15 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, Self
 
+from sim.fleet import fork_server
+from tests.process.programs import Swarm
+
 __all__ = ["SwarmRun", "alive", "child_pids", "wait_until"]
+
+
+FORK_SERVER = fork_server.__name__
+POSITION_RATE_HZ = 25.0
+"""Of each UAV, by the wall's clock; many tests have fewer processors than UAVs."""
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float, what: str) -> None:
@@ -26,17 +34,19 @@ def wait_until(condition: Callable[[], bool], timeout_s: float, what: str) -> No
 
 
 def child_pids(parent: int) -> dict[str, int]:
-    """Living children of a process: the words after ``swarm`` on their command line -> pid."""
+    """Living children of a process: the words after ``swarm`` on their command line -> pid.
+
+    Without what only forks the others.
+    """
     found = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit() and _parent(entry) == parent:
-            try:
-                words = (entry / "cmdline").read_bytes().decode().split("\0")
-            except OSError:
-                continue
-            found[" ".join(words[words.index("swarm") + 1 :] if "swarm" in words else words)] = int(
-                entry.name
-            )
+    for pid in _children(parent):
+        try:
+            line = (Path("/proc") / str(pid) / "cmdline").read_bytes().decode()
+        except OSError:
+            continue
+        words = line.rstrip("\0").split("\0")
+        if FORK_SERVER not in words:
+            found[" ".join(words[words.index("swarm") + 1 :] if "swarm" in words else words)] = pid
     return found
 
 
@@ -49,25 +59,29 @@ def alive(pid: int) -> bool:
     return state != "Z"
 
 
-def _parent(entry: Path) -> int | None:
-    try:
-        return int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
-    except (OSError, ValueError):
-        return None
+def _children(parent: int) -> list[int]:
+    """Of all threads of a process, zombies included."""
+    found = []
+    with contextlib.suppress(OSError):
+        for thread in (Path("/proc") / str(parent) / "task").iterdir():
+            with contextlib.suppress(OSError):
+                found += [int(pid) for pid in (thread / "children").read_text().split()]
+    return found
 
 
 class SwarmRun:
     """One `swarm run --json` in the background."""
 
     def __init__(self, arguments: list[str], folder: Path) -> None:
+        if "--position-rate-hz" not in arguments:
+            arguments = [*arguments, "--position-rate-hz", f"{POSITION_RATE_HZ:g}"]
         environment = {**os.environ, "TMPDIR": str(folder), "NO_COLOR": "1"}
         self.folder = folder
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "swarm", "run", *arguments, "--json"],
+        self.process = Swarm(
+            ["run", *arguments, "--json"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            text=True,
             env=environment,
             cwd=folder,
         )

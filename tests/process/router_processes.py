@@ -9,6 +9,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
+from tests.process.programs import Swarm
+
+PIPE = subprocess.PIPE
 SWARM = "import sys; from swarm.cli import console_main; sys.exit(console_main())"
 LIMIT_S = 20.0
 
@@ -51,9 +54,20 @@ def started(*argv: str, **environment: str) -> Iterator[subprocess.Popen[str]]:
 
 
 @contextlib.contextmanager
+def commanded(*words: str, **environment: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a `swarm` command with pipes on all three streams; killed at the end if still there."""
+    variables = os.environ | environment
+    with Swarm(words, stdin=PIPE, stdout=PIPE, stderr=PIPE, env=variables) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@contextlib.contextmanager
 def router(*options: str, **environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A router that serves already, and its first endpoint."""
-    with started("-c", SWARM, "router", *options, "--lifeline", **environment) as process:
+    with commanded("router", *options, "--lifeline", **environment) as process:
         yield process, read_endpoints(process)[0]
 
 

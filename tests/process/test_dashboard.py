@@ -7,8 +7,6 @@ import os
 import re
 import signal
 import socket
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -19,7 +17,8 @@ from swarm.scenario.write import format_scenario
 from tests.process.feed_reader import FeedReader, answers, post
 from tests.process.kept_open import kept_open
 from tests.process.mission import SwarmRun, alive, child_pids, wait_until
-from tests.process.router_processes import router, started
+from tests.process.programs import run_swarm
+from tests.process.router_processes import commanded, router
 
 pytestmark = [pytest.mark.process]
 
@@ -33,7 +32,6 @@ MISSION = Mission(
     tuple(Task(TaskId(f"t{n}"), (40.0 * n, 900.0, 0.0), 1.0) for n in range(6)),
     origin=Origin(46.8, 9.7, 1100.0),
 )
-SWARM = "import sys; from swarm.cli import console_main; sys.exit(console_main())"
 
 
 def test_an_operator_sees_and_steers_a_run(tmp_path: Path) -> None:
@@ -100,7 +98,7 @@ def _everyone_moves(page: FeedReader) -> None:
 def test_a_coordinators_dashboard_lives_and_ends_beside_it() -> None:
     with router("--listen", "tcp/127.0.0.1:0") as (_, endpoint):
         words = ("coordinator", "table-1", "--connect", endpoint, "--dashboard", "0")
-        with started("-c", SWARM, *words, "--lifeline") as coordinator:
+        with commanded(*words, "--lifeline") as coordinator:
             assert coordinator.stderr is not None
             url = coordinator.stderr.readline().removeprefix("dashboard: ").strip()
             wait_until(lambda: answers(url), SOON_S, "a dashboard")
@@ -122,7 +120,7 @@ def test_a_coordinators_dashboard_lives_and_ends_beside_it() -> None:
 def test_a_dashboard_waits_for_a_mission_and_ends_at_once() -> None:
     with router("--listen", "tcp/127.0.0.1:0") as (_, endpoint):
         words = ("dashboard", "--connect", endpoint, "--port", "0", "--json")
-        with started("-c", SWARM, *words) as dashboard:
+        with commanded(*words) as dashboard:
             assert dashboard.stdout is not None
             url = json.loads(dashboard.stdout.readline())["url"]
             with FeedReader(url) as page:
@@ -142,14 +140,7 @@ def test_a_dashboard_waits_for_a_mission_and_ends_at_once() -> None:
 def test_a_port_that_is_taken_is_told_in_one_line() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
-        told = subprocess.run(
-            [sys.executable, "-m", "swarm", "dashboard", "--port", port],
-            capture_output=True,
-            text=True,
-            timeout=SOON_S,
-            check=False,
-            stdin=subprocess.DEVNULL,
-        )
+        told = run_swarm("dashboard", "--port", port)
 
     assert (told.returncode, told.stdout) == (2, "")
     assert re.fullmatch(

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.process.router_processes import SWARM, router, started
+from tests.process.programs import run_swarm
+from tests.process.router_processes import commanded, router
 
 pytestmark = [pytest.mark.process]
 
 
 def doctor(*words: str) -> tuple[int, dict[str, dict[str, Any]]]:
     """Exit status, and the checks by name."""
-    done = subprocess.run(
-        [sys.executable, "-m", "swarm", "doctor", *words, "--json"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
+    done = run_swarm("doctor", *words, "--json")
     assert done.stderr == ""
     told = json.loads(done.stdout)
     assert told["ok"] == (done.returncode == 0)
@@ -40,7 +32,7 @@ def test_a_sound_flight_passes_and_every_fault_is_named(tmp_path: Path) -> None:
     flying += ["--speedup", "0.5"]
     with (
         router("--listen", "tcp/127.0.0.1:0") as (serving, endpoint),
-        started("-c", SWARM, *flying) as autopilot,
+        commanded(*flying) as autopilot,
     ):
         assert autopilot.stdout is not None
         url = json.loads(autopilot.stdout.readline())["url"]

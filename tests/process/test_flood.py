@@ -8,20 +8,23 @@ import pytest
 
 from sim.fleet.faults.flood import RATE_HZ, fly_flooded, long_mission
 from sim.fleet.faults.forgery import Malformation
+from tests.process.pace import pace
 from tests.support.observed_mission import watch
 
 pytestmark = [pytest.mark.process]
 
 
 def test_malformed_messages_change_no_decision_and_are_all_counted() -> None:
-    flood = asyncio.run(fly_flooded(1.5))
+    times = 1.5 / pace(1.0)
+    flood = asyncio.run(fly_flooded(times))
 
     assert flood.flood_s > 5.0
     for kind in Malformation:
         assert flood.sent[kind] >= 2.0 * RATE_HZ, kind  # how many more depends on the machine
     assert flood.answers > 0
     # The same mission in virtual time, where nobody is hostile.
-    assert flood.result.executed_routes == watch(long_mission(1.5)).result().executed_routes
+    routes = watch(long_mission(times)).result().executed_routes
+    assert flood.result.executed_routes == routes
     assert flood.decisions_kept
     assert len(flood.result.done) == 8
     assert flood.fates == ()

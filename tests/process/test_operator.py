@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import ByHand
+from tests.process.programs import run_swarm
 
 pytestmark = [pytest.mark.process]
 
@@ -29,14 +29,7 @@ MISSION = Mission(
 
 
 def swarm(by_hand: ByHand, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "swarm", *words, *by_hand.seat],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
+    return run_swarm(*words, *by_hand.seat)
 
 
 def does(by_hand: ByHand, uav: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
 from tests.process.kept_open import kept_open, let_end
 from tests.process.mission import SwarmRun, wait_until
+from tests.process.programs import Swarm
 from tests.process.test_status import router_of
 
 pytestmark = [pytest.mark.process]
@@ -30,13 +30,8 @@ LOOK_S = 0.05
 
 
 def swarm(*words: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "swarm", *words],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    pipe = subprocess.PIPE
+    return Swarm(words, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe)
 
 
 def _entries(file: Path) -> int:

@@ -8,14 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.process.router_processes import (
-    SWARM,
-    finish,
-    read_endpoints,
-    router,
-    started,
-    token_holder,
-)
+from tests.process.router_processes import commanded, finish, read_endpoints, router, token_holder
 
 pytestmark = pytest.mark.process
 
@@ -41,7 +34,7 @@ def test_end_of_standard_input_ends_it() -> None:
 
 
 def test_without_lifeline_standard_input_does_not_matter() -> None:
-    with started("-c", SWARM, "router", "--listen", LOOPBACK) as process:
+    with commanded("router", "--listen", LOOPBACK) as process:
         assert process.stdin is not None
         process.stdin.close()
         assert len(read_endpoints(process)) == 1
@@ -59,7 +52,7 @@ def test_standard_output_has_the_endpoints_alone() -> None:
 
 
 def test_says_the_real_port_of_every_endpoint() -> None:
-    with started("-c", SWARM, "router", *["--listen", LOOPBACK] * 2) as process:
+    with commanded("router", *["--listen", LOOPBACK] * 2) as process:
         endpoints = read_endpoints(process)
         assert len(set(endpoints)) == 2
         for endpoint in endpoints:
@@ -89,7 +82,7 @@ def test_configuration_file_is_used(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_options_are_one_line_and_status_2(options: list[str], says: str) -> None:
-    with started("-c", SWARM, "router", *options) as process:
+    with commanded("router", *options) as process:
         status, out, err = finish(process)
     assert (status, out) == (2, "")
     assert says in err
@@ -99,7 +92,7 @@ def test_wrong_options_are_one_line_and_status_2(options: list[str], says: str) 
 def test_broken_configuration_file_is_one_line_and_status_2(tmp_path: Path) -> None:
     file = tmp_path / "broken.json5"
     file.write_text('{listen: {endpoints: ["tcp/127.0.0.1:0"]}, no_such_key: 1}')
-    with started("-c", SWARM, "router", "--config", str(file)) as process:
+    with commanded("router", "--config", str(file)) as process:
         status, out, err = finish(process)
     assert (status, out) == (2, "")
     assert err.startswith(f"{file}: ")
@@ -110,7 +103,7 @@ def test_broken_configuration_file_is_one_line_and_status_2(tmp_path: Path) -> N
 def test_taken_endpoint_is_one_line_and_status_1() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
-        with started("-c", SWARM, "router", "--listen", endpoint) as process:
+        with commanded("router", "--listen", endpoint) as process:
             status, out, err = finish(process)
     assert (status, out) == (1, "")
     told = f"swarm: cannot open the bus: {endpoint} is already in use by another process"

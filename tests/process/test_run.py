@@ -40,6 +40,7 @@ def test_paper_mission_flies_the_offline_plan(tmp_path: Path, bus: str) -> None:
     logs, scenario = tmp_path / "logs", tmp_path / "scenario.toml"
     scenario.write_text(format_scenario(replace(long_mission(TIMES), name="table-1")))
     arguments = [str(scenario), "--bus", bus, "--method", "greedy", "--logs", str(logs)]
+    arguments += ["--position-rate-hz", "100"]  # an arrival is seen at the next report
     with SwarmRun(arguments, tmp_path) as run:
         status, told = run.result()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ from swarm.runtime.clock import unix_s
 from swarm.scenario.write import format_scenario
 from tests.process.feed_reader import post
 from tests.process.mission import SwarmRun
+from tests.process.programs import run_swarm
 from tests.process.test_status import router_of
 
 pytestmark = [pytest.mark.process]
@@ -99,11 +99,4 @@ def written(mission: Mission, folder: Path) -> str:
 
 
 def swarm(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "swarm", *words],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
+    return run_swarm(*words)

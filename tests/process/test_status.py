@@ -6,7 +6,6 @@ import contextlib
 import json
 import signal
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,20 +17,14 @@ from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
 from tests.process.kept_open import kept_open, let_end
 from tests.process.mission import SwarmRun, wait_until
+from tests.process.programs import Swarm, run_swarm
 from tests.process.router_processes import router
 
 pytestmark = [pytest.mark.process]
 
 
 def status(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "swarm", "status", *words],
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
+    return run_swarm("status", *words)
 
 
 def wait_for_text(file: Path, text: str) -> None:
@@ -77,15 +70,13 @@ def test_a_mission_is_watched_to_its_end(tmp_path: Path) -> None:
     arguments = [str(scenario), "--bus", "router", "--method", "greedy", "--speedup", "6"]
     with SwarmRun(arguments, tmp_path) as run:
         wait_until(lambda: any(w.startswith("coord") for w in run.children()), 100, "coordinator")
-        words = [sys.executable, "-m", "swarm", "status", "--watch", "--connect", router_of(run)]
+        words = ["status", "--watch", "--connect", router_of(run)]
         with contextlib.ExitStack() as stack:
 
-            def watching(name: str, *more: str) -> subprocess.Popen[bytes]:
+            def watching(name: str, *more: str) -> Swarm:
                 said = stack.enter_context((tmp_path / name).open("w"))
                 process = stack.enter_context(
-                    subprocess.Popen(
-                        [*words, *more], stdin=subprocess.DEVNULL, stdout=said, stderr=said
-                    )
+                    Swarm([*words, *more], stdin=subprocess.DEVNULL, stdout=said, stderr=said)
                 )
                 stack.callback(process.kill)  # none of them ends by itself after a failure
                 return process

@@ -6,7 +6,6 @@ import asyncio
 import json
 import signal
 import subprocess
-import sys
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -21,6 +20,7 @@ from sim.autopilot.options import parse_endpoint
 from sim.autopilot.server import VehicleServer
 from sim.autopilot.vehicle import SimulatedAutopilot
 from swarm.runtime.clock import ScaledClock
+from tests.process.programs import Swarm
 
 pytestmark = pytest.mark.sitl
 TIMEOUT_S = 20.0
@@ -254,14 +254,9 @@ def start(tmp_path: Path) -> Iterator[Started]:
     processes: list[subprocess.Popen[str]] = []
 
     def begin(*options: str) -> subprocess.Popen[str]:
-        code = "import sys; from swarm.cli import main; sys.exit(main())"
-        process = subprocess.Popen(
-            [sys.executable, "-c", code, "autopilot", str(scenario), *options],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        pipe = subprocess.PIPE
+        words = ["autopilot", str(scenario), *options]
+        process = Swarm(words, stdin=pipe, stdout=pipe, stderr=pipe)
         processes.append(process)
         return process
 

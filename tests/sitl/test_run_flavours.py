@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from agent.vehicle.config import CommandStyle
 from sim.fleet.firmware import FirmwareKind
 from tests.process.mission import alive, wait_until
 from tests.process.pace import pace
+from tests.process.programs import Swarm
 from tests.sitl.firmware_stand_in import arducopter_stand_in, px4_stand_in
 from tests.sitl.whole_run import MEADOW, UAVS, autopilot_of, fly
 
@@ -70,14 +70,8 @@ def test_firmware_is_started_on_the_ports_where_agents_look_for_it(
 
 def test_vehicles_that_run_already_are_flown_and_left_running(tmp_path: Path) -> None:
     speedup = pace(20.0)
-    vehicles = subprocess.Popen(
-        [
-            *(sys.executable, "-m", "swarm", "autopilot", str(MEADOW), "--json"),
-            *("--system-id", "41", "--speedup", f"{speedup:g}"),
-        ],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    words = ["autopilot", str(MEADOW), "--json", "--system-id", "41", "--speedup", f"{speedup:g}"]
+    vehicles = Swarm(words, stdout=subprocess.PIPE)
     try:
         assert vehicles.stdout is not None
         places = {

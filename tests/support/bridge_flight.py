@@ -27,7 +27,10 @@ from tests.support.fake_copter import FakeCopter
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 START = Prepare((5.0, 0.0, 10.0), 4.0)
-STEP_S = 0.02
+STEP_S = 0.05
+"""Of virtual time; twice for every position that the vehicle reports."""
+RATE_HZ = 10.0
+"""At which it does, as in flights."""
 UNIX_S = 1_420_170_400.0
 """Wall time at the beginning, a day into 2015: signatures count from there."""
 
@@ -62,7 +65,7 @@ class BridgeFlight:
     ) -> None:
         self.copter = copter or FakeCopter(ORIGIN)
         signing = None if key is None else Signing(key, lambda: UNIX_S + self.now_s)
-        self.bridge = Bridge(config or BridgeConfig(1, ORIGIN, position_rate_hz=50.0), signing)
+        self.bridge = Bridge(config or BridgeConfig(1, ORIGIN, position_rate_hz=RATE_HZ), signing)
         self.to_vehicle = to_vehicle
         self.to_bridge = to_bridge
         if self.copter.now_s == 0.0:

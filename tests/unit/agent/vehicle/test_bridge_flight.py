@@ -88,7 +88,7 @@ def test_retarget_in_mid_flight_leads_to_the_new_target_only(fake: type[FakeCopt
 
 
 def test_passing_by_the_target_is_no_arrival(fake: type[FakeCopter]) -> None:
-    config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, acceptance_radius_m=5.0)
+    config = BridgeConfig(1, ORIGIN, position_rate_hz=10.0, acceptance_radius_m=5.0)
     flight = BridgeFlight(fake(ORIGIN), config=config).prepared()
     flight.order(GoTo(1, (5.0, 60.0, 10.0)))
     flight.run(6.0)
@@ -461,7 +461,7 @@ def test_lossy_doubling_link_delays_but_does_not_break_a_flight(
     fake: type[FakeCopter], seed: int
 ) -> None:
     rough = rough_link(seed)
-    config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, commands=CommandPolicy(tries=9))
+    config = BridgeConfig(1, ORIGIN, position_rate_hz=10.0, commands=CommandPolicy(tries=9))
     flight = BridgeFlight(fake(ORIGIN), config, to_vehicle=rough, to_bridge=rough)
     flight.order(START)
     flight.run_until(VehicleReady(), limit_s=120.0)

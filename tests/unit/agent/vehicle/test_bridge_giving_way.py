@@ -183,7 +183,7 @@ def test_another_life_takes_on_either_kind_of_mission(guided_s: int) -> None:
         # What the last release left.
         told = [flight.bridge.codec.encode(item) for item in plan.items(ArduCopter())]
         copter.mission.items = [m for data in told for m in copter._parser.parse_buffer(data)]
-        copter.mission.current = 2
+        copter.mission._fly(2)
     flight.restart()
     flight.order(replace(START, resume=True))
     flight.run_until(VehicleReady())

@@ -31,7 +31,7 @@ from tests.support.fake_px4 import FakePx4
 Fake = type[FakeCopter]
 Mishap = Callable[[BridgeFlight], None]
 
-CONFIG = BridgeConfig(1, ORIGIN, position_rate_hz=50.0)
+CONFIG = BridgeConfig(1, ORIGIN, position_rate_hz=10.0)
 FENCED = replace(CONFIG, fence_radius_m=60.0, fence_height_m=30.0)
 CRITICAL, EMERGENCY, TERMINATION = 5, 6, 8
 

@@ -308,9 +308,9 @@ def glitch(flight: BridgeFlight, east_m: float, times: int = 1) -> None:
     copter, truth_m = flight.copter, flight.copter.position_m
     copter.position_m = (east_m, *truth_m[1:])
     for _ in range(times):
-        flight.run(0.02)
+        flight.step()
         copter.position()
-        flight.run(0.02)
+        flight.step()
     copter.position_m = (truth_m[0] + 0.2 * times, *truth_m[1:])
 
 

@@ -149,7 +149,7 @@ def test_vehicle_whose_mission_is_not_known_is_stopped_and_told_so(
     flight = under_way(fake)
     copter = flight.copter
     flight.order(GoTo(2, NEW))
-    flight.run(0.02)
+    flight.step()
     copter._handlers["MISSION_REQUEST_LIST"] = lambda _: None
     copter._handlers["MISSION_REQUEST_INT"] = lambda _: None
     flight.order(GoTo(3, EAST))

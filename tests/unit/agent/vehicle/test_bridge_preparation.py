@@ -328,7 +328,7 @@ def test_home_at_another_height_than_the_scenario_says_is_refused_before_arming(
 def test_home_at_about_the_height_that_the_scenario_says_will_do(
     fake: type[FakeCopter], ground_m: float, tolerance_m: float
 ) -> None:
-    config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, home_tolerance_m=tolerance_m)
+    config = BridgeConfig(1, ORIGIN, position_rate_hz=10.0, home_tolerance_m=tolerance_m)
     flight = BridgeFlight(fake(ORIGIN, ground_m=ground_m), config)
     flight.order(replace(START, position_enu_m=(5.0, 0.0, 30.0), ground_up_m=0.0))
     flight.run_until(VehicleReady())

@@ -28,7 +28,7 @@ Fake = type[FakeCopter]
 Meanwhile = Callable[[FakeCopter], None]
 
 AGAIN = r"heard again after \d+ s"
-MISSIONS = BridgeConfig(1, ORIGIN, CommandStyle.MISSION, position_rate_hz=50.0)
+MISSIONS = BridgeConfig(1, ORIGIN, CommandStyle.MISSION, position_rate_hz=10.0)
 
 
 def fall_silent(flight: BridgeFlight, silence_s: float = 20.0) -> BridgeFlight:

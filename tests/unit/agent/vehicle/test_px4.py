@@ -238,7 +238,7 @@ def test_a_takeoff_that_is_not_ours_is_waited_out_and_not_repeated() -> None:
     flight = taking_off().restart(down_s=0.5)
     flight.copter.heard.clear()
     flight.order(START)
-    flight.run(1.0)
+    flight.run(1.5)
     assert flight.reasons()[-1] == "waiting for the takeoff under way to end"
     assert set(flight.copter.count()) <= {511}
     flight.run(20.0)

@@ -15,7 +15,7 @@ from tests.support.fake_copter import REPOSITION, FakeCopter
 NORTH = (5.0, 20.0, 10.0)
 SOUTH = (5.0, -20.0, 10.0)
 OUTSIDE = (500.0, 0.0, 10.0)
-CONFIG = BridgeConfig(1, ORIGIN, position_rate_hz=50.0, fence_radius_m=100.0)
+CONFIG = BridgeConfig(1, ORIGIN, position_rate_hz=10.0, fence_radius_m=100.0)
 
 
 class Wire(ByteLink):

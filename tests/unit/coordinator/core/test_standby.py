@@ -39,6 +39,7 @@ from tests.support.builders import (
 )
 from tests.support.lone_coordinator import LAYERS
 from tests.support.seat_play import TIMING, SeatPlay
+from tests.support.seeds import seeds
 
 FLOWN = mission([uav("u0")], [task("t0", 5.0)])
 STARTED_S = 5.0
@@ -181,7 +182,7 @@ def disturbed(seed: int) -> tuple[SeatPlay, float]:
     return play, now_s
 
 
-@pytest.mark.parametrize("seed", range(150))
+@pytest.mark.parametrize("seed", seeds(50, 150))
 def test_in_the_end_one_coordinator_is_in_charge_and_the_fleet_hears_it(seed: int) -> None:
     play, healed_s = disturbed(seed)
     settled_s = healed_s + TAKEN_S + 2.0 * SETTLED_S

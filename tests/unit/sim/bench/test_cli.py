@@ -32,7 +32,7 @@ def test_plan_compares_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_plan_takes_a_scenario_and_speaks_json(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ("--methods", "exact,greedy", "--time-limit-s", "0.2", "--seeds", "0", "--json")
+    arguments = ("--methods", "exact,greedy", "--time-limit-s", "60", "--seeds", "0", "--json")
     assert swarm("plan", "table-1", *arguments) == 0
     said = json.loads(capsys.readouterr().out)
     worths = {row["method"]: row["objective"] for row in said["measured"]}

@@ -1,0 +1,17 @@
+"""Seeds of random cases: some for every run of the tests, more for those of the night."""
+
+from __future__ import annotations
+
+import pytest
+
+__all__ = ["seeds"]
+
+
+def seeds(quick: int, thorough: int) -> list[object]:
+    """The first ``thorough`` seeds, of which those after the first ``quick`` are marked as slow.
+
+    A fault that only one seed in fifty shows is found by the tests of the night; what breaks
+    often is found at once.
+    """
+    later = (pytest.param(seed, marks=pytest.mark.slow) for seed in range(quick, thorough))
+    return [*range(quick), *later]
