@@ -1,4 +1,4 @@
-"""Sessions with keys: mutual TLS or QUIC, the door, and and why a router refuses a process.
+"""Sessions with keys: mutual TLS or QUIC, the door, and why a router refuses a process.
 
 TLS refuses who has no certificate of the mission's authority, or an expired one; the door of a
 router who has one that is revoked. Zenoh only tells that there is no link: a TLS handshake of
