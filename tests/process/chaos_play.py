@@ -14,6 +14,7 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.protocol.timing import LinkKind
 from swarm.scenario.write import format_scenario
 from tests.process.mission import POSITION_RATE_HZ
+from tests.process.pace import pace
 
 __all__ = ["all_done", "logged_done", "play", "story", "survey", "told"]
 
@@ -60,14 +61,17 @@ def play(
     relayed: bool = False,
     link: LinkKind = LinkKind.NORMAL,
 ) -> ChaosVerdict:
-    """Fly ``mission``, do to it what ``script`` says, and judge what came of it."""
+    """Fly ``mission``, do to it what ``script`` says, and judge what came of it.
+
+    On a slow machine it is flown slower than ``speedup``.
+    """
     scenario = folder / "scenario.toml"
     scenario.write_text(format_scenario(mission))
     options = LaunchOptions(
         scenario=scenario,
         method="guided",
         seed=0,
-        speedup=speedup,
+        speedup=pace(speedup),
         bus=bus,
         position_rate_hz=POSITION_RATE_HZ,
         acceptance_radius_m=1.0,

@@ -332,7 +332,7 @@ async def _fly_through_sockets(
     try:
         await vehicle.start()
         vehicle.order(START)
-        async with asyncio.timeout(60.0), Lateness() as late:
+        async with asyncio.timeout(300.0), Lateness() as late:
             await home.wait()
     finally:
         await vehicle.close()
