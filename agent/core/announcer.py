@@ -18,6 +18,8 @@ from swarm.protocol.uav_messages import Claim, Outcome, Status
 __all__ = ["Announcer"]
 
 
+_LONGEST_NOTE = 200
+"""Characters of a status's note; an autopilot's words may be longer."""
 _OUTCOMES_AT_ONCE = 4
 """Outcomes in one announcement; others that missed more ask when they are back."""
 
@@ -26,21 +28,29 @@ class Announcer:
     """States and repeats the registers and status of one UAV's agent.
 
     Args:
-        voice: stamps them.
+        register_writer: stamps them.
         replica: holds the own registers among all others.
         timing: how often registers and status are repeated.
     """
 
     def __init__(self, register_writer: RegisterWriter, replica: Replica, timing: Timing) -> None:
-        self.note = ""
-        """What the status tells a reader about the state of affairs."""
         self._register_writer = register_writer
         self._replica = replica
         self._timing = timing
         self._claim_key = KeySpace(register_writer.mission).claim(register_writer.writer)
+        self._note = ""
         self._turn = 0
         self._announce_at_s: float | None = None
         self._status_at_s: float | None = None
+
+    @property
+    def note(self) -> str:
+        """What the status tells a reader about the state of affairs."""
+        return self._note
+
+    def explain(self, note: str) -> None:
+        """From now on the status tells a reader this; "" where there is nothing to tell."""
+        self._note = note[:_LONGEST_NOTE]
 
     @property
     def incarnation(self) -> int:

@@ -41,6 +41,7 @@ __all__ = [
     "ChoiceReporter",
     "DecisionTurn",
     "RecordingRule",
+    "RefusedTasks",
     "decide",
     "decide_diversion",
 ]
@@ -167,6 +168,29 @@ def _stronger_claims(
         for uav, claim in claims.items()
         if uav in turn.credible and claim.task is not None and claim_strength(uav, claim) < own
     }
+
+
+class RefusedTasks:
+    """Tasks that a UAV's vehicle would not fly to, each left alone for a while.
+
+    Args:
+        pause_s: for how long after the first time [s].
+    """
+
+    def __init__(self, pause_s: float) -> None:
+        self._pause_s = pause_s
+        self._refusals: dict[str, tuple[int, float]] = {}
+        """How often, and until when."""
+
+    def add(self, task: str, now_s: float) -> None:
+        """The vehicle has refused ``task``."""
+        times = 1 + self._refusals.get(task, (0, 0.0))[0]
+        # Each time for longer, so that a fleet may find that nobody takes what is left.
+        self._refusals[task] = times, now_s + self._pause_s * 2.0 ** (times - 1)
+
+    def left_alone(self, now_s: float) -> dict[str, float]:
+        """Task -> until when it is left alone [s]."""
+        return {task: until_s for task, (_, until_s) in self._refusals.items() if now_s < until_s}
 
 
 class RecordingRule:

@@ -54,8 +54,7 @@ class MissionView:
         self.board = TaskBoard(replica, mission)
         self.telemetry: Telemetry | None = None
         """The newest of the own vehicle."""
-        self.place_enu_m: Point | None = None
-        """Where the UAV is [m; mission origin], without its height layer."""
+        self._place_enu_m: Point | None = None
         self._uav = uav
         self._replica = replica
         self._clock = MissionClock()
@@ -107,6 +106,12 @@ class MissionView:
         over = epoch is None or epoch.phase is MissionPhase.ENDED
         return self._clock.is_set and not over
 
+    @property
+    def said_to_run(self) -> bool:
+        """Whether that is the last word, be the time of the mission known or not."""
+        epoch = self._replica.epoch
+        return epoch is not None and epoch.phase is MissionPhase.RUNNING
+
     # -- the mission clock ------------------------------------------------------------
 
     def hear_time(self, mission_s: float, now_s: float) -> float | None:
@@ -144,11 +149,25 @@ class MissionView:
             self._me = next((uav for uav in fleet if uav.id == self._uav), None)
         return self._me
 
+    @property
+    def place_enu_m(self) -> Point | None:
+        """Where the UAV is [m; mission origin], without its height layer; None if not known."""
+        return self._place_enu_m
+
     def move(self, telemetry: Telemetry) -> None:
         """The vehicle has told where it is."""
         east_m, north_m, up_m = telemetry.position_enu_m
         self.telemetry = telemetry
-        self.place_enu_m = east_m, north_m, up_m - self._layer_m
+        self._place_enu_m = east_m, north_m, up_m - self._layer_m
+
+    def arrive(self, place_enu_m: Point) -> None:
+        """The vehicle has reached that place; where exactly it is follows with its next word."""
+        self._place_enu_m = place_enu_m
+
+    def take_off(self) -> None:
+        """The vehicle is in the air; one that has not told where it is hovers at its start."""
+        if self._place_enu_m is None and self.me is not None:
+            self._place_enu_m = self.me.position_enu_m
 
     def in_layer(self, point: Point) -> Point:
         """That point in the UAV's own height layer, where it flies."""

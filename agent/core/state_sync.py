@@ -2,9 +2,8 @@
 
 Its knowledge is old at the start, when its link is back and after it was itself held up. Until
 everyone has been asked since, and has had the time to answer, it goes on with the task it has
-and decides nothing new. What an earlier life kept counts when the others speak of the same
-flight, or when nobody knows of any. Leaves out: what follows for the vehicle
-(agent.core.agent_core) and for tasks (agent.core.tasking), and where memory is kept (swarm).
+and decides nothing new. Leaves out: what follows for the vehicle (agent.core.vehicle_commander)
+and for tasks (agent.core.tasking), and what an earlier life knew (agent.core.memory).
 """
 
 from __future__ import annotations
@@ -16,16 +15,17 @@ from statistics import median_high
 from agent.core.announcer import Announcer
 from agent.core.interface import Action
 from agent.core.mission_view import MissionChange, MissionView, Peers
+from agent.core.states import AgentStateMachine
 from agent.core.tasking import Tasking
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import Ask, LogLine
 from swarm.protocol.messages import Body, Message, MissionConfig, MissionPhase, PlanEpoch, Snapshot
-from swarm.protocol.registers import Replica, snapshot_without, without_signers
+from swarm.protocol.registers import Replica, without_signers
 from swarm.protocol.sync import QuestionTimer
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import ClaimPhase
 
-__all__ = ["RecoveredState", "StateQueries", "StateSync"]
+__all__ = ["StateQueries", "StateSync"]
 
 
 _WORTH_TELLING_S = 0.1
@@ -42,6 +42,7 @@ class StateSync:
         peers: the others.
         announcer: says what this agent says.
         tasking: hears of it when a task may have opened.
+        machine: whether this life has begun to act.
         timing: timers.
     """
 
@@ -53,17 +54,17 @@ class StateSync:
         peers: Peers,
         announcer: Announcer,
         tasking: Tasking,
+        machine: AgentStateMachine,
         timing: Timing,
     ) -> None:
         self.queries = StateQueries(timing)
-        self.at_work = False
-        """Whether this life has begun to act; until then, words in its name are of an earlier."""
         self._uav = uav
         self._replica = replica
         self._mission_view = mission_view
         self._peers = peers
         self._announcer = announcer
         self._tasking = tasking
+        self._machine = machine
         self._timing = timing
         self._answered: set[str] = set()
         self._insisted = False
@@ -95,7 +96,7 @@ class StateSync:
         actions = (
             self._greet(writer, now_s) if self._peers.heard(message, self._replica, now_s) else []
         )
-        if not self.at_work and self._is_first(body):
+        if not self._machine.acts and self._is_first(body):
             # Whoever answered before did not know the mission; now somebody may know more.
             self.queries.doubt(now_s)
         known = self._replica.epoch_stamp
@@ -118,7 +119,7 @@ class StateSync:
         self._echoes.clear()
         self._learn_clock(snapshots, now_s)
         somebody_knows = any(isinstance(message.body, MissionConfig) for message in told)
-        self.queries.take(enough=somebody_knows and not self.at_work)
+        self.queries.take(enough=somebody_knows and not self._machine.acts)
         answered = {snapshot.writer for snapshot in snapshots}
         self._answered |= answered & self._peers.membership.present
         if self._left_open:
@@ -136,10 +137,10 @@ class StateSync:
         silent = self._peers.membership.present - self._answered - {self._uav}
         if not silent:
             return
-        if not self.at_work and not self._insisted:
+        if not self._machine.acts and not self._insisted:
             self._insisted = True
             self.queries.doubt(now_s)
-        elif self.at_work and now_s < self._insists_until_s:
+        elif self._machine.acts and now_s < self._insists_until_s:
             self.queries.doubt(now_s + 2.0 * self._timing.ask_gap_s)
 
     def _catch_up(self, now_s: float) -> None:
@@ -165,7 +166,7 @@ class StateSync:
 
     def _yields_to(self, twin: Snapshot) -> bool:
         newer = twin.incarnation > self._announcer.incarnation
-        if self.at_work:
+        if self._machine.acts:
             return bool(twin.messages) and newer
         return bool(twin.messages) or not newer
 
@@ -177,7 +178,7 @@ class StateSync:
 
     def _take_in(self, message: Message, now_s: float) -> list[Action]:
         if message.writer == self._uav:
-            if self.at_work:
+            if self._machine.acts:
                 return [*self._announcer.hear_echo(message)]
             self._announcer.remember(message)
             return []
@@ -272,7 +273,7 @@ class StateSync:
 
     def _announce(self, now_s: float) -> list[Action]:
         """Repeat the own registers; what an earlier life said is not this one's to repeat."""
-        return [*self._announcer.announce(now_s)] if self.at_work else []
+        return [*self._announcer.announce(now_s)] if self._machine.acts else []
 
     def _awake(self, now_s: float) -> None:
         """A task may have opened: everyone who is free decides anew, in sequence order."""
@@ -338,67 +339,3 @@ class StateQueries:
     def next_deadline_s(self) -> float | None:
         """When `questions` will next have one."""
         return earliest(self._asking.next_deadline_s(), self._again_at_s)
-
-
-class RecoveredState:
-    """The memory of an earlier life of the agent of ``uav``, until it is taken or dropped.
-
-    Args:
-        uav: id of the UAV.
-        memory: every register it knew, and the mission time of now as far as it knew; None
-            if there was no earlier life.
-        age_s: how long ago that was kept.
-        timing: how old a memory is trusted, and how long the others get to contradict it.
-    """
-
-    def __init__(self, uav: str, memory: Snapshot | None, age_s: float, timing: Timing) -> None:
-        self.unconfirmed = False
-        """Whether it was taken because nobody came who knows better."""
-        self._memory = memory
-        self._known = Replica()
-        self._known.join_all(() if memory is None else memory.messages)
-        claim = self._known.claims.get(uav)
-        self._took_part = claim is not None and claim.phase is not ClaimPhase.OUT
-        epoch = self._known.epoch
-        begun = epoch is not None and epoch.phase is not MissionPhase.PREPARING
-        self._fresh = begun and age_s <= timing.recall_s
-        self._patience_s = timing.abandon_s
-        self._began_s = 0.0
-
-    def begin(self, now_s: float) -> None:
-        """The new life begins."""
-        self._began_s = now_s
-
-    def demote_revoked(self, signers: Collection[str]) -> None:
-        """See `Replica.demote_revoked`."""
-        if self._memory is not None:
-            self._memory = snapshot_without(signers, self._memory)
-
-    def fitting(
-        self, brief: MissionConfig | None, now_s: float, *, last_chance: bool
-    ) -> Snapshot | None:
-        """The memory, once it is known to count; given once.
-
-        Args:
-            brief: what others have told; None as long as nobody has.
-            now_s: now.
-            last_chance: the agent is about to end.
-        """
-        if self._memory is None:
-            return None
-        if brief is not None:
-            remembered = self._known.brief
-            return self._take(remembered is not None and remembered.run == brief.run)
-        self.unconfirmed = self._took_part and now_s >= self._began_s + self._patience_s
-        if self.unconfirmed or (self._took_part and (self._fresh or last_chance)):
-            return self._take(True)
-        return None
-
-    def next_deadline_s(self) -> float | None:
-        """When an old memory will count for want of a better one."""
-        waits = self._memory is not None and self._took_part
-        return self._began_s + self._patience_s if waits else None
-
-    def _take(self, counts: bool) -> Snapshot | None:
-        memory, self._memory = self._memory, None
-        return memory if counts else None

@@ -1,8 +1,10 @@
-"""The tasks of one airborne UAV, one after the other: from the decision to the outcome.
+"""The tasks of one UAV under command, one after the other: from the decision to the outcome.
 
 Decides whenever the UAV is free, claims and flies at once, turns to something better that opens on
-the way, gives way to stronger claims and waits idle while there is nothing for it. Leaves out:
-which task is best (agent.core.decision), getting airborne and going home (agent.core.agent_core).
+the way, gives way to stronger claims and waits idle while there is nothing for it. A claim's way:
+`Tasking.advance`, which `AgentCore.step` calls, decides (`decide`), claims (`Announcer.say`) and
+orders the vehicle to the task (`GoTo`), all in one step. Leaves out: which task is best
+(agent.core.decision), getting airborne and going home (agent.core.vehicle_commander).
 """
 
 from __future__ import annotations
@@ -14,11 +16,21 @@ from agent.core.decision import (
     ChoiceReporter,
     DecisionTurn,
     RecordingRule,
+    RefusedTasks,
     decide,
     decide_diversion,
 )
 from agent.core.interface import Action, GoTo, OrderVehicle
 from agent.core.mission_view import MissionView, Peers
+from agent.core.states import (
+    FREE,
+    TAKES_TARGETS,
+    AgentState,
+    AgentStateMachine,
+    FreePeriod,
+    TaskAttempt,
+    Trigger,
+)
 from swarm.allocation.lower_level import Decision, Rule
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule
@@ -27,7 +39,7 @@ from swarm.protocol.events import LogLine
 from swarm.protocol.messages import PlanEpoch, TaskEntry
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing, earliest
-from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome, StatusPhase
+from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome
 
 __all__ = ["Tasking"]
 
@@ -41,6 +53,7 @@ class Tasking:
         mission_view: the mission.
         peers: the others.
         announcer: says what this UAV claims and has done.
+        machine: the agent's state.
         timing: timers.
     """
 
@@ -51,55 +64,49 @@ class Tasking:
         mission_view: MissionView,
         peers: Peers,
         announcer: Announcer,
+        machine: AgentStateMachine,
         timing: Timing,
     ) -> None:
-        self.phase: StatusPhase | None = None
-        """Idle, flying or serving; None while the UAV takes no tasks."""
-        self.airborne = False
-        """Whether the vehicle takes targets."""
         self._uav = uav
         self._replica = replica
         self._mission_view = mission_view
         self._peers = peers
         self._announcer = announcer
+        self._machine = machine
         self._timing = timing
         self._choices = ChoiceReporter(uav, replica, announcer)
         self._rule: Rule | None = None
         self._rule_basis: object = None
-        self._free_since_s = 0.0
+        self._free = FreePeriod(0.0)
+        self._attempt = TaskAttempt()
         self._leg = 0
-        self._refusals: dict[str, tuple[int, float]] = {}
-        """How often the vehicle refused a task, and until when it is left alone."""
-        self._adrift = False
+        """Number of the last order to fly somewhere; what the vehicle says of others is late."""
+        self._refused = RefusedTasks(timing.reconsider_s)
         self._diversion_due = False
-        self._to_decide = False
-        self._idled = False
-        self._awaits_peers = False
-        self._held_at_s: float | None = None
-        self._served_at_s: float | None = None
-        self._fails = False
-        """Whether the attempt at the claimed task is known to fail."""
-        self._retry_at_s: float | None = None
-        self._ready_by_s: float | None = None
+        """Whether something has opened that may be worth turning to in flight."""
 
     # -- from without ---------------------------------------------------------------
 
     @property
     def claim(self) -> Claim | None:
         """The UAV's claim register; None while it takes no tasks."""
-        return None if self.phase is None else self._replica.claims.get(self._uav)
+        return self._replica.claims.get(self._uav) if self._machine.takes_tasks else None
+
+    @property
+    def is_handed_over(self) -> bool:
+        """Whether the last claim says that somebody else has the vehicle."""
+        claim = self._replica.claims.get(self._uav)
+        return claim is not None and claim.handed_over
 
     @property
     def undecided(self) -> bool:
         """Whether, being idle, it may yet find a task."""
-        return self._to_decide or self._awaits_peers
+        return self._free.to_decide or self._free.awaits_peers
 
     def leaves_refused(self, now_s: float) -> bool:
         """Whether, being idle, it leaves an open task alone that its vehicle has refused."""
-        return self.phase is StatusPhase.IDLE and any(
-            now_s < until_s and self._mission_view.is_open(task)
-            for task, (_, until_s) in self._refusals.items()
-        )
+        left_alone = self._refused.left_alone(now_s)
+        return self._machine.state in FREE and any(map(self._mission_view.is_open, left_alone))
 
     def label(self, leg: int) -> dict[str, object]:
         """For the log: which choice that leg came of, if it is the one being flown."""
@@ -110,24 +117,26 @@ class Tasking:
 
         The vehicle may fly there, but takes no targets before `begin`.
         """
-        if claim.task is None:
+        if claim.task is None or not self._machine.take(Trigger.CLAIM_RECOVERED):
             return []
-        self.phase = StatusPhase.FLYING
         if (lost := self._lost()) is not None:
             return self._release(lost, now_s)
-        if claim.phase is ClaimPhase.PROPOSED:
-            self._held_at_s = now_s + self._timing.objection_window_s
         # Others keep away from the task only for a vehicle that shows itself.
-        self._ready_by_s = now_s + self._timing.silence_s
+        self._attempt = TaskAttempt(ready_by_s=now_s + self._timing.silence_s)
+        if claim.phase is ClaimPhase.PROPOSED:
+            self._attempt.held_at_s = now_s + self._timing.objection_window_s
         return [self._announcer.say(claim), LogLine("resumes", {"task": claim.task})]
 
     def begin(self, now_s: float) -> list[Action]:
         """The vehicle takes targets: fly to the resumed task, or be free."""
-        self.airborne, self._ready_by_s = True, None
         task = self._task()
+        if task is None and self._machine.state is AgentState.RESUMING:
+            self._machine.take(Trigger.CLAIM_LOST)
+        self._machine.take(Trigger.VEHICLE_READY)
+        self._attempt.ready_by_s = None
         if task is not None:
             return [self._order_to(task)]
-        self._become_free(self._mission_view.mission_s(now_s))
+        self._become_free(self._mission_view.mission_s(now_s), adrift=self._free.adrift)
         return [self._say_idle()]
 
     def end(self, now_s: float, *, handed_over: bool) -> list[Action]:
@@ -143,17 +152,16 @@ class Tasking:
         """The UAV gives its task up, and takes none before it `begin`s anew."""
         task = self._task()
         said = self._withdraw(ClaimPhase.PAUSED, now_s, handed_over=False)
-        if task is None:
-            return [said]
-        return [said, self._note("released", task.task, reason="the operator holds the UAV")]
+        why = "the operator holds the UAV"
+        return [said] if task is None else [said, self._note("released", task.task, reason=why)]
 
     def wake(self, now_s: float) -> None:
         """Decide anew when free; who found nothing before takes no precedence from that."""
-        self._retry_at_s = None
-        if self.phase is StatusPhase.IDLE and not self._to_decide:
-            self._to_decide = True
+        self._free.retry_at_s = None
+        if self._machine.state in FREE and not self._free.to_decide:
+            self._free.to_decide = True
             if self._mission_view.running:
-                self._free_since_s = self._mission_view.mission_s(now_s)
+                self._free.since_s = self._mission_view.mission_s(now_s)
 
     def consider_diversion(self) -> None:
         """A task has appeared, or a lost UAV's has opened: it may be worth turning to in flight.
@@ -164,31 +172,27 @@ class Tasking:
 
     def peer_claimed(self, now_s: float) -> None:
         """Somebody has said what it claims; it may be whom this UAV waits for."""
-        if self._awaits_peers:
+        if self._free.awaits_peers:
             self.wake(now_s)
 
     def arrive(self, leg: int, now_s: float) -> None:
         """The vehicle is where that leg ends."""
         task = self._task()
-        if leg != self._leg or task is None or self.phase is not StatusPhase.FLYING:
+        if leg != self._leg or task is None or not self._machine.take(Trigger.ARRIVED):
             return
-        self.phase = StatusPhase.SERVING
-        self._mission_view.place_enu_m = task.position_enu_m
-        self._served_at_s = now_s + task.service_s
+        self._mission_view.arrive(task.position_enu_m)
+        self._attempt.served_at_s = now_s + task.service_s
 
     def fail(self, leg: int) -> None:
         """The attempt at the task of that leg fails; its service takes its time all the same."""
-        self._fails |= leg == self._leg and self._task() is not None
+        self._attempt.fails |= leg == self._leg and self._task() is not None
 
     def refuse(self, leg: int, reason: str, now_s: float) -> list[Action]:
         """The vehicle will not fly that leg: leave its task alone for a while."""
         task = self._task()
-        if leg != self._leg or task is None:
+        if leg != self._leg or task is None or not self._machine.allows(Trigger.CLAIM_LOST):
             return []
-        times = 1 + self._refusals.get(task.task, (0, 0.0))[0]
-        # Each time for longer, so that a fleet may find that nobody takes what is left.
-        pause_s = self._timing.reconsider_s * 2.0 ** (times - 1)
-        self._refusals[task.task] = times, now_s + pause_s
+        self._refused.add(task.task, now_s)
         return self._release(f"vehicle refused: {reason}", now_s)
 
     def advance(self, now_s: float, *, informed: bool) -> list[Action]:
@@ -199,32 +203,30 @@ class Tasking:
             informed: whether the registers are up to date, so that a decision may rest on them.
         """
         actions = self._serve(now_s) + self._keep_or_lose_claim(now_s)
-        if self._retry_at_s is not None and self._retry_at_s <= now_s:
+        if self._free.retry_at_s is not None and self._free.retry_at_s <= now_s:
             self.wake(now_s)
-        if self._diversion_due and informed and self.airborne:
+        ready = informed and self._machine.state in TAKES_TARGETS
+        if self._diversion_due and ready:
             actions += self._divert(now_s)
-        if self.phase is StatusPhase.IDLE and self._to_decide:
-            ready = informed and self.airborne
+        if self._machine.state in FREE and self._free.to_decide:
             actions += self._decide(now_s) if ready else self._give_up_claim()
         return actions
 
     def next_deadline_s(self) -> float | None:
         """When `advance` will next have something to do."""
-        return earliest(self._held_at_s, self._served_at_s, self._retry_at_s, self._ready_by_s)
+        return earliest(self._attempt.next_deadline_s(), self._free.retry_at_s)
 
     # -- with a task ----------------------------------------------------------------
 
     def _serve(self, now_s: float) -> list[Action]:
-        if self._served_at_s is None or self._served_at_s > now_s:
+        served_at_s, task = self._attempt.served_at_s, self._task()
+        if served_at_s is None or served_at_s > now_s or task is None:
             return []
-        task = self._task()
-        if task is None:
-            return []
-        self._served_at_s = None
         mission_s = self._mission_view.mission_s(now_s)
-        result = AttemptResult.FAILED if self._fails else AttemptResult.DONE
+        result = AttemptResult.FAILED if self._attempt.fails else AttemptResult.DONE
         outcome = Outcome(task.task, result, self._attempt_at(task.task), mission_s)
         # The next claim, made in this same step, replaces the old one on the bus.
+        self._machine.take(Trigger.SERVED)
         self._become_free(mission_s)
         return [
             self._announcer.say(outcome),
@@ -232,15 +234,15 @@ class Tasking:
         ]
 
     def _keep_or_lose_claim(self, now_s: float) -> list[Action]:
-        claim = self.claim
-        if claim is None or claim.task is None or self.phase is StatusPhase.IDLE:
+        claim, attempt = self.claim, self._attempt
+        if claim is None or claim.task is None or self._machine.state in FREE:
             return []
         if (lost := self._lost()) is not None:
             return self._release(lost, now_s)
-        if self._ready_by_s is not None and self._ready_by_s <= now_s:
+        if attempt.ready_by_s is not None and attempt.ready_by_s <= now_s:
             return self._release("the vehicle is not ready", now_s)
-        if self._held_at_s is not None and self._held_at_s <= now_s:
-            self._held_at_s = None
+        if attempt.held_at_s is not None and attempt.held_at_s <= now_s:
+            attempt.held_at_s = None
             return [self._announcer.say(replace(claim, phase=ClaimPhase.HELD))]
         return []
 
@@ -248,7 +250,7 @@ class Tasking:
         """Leave the task for a better one, unless somebody free is about to take that."""
         self._diversion_due = False
         claim, epoch = self.claim, self._replica.epoch
-        if claim is None or epoch is None or self.phase is not StatusPhase.FLYING:
+        if claim is None or epoch is None or self._machine.state is not AgentState.FLYING:
             return []
         rule, actions = self._rule_of(epoch)
         if not isinstance(rule, GuidedRule):
@@ -261,14 +263,9 @@ class Tasking:
         if decision is None:
             return actions
         self._become_free(turn.now_s)
+        recording_rule = RecordingRule(rule, decision.uav)
         return actions + self._set_off(
-            turn,
-            problem,
-            epoch,
-            RecordingRule(rule, decision.uav),
-            decision,
-            now_s,
-            left=claim.task,
+            turn, problem, epoch, recording_rule, decision, now_s, left=claim.task
         )
 
     def _lost(self) -> str | None:
@@ -285,22 +282,20 @@ class Tasking:
         claim = self.claim
         if claim is None:
             return []
+        self._machine.take(Trigger.CLAIM_LOST)
         proposed = claim.phase is ClaimPhase.PROPOSED
-        self._become_free(claim.decided_s if proposed else self._mission_view.mission_s(now_s))
-        self._adrift = True
+        since_s = claim.decided_s if proposed else self._mission_view.mission_s(now_s)
+        self._become_free(since_s, adrift=True)
         return [self._note("released", str(claim.task), reason=reason)]
 
-    def _become_free(self, free_since_s: float) -> None:
-        self.phase, self._to_decide, self._idled = StatusPhase.IDLE, True, False
-        self._fails = False
-        self._free_since_s = free_since_s
-        self._held_at_s = self._served_at_s = self._retry_at_s = self._ready_by_s = None
+    def _become_free(self, since_s: float, *, adrift: bool = False) -> None:
+        self._free, self._attempt = FreePeriod(since_s, adrift), TaskAttempt()
 
     # -- without one ----------------------------------------------------------------
 
     def _decide(self, now_s: float) -> list[Action]:
         epoch, problem = self._replica.epoch, self._mission_view.board.problem
-        turn = self._turn(self._free_since_s, now_s)
+        turn = self._turn(self._free.since_s, now_s)
         if epoch is None or problem is None or turn is None:
             return []
         rule, actions = self._rule_of(epoch)
@@ -325,7 +320,7 @@ class Tasking:
             credible=self._peers.credible,
             awaited=self._peers.awaited(self._replica, now_s),
             patience_s=self._timing.patience_s,
-            excluded={t for t, (_, until_s) in self._refusals.items() if now_s < until_s},
+            excluded=self._refused.left_alone(now_s).keys(),
         )
 
     def _rule_of(self, epoch: PlanEpoch) -> tuple[Rule | None, list[Action]]:
@@ -336,7 +331,7 @@ class Tasking:
         self._rule, self._rule_basis = rule_of(*basis), basis
         if self._rule is not None:
             return self._rule, []
-        self._announcer.note = f"cannot decide by rule {epoch.rule}"
+        self._announcer.explain(f"cannot decide by rule {epoch.rule}")
         return None, [LogLine("unknown rule", {"rule": epoch.rule})]
 
     def _set_off(
@@ -351,11 +346,11 @@ class Tasking:
     ) -> list[Action]:
         task = self._replica.board[problem.task_ids[decision.task]]
         rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
-        self.phase = StatusPhase.FLYING
-        self._retry_at_s, self._adrift, self._diversion_due = None, False, False
-        self._held_at_s = now_s + self._timing.objection_window_s
+        self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
+        self._free.retry_at_s, self._free.adrift, self._diversion_due = None, False, False
+        self._attempt = TaskAttempt(held_at_s=now_s + self._timing.objection_window_s)
         claim = Claim(
-            ClaimPhase.PROPOSED, task.task, self._free_since_s, rank, decision.completion_s
+            ClaimPhase.PROPOSED, task.task, self._free.since_s, rank, decision.completion_s
         )
         told = self._choices.made(turn, problem, epoch, recording_rule, decision, claim, left)
         turns: dict[str, object] = {"task": left, "for": task.task, **self._choices.label}
@@ -367,28 +362,26 @@ class Tasking:
             certificate=decision.certificate,
             completion_s=decision.completion_s,
         )
-        order = self._order_to(task, idled=self._idled)
+        order = self._order_to(task, idled=self._free.found_nothing)
         actions = [order, self._announcer.say(claim), decided, told]
         return actions if left is None else [LogLine("turns aside", turns), *actions]
 
     def _stay_idle(self, now_s: float) -> list[Action]:
         actions, telemetry = self._give_up_claim(), self._mission_view.telemetry
-        if self._adrift and telemetry is not None:
+        free = self._free
+        if free.adrift and telemetry is not None:
             # Nothing to fly to any more: stop here rather than at a lost target.
             self._leg += 1
             actions.append(OrderVehicle(GoTo(self._leg, telemetry.position_enu_m)))
-        self._adrift = self._to_decide = False
-        self._idled = True
+        free.adrift, free.to_decide, free.found_nothing = False, False, True
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
-        self._awaits_peers = patience_ends_s is not None
-        again_s = self._look_again_s(now_s) if self._mission_view.unfinished else None
-        self._retry_at_s = patience_ends_s if patience_ends_s is not None else again_s
+        free.awaits_peers = patience_ends_s is not None
+        free.retry_at_s = patience_ends_s
+        if patience_ends_s is None and self._mission_view.unfinished:
+            # By and by, lest a lost message strand a task; or when a refused one may be taken.
+            until_s = self._refused.left_alone(now_s).values()
+            free.retry_at_s = min([now_s + self._timing.announce_s, *until_s])
         return actions
-
-    def _look_again_s(self, now_s: float) -> float:
-        """By and by, lest a lost message strand a task; or when a refused one may be taken."""
-        paused_s = (until_s for _, until_s in self._refusals.values() if until_s > now_s)
-        return min([now_s + self._timing.announce_s, *paused_s])
 
     def _give_up_claim(self) -> list[Action]:
         """Say that the UAV is free, unless it has."""
@@ -404,7 +397,6 @@ class Tasking:
     def _withdraw(self, phase: ClaimPhase, now_s: float, *, handed_over: bool) -> Action:
         mission_s = self._mission_view.mission_s(now_s)
         self._become_free(mission_s)
-        self.phase, self.airborne = None, False
         return self._announcer.say(Claim(phase, None, mission_s, 0, mission_s, handed_over))
 
     def _task(self) -> TaskEntry | None:
@@ -423,5 +415,5 @@ class Tasking:
         return OrderVehicle(GoTo(self._leg, place_enu_m, task.service_s, idled, task.task, attempt))
 
     def _say_idle(self) -> Action:
-        since_s = self._free_since_s
+        since_s = self._free.since_s
         return self._announcer.say(Claim(ClaimPhase.IDLE, None, since_s, 0, since_s))

@@ -1,0 +1,297 @@
+"""One UAV's vehicle in the hands of its agent: prepared, stopped, brought home, or given up.
+
+Says what follows for the vehicle and for the agent's state from each of the vehicle's reports and
+from each reason to stop or to go home. Leaves out: whence those reasons come
+(agent.core.agent_core), targets and what becomes of them (agent.core.tasking), and how any of it
+is flown (agent.vehicle).
+"""
+
+from __future__ import annotations
+
+from agent.core.announcer import Announcer
+from agent.core.interface import (
+    Action,
+    Arrived,
+    AttemptFailed,
+    Caution,
+    GoTo,
+    HandedOver,
+    HandOverExplained,
+    HeardAgain,
+    Held,
+    Hold,
+    Home,
+    NotReady,
+    OrderVehicle,
+    Prepare,
+    Refused,
+    Return,
+    ReturnAdvised,
+    ReturnBegun,
+    Telemetry,
+    VehicleOrder,
+    VehicleReady,
+    VehicleReport,
+)
+from agent.core.mission_view import MissionView
+from agent.core.states import (
+    HEADED_HOME,
+    PAUSED_BY_OPERATOR,
+    TAKES_TARGETS,
+    AgentState,
+    AgentStateMachine,
+    Trigger,
+)
+from agent.core.stop_conditions import EndCondition
+from agent.core.tasking import Tasking
+from swarm.protocol.events import LogLine
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import UavSpec
+from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD
+from swarm.protocol.uav_messages import Claim, ClaimPhase
+
+__all__ = ["VehicleCommander"]
+
+
+_ALOFT = (ClaimPhase.IDLE, ClaimPhase.PROPOSED, ClaimPhase.HELD)
+"""A UAV that claims so has its vehicle in the air."""
+
+
+class VehicleCommander:
+    """Commands one UAV's vehicle, all but its targets.
+
+    Args:
+        machine: the agent's state.
+        mission_view: the mission, the vehicle's start and place.
+        announcer: tells readers of the status what is going on.
+        tasking: the UAV's tasks, which begin and end with the vehicle.
+        ending: when the mission is over.
+    """
+
+    def __init__(
+        self,
+        machine: AgentStateMachine,
+        mission_view: MissionView,
+        announcer: Announcer,
+        tasking: Tasking,
+        ending: EndCondition,
+    ) -> None:
+        self.exit_status = 0
+        """Of the process, when it ends."""
+        self._machine = machine
+        self._mission_view = mission_view
+        self._announcer = announcer
+        self._tasking = tasking
+        self._ending = ending
+        # What the state can't tell of the vehicle, as it stays true from state to state.
+        self._flew_before = False
+        """Whether it may be in the air though this life has not brought it there."""
+        self._left_in_air = False
+        """Whether an earlier life was last heard to have it in the air."""
+        self._flown = False
+        """Whether it has been in the air in this life."""
+        self._caution = ""
+        """What people should know of it in flight."""
+
+    # -- what it reports ------------------------------------------------------------
+
+    def hear(self, report: VehicleReport, now_s: float) -> list[Action]:
+        """The vehicle says so; what comes late means nothing."""
+        match report:
+            case VehicleReady():
+                return self._take_targets(now_s)
+            case NotReady(reason):
+                if self._machine.state not in PAUSED_BY_OPERATOR:  # why it holds is worth more
+                    self._announcer.explain(reason)
+                return [LogLine("vehicle not ready", {"reason": reason})]
+            case Caution(reason):
+                self._caution = reason
+                if self._machine.state in TAKES_TARGETS:  # else the note says what it waits for
+                    self._announcer.explain(reason)
+                return [LogLine("caution", {"reason": reason})]
+            case Arrived(leg):
+                self._tasking.arrive(leg, now_s)
+            case AttemptFailed(leg):
+                self._tasking.fail(leg)
+            case Telemetry():
+                self._mission_view.move(report)
+            case Refused(order, reason):
+                return self._give_up_order(order, reason, now_s)
+            case HandedOver(reason, silent):
+                return self.give_up(reason, now_s, handed_over=not silent)
+            case HandOverExplained(reason):
+                return self._explain(reason, now_s)
+            case HeardAgain(reason):
+                return self._turn_home(Trigger.HEARD_AGAIN, reason, None, now_s)
+            case ReturnBegun():
+                self._flown = True
+            case ReturnAdvised(reason):
+                self._flown = True
+                if self._machine.state is not AgentState.OUT:
+                    return self.go_home(reason, now_s, hurry=True)
+            case Held():
+                if self._machine.state in PAUSED_BY_OPERATOR:
+                    self._announcer.explain(self._announcer.note.removeprefix(BEING_STOPPED))
+            case Home():
+                return self._land()
+        return []
+
+    def _take_targets(self, now_s: float) -> list[Action]:
+        """It is in the air and under command."""
+        if not self._machine.allows(Trigger.VEHICLE_READY):
+            return []
+        self._flown = True
+        self._announcer.explain(self._caution)
+        self._mission_view.take_off()
+        return [*self._tasking.begin(now_s), LogLine("airborne")]
+
+    def _give_up_order(self, order: VehicleOrder, reason: str, now_s: float) -> list[Action]:
+        label = self._tasking.label(order.leg) if isinstance(order, GoTo) else {}
+        fields = {"order": str(order), "reason": reason, **label}
+        actions: list[Action] = [LogLine("vehicle refused", fields)]
+        if isinstance(order, GoTo):
+            actions += self._tasking.refuse(order.leg, reason, now_s)
+        elif isinstance(order, Prepare) and self._flew_before:
+            # It may be in the air.
+            actions += self.go_home(reason, now_s, status=1, hurry=True)
+        elif isinstance(order, Hold) and self._machine.state in PAUSED_BY_OPERATOR:
+            self._announcer.explain(f"{CANNOT_HOLD}{reason}")
+        elif isinstance(order, Prepare | Return):
+            actions += self.give_up(reason, now_s, handed_over=False)
+        return actions
+
+    # -- on its way up ----------------------------------------------------------------
+
+    def recall(self, claim: Claim | None, *, rejoin: bool) -> None:
+        """What the last claim of an earlier life, if there was one, tells of the vehicle."""
+        self._flew_before = claim is not None
+        self._left_in_air = claim is not None and claim.phase in _ALOFT and not rejoin
+
+    def stay_out(self, claim: Claim, now_s: float) -> list[Action]:
+        """An earlier life took no more part, as it claimed: neither does this one."""
+        if claim.handed_over:
+            return self.give_up("handed over in an earlier life", now_s, handed_over=True)
+        if self._mission_view.said_to_run:
+            return self.go_home("left the mission in an earlier life", now_s)
+        return []
+
+    def prepare(self, me: UavSpec, trigger: Trigger) -> list[Action]:
+        """Get it ready for tasks, or take it in hand where it is."""
+        if not self._machine.take(trigger):
+            return []
+        self._announcer.explain("")
+        order = Prepare(
+            self._mission_view.in_layer(me.position_enu_m),
+            me.speed_m_s,
+            resume=self._mission_view.said_to_run or self._left_in_air,
+            ground_up_m=me.position_enu_m[2],
+            left_in_air=self._left_in_air,
+        )
+        return [OrderVehicle(order)]
+
+    # -- stopped by the operator --------------------------------------------------------
+
+    def hold(self, reason: str, now_s: float) -> list[Action]:
+        """Stop it, or leave it on the ground where nobody has begun to prepare it."""
+        if not self._machine.allows(Trigger.HOLD):
+            return []
+        before = self._machine.state
+        self._flew_before |= before in TAKES_TARGETS
+        untouched = before is AgentState.SYNCING and not self._flew_before
+        actions = [] if before in HEADED_HOME else self._tasking.pause(now_s)
+        self._machine.take(Trigger.HOLD)
+        self._announcer.explain(reason if untouched else f"{BEING_STOPPED}{reason}")
+        return actions if untouched else [*actions, OrderVehicle(Hold(reason))]
+
+    def resume(self, reason: str, now_s: float) -> list[Action]:
+        """Take part again, as far as there is anything to take part in."""
+        me = self._mission_view.me
+        if self._machine.allows(Trigger.RESUME) and me is not None:
+            return self.prepare(me, Trigger.RESUME)
+        return self.go_home(reason, now_s)
+
+    def stay_paused(self, now_s: float) -> list[Action]:
+        """The mission has ended; the vehicle stays where the operator wants it."""
+        if not self._machine.take(Trigger.MISSION_OVER):
+            return []
+        return self._take_no_further_part(now_s)
+
+    # -- on its way home ----------------------------------------------------------------
+
+    def go_home(
+        self, reason: str, now_s: float, *, status: int = 0, hurry: bool = False
+    ) -> list[Action]:
+        """Bring it home; where there is time, in its own layer as far as its start.
+
+        One that is not ours to command any more is not waited for any longer.
+
+        Args:
+            reason: why, for the log and the status.
+            now_s: now.
+            status: exit status of the process, when the vehicle is home.
+            hurry: return from where it is.
+        """
+        if self._machine.state is AgentState.OUT:
+            self.exit_status = 0
+            self._machine.take(Trigger.DISMISSED)
+            return []
+        me = None if hurry else self._mission_view.me
+        via_enu_m = None if me is None else self._mission_view.in_layer(me.position_enu_m)
+        trigger = Trigger.RETURN_AT_ONCE if via_enu_m is None else Trigger.RETURN
+        if self._machine.allows(trigger):
+            self.exit_status = max(self.exit_status, status)
+        return self._turn_home(trigger, reason, via_enu_m, now_s)
+
+    def _turn_home(
+        self, trigger: Trigger, reason: str, via_enu_m: Point | None, now_s: float
+    ) -> list[Action]:
+        """Order the return, from whatever the vehicle does now."""
+        before = self._machine.state
+        if not self._machine.take(trigger):
+            return []
+        actions = [] if before in HEADED_HOME else self._take_no_further_part(now_s)
+        self._announcer.explain(reason)
+        order = Return(reason, self._flew_before, via_enu_m)
+        return [*actions, LogLine("returning", {"reason": reason}), OrderVehicle(order)]
+
+    def _take_no_further_part(self, now_s: float) -> list[Action]:
+        self._ending.settle()
+        return self._tasking.end(now_s, handed_over=False)
+
+    def _land(self) -> list[Action]:
+        return [LogLine(self._how_it_ended)] if self._machine.take(Trigger.LANDED) else []
+
+    @property
+    def _how_it_ended(self) -> str:
+        """What is true of a vehicle that is said to be home."""
+        if self._flown:
+            return "landed at home"
+        return "is on the ground" if self._flew_before else "ends without having taken off"
+
+    # -- not to be commanded any more ---------------------------------------------------
+
+    def give_up(self, reason: str, now_s: float, *, handed_over: bool) -> list[Action]:
+        """Command it no more.
+
+        Args:
+            reason: why, for the log and the status.
+            now_s: now.
+            handed_over: because somebody else has it.
+        """
+        if not self._machine.take(Trigger.HANDED_OVER):
+            return []
+        if self._machine.state is AgentState.LEFT:
+            self.exit_status = 1
+        self._announcer.explain(reason)
+        given_up = LogLine("vehicle given up", {"reason": reason})
+        return [given_up, *self._tasking.end(now_s, handed_over=handed_over)]
+
+    def _explain(self, reason: str, now_s: float) -> list[Action]:
+        """More is known of the vehicle given up; one that was only silent is another's now."""
+        if not self._machine.take(Trigger.EXPLAINED):
+            return []
+        self._announcer.explain(reason)
+        actions: list[Action] = [LogLine("of the vehicle given up", {"reason": reason})]
+        if not self._tasking.is_handed_over:
+            actions += self._tasking.end(now_s, handed_over=True)
+        return actions
