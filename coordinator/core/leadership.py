@@ -1,15 +1,16 @@
 """Who leads a mission, and from which state.
 
 Two coordinators meet when one was started beside the other, or after a partition in which the one
-standing by took over. Both apply one rule to what they know of each other, so one gives way. Who
-leads asks before it decides, and goes on from what those who fly it answer, or from its own
-memory. Leaves out: what it does then (coordinator.core.active).
+standing by took over. Both apply one rule to what they know of each other, `LeadershipBid`, so one
+gives way. Who leads asks before it decides (`StateQuery`), goes on from what those who fly the
+mission answer or from its own memory (`Predecessors`), and later takes in what the other side of a
+partition has done (`reunion`). Leaves out: saying so (coordinator.core.active).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from statistics import median_high
@@ -17,19 +18,66 @@ from statistics import median_high
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.messages import Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.operator_commands import abort_command
-from swarm.protocol.registers import Replica
+from swarm.protocol.registers import Replica, snapshot_without, without_signers
 from swarm.protocol.sync import QuestionTimer
 
 __all__ = [
     "InheritedState",
+    "LeadershipBid",
     "LeadershipStage",
+    "Predecessors",
+    "Reunion",
     "StateQuery",
     "coordinator_messages",
     "inherited_state",
-    "stage_of",
-    "without_incarnation",
-    "yields_to",
+    "reunion",
 ]
+
+
+class LeadershipStage(IntEnum):
+    """How far a coordinator has come with its mission."""
+
+    LEARNING = 0
+    """It has said nothing yet."""
+    BRIEFED = 1
+    STARTED = 2
+    """It has announced that the mission runs, or has ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeadershipBid:
+    """What one coordinator has to say for leading the mission.
+
+    The agents follow the highest stamp alone, so its incarnation is the term of a coordinator: who
+    takes over speaks under a higher one than any it knows, and the last three digits stay those of
+    its process, so no two lead in one term. A process that has just started has the highest term
+    of all by its clock, though, and knows the least. So how far each has come goes first.
+    """
+
+    stage: LeadershipStage
+    term: int
+    """Its incarnation."""
+
+    @classmethod
+    def of(cls, answer: Snapshot) -> LeadershipBid:
+        """That of the coordinator which answers so, and therefore lives."""
+        own = [m for m in answer.messages if m.writer == answer.writer]
+        if answer.mission_s is not None or any(isinstance(m.body, PlanEpoch) for m in own):
+            stage = LeadershipStage.STARTED
+        else:
+            stage = LeadershipStage.BRIEFED if own else LeadershipStage.LEARNING
+        return cls(stage, answer.incarnation)
+
+    def yields_to(self, other: LeadershipBid) -> bool:
+        """Whether this one leaves its seat to the other.
+
+        Who has started the mission keeps the seat, else who has briefed the fleet; among
+        equals the higher term, which all the fleet listens to. As long as neither has said
+        anything, the one that came first may.
+        """
+        if self.stage is other.stage is LeadershipStage.LEARNING:
+            return other.term < self.term
+        return (other.stage, other.term) > (self.stage, self.term)
 
 
 class StateQuery:
@@ -137,7 +185,115 @@ def inherited_state(
     return InheritedState(replica, mission_s)
 
 
-def without_incarnation(snapshots: Iterable[Snapshot], incarnation: int) -> list[Snapshot]:
+def coordinator_messages(messages: Iterable[Message]) -> list[Message]:
+    """Those of the coordinator's seat."""
+    return [message for message in messages if message.writer == COORDINATOR]
+
+
+class Predecessors:
+    """What is known of other coordinators of the mission, until one's own words are above theirs.
+
+    Args:
+        memory: of an earlier life, its mission time brought to ``now_s`` of `begin`; None if there
+            is none.
+        memory_is_young: whether the mission it tells of may still be on.
+    """
+
+    def __init__(self, memory: Snapshot | None, *, memory_is_young: bool) -> None:
+        self.overheard: list[Message] = []
+        """Words from this seat that are not its own."""
+        self._memory = memory
+        self._memory_is_young = memory_is_young
+        self._began_s = 0.0
+        self._answers: list[Snapshot] = []
+
+    def begin(self, now_s: float) -> None:
+        """The process starts, and what it remembers grows older from now on."""
+        self._began_s = now_s
+
+    def answered(self, snapshots: Sequence[Snapshot]) -> None:
+        """What others know, before this one is in charge."""
+        self._answers += snapshots
+
+    def disown(self, names: Collection[str]) -> None:
+        """Of what was signed by those, whose keys are replaced, any later word is worth more."""
+        self.overheard = without_signers(names, self.overheard)
+        self._answers = [snapshot_without(names, answer) for answer in self._answers]
+        if self._memory is not None:
+            self._memory = snapshot_without(names, self._memory)
+
+    def memory(self, now_s: float) -> Snapshot | None:
+        """Of the earlier life, with the mission time of now; None once it has been `succeeded`."""
+        memory = self._memory
+        if memory is None or memory.mission_s is None:
+            return memory
+        return replace(memory, mission_s=memory.mission_s + (now_s - self._began_s))
+
+    def inherited(self, heard: Iterable[Message], now_s: float) -> InheritedState:
+        """The mission to go on with, by all that is known; ``heard`` besides."""
+        memory = self.memory(now_s)
+        said = [*heard, *self.overheard]
+        return inherited_state(self._answers, said, memory, memory_is_young=self._memory_is_young)
+
+    def succeeded(self) -> None:
+        """Whoever came before is followed; their words are outdone."""
+        self.overheard, self._answers, self._memory = [], [], None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reunion:
+    """What who leads makes of what others answer."""
+
+    inherited: InheritedState
+    """All that they know."""
+    is_open: bool
+    """Whether one that has come as far may live, and has said newer things: it is not outdone, or
+    the two would outbid each other for ever instead of one giving way. Ask again."""
+    is_followed: bool
+    """Whether the newer words are of a coordinator that is gone and hold."""
+    theirs: list[Message]
+    """What others have said from this seat."""
+    posts: list[Message]
+    """What of it may be on the board, or withdrawn, without being so here."""
+
+
+def reunion(
+    snapshots: Sequence[Snapshot], overheard: Sequence[Message], bid: LeadershipBid, *, runs: bool
+) -> Reunion:
+    """What has become known to who leads, of others that lead or have led.
+
+    Newer statements from this seat than the own ones are of a coordinator that is gone: they
+    hold, unless it had only begun a mission that runs already.
+
+    Args:
+        snapshots: what the others answer; no coordinator is among them to whom this one yields.
+        overheard: what was heard from this seat besides.
+        bid: of who leads.
+        runs: whether its mission has begun, and so has a time.
+    """
+    # Who has only begun a flight takes the brief of the one that runs for its own.
+    inherited = inherited_state(snapshots if runs else _without_incarnation(snapshots, bid.term))
+    theirs = coordinator_messages(inherited.replica.messages())
+    newer = [m for m in theirs if m.stamp.incarnation > bid.term]
+    newer_heard = newer or any(m.stamp.incarnation > bid.term for m in overheard)
+    others = [answer for answer in snapshots if answer.writer == COORDINATOR]
+    equals = [other for other in others if LeadershipBid.of(other).stage is bid.stage]
+    newer_hold = any(isinstance(message.body, PlanEpoch) for message in newer)
+    posts: list[Message] = []
+    if runs:
+        posts = [m for m in theirs if m.stamp.incarnation < bid.term]
+        same = [s for s in others if LeadershipBid.of(s).stage is LeadershipStage.STARTED]
+        posts += [m for s in same for m in coordinator_messages(s.messages)]
+    return Reunion(
+        inherited=inherited,
+        is_open=bool(equals and newer_heard),
+        is_followed=newer_hold if runs else inherited.runs,
+        theirs=theirs,
+        posts=posts,
+    )
+
+
+def _without_incarnation(snapshots: Iterable[Snapshot], incarnation: int) -> list[Snapshot]:
     """``snapshots`` without what the coordinator of that life has said."""
 
     def counts(message: Message) -> bool:
@@ -147,11 +303,6 @@ def without_incarnation(snapshots: Iterable[Snapshot], incarnation: int) -> list
         replace(snapshot, messages=tuple(filter(counts, snapshot.messages)))
         for snapshot in snapshots
     ]
-
-
-def coordinator_messages(messages: Iterable[Message]) -> list[Message]:
-    """Those of the coordinator's seat."""
-    return [message for message in messages if message.writer == COORDINATOR]
 
 
 def _counts(
@@ -165,39 +316,3 @@ def _counts(
     ended = over and abort_command(remembered) is None
     somebody_flies = any(snapshot.writer in living.claims for snapshot in snapshots)
     return living.epoch is None and is_young and (somebody_flies or not ended)
-
-
-class LeadershipStage(IntEnum):
-    """How far a coordinator has come with its mission."""
-
-    LEARNING = 0
-    """It has said nothing yet."""
-    BRIEFED = 1
-    STARTED = 2
-    """It has announced that the mission runs, or has ended."""
-
-
-def stage_of(answer: Snapshot) -> LeadershipStage:
-    """How far the coordinator has come that answers so."""
-    own = [m for m in answer.messages if m.writer == answer.writer]
-    if answer.mission_s is not None or any(isinstance(m.body, PlanEpoch) for m in own):
-        return LeadershipStage.STARTED
-    return LeadershipStage.BRIEFED if own else LeadershipStage.LEARNING
-
-
-def yields_to(standing: LeadershipStage, incarnation: int, answer: Snapshot) -> bool:
-    """Whether the coordinator of that standing and incarnation leaves its seat to the other.
-
-    Who has started the mission keeps the seat, else who has briefed the fleet; among
-    equals the higher incarnation, which all the fleet listens to. As long as neither has
-    said anything, the one that came first may.
-
-    Args:
-        standing: how far it has come itself.
-        incarnation: its own.
-        answer: the other one's answer to a question, so the other one lives.
-    """
-    theirs = stage_of(answer)
-    if standing is theirs is LeadershipStage.LEARNING:
-        return answer.incarnation < incarnation
-    return (theirs, answer.incarnation) > (standing, incarnation)

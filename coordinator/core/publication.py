@@ -13,9 +13,19 @@ from dataclasses import dataclass, replace
 
 from swarm.model import Mission, Origin, Task
 from swarm.model.frames import DEFAULT_ORIGIN
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskBoard, TaskState
-from swarm.protocol.events import Publish
-from swarm.protocol.messages import Body, Message, MissionConfig, PlanEpoch, TaskEntry, UavSpec
+from swarm.protocol.events import LogLine, Publish
+from swarm.protocol.messages import (
+    Body,
+    Message,
+    MissionConfig,
+    MissionPhase,
+    PlanEpoch,
+    Snapshot,
+    TaskEntry,
+    UavSpec,
+)
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
@@ -26,6 +36,7 @@ __all__ = [
     "TaskReleaser",
     "exit_status",
     "height_warning",
+    "last_epoch",
     "mission_config_of",
     "scenario_differences",
     "task_entry_of",
@@ -97,6 +108,12 @@ def height_warning(mission: Mission, layers: FlightLayers) -> str | None:
         f"above {HIGHEST_M:g} m, which many countries forbid: fly fewer UAVs, or let swarm "
         "coordinator lower --layer-spacing-m or --lowest-layer-m"
     )
+
+
+def last_epoch(epoch: PlanEpoch, mission_s: float, reason: str) -> PlanEpoch:
+    """The epoch by which the mission ends, after ``epoch``."""
+    number, phase = epoch.number + 1, MissionPhase.ENDED
+    return replace(epoch, number=number, phase=phase, mission_s=mission_s, reason=reason[:200])
 
 
 def task_entry_of(task: Task, number: int) -> TaskEntry:
@@ -195,16 +212,30 @@ ENTRIES_PER_ANNOUNCEMENT = 8
 
 
 class RegisterAnnouncer:
-    """The statements of one coordinator.
+    """The statements of one coordinator, and the mission time that they tell.
 
     Args:
-        voice: stamps them.
+        mission: the scenario, pop-ups included.
+        layers: heights of flight.
+        incarnation: greater than in any earlier life of this coordinator.
         replica: holds the own registers among all others.
         timing: how often they are repeated.
     """
 
-    def __init__(self, register_writer: RegisterWriter, replica: Replica, timing: Timing) -> None:
-        self._register_writer = register_writer
+    def __init__(
+        self,
+        mission: Mission,
+        layers: FlightLayers,
+        incarnation: int,
+        replica: Replica,
+        timing: Timing,
+    ) -> None:
+        self.zero_s: float | None = None
+        """When mission time was 0; None while it has not begun, and if it ends without."""
+        self.tasks = TaskReleaser(mission, replica)
+        self._mission = mission
+        self._layers = layers
+        self._register_writer = RegisterWriter(mission.name, COORDINATOR, incarnation)
         self._replica = replica
         self._announce_s = timing.announce_s
         self._announce_at_s: float | None = None
@@ -214,6 +245,61 @@ class RegisterAnnouncer:
     def incarnation(self) -> int:
         """Of this life of the coordinator."""
         return self._register_writer.incarnation
+
+    def set_zero(self, zero_s: float) -> None:
+        """Mission time begins; once it runs it is not set again."""
+        self.zero_s = zero_s if self.zero_s is None else self.zero_s
+
+    def mission_s(self, now_s: float) -> float:
+        """Mission time [s]; 0 as long as the mission has not begun."""
+        return 0.0 if self.zero_s is None else now_s - self.zero_s
+
+    def snapshot(self, messages: Iterable[Message], now_s: float) -> Snapshot:
+        """``messages`` as this coordinator's answer."""
+        mission_s = None if self.zero_s is None else now_s - self.zero_s
+        told = tuple(messages)
+        return Snapshot(self._mission.name, COORDINATOR, self.incarnation, mission_s, told)
+
+    def brief(self) -> list[Publish]:
+        """Say who flies, unless somebody has."""
+        if self._replica.brief is not None:
+            return []
+        return [self.say(mission_config_of(self._mission, self._layers, self.incarnation))]
+
+    def post(self, now_s: float) -> list[Publish | LogLine]:
+        """Put on the board what is due by now."""
+        actions: list[Publish | LogLine] = []
+        for entry in self.tasks.due(self.zero_s, now_s):
+            actions.append(self.say(entry))
+            if self.zero_s is not None:
+                actions.append(LogLine("pop-up posted", {"task": entry.task}))
+        return actions
+
+    def withdraw(self, task: str) -> list[Publish]:
+        """Take ``task`` off the board, if it was posted and is not off already."""
+        entry = self._replica.posted.get(task)
+        if entry is None or entry.withdrawn:
+            return []
+        return [self.say(replace(entry, withdrawn=True))]
+
+    def resume(self, left: Replica, now_s: float) -> list[Publish | LogLine]:
+        """Say in one's own name what another coordinator, or an earlier life, has ``left``."""
+        theirs, epoch = list(left.messages({COORDINATOR})), left.epoch
+        self.observe(theirs)
+        actions: list[Publish | LogLine] = []
+        brief, own = left.brief, self._replica.brief
+        if brief is not None and own is not None and own.run != brief.run:
+            # Before others take the one that it began for that of who is in charge.
+            actions.append(self.say(brief))
+        bodies = [m.body for m in theirs if epoch is None or not isinstance(m.body, PlanEpoch)]
+        if epoch is not None:
+            bodies = [replace(epoch, mission_s=self.mission_s(now_s)), *bodies]
+        actions += self.restate(bodies)
+        actions.append(LogLine("resumes the mission", {"mission_s": self.mission_s(now_s)}))
+        if changed := scenario_differences(self._mission, self._layers, self._replica):
+            fields: dict[str, object] = {"differs_in": ", ".join(changed)}
+            actions.append(LogLine("the mission is not that of the scenario file", fields))
+        return actions
 
     def say(self, body: Body) -> Publish:
         """State the new content of an own register."""
@@ -238,7 +324,7 @@ class RegisterAnnouncer:
         ordered = sorted(bodies.values(), key=lambda body: not isinstance(body, PlanEpoch))
         return [self.say(body) for body in ordered]
 
-    def repeat(self, now_s: float, mission_s: float) -> list[Publish]:
+    def repeat(self, now_s: float) -> list[Publish]:
         """What is due again by now: the epoch with its time, the brief and some of the board.
 
         Whoever joins asks by itself; this is for what got lost on the way, so a few
@@ -250,7 +336,7 @@ class RegisterAnnouncer:
         if not due:
             return []
         epoch = self._replica.epoch
-        said = [] if epoch is None else [self.say(replace(epoch, mission_s=mission_s))]
+        said = [] if epoch is None else [self.say(replace(epoch, mission_s=self.mission_s(now_s)))]
         own = list(self._replica.messages({self._register_writer.writer}))
         rest = [message for message in own if not isinstance(message.body, PlanEpoch)]
         count = min(ENTRIES_PER_ANNOUNCEMENT, len(rest))
@@ -265,6 +351,10 @@ class RegisterAnnouncer:
     def next_deadline_s(self) -> float | None:
         """When `repeat` will next have something to say."""
         return self._announce_at_s
+
+    def next_release_s(self) -> float | None:
+        """When the next task appears in a mission that has begun."""
+        return None if self.zero_s is None else self.tasks.next_deadline_s(self.zero_s)
 
 
 def _register(body: Body) -> tuple[type[Body], str | None]:

@@ -2,17 +2,18 @@
 
 Reasons are differences between the situation that the epoch in force answers to and the
 situation of now, so a reason that comes at a bad moment is not forgotten. Leaves out: planning
-(`coordinator.planner.online`) and publishing (`coordinator.core.active`).
+(`coordinator.planner.online`) and publishing (`coordinator.core.stages`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from coordinator.core.events import Replan, Replanned
+from coordinator.core.events import CoordinatorAction, Replan, Replanned, StopPlanning
 from coordinator.planner.online import EpochPolicy, Situation, complete_lists, objective_to_go
+from swarm.protocol.events import LogLine
 from swarm.protocol.messages import PlanEpoch
 
 __all__ = ["DRIFT_FRAC", "MARGIN_FRAC", "ReplanPolicy"]
@@ -56,11 +57,6 @@ class ReplanPolicy:
         self._request = 0
         self._quiet_until_s: float | None = None
 
-    @property
-    def is_under_way(self) -> bool:
-        """Whether a plan is being made."""
-        return self._under_way is not None
-
     def begin(
         self, situation: Situation | None, completion_s: Mapping[str, float], now_s: float
     ) -> None:
@@ -79,6 +75,21 @@ class ReplanPolicy:
         if self._quiet_until_s is not None and self._quiet_until_s <= now_s:
             self._quiet_until_s = None
         return self._under_way is not None or self._quiet_until_s is not None
+
+    def pursue(
+        self, situation: Callable[[], Situation | None], epoch: PlanEpoch, now_s: float
+    ) -> list[CoordinatorAction]:
+        """Have a plan made if one is `wanted`.
+
+        Args:
+            situation: tells that of now, which takes a while; None if it cannot be told.
+            epoch: in force.
+            now_s: now.
+        """
+        if self.is_quiet(now_s) or (found := situation()) is None:
+            return []
+        wanted = self.wanted(found, epoch, now_s)
+        return [wanted, LogLine("plans the rest", {"because": wanted.reason})] if wanted else []
 
     def wanted(self, situation: Situation, epoch: PlanEpoch, now_s: float) -> Replan | None:
         """The plan that is wanted, if any; its answer goes to `judge`.
@@ -108,6 +119,13 @@ class ReplanPolicy:
     def drop(self) -> None:
         """What is being planned comes at a bad moment; it will be wanted again."""
         self._under_way = None
+
+    def stop(self) -> list[CoordinatorAction]:
+        """What is being planned is for nothing, whatever it turns out to be."""
+        if self._under_way is None:
+            return []
+        self._under_way = None
+        return [StopPlanning()]
 
     def judge(
         self, replanned: Replanned, situation: Situation, epoch: PlanEpoch, now_s: float

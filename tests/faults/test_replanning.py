@@ -72,7 +72,7 @@ class ReplannedWorld(World):
             ),
         )
         if margin_frac is not None:
-            self.coordinator._replan_policy._margin_frac = margin_frac
+            self.coordinator._mission.replan_policy._margin_frac = margin_frac
 
     @property
     def coordinator(self) -> CoordinatorCore:
@@ -218,7 +218,8 @@ def test_a_coordinator_that_swaps_every_second_swaps_nobody_under_way() -> None:
         core, last = world.coordinator, world.coordinator.replica.epoch
         if last is not None and last.phase is MissionPhase.RUNNING:
             sequence = ("a", "b") if second % 2 == 0 else ("b", "a")
-            core._say(replace(last, number=last.number + 1, sequence=sequence, routes=lists))
+            swapped = replace(last, number=last.number + 1, sequence=sequence, routes=lists)
+            core._actions.append(core._announcer.say(swapped))
 
     for second in range(1, 100):
         world.queue.at(float(second), partial(swap, second))

@@ -206,7 +206,8 @@ def test_a_running_mission_is_planned_anew_beside_the_loop() -> None:
     async def scenario() -> None:
         async with at_work(flown=mission([uav("u0")], tasks)) as played:
             await until(lambda: played.core.plan is not None, "a plan")
-            played.core._replan_policy._margin_frac = -1.0  # whatever is planned becomes an epoch
+            # Whatever is planned becomes an epoch.
+            played.core._mission.replan_policy._margin_frac = -1.0
             played.say(IDLE)
             await played.phase(MissionPhase.RUNNING)
             played.clock.time_s += 6.0
