@@ -13,7 +13,8 @@ from pathlib import Path
 from types import FrameType
 
 from agent.vehicle.session import SendBytes
-from swarm.protocol.codec import Codec, encode
+from swarm.protocol.codec import Codec
+from swarm.protocol.encoding import encode
 from swarm.protocol.events import MessageReceived, Publish
 from swarm.protocol.uav_messages import Claim
 from tests.support.bridge_flight import BridgeFlight
