@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -47,6 +47,8 @@ from swarm.runtime.store import Store
 __all__ = ["CoordinatorProcess", "run_coordinator"]
 
 
+MissionPlanner = Callable[[Mission, str, int, ShouldStop], Plan]
+"""Plans a mission by method and seed, until told to stop."""
 T = TypeVar("T")
 
 
@@ -59,7 +61,7 @@ async def run_coordinator(
     mission: Mission,
     bus: Bus,
     clock: Clock,
-    make_plan: Callable[[Mission, str, int, ShouldStop], Plan],
+    make_plan: MissionPlanner,
     *,
     save: Callable[[Snapshot], None] | None = None,
     answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
@@ -79,62 +81,17 @@ async def run_coordinator(
         Exit status: 0 when every task was done, 1 otherwise, also when the core has stood
         down for another coordinator.
     """
-    planning: set[asyncio.Task[None]] = set()
     keys = KeySpace(mission.name)
-
-    async def plan(request: MakePlan) -> None:
-        def call(unwanted: ShouldStop) -> Plan:
-            return make_plan(request.mission, request.method, request.seed, unwanted)
-
-        try:
-            made = await _planned_beside(call, "planner")
-        except ValueError as fault:
-            shell.step(PlanFailed(request.request, str(fault)))
-        else:
-            shell.step(PlanMade(request.request, made))
-
-    async def plan_anew(request: Replan) -> None:
-        def call(unwanted: ShouldStop) -> ReplanResult:
-            return replan(
-                request.situation,
-                request.course,
-                request.method,
-                seed=request.seed,
-                stop=first_of(after_time(SystemClock(), REPLAN_S), unwanted),
-                threads=1,  # agents on this machine must not wait for a processor
-            )
-
-        made = await _planned_beside(call, "replanner")
-        shell.step(Replanned(request.request, made))
-
-    def cancel_all() -> list[asyncio.Task[None]]:
-        tasks = list(planning)
-        for task in tasks:
-            task.cancel()
-        return tasks
-
-    def begin(work: Coroutine[None, None, None]) -> None:
-        cancel_all()  # whatever was planned before is superseded
-        task = asyncio.get_running_loop().create_task(work)
-        planning.add(task)
-        task.add_done_callback(planned)
 
     def execute(action: CoordinatorAction) -> None:
         match action:
-            case MakePlan():
-                begin(plan(action))
-            case Replan():
-                begin(plan_anew(action))
+            case MakePlan() | Replan():
+                planner.begin(action)
             case StopPlanning():
-                cancel_all()
+                planner.cancel()
             case TakeSeat():
                 bus.serve(keys.state(COORDINATOR))
                 bus.declare_token(keys.alive(COORDINATOR))
-
-    def planned(task: asyncio.Task[None]) -> None:
-        planning.discard(task)
-        if not task.cancelled() and (fault := task.exception()):
-            shell.fail(fault)
 
     def known() -> Mapping[str, int]:
         return core.replica.digest()  # of another one once it has taken over
@@ -161,12 +118,82 @@ async def run_coordinator(
         answer_s=answer_s,
         context=context,
     )
+    planner = BackgroundPlanner(make_plan, shell.step, shell.fail)
     watches = isinstance(core, StandbyCore)
     join_mission(bus, mission.name, None if watches else COORDINATOR, status=False)
     try:
         return await shell.run()
     finally:
-        await asyncio.gather(*cancel_all(), return_exceptions=True)
+        await planner.close()
+
+
+class BackgroundPlanner:
+    """Plans beside a core, on threads that do not hold the process up; one plan at a time.
+
+    Args:
+        make_plan: plans a mission by method and seed; told to stop once nobody waits for the plan.
+        tell: takes the plan.
+        fail: takes what a planner raises, unless it says that there is no plan.
+    """
+
+    def __init__(
+        self,
+        make_plan: MissionPlanner,
+        tell: Callable[[CoordinatorEvent], None],
+        fail: Callable[[BaseException], None],
+    ) -> None:
+        self._make_plan = make_plan
+        self._tell = tell
+        self._fail = fail
+        self._planning: set[asyncio.Task[None]] = set()
+
+    def begin(self, request: MakePlan | Replan) -> None:
+        """Make that plan; whatever was planned before is superseded."""
+        self.cancel()
+        work = self._plan(request) if isinstance(request, MakePlan) else self._replan(request)
+        task = asyncio.get_running_loop().create_task(work)
+        self._planning.add(task)
+        task.add_done_callback(self._planned)
+
+    def cancel(self) -> None:
+        """Nobody waits for a plan any more."""
+        for task in self._planning:
+            task.cancel()
+
+    async def close(self) -> None:
+        """Wait until nothing is being planned that somebody could be told."""
+        self.cancel()
+        await asyncio.gather(*self._planning, return_exceptions=True)
+
+    async def _plan(self, request: MakePlan) -> None:
+        def call(unwanted: ShouldStop) -> Plan:
+            return self._make_plan(request.mission, request.method, request.seed, unwanted)
+
+        try:
+            made = await _planned_beside(call, "planner")
+        except ValueError as fault:
+            self._tell(PlanFailed(request.request, str(fault)))
+        else:
+            self._tell(PlanMade(request.request, made))
+
+    async def _replan(self, request: Replan) -> None:
+        def call(unwanted: ShouldStop) -> ReplanResult:
+            return replan(
+                request.situation,
+                request.course,
+                request.method,
+                seed=request.seed,
+                stop=first_of(after_time(SystemClock(), REPLAN_S), unwanted),
+                threads=1,  # agents on this machine must not wait for a processor
+            )
+
+        made = await _planned_beside(call, "replanner")
+        self._tell(Replanned(request.request, made))
+
+    def _planned(self, task: asyncio.Task[None]) -> None:
+        self._planning.discard(task)
+        if not task.cancelled() and (fault := task.exception()):
+            self._fail(fault)
 
 
 async def _planned_beside(call: Callable[[ShouldStop], T], name: str) -> T:
@@ -186,7 +213,7 @@ class CoordinatorProcess:
 
     mission: Mission
     make_core: MakeCoordinator
-    make_plan: Callable[[Mission, str, int, ShouldStop], Plan]
+    make_plan: MissionPlanner
     open_bus: Callable[[], Awaitable[ZenohBus]]
     clock: Clock
     timing: Timing

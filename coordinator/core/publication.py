@@ -1,9 +1,10 @@
-"""A mission as the coordinator publishes it: brief, board and epoch.
+"""A mission as the coordinator publishes it: brief, board, epoch and mission time.
 
 What a scenario looks like in these registers and how they differ from its file, when each task is
-released to the fleet, and when a register is said again. What the operator has ordered counts
-first: a task withdrawn before it appeared is not released any more. Leaves out: deciding on them
-(coordinator.core.active), and keys and bytes (swarm.protocol).
+released to the fleet, and what is said, said again, and said in the place of another coordinator.
+What the operator has ordered counts first: a task withdrawn before it appeared is not released any
+more. Leaves out: when to start and to end (coordinator.core.stages), and keys and bytes
+(swarm.protocol).
 """
 
 from __future__ import annotations
