@@ -206,8 +206,7 @@ def make_plan(
         bound_s: work out an upper bound on J for about this long where the optimum is not proven
             [s]; not at all when None.
         bound_frac: share of a limit that is kept for that bound, within 0..1.
-        threads: at most this many; as many as there are processors when None. Changes nothing but
-            speed.
+        threads: at most this many, of processors if None; changes nothing but speed.
         modest: spend little on the search for a sequence, for studies of many missions; costs
             some 0.1 % of J at 10 × 50 and saves most of the time.
 
@@ -241,25 +240,21 @@ def make_plan(
         modest=modest,
     )
     objective, completion_s = evaluate(problem, routes)
-    best = bound = None
-    if proven is not None:  # the same lists summed in another order may be 1e-15 off
-        best = max(evaluate(problem, proven.routes)[0], objective)
-    elif bound_s is not None:
+    bound: float | None = None
+    if proven is None and bound_s is not None:
         bound_ends = first_of(after_time(clock, bound_s), ends)
         bound = upper_bound(problem, routes, bound_ends, threads=threads).objective
     return Plan(
         scenario=mission.name,
         method=method,
-        routes={
-            uav: tuple(problem.task_ids[task] for task in route)
-            for uav, route in zip(problem.uav_ids, routes, strict=True)
-        },
+        routes=_by_id(problem, routes),
         objective=objective,
         completion_s={
             problem.task_ids[task]: float(completion_s[task]) for route in routes for task in route
         },
         sequence=None if sequence is None else tuple(problem.uav_ids[uav] for uav in sequence),
-        optimum=best,
+        # The same lists summed in another order may be 1e-15 off.
+        optimum=None if proven is None else max(evaluate(problem, proven.routes)[0], objective),
         evaluations=evaluations,
         elapsed_s=clock.now_s() - begin_s,
         seed=seed,
@@ -313,6 +308,13 @@ def _searched(
         threads=threads,
     )
     return search.routes, search.sequence, search.evaluations
+
+
+def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[str, tuple[str, ...]]:
+    return {
+        uav: tuple(problem.task_ids[task] for task in route)
+        for uav, route in zip(problem.uav_ids, routes, strict=True)
+    }
 
 
 def _proven(problem: Problem, method: str, ends: ShouldStop, threads: int | None) -> Optimum | None:
