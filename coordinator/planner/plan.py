@@ -32,7 +32,7 @@ from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule, route_arrays, team_arrays
 from swarm.kernels.lower_level import EXACT_TASKS
 from swarm.kernels.routes import TeamArrays, optimise_routes
-from swarm.model import Mission, Plan
+from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
@@ -211,9 +211,8 @@ def make_plan(
             some 0.1 % of J at 10 × 50 and saves most of the time.
 
     Returns:
-        The plan. Its sequence is None for ``exact``, which has none. Where the limit came before
-        the end of the very first evaluation it has 0 evaluations, and the last decisions are
-        greedy.
+        The plan; without a sequence for ``exact``, which has none. Where the limit came before the
+        end of the first evaluation, it has 0 evaluations and the last decisions are greedy.
 
     Raises:
         ValueError: there is no such method.
@@ -310,7 +309,7 @@ def _searched(
     return search.routes, search.sequence, search.evaluations
 
 
-def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[str, tuple[str, ...]]:
+def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[UavId, tuple[TaskId, ...]]:
     return {
         uav: tuple(problem.task_ids[task] for task in route)
         for uav, route in zip(problem.uav_ids, routes, strict=True)
