@@ -3,6 +3,7 @@
 Beside the invariants of the messages (sim.faults.message_log):
 
 - *raises*, *never rests*: no core raises, or is busy without time passing;
+- *impossible*: no agent decides anything that its state has no transition for;
 - *suspects without link*: no process gives another up while its own link is down;
 - *claimed twice*: once everything has been calm for `SETTLED_S`, no two living UAVs that can
   talk to each other claim one task for longer than that;
@@ -30,7 +31,7 @@ import itertools
 import traceback
 from collections.abc import Iterator
 
-from agent.core.agent_core import AgentCore
+from agent.core.agent_core import IMPOSSIBLE, AgentCore
 from agent.core.interface import GoTo
 from coordinator.core.active import CoordinatorCore
 from coordinator.core.standby import StandbyCore
@@ -142,6 +143,8 @@ class InvariantChecker:
 
     def noted(self, process: Process, note: LogLine) -> None:
         """``process`` has written a line into its log."""
+        if note.text == IMPOSSIBLE:
+            self._break("impossible", f"{process.name}: {note.fields}")
         if note.text == "lost":
             self.message_log.missed(process.name)
         if note.text == "turns aside":

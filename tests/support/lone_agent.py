@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TypeVar
 
-from agent.core.agent_core import AgentCore
+from agent.core.agent_core import IMPOSSIBLE, AgentCore
 from agent.core.interface import (
     Action,
     Arrived,
@@ -229,6 +229,7 @@ class LoneAgent:
         return None if claim is None else claim.phase
 
     def _do(self, actions: Sequence[Action]) -> list[Action]:
+        assert IMPOSSIBLE not in notes(actions)
         self.log += actions
         self.choices += [action.make() for action in actions if isinstance(action, PublishLast)]
         return list(actions)
