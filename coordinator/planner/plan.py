@@ -207,8 +207,7 @@ def make_plan(
             [s]; not at all when None.
         bound_frac: share of a limit that is kept for that bound, within 0..1.
         threads: at most this many, of processors if None; changes nothing but speed.
-        modest: spend little on the search for a sequence, for studies of many missions; costs
-            some 0.1 % of J at 10 × 50 and saves most of the time.
+        modest: search little for a sequence; costs 0.1 % of J at 10 × 50, saves most of the time.
 
     Returns:
         The plan; without a sequence for ``exact``, which has none. Where the limit came before the
