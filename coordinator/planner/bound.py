@@ -33,7 +33,7 @@ import numpy as np
 from coordinator.planner.options import Limit, ShouldStop, never
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import FloatArray, IntArray, Problem
-from swarm.allocation.rules import route_arrays
+from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes import TeamArrays
 from swarm.kernels.routes_bound import priced_lists, shortest_legs_s
 
@@ -118,7 +118,7 @@ def upper_bound(
         return UpperBound(trivial, "trivial", 0)
     if _affordable_cycles(problem, _COARSEST) < _FEWEST_CYCLES:
         return UpperBound(trivial, "trivial", 0)
-    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    team = team_at_start(problem)
     bucket_s, cycles = _affordable(problem, team)
     if cycles < _FEWEST_CYCLES:
         return UpperBound(trivial, "trivial", 0)
@@ -160,7 +160,7 @@ def lagrangian_bound(
     Returns:
         The bound [value·s], infinite if it was stopped before there was any, and the cycles made.
     """
-    n_uav = team.mission.n_uav
+    n_uav = team.problem.n_uav
     n_group = min(_GROUPS, n_uav)
     groups = [
         replace(team, active=np.asarray(team.active) & (np.arange(n_uav) % n_group == group))
@@ -229,8 +229,7 @@ def _marginal_worth(problem: Problem, lists: Sequence[Sequence[int]]) -> FloatAr
 def _list_worth(problem: Problem, uav: int, route: Sequence[int]) -> float:
     """Σ p·m·(D − t)⁺, S left out."""
     tasks = np.array(route, dtype=np.int64)
-    places = np.vstack([problem.start_enu_m[uav], problem.task_enu_m[tasks]])
-    legs_m = np.sqrt((np.diff(places, axis=0) ** 2).sum(axis=1))
-    times_s = np.cumsum(legs_m / problem.speed_m_s[uav] + problem.service_s[tasks])
+    travel_s = problem.travel_along_s(uav, problem.start_enu_m[uav], tasks)
+    times_s = np.cumsum(travel_s + problem.service_s[tasks])
     left_s = np.maximum(0.0, problem.horizon_s - times_s)
     return float(problem.weight[uav, tasks] @ left_s)

@@ -19,7 +19,7 @@ from coordinator.planner.plan import guided_plan
 from swarm.allocation.lower_level import TeamState, run
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
-from swarm.allocation.rules import GuidedRule, route_arrays, rule_by_name, team_arrays
+from swarm.allocation.rules import GuidedRule, rule_by_name, team_arrays
 from swarm.kernels.rollout import guided_choice
 from swarm.protocol.board import (
     TaskBoard,
@@ -289,8 +289,7 @@ def objective_to_go(situation: Situation, lists: Lists) -> float:
     if situation.is_settled:
         return 0.0
     next_s = np.where(state.active, state.free_s, np.inf)
-    arrays = route_arrays(situation.problem)
-    team = team_arrays(arrays, state, state.active, situation.now_s)
+    team = team_arrays(situation.problem, state, state.active, situation.now_s)
     indices = _by_index(situation.problem, lists)
     return guided_choice(team, indices, int(next_s.argmin())).worth
 

@@ -29,7 +29,7 @@ from coordinator.planner.sequence_search import EXHAUSTIVE_UAVS, SearchLimits
 from swarm.allocation import RULE_NAMES, evaluate, rule_by_name
 from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import Problem
-from swarm.allocation.rules import GuidedRule, route_arrays, team_arrays
+from swarm.allocation.rules import GuidedRule, team_arrays
 from swarm.kernels.lower_level import EXACT_TASKS
 from swarm.kernels.routes import TeamArrays, optimise_routes
 from swarm.model import Mission, Plan, TaskId, UavId
@@ -105,7 +105,7 @@ def guided_plan(
     state = TeamState.at_start(problem) if state is None else state
     finite = state.free_s[state.active & np.isfinite(state.free_s)]
     now_s = float(finite.min()) if len(finite) else 0.0
-    team = team_arrays(route_arrays(problem), state, state.active, now_s)
+    team = team_arrays(problem, state, state.active, now_s)
     spent = 0
 
     def count(iterations: int, worth: float) -> None:

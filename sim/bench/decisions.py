@@ -21,9 +21,9 @@ from sim.bench.solvers import MissionSource, problem_of
 from swarm.allocation import Problem, TeamState, rank_of, rule_by_name
 from swarm.allocation.lower_level import Decision, Rule, decisions
 from swarm.allocation.problem import IntArray
-from swarm.allocation.rules import GuidedRule, route_arrays
+from swarm.allocation.rules import GuidedRule, team_at_start
 from swarm.kernels.lower_level import GREEDY, default_threads, evaluate_sequences
-from swarm.kernels.routes import TeamArrays, optimise_routes
+from swarm.kernels.routes import optimise_routes
 from swarm.model import TaskId
 from swarm.runtime.clock import Clock
 
@@ -166,9 +166,8 @@ def _rules(
 ) -> Iterator[tuple[str, Rule, TeamState]]:
     for name in ("greedy", "lookahead"):
         yield name, rule_by_name(name), TeamState.at_start(problem)
-    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
     iterations = _ITERATIONS_PER_TASK * problem.n_task
-    routes, _ = optimise_routes(team, seed=seed, iterations=iterations)
+    routes, _ = optimise_routes(team_at_start(problem), seed=seed, iterations=iterations)
     lists: dict[str, list[TaskId]] = {
         uav: [problem.task_ids[task] for task in route]
         for uav, route in zip(problem.uav_ids, routes, strict=True)

@@ -7,7 +7,6 @@ before this one on its list. Leaves out: finding good lists.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -38,21 +37,16 @@ def evaluate(
     state = TeamState.at_start(problem) if state is None else state
     objective = 0.0
     completion_s = np.full(problem.n_task, np.nan)
+    travel_s = iter(problem.travel_by_lists_s(routes, state.place_enu_m).tolist())
     for uav, route in enumerate(routes):
         free_s, survived = float(state.free_s[uav]), float(state.survived[uav])
-        place = state.place_enu_m[uav].tolist()
-        speed_m_s = float(problem.speed_m_s[uav])
         for task in route:
             if not np.isnan(completion_s[task]):
                 raise ValueError(f"task {problem.task_ids[task]} is on the lists twice")
-            there = problem.task_enu_m[task].tolist()
-            dx_m, dy_m, dz_m = there[0] - place[0], there[1] - place[1], there[2] - place[2]
-            travel_s = sqrt(dx_m * dx_m + dy_m * dy_m + dz_m * dz_m) / speed_m_s
-            free_s = (free_s + travel_s) + float(problem.service_s[task])
+            free_s = (free_s + next(travel_s)) + float(problem.service_s[task])
             completion_s[task] = free_s
             objective += survived * problem.weight[uav, task] * (problem.horizon_s - free_s)
             survived *= problem.survival[uav, task]
-            place = there
     return float(objective), completion_s
 
 

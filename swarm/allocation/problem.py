@@ -13,19 +13,30 @@ import numpy as np
 import numpy.typing as npt
 
 from swarm.kernels._kernels import KernelProblem
-from swarm.kernels.problem import prepare
+from swarm.kernels.problem import converted, prepare
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.mission import chances
 
-__all__ = ["BoolArray", "FloatArray", "IntArray", "Problem"]
+__all__ = ["BoolArray", "FloatArray", "IntArray", "Problem", "straight_m"]
 
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
+_COLUMNS: Mapping[str, int] = {
+    "start_enu_m": 2,
+    "task_enu_m": 2,
+    "speed_m_s": 1,
+    "value": 1,
+    "service_s": 1,
+    "success": 2,
+    "survival": 2,
+}
+"""Arrays that a problem is made of, with their axes."""
 
-@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Problem:
     """Arrays of eq. 1; read-only copies of what is passed in.
 
@@ -53,58 +64,35 @@ class Problem:
     """(n_uav, n_task) probability of surviving the task, within 0..1."""
     horizon_s: float
     """D [s]; > 0."""
+    kernel: KernelProblem = field(init=False, repr=False)
+    """The same, prepared for the compiled kernels, which check all numbers."""
     capable: BoolArray = field(init=False, repr=False)
     """(n_uav, n_task) success > 0."""
     weight: FloatArray = field(init=False, repr=False)
     """(n_uav, n_task) p · m."""
-    kernel: KernelProblem = field(init=False, repr=False)
-    """The same, prepared for the compiled kernels."""
     _task_columns_m: FloatArray = field(init=False, repr=False)
     """(3, n_task) the places again, one contiguous row per axis."""
 
     def __post_init__(self) -> None:
-        n_uav, n_task = len(self.uav_ids), len(self.task_ids)
-        _require_distinct("uav_ids", self.uav_ids)
-        _require_distinct("task_ids", self.task_ids)
-        shapes: dict[str, tuple[int, ...]] = {
-            "start_enu_m": (n_uav, 3),
-            "task_enu_m": (n_task, 3),
-            "speed_m_s": (n_uav,),
-            "value": (n_task,),
-            "service_s": (n_task,),
-            "success": (n_uav, n_task),
-            "survival": (n_uav, n_task),
-        }
-        for name, shape in shapes.items():
-            self._freeze(name, _checked(name, getattr(self, name), shape))
-        object.__setattr__(self, "uav_ids", tuple(self.uav_ids))
-        object.__setattr__(self, "task_ids", tuple(self.task_ids))
+        for name in ("uav_ids", "task_ids"):
+            ids = tuple(getattr(self, name))
+            _require_distinct(name, ids)
+            object.__setattr__(self, name, ids)
+        for name, n_axes in _COLUMNS.items():
+            self._freeze(name, converted(name, getattr(self, name), np.float64, n_axes).copy())
+        for name, n in (("speed_m_s", self.n_uav), ("value", self.n_task)):
+            if len(getattr(self, name)) != n:  # all other shapes are held against these two
+                raise ValueError(f"{name} must have shape {(n,)}, not {getattr(self, name).shape}")
         object.__setattr__(self, "horizon_s", float(self.horizon_s))
-        if not 0.0 < self.horizon_s < float("inf"):
-            raise ValueError(f"horizon_s must be > 0 and finite, not {self.horizon_s}")
-        if (self.speed_m_s <= 0.0).any():
-            raise ValueError(f"speed_m_s must be > 0, not {self.speed_m_s.min()}")
-        for name in ("value", "service_s"):
-            if (getattr(self, name) < 0.0).any():
-                raise ValueError(f"{name} must be >= 0, not {getattr(self, name).min()}")
-        for name in ("success", "survival"):
-            array = getattr(self, name)
-            if ((array < 0.0) | (array > 1.0)).any():
-                raise ValueError(f"{name} must be within 0..1")
-        self._freeze("capable", self.success > 0.0)
-        self._freeze("weight", self.success * self.value)
+        columns = {name: getattr(self, name) for name in _COLUMNS}
+        kernel = prepare(**columns, horizon_s=self.horizon_s)
+        for name, item in (
+            ("kernel", kernel),
+            ("capable", kernel.capable),
+            ("weight", kernel.weight),
+        ):
+            object.__setattr__(self, name, item)
         self._freeze("_task_columns_m", np.ascontiguousarray(self.task_enu_m.T))
-        kernel = prepare(
-            start_enu_m=self.start_enu_m,
-            task_enu_m=self.task_enu_m,
-            speed_m_s=self.speed_m_s,
-            service_s=self.service_s,
-            weight=self.weight,
-            capable=self.capable,
-            survival=self.survival,
-            horizon_s=self.horizon_s,
-        )
-        object.__setattr__(self, "kernel", kernel)
 
     def __reduce__(self) -> tuple[type[Problem], tuple[object, ...]]:
         given = (getattr(self, item.name) for item in fields(self) if item.init)
@@ -171,23 +159,67 @@ class Problem:
         """Number of tasks."""
         return len(self.task_ids)
 
-    def travel_s(self, uav: int, place_enu_m: FloatArray) -> FloatArray:
-        """(n_task,) straight-line flight times of ``uav`` from a (3,) place [m; ENU] [s].
+    # Nothing else in allocation, planner and studies knows how long a UAV takes to fly somewhere.
 
-        Computed as sqrt(dx² + dy² + dz²) / speed with each operation rounded by itself, so that
-        every implementation of the same formula finds the same floats.
+    def travel_s(self, uav: int, place_enu_m: FloatArray) -> FloatArray:
+        """(n_task,) flight times of ``uav`` from a (3,) place [m; ENU] to every task [s].
+
+        Straight at cruise speed: `straight_m` / speed, rounded by itself, so that every
+        implementation of the same formula finds the same floats.
         """
-        d = self._task_columns_m - place_enu_m[:, None]
-        d *= d
-        square = d[0] + d[1]
-        square += d[2]
-        travel: FloatArray = np.sqrt(square)
-        travel /= self.speed_m_s[uav]
-        return travel
+        return self._flown_s(uav, self._task_columns_m - place_enu_m[:, None])
+
+    def travel_between_s(self, uav: int) -> FloatArray:
+        """(n_task, n_task) the same from every task to every other [s]."""
+        columns_m = self._task_columns_m
+        return self._flown_s(uav, columns_m[:, None, :] - columns_m[:, :, None])
+
+    def travel_along_s(
+        self, uav: int, place_enu_m: FloatArray, route: Sequence[int] | IntArray
+    ) -> FloatArray:
+        """(k,) the same from a (3,) place to a list's first task, and from each to the next [s]."""
+        tasks = np.asarray(route, dtype=np.int64)
+        places_m = np.concatenate([place_enu_m[None], self.task_enu_m[tasks]])
+        return self._flown_s(uav, (places_m[1:] - places_m[:-1]).T)
+
+    def travel_by_lists_s(
+        self, routes: Sequence[Sequence[int]], first_enu_m: FloatArray
+    ) -> FloatArray:
+        """(k,) the same of all UAVs, list after list [s].
+
+        Args:
+            routes: task indices per UAV in order of execution; k in all.
+            first_enu_m: (n_uav, 3) where each UAV begins [m; ENU].
+        """
+        lengths = np.array([len(route) for route in routes], dtype=np.int64)
+        tasks = np.array([task for route in routes for task in route], dtype=np.int64)
+        uavs = np.repeat(np.arange(len(lengths)), lengths)
+        places_m = self.task_enu_m[tasks]
+        from_m = np.roll(places_m, 1, axis=0)
+        begins = (np.cumsum(lengths) - lengths)[lengths > 0]
+        from_m[begins] = first_enu_m[uavs[begins]]
+        return self._flown_s(uavs, (places_m - from_m).T)
+
+    def _flown_s(self, uav: int | IntArray, offset_m: FloatArray) -> FloatArray:
+        travel_s = straight_m(offset_m)
+        travel_s /= self.speed_m_s[uav]
+        return travel_s
 
     def _freeze(self, name: str, array: npt.NDArray[np.generic]) -> None:
         array.setflags(write=False)
         object.__setattr__(self, name, array)
+
+
+def straight_m(offset_m: FloatArray) -> FloatArray:
+    """(...) lengths of (3, ...) offsets, east, north and up, which are used up [m].
+
+    sqrt(dx² + dy² + dz²), with each operation rounded by itself and in this order.
+    """
+    offset_m *= offset_m
+    square_m2 = offset_m[0] + offset_m[1]
+    square_m2 += offset_m[2]
+    length_m: FloatArray = np.sqrt(square_m2)
+    return length_m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,12 +254,3 @@ def _columns(mission: Mission, uavs: Sequence[Uav], tasks: Sequence[Task]) -> _C
 def _require_distinct(name: str, ids: Sequence[str]) -> None:
     if len(set(ids)) != len(ids):
         raise ValueError(f"{name} must differ from each other: {list(ids)}")
-
-
-def _checked(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    array = np.array(value, dtype=np.float64, order="C")
-    if array.shape != shape:
-        raise ValueError(f"{name} must have shape {shape}, not {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, not NaN or infinite")
-    return array

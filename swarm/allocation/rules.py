@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,16 +17,16 @@ from swarm.allocation.lower_level import Decision, TeamState
 from swarm.allocation.problem import BoolArray, IntArray, Problem
 from swarm.kernels.lower_level import GREEDY, LOOKAHEAD, RuleCode, decide, valued
 from swarm.kernels.rollout import GuidedChoice, guided_choice
-from swarm.kernels.routes import RouteArrays, Routes, TeamArrays
+from swarm.kernels.routes import Routes, TeamArrays
 
 __all__ = [
     "RULE_NAMES",
     "GuidedRule",
     "KernelRule",
     "kernel_rule",
-    "route_arrays",
     "rule_by_name",
     "team_arrays",
+    "team_at_start",
 ]
 
 
@@ -92,10 +91,6 @@ _REPAIR_ITERATIONS = 200
 """Steps of the search after a disturbance; some 3 ms in all at 50 UAVs × 500 tasks."""
 
 
-# With thousands of tasks it takes half a second, and a re-plan needs it at each of its steps.
-_ARRAYS: WeakKeyDictionary[Problem, RouteArrays] = WeakKeyDictionary()
-
-
 class GuidedRule:
     """Decide by published lists; see the module.
 
@@ -103,7 +98,7 @@ class GuidedRule:
         lists: task ids per UAV id in order; ids that a problem does not know are skipped.
         repair_iterations: steps of the search after a disturbance; all replicas need the same.
 
-    Arrays derived from the problem last asked about are kept; they change speed, never results.
+    The lists as the problem last asked about has them are kept; that changes speed, never results.
     """
 
     name = "guided"
@@ -117,7 +112,6 @@ class GuidedRule:
         self._lists = {uav: tuple(tasks) for uav, tasks in lists.items()}
         self._repair_iterations = repair_iterations
         self._problem: Problem | None = None
-        self._arrays: RouteArrays | None = None
         self._routes: Routes = []
         self._owner: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -153,11 +147,11 @@ class GuidedRule:
         return self._choice(problem, state, rank, uav).worth
 
     def _choice(self, problem: Problem, state: TeamState, rank: IntArray, uav: int) -> GuidedChoice:
-        mission = self._arrays_of(problem)
+        self._look_up(problem)
         now_s = float(state.free_s[uav])
         active = state.active & ~_has_declined(state, rank, now_s, int(rank[uav]))
         active[uav] = True
-        team = team_arrays(mission, state, active, now_s)
+        team = team_arrays(problem, state, active, now_s)
         on_a_list = self._owner >= 0
         kept = on_a_list & active[self._owner]
         disturbed = bool((problem.capable.any(axis=0) & ~on_a_list).any())
@@ -166,47 +160,31 @@ class GuidedRule:
             team, self._routes, uav, iterations=self._repair_iterations if disturbed else 0
         )
 
-    def _arrays_of(self, problem: Problem) -> RouteArrays:
-        if self._problem is not problem or self._arrays is None:
-            self._arrays = route_arrays(problem)
-            self._problem = problem
-            index: dict[str, int] = {task: i for i, task in enumerate(problem.task_ids)}
-            self._routes = [
-                [index[task] for task in self._lists.get(uav, ()) if task in index]
-                for uav in problem.uav_ids
-            ]
-            self._owner = np.full(problem.n_task, -1, dtype=np.int64)
-            for uav_index, route in enumerate(self._routes):
-                self._owner[route] = uav_index
-        return self._arrays
+    def _look_up(self, problem: Problem) -> None:
+        """Find the listed tasks among those of the problem."""
+        if self._problem is problem:
+            return
+        self._problem = problem
+        index: dict[str, int] = {task: i for i, task in enumerate(problem.task_ids)}
+        self._routes = [
+            [index[task] for task in self._lists.get(uav, ()) if task in index]
+            for uav in problem.uav_ids
+        ]
+        self._owner = np.full(problem.n_task, -1, dtype=np.int64)
+        for uav_index, route in enumerate(self._routes):
+            self._owner[route] = uav_index
 
 
-def route_arrays(problem: Problem) -> RouteArrays:
-    """The problem laid out for route kernels; worked out once for each problem."""
-    arrays = _ARRAYS.get(problem)
-    if arrays is None:
-        arrays = _ARRAYS[problem] = _laid_out(problem)
-    return arrays
-
-
-def _laid_out(problem: Problem) -> RouteArrays:
-    return RouteArrays(
-        problem.task_enu_m,
-        problem.speed_m_s,
-        problem.value,
-        problem.service_s,
-        problem.success,
-        problem.survival,
-        problem.horizon_s,
-    )
-
-
-def team_arrays(
-    mission: RouteArrays, state: TeamState, active: BoolArray, now_s: float
-) -> TeamArrays:
+def team_arrays(problem: Problem, state: TeamState, active: BoolArray, now_s: float) -> TeamArrays:
     """The state for route kernels; UAVs that are free at an unknown time count as free now."""
     free_s = np.where(np.isfinite(state.free_s), state.free_s, now_s)
-    return TeamArrays(mission, free_s, state.place_enu_m, state.survived, active, state.open)
+    return TeamArrays(problem.kernel, free_s, state.place_enu_m, state.survived, active, state.open)
+
+
+def team_at_start(problem: Problem) -> TeamArrays:
+    """The same at mission time 0, with everything open."""
+    state = TeamState.at_start(problem)
+    return team_arrays(problem, state, state.active, 0.0)
 
 
 def _has_declined(state: TeamState, rank: IntArray, now_s: float, own_rank: int) -> BoolArray:

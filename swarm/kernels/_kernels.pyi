@@ -21,15 +21,15 @@ class KernelProblem:
         speed_m_s: Annotated[
             NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
         ],
+        value: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
         service_s: Annotated[
             NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
         ],
-        weight: Annotated[
+        success: Annotated[
             NDArray[numpy.float64],
             dict(shape=(None, None), order="C", device="cpu", writable=False),
-        ],
-        capable: Annotated[
-            NDArray[numpy.bool_], dict(shape=(None, None), order="C", device="cpu", writable=False)
         ],
         survival: Annotated[
             NDArray[numpy.float64],
@@ -41,6 +41,16 @@ class KernelProblem:
     def n_uav(self) -> int: ...
     @property
     def n_task(self) -> int: ...
+    @property
+    def horizon_s(self) -> float: ...
+    @property
+    def weight(
+        self,
+    ) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]: ...
+    @property
+    def capable(
+        self,
+    ) -> Annotated[NDArray[numpy.bool_], dict(shape=(None, None), writable=False)]: ...
 
 class TourTable:
     def __init__(
@@ -189,32 +199,6 @@ def run_sequences(
     Annotated[NDArray[numpy.int64], dict(shape=(None, None))],
     Annotated[NDArray[numpy.int64], dict(shape=(None, None))],
 ]: ...
-def evaluate_sequences(
-    problem: KernelProblem,
-    free_s: Annotated[
-        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
-    ],
-    place_enu_m: Annotated[
-        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
-    ],
-    survived: Annotated[
-        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
-    ],
-    open: Annotated[
-        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
-    ],
-    active: Annotated[
-        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
-    ],
-    rank: Annotated[
-        NDArray[numpy.int64], dict(shape=(None, None), order="C", device="cpu", writable=False)
-    ],
-    rule: int,
-    threads: int,
-) -> tuple[
-    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
-    Annotated[NDArray[numpy.bool_], dict(shape=(None,))],
-]: ...
 def first_rounds(
     problem: KernelProblem,
     free_s: Annotated[
@@ -248,7 +232,7 @@ def optimum(
     problem: KernelProblem, worst: bool, threads: int, should_stop: object | None = None
 ) -> tuple[float, list[list[int]]]: ...
 def guided_choice(
-    instance: RouteInstance,
+    problem: KernelProblem,
     free_s: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
@@ -274,37 +258,10 @@ def guided_choice(
     iterations: int,
 ) -> tuple[int, float, float, int, list[tuple[int, float]]]: ...
 
-class RouteInstance:
-    def __init__(
-        self,
-        task_m: Annotated[
-            NDArray[numpy.float64],
-            dict(shape=(None, None), order="C", device="cpu", writable=False),
-        ],
-        speed_m_s: Annotated[
-            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
-        ],
-        value: Annotated[
-            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
-        ],
-        service_s: Annotated[
-            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
-        ],
-        success: Annotated[
-            NDArray[numpy.float64],
-            dict(shape=(None, None), order="C", device="cpu", writable=False),
-        ],
-        survival: Annotated[
-            NDArray[numpy.float64],
-            dict(shape=(None, None), order="C", device="cpu", writable=False),
-        ],
-        horizon_s: float,
-    ) -> None: ...
-
 class RouteSearch:
     def __init__(
         self,
-        instance: RouteInstance,
+        problem: KernelProblem,
         free_s: Annotated[
             NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
         ],
@@ -341,7 +298,7 @@ class RouteSearch:
     ]: ...
 
 def improve_routes(
-    instance: RouteInstance,
+    problem: KernelProblem,
     free_s: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
@@ -365,7 +322,7 @@ def improve_routes(
     Annotated[NDArray[numpy.int64], dict(shape=(None,))],
 ]: ...
 def shortest_legs_s(
-    instance: RouteInstance,
+    problem: KernelProblem,
     free_s: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
@@ -402,7 +359,7 @@ class Timetable:
     ) -> None: ...
 
 def priced_lists(
-    instance: RouteInstance,
+    problem: KernelProblem,
     free_s: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],

@@ -34,23 +34,17 @@ struct UavTours {
     UavTours(const Problem& problem, int uav, double sign, const std::vector<int>& tasks,
              Watch& watch) {
         const Size n = tasks.size();
-        const double* start = &problem.start_m[3 * static_cast<Size>(uav)];
-        std::vector<double> weight(n), survival(n), leg_s(n * n);
+        std::vector<double> weight(n), survival(n);
         completion_s.resize(n);
         for (Size i = 0; i < n; ++i) {
-            const Size from = static_cast<Size>(tasks[i]);
-            weight[i] = sign * problem.weight[problem.cell(uav, tasks[i])];
-            survival[i] = problem.survival[problem.cell(uav, tasks[i])];
-            completion_s[i] = problem.travel_s(uav, start[0], start[1], start[2], tasks[i]) +
-                              problem.service_s[from];
-            for (Size j = 0; j < n; ++j) {
-                leg_s[i * n + j] = problem.travel_s(uav, problem.x_m[from], problem.y_m[from],
-                                                    problem.z_m[from], tasks[j]) +
-                                   problem.service_s[static_cast<Size>(tasks[j])];
-            }
+            weight[i] = sign * problem.weights(uav)[tasks[i]];
+            survival[i] = problem.survivals(uav)[tasks[i]];
+            completion_s[i] = problem.travel_s(uav, problem.start_m(uav), tasks[i]) +
+                              problem.service_s(tasks[i]);
         }
+        const std::vector<double> leg_s = problem.legs_s(uav, tasks);
         table = std::make_unique<TourTable>(static_cast<int>(n), weight.data(), survival.data(),
-                                            leg_s.data(), problem.horizon_s, watch);
+                                            leg_s.data(), problem.horizon_s(), watch);
     }
 
     std::vector<double> completion_s;
@@ -63,7 +57,7 @@ std::vector<double> subset_values(const Problem& problem, int uav, double sign,
     std::vector<int> own;
     std::vector<Mask> bits;
     for (Size i = 0; i < universe.size(); ++i) {
-        if (problem.capable[problem.cell(uav, universe[i])]) {
+        if (problem.abilities(uav)[universe[i]]) {
             own.push_back(universe[i]);
             bits.push_back(Mask{1} << i);
         }
@@ -113,7 +107,7 @@ using Lists = std::vector<std::vector<int>>;
 // has stopped it.
 double best_lists(const Problem& problem, const std::vector<int>& universe, double sign,
                   int threads, Watch& watch, Lists& routes) {
-    const Size n_uav = static_cast<Size>(problem.n_uav);
+    const Size n_uav = static_cast<Size>(problem.n_uav());
     std::vector<std::vector<double>> own(n_uav), best(n_uav);
     parallel_for(n_uav, threads, 1, [&] {
         return [&](Size uav) {
@@ -157,20 +151,16 @@ double best_lists(const Problem& problem, const std::vector<int>& universe, doub
 std::tuple<double, Lists> optimum(const Problem& problem, bool worst, int threads,
                                   nb::handle should_stop) {
     const double sign = worst ? -1.0 : 1.0;
-    const Size n_uav = static_cast<Size>(problem.n_uav);
+    const Size n_uav = static_cast<Size>(problem.n_uav());
     std::vector<int> universe;
-    bool certain = true;
-    for (int task = 0; task < problem.n_task; ++task) {
+    for (int task = 0; task < problem.n_task(); ++task) {
         bool possible = false;
-        for (int uav = 0; uav < problem.n_uav; ++uav) {
-            const Size cell = problem.cell(uav, task);
-            if (!problem.capable[cell]) continue;
-            possible = true;
-            certain = certain && problem.survival[cell] == 1.0;
+        for (int uav = 0; uav < problem.n_uav() && !possible; ++uav) {
+            possible = problem.abilities(uav)[task] != 0;
         }
         if (possible) universe.push_back(task);
     }
-    const int most = certain ? TourTable::kMostTasks : TourTable::kMostUncertainTasks;
+    const int most = problem.certain() ? TourTable::kMostTasks : TourTable::kMostUncertainTasks;
     if (universe.size() > static_cast<Size>(most)) {
         refuse("problem must have at most " + std::to_string(most) + " tasks");
     }

@@ -57,11 +57,11 @@ struct Team {  // as Python passes it
     In<bool, 1> active;
 
     TeamView checked(const Problem& problem) const {
-        const Size n_uav = static_cast<Size>(problem.n_uav);
+        const Size n_uav = static_cast<Size>(problem.n_uav());
         require_shape("free_s", free_s, {n_uav});
         require_shape("place_enu_m", place_enu_m, {n_uav, 3});
         require_shape("survived", survived, {n_uav});
-        require_shape("open", open, {static_cast<Size>(problem.n_task)});
+        require_shape("open", open, {static_cast<Size>(problem.n_task())});
         require_shape("active", active, {n_uav});
         for (Size i = 0; i < n_uav; ++i) {
             if (!(free_s.data()[i] > -HUGE_VAL)) {
@@ -84,12 +84,12 @@ bool decide_once(const Problem& problem, const In<double, 1>& free_s,
                  const In<double, 2>& place_enu_m, const In<double, 1>& survived,
                  const In<bool, 1>& open, int uav, int rule_code, const Look& look) {
     const RuleCode rule = checked_rule(rule_code);
-    if (uav < 0 || uav >= problem.n_uav) refuse("uav must be an index of a UAV");
-    const Size n_uav = static_cast<Size>(problem.n_uav);
+    if (uav < 0 || uav >= problem.n_uav()) refuse("uav must be an index of a UAV");
+    const Size n_uav = static_cast<Size>(problem.n_uav());
     require_shape("free_s", free_s, {n_uav});
     require_shape("place_enu_m", place_enu_m, {n_uav, 3});
     require_shape("survived", survived, {n_uav});
-    require_shape("open", open, {static_cast<Size>(problem.n_task)});
+    require_shape("open", open, {static_cast<Size>(problem.n_task())});
     const TeamView team{free_s.data(), place_enu_m.data(), survived.data(), bytes_of(open), nullptr};
     const Decider decider = team.decider(uav);
     if (!(decider.free_s > -HUGE_VAL)) refuse("free_s must be a time, not NaN or -infinity");
@@ -105,7 +105,7 @@ bool decide_once(const Problem& problem, const In<double, 1>& free_s,
             choice = workspace.decide(problem, workspace.open, decider, rule, false);
             if (choice.task >= 0) look(decider, choice, workspace);
         };
-        if (rule == RuleCode::kGreedy && problem.n_task < kBriefTasks) {
+        if (rule == RuleCode::kGreedy && problem.n_task() < kBriefTasks) {
             work();
         } else {
             nb::gil_scoped_release released;
@@ -148,7 +148,7 @@ Run run(const Problem& problem, const Team& team, In<std::int64_t, 1> rank, int 
         nb::handle should_stop) {
     const RuleCode rule = checked_rule(rule_code);
     const TeamView view = team.checked(problem);
-    require_shape("rank", rank, {static_cast<Size>(problem.n_uav)});
+    require_shape("rank", rank, {static_cast<Size>(problem.n_uav())});
     std::vector<std::int64_t> uavs, tasks;
     std::vector<double> completion_s, scores;
     PythonWatch(should_stop).released([&](Watch& watch) {
@@ -171,7 +171,7 @@ struct Sequences {
 
     Size checked(const Problem& problem) const {
         const Size count = rank.shape(0);
-        require_shape("rank", rank, {count, static_cast<Size>(problem.n_uav)});
+        require_shape("rank", rank, {count, static_cast<Size>(problem.n_uav())});
         if (threads < 1 || threads > 1024) refuse("threads must be within 1..1024");
         return count;
     }
@@ -194,8 +194,8 @@ Runs run_sequences(const Problem& problem, const Team& team, const Sequences& se
                    int rule_code, nb::handle should_stop) {
     const RuleCode rule = checked_rule(rule_code);
     const TeamView view = team.checked(problem);
-    const Size count = sequences.checked(problem), n_uav = static_cast<Size>(problem.n_uav);
-    const Size n_task = static_cast<Size>(problem.n_task);
+    const Size count = sequences.checked(problem), n_uav = static_cast<Size>(problem.n_uav());
+    const Size n_task = static_cast<Size>(problem.n_task());
     std::vector<double> objectives(count, std::numeric_limits<double>::quiet_NaN());
     std::vector<std::uint8_t> tied(count, 0), whole(count, 0);
     std::vector<std::int64_t> uavs(count * n_task, -1), tasks(count * n_task, -1);
@@ -209,9 +209,8 @@ Runs run_sequences(const Problem& problem, const Team& team, const Sequences& se
                 whole[job] = simulate(
                     problem, view, sequences.rank.data() + job * n_uav, rule, true, *lease, watch,
                     [&](const Decider& decider, const Choice& choice, bool tie) {
-                        const double weight =
-                            problem.weight[problem.cell(decider.uav, choice.task)];
-                        const double left_s = problem.horizon_s - choice.completion_s;
+                        const double weight = problem.weights(decider.uav)[choice.task];
+                        const double left_s = problem.horizon_s() - choice.completion_s;
                         objective += (decider.survived * weight) * left_s;
                         any_tie = any_tie || tie;
                         uavs[at] = decider.uav;
@@ -235,7 +234,7 @@ Out<std::int64_t, 2> first_rounds(const Problem& problem, const Team& team,
                                   nb::handle should_stop) {
     const RuleCode rule = checked_rule(rule_code);
     const TeamView view = team.checked(problem);
-    const Size count = sequences.checked(problem), n_uav = static_cast<Size>(problem.n_uav);
+    const Size count = sequences.checked(problem), n_uav = static_cast<Size>(problem.n_uav());
     std::vector<std::int64_t> tasks(count * n_uav, kUndone);
     PythonWatch(should_stop).released([&](Watch& watch) {
         parallel_for(count, sequences.threads, 16, [&] {
@@ -244,7 +243,7 @@ Out<std::int64_t, 2> first_rounds(const Problem& problem, const Team& team,
                 if (watch.stopped()) return;
                 const std::int64_t* rank = sequences.rank.data() + job * n_uav;
                 order.clear();
-                for (int uav = 0; uav < problem.n_uav; ++uav) {
+                for (int uav = 0; uav < problem.n_uav(); ++uav) {
                     if (view.active[uav] && std::isfinite(view.free_s[uav])) {
                         order.emplace_back(rank[uav], uav);
                     }
@@ -301,17 +300,6 @@ void bind_lower_level(nb::module_& module) {
         nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(), nb::arg("survived").noconvert(),
         nb::arg("open").noconvert(), nb::arg("active").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"), nb::arg("threads"),
         nb::arg("should_stop") = nb::none());
-    module.def(
-        "evaluate_sequences",  // as released in 0.1.0, whose sources fly with these kernels
-        [](const Problem& problem, In<double, 1> free_s, In<double, 2> place_enu_m,
-           In<double, 1> survived, In<bool, 1> open, In<bool, 1> active, In<std::int64_t, 2> rank,
-           int rule, int threads) {
-            auto runs = run_sequences(problem, {free_s, place_enu_m, survived, open, active},
-                                      {rank, threads}, rule, nb::none());
-            return std::make_tuple(std::get<0>(runs), std::get<1>(runs));
-        },
-        nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("place_enu_m").noconvert(), nb::arg("survived").noconvert(),
-        nb::arg("open").noconvert(), nb::arg("active").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"), nb::arg("threads"));
     module.def(
         "first_rounds",
         [](const Problem& problem, In<double, 1> free_s, In<double, 2> place_enu_m,

@@ -1,6 +1,7 @@
 // The lower level (Fig. 1): UAVs decide one after another, each for itself.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -103,9 +104,9 @@ bool simulate(const Problem& problem, const TeamView& team, const std::int64_t* 
         Decider decider;
         bool decided;
     };
-    std::vector<Flying> fleet(static_cast<std::size_t>(problem.n_uav));
+    std::vector<Flying> fleet(static_cast<std::size_t>(problem.n_uav()));
     Turns turns;
-    for (int uav = 0; uav < problem.n_uav; ++uav) {
+    for (int uav = 0; uav < problem.n_uav(); ++uav) {
         fleet[static_cast<std::size_t>(uav)] = {team.decider(uav), false};
         if (team.active[uav] && std::isfinite(team.free_s[uav])) {
             turns.add(team.free_s[uav], rank[uav], uav);
@@ -129,12 +130,9 @@ bool simulate(const Problem& problem, const TeamView& team, const std::int64_t* 
         }
         took(decider, choice, next.decided && turns.tied());
         next.decided = true;
-        const std::size_t task = static_cast<std::size_t>(choice.task);
         decider.free_s = choice.completion_s;
-        decider.place_m[0] = problem.x_m[task];
-        decider.place_m[1] = problem.y_m[task];
-        decider.place_m[2] = problem.z_m[task];
-        decider.survived *= problem.survival[problem.cell(decider.uav, choice.task)];
+        std::copy_n(problem.place_m(choice.task), 3, decider.place_m);
+        decider.survived *= problem.survivals(decider.uav)[choice.task];
         open.remove_task(choice.task);
         if (std::isfinite(decider.free_s)) {
             turns.put_off_next(decider.free_s);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
@@ -10,8 +12,108 @@
 
 namespace peckorder {
 
-Problem::Problem() = default;
+namespace {
+constexpr int kTogether = 32;  // tasks whose rows stay in cache while UAVs are gone through
+constexpr int kMostNear = 48;
+constexpr int kMostInTable = 1500;  // 18 MB of distances; beyond, computing costs less than memory
+}  // namespace
+
+Problem::Problem(const MissionArrays& arrays)
+    : n_uav_(arrays.n_uav),
+      n_task_(arrays.n_task),
+      horizon_s_(arrays.horizon_s),
+      start_m_(arrays.start_m, arrays.start_m + 3 * static_cast<std::size_t>(n_uav_)),
+      task_m_(arrays.task_m, arrays.task_m + 3 * static_cast<std::size_t>(n_task_)),
+      speed_m_s_(arrays.speed_m_s, arrays.speed_m_s + n_uav_),
+      value_(arrays.value, arrays.value + n_task_),
+      service_s_(arrays.service_s, arrays.service_s + n_task_) {
+    for (const double speed_m_s : speed_m_s_) pace_s_m_.push_back(1.0 / speed_m_s);
+    by_uav_ = table();
+    for (int uav = 0; uav < n_uav_; ++uav) {
+        bool all = true;
+        for (int task = 0; task < n_task_; ++task) {
+            const std::size_t cell = row(uav) + task;
+            const bool capable = arrays.success[cell] > 0.0;
+            by_uav_.weight[cell] = arrays.success[cell] * value_[task];
+            by_uav_.survival[cell] = arrays.survival[cell];
+            by_uav_.capable[cell] = capable;
+            all = all && capable;
+            certain_ = certain_ && (arrays.survival[cell] == 1.0 || !capable);
+        }
+        capable_of_all_.push_back(all);
+    }
+}
+
 Problem::~Problem() = default;
+
+std::vector<double> Problem::legs_s(int uav, const std::vector<int>& tasks) const {
+    std::vector<double> legs_s(tasks.size() * tasks.size());
+    double* leg_s = legs_s.data();
+    for (const int from : tasks) {
+        for (const int to : tasks) *leg_s++ = travel_s(uav, from, to) + service_s(to);
+    }
+    return legs_s;
+}
+
+int Problem::fastest(const std::vector<int>& uavs) const {
+    int fastest = -1;
+    for (const int uav : uavs) {
+        if (fastest < 0 || pace_s_m_[uav] < pace_s_m_[fastest]) fastest = uav;
+    }
+    return fastest;
+}
+
+void Problem::lay_out() const {
+    std::call_once(laid_out_, [this] {
+        turn_table();
+        find_near();
+    });
+}
+
+Problem::Table Problem::table() const {
+    const std::size_t cells = static_cast<std::size_t>(n_uav_) * n_task_;
+    return {std::vector<double>(cells), std::vector<double>(cells),
+            std::vector<std::uint8_t>(cells)};
+}
+
+void Problem::turn_table() const {
+    by_task_ = table();
+    for (int first = 0; first < n_task_; first += kTogether) {
+        const int end = std::min(n_task_, first + kTogether);
+        for (int uav = 0; uav < n_uav_; ++uav) {
+            for (int task = first; task < end; ++task) {
+                const std::size_t from = row(uav) + task, to = column(uav, task);
+                by_task_.weight[to] = by_uav_.weight[from];
+                by_task_.survival[to] = by_uav_.survival[from];
+                by_task_.capable[to] = by_uav_.capable[from];
+            }
+        }
+    }
+}
+
+void Problem::find_near() const {
+    n_near_ = std::max(0, std::min(kMostNear, n_task_ - 1));
+    const bool in_table = n_task_ <= kMostInTable;
+    std::vector<double> row(n_task_), between_m;
+    std::vector<std::int32_t> order(n_task_);
+    if (in_table) between_m.reserve(static_cast<std::size_t>(n_task_) * n_task_);
+    near_.clear();
+    near_.reserve(static_cast<std::size_t>(n_task_) * n_near_);
+    for (int task = 0; task < n_task_; ++task) {
+        for (int to = 0; to < n_task_; ++to) row[to] = straight_m(place_m(task), place_m(to));
+        if (in_table) between_m.insert(between_m.end(), row.begin(), row.end());
+        std::iota(order.begin(), order.end(), 0);
+        order.erase(order.begin() + task);
+        const auto nearer = [&](int a, int b) {
+            return row[a] < row[b] || (row[a] == row[b] && a < b);
+        };
+        std::nth_element(order.begin(), order.begin() + n_near_, order.end(), nearer);
+        std::sort(order.begin(), order.begin() + n_near_, nearer);
+        near_.insert(near_.end(), order.begin(), order.begin() + n_near_);
+        order.resize(n_task_);
+    }
+    between_m_ = std::move(between_m);
+}
 
 std::unique_ptr<Workspace> Problem::borrow_workspace() const {
     {
@@ -30,66 +132,84 @@ void Problem::return_workspace(std::unique_ptr<Workspace> workspace) const {
     idle_.push_back(std::move(workspace));
 }
 
+namespace {
+
+using Given = In<double, 1>;
+using GivenTable = In<double, 2>;
+
+constexpr double kMost = std::numeric_limits<double>::max();
+constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+
+template <typename Array>
+void require_all(const char* name, const Array& array, double low, double high,
+                 const char* range) {
+    for (std::size_t i = 0; i < array.size(); ++i) {
+        require_within(name, array.data()[i], low, high, range);
+    }
+}
+
+// The only place where numbers of a mission are checked, whoever makes a problem.
+MissionArrays checked(const GivenTable& start_enu_m, const GivenTable& task_enu_m,
+                      const Given& speed_m_s, const Given& value, const Given& service_s,
+                      const GivenTable& success, const GivenTable& survival, double horizon_s) {
+    const std::size_t n_uav = speed_m_s.shape(0), n_task = value.shape(0);
+    if (n_uav > 100'000 || n_task > 1'000'000) refuse("speed_m_s or value is too long");
+    require_shape("start_enu_m", start_enu_m, {n_uav, 3});
+    require_shape("task_enu_m", task_enu_m, {n_task, 3});
+    require_shape("service_s", service_s, {n_task});
+    require_shape("success", success, {n_uav, n_task});
+    require_shape("survival", survival, {n_uav, n_task});
+    require_finite("start_enu_m", start_enu_m.data(), start_enu_m.size());
+    require_finite("task_enu_m", task_enu_m.data(), task_enu_m.size());
+    require_all("speed_m_s", speed_m_s, kLeast, kMost, "> 0 and finite");
+    require_all("value", value, 0.0, kMost, ">= 0 and finite");
+    require_all("service_s", service_s, 0.0, kMost, ">= 0 and finite");
+    require_all("success", success, 0.0, 1.0, "within 0..1");
+    require_all("survival", survival, 0.0, 1.0, "within 0..1");
+    require_within("horizon_s", horizon_s, kLeast, kMost, "> 0 and finite");
+    return {static_cast<int>(n_uav), static_cast<int>(n_task), start_enu_m.data(),
+            task_enu_m.data(),       speed_m_s.data(),         value.data(),
+            service_s.data(),        success.data(),           survival.data(),
+            horizon_s};
+}
+
+// What a problem keeps, for reading.
+template <typename T, typename Kept>
+nb::ndarray<nb::numpy, const T, nb::ndim<2>> view(nb::handle owner, const Problem& problem,
+                                                  const Kept* first) {
+    const std::size_t shape[2] = {static_cast<std::size_t>(problem.n_uav()),
+                                  static_cast<std::size_t>(problem.n_task())};
+    return nb::ndarray<nb::numpy, const T, nb::ndim<2>>(first, 2, shape, owner);
+}
+
+}  // namespace
+
 void bind_problem(nb::module_& module) {
     nb::class_<Problem>(module, "KernelProblem")
         .def(
             "__init__",
-            [](Problem* self, In<double, 2> start_enu_m, In<double, 2> task_enu_m,
-               In<double, 1> speed_m_s, In<double, 1> service_s, In<double, 2> weight,
-               In<bool, 2> capable, In<double, 2> survival, double horizon_s) {
-                const std::size_t n_uav = speed_m_s.shape(0), n_task = service_s.shape(0);
-                const std::size_t cells = n_uav * n_task;
-                if (n_uav > 100'000 || n_task > 1'000'000) refuse("speed_m_s or service_s is too long");
-                require_shape("start_enu_m", start_enu_m, {n_uav, 3});
-                require_shape("task_enu_m", task_enu_m, {n_task, 3});
-                require_shape("weight", weight, {n_uav, n_task});
-                require_shape("capable", capable, {n_uav, n_task});
-                require_shape("survival", survival, {n_uav, n_task});
-                require_finite("start_enu_m", start_enu_m.data(), 3 * n_uav);
-                require_finite("task_enu_m", task_enu_m.data(), 3 * n_task);
-                const double most = std::numeric_limits<double>::max();
-                for (std::size_t i = 0; i < n_uav; ++i) {
-                    require_within("speed_m_s", speed_m_s.data()[i],
-                                   std::numeric_limits<double>::denorm_min(), most,
-                                   "> 0 and finite");
-                }
-                for (std::size_t i = 0; i < n_task; ++i) {
-                    require_within("service_s", service_s.data()[i], 0.0, most, ">= 0 and finite");
-                }
-                for (std::size_t i = 0; i < cells; ++i) {
-                    require_within("weight", weight.data()[i], 0.0, most, ">= 0 and finite");
-                    require_within("survival", survival.data()[i], 0.0, 1.0, "within 0..1");
-                }
-                require_within("horizon_s", horizon_s, std::numeric_limits<double>::denorm_min(),
-                               most, "> 0 and finite");
-
-                new (self) Problem();
-                self->n_uav = static_cast<int>(n_uav);
-                self->n_task = static_cast<int>(n_task);
-                self->horizon_s = horizon_s;
-                self->start_m.assign(start_enu_m.data(), start_enu_m.data() + 3 * n_uav);
-                self->speed_m_s.assign(speed_m_s.data(), speed_m_s.data() + n_uav);
-                self->service_s.assign(service_s.data(), service_s.data() + n_task);
-                self->weight.assign(weight.data(), weight.data() + cells);
-                self->survival.assign(survival.data(), survival.data() + cells);
-                for (std::size_t i = 0; i < n_task; ++i) {
-                    self->x_m.push_back(task_enu_m.data()[3 * i]);
-                    self->y_m.push_back(task_enu_m.data()[3 * i + 1]);
-                    self->z_m.push_back(task_enu_m.data()[3 * i + 2]);
-                }
-                const auto* bytes = reinterpret_cast<const std::uint8_t*>(capable.data());
-                for (std::size_t i = 0; i < cells; ++i) self->capable.push_back(bytes[i] != 0);
-                for (std::size_t i = 0; i < n_uav; ++i) {
-                    const auto row = self->capable.begin() + static_cast<std::ptrdiff_t>(i * n_task);
-                    const auto end = row + static_cast<std::ptrdiff_t>(n_task);
-                    self->capable_of_all.push_back(std::find(row, end, 0) == end);
-                }
+            [](Problem* self, const GivenTable& start_enu_m, const GivenTable& task_enu_m,
+               const Given& speed_m_s, const Given& value, const Given& service_s,
+               const GivenTable& success, const GivenTable& survival, double horizon_s) {
+                new (self) Problem(checked(start_enu_m, task_enu_m, speed_m_s, value, service_s,
+                                           success, survival, horizon_s));
             },
-            nb::arg("start_enu_m").noconvert(), nb::arg("task_enu_m").noconvert(), nb::arg("speed_m_s").noconvert(),
-            nb::arg("service_s").noconvert(), nb::arg("weight").noconvert(), nb::arg("capable").noconvert(), nb::arg("survival").noconvert(),
-            nb::arg("horizon_s"))
-        .def_prop_ro("n_uav", [](const Problem& self) { return self.n_uav; })
-        .def_prop_ro("n_task", [](const Problem& self) { return self.n_task; });
+            nb::arg("start_enu_m").noconvert(), nb::arg("task_enu_m").noconvert(),
+            nb::arg("speed_m_s").noconvert(), nb::arg("value").noconvert(),
+            nb::arg("service_s").noconvert(), nb::arg("success").noconvert(),
+            nb::arg("survival").noconvert(), nb::arg("horizon_s"))
+        .def_prop_ro("n_uav", &Problem::n_uav)
+        .def_prop_ro("n_task", &Problem::n_task)
+        .def_prop_ro("horizon_s", &Problem::horizon_s)
+        .def_prop_ro("weight",
+                     [](nb::handle self) {
+                         const auto& problem = nb::cast<const Problem&>(self);
+                         return view<double>(self, problem, problem.weights(0));
+                     })
+        .def_prop_ro("capable", [](nb::handle self) {
+            const auto& problem = nb::cast<const Problem&>(self);
+            return view<bool>(self, problem, problem.abilities(0));
+        });
 }
 
 }  // namespace peckorder

@@ -44,9 +44,9 @@ def prepare(
     start_enu_m: npt.ArrayLike,
     task_enu_m: npt.ArrayLike,
     speed_m_s: npt.ArrayLike,
+    value: npt.ArrayLike,
     service_s: npt.ArrayLike,
-    weight: npt.ArrayLike,
-    capable: npt.ArrayLike,
+    success: npt.ArrayLike,
     survival: npt.ArrayLike,
     horizon_s: float,
 ) -> KernelProblem:
@@ -56,11 +56,15 @@ def prepare(
         start_enu_m: (n_uav, 3) starts [m; east, north, up from the mission origin].
         task_enu_m: (n_task, 3) task places [m; same frame].
         speed_m_s: (n_uav,) cruise speeds [m/s]; > 0.
+        value: (n_task,) m_i; >= 0.
         service_s: (n_task,) time on the spot [s]; >= 0.
-        weight: (n_uav, n_task) p · m; >= 0.
-        capable: (n_uav, n_task) whether the UAV may take the task.
+        success: (n_uav, n_task) p within 0..1; 0: incapable, never on the UAV's list.
         survival: (n_uav, n_task) probability of surviving the task, within 0..1.
         horizon_s: D [s]; > 0.
+
+    Returns:
+        It also knows, as read-only arrays, the (n_uav, n_task) ``weight`` p·m, and of which tasks
+        each UAV is ``capable``.
 
     Raises:
         ValueError: names the argument whose shape or numbers are wrong.
@@ -69,9 +73,9 @@ def prepare(
         start_enu_m=converted("start_enu_m", start_enu_m, np.float64, 2),
         task_enu_m=converted("task_enu_m", task_enu_m, np.float64, 2),
         speed_m_s=converted("speed_m_s", speed_m_s, np.float64, 1),
+        value=converted("value", value, np.float64, 1),
         service_s=converted("service_s", service_s, np.float64, 1),
-        weight=converted("weight", weight, np.float64, 2),
-        capable=converted("capable", capable, np.bool_, 2),
+        success=converted("success", success, np.float64, 2),
         survival=converted("survival", survival, np.float64, 2),
         horizon_s=float(horizon_s),
     )

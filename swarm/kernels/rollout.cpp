@@ -30,13 +30,12 @@ constexpr std::uint64_t kSeed = 2005;  // every replica searches alike
 
 // Open tasks by m·p / (travel + service), best first.
 std::vector<int> candidates(const Solution& solution, const std::vector<int>& open, int uav) {
-  const Instance& instance = solution.instance();
+  const Problem& problem = solution.problem();
   std::vector<std::pair<double, int>> order;
   for (const int task : open) {
-    if (!instance.capable(uav, task)) continue;
-    const double leg_s = solution.start().first_m(uav, task) * instance.pace(uav) +
-                         instance.service_s(task);
-    order.emplace_back(-instance.weight(uav, task) / (leg_s + 1e-9), task);
+    if (!problem.capable(uav, task)) continue;
+    const double leg_s = solution.start().travel_s(uav, task) + problem.service_s(task);
+    order.emplace_back(-problem.weight(uav, task) / (leg_s + 1e-9), task);
   }
   const std::size_t count = std::min<std::size_t>(kCandidates, order.size());
   std::partial_sort(order.begin(), order.begin() + count, order.end());
@@ -68,10 +67,9 @@ std::vector<int> near_uavs(const Solution& solution, int uav) {
   std::vector<std::pair<double, int>> order;
   for (const int other : solution.allowed()) {
     const double* there = &start.place_m[3 * static_cast<std::size_t>(other)];
-    const double x = there[0] - here[0], y = there[1] - here[1], z = there[2] - here[2];
-    double nearest_m = std::sqrt((x * x + y * y) + z * z);
+    double nearest_m = Problem::straight_m(here, there);
     for (const int task : solution.route(other))
-      nearest_m = std::min(nearest_m, start.first_m(uav, task));
+      nearest_m = std::min(nearest_m, Problem::straight_m(here, solution.problem().place_m(task)));
     order.emplace_back(other == uav ? -1.0 : nearest_m, other);
   }
   std::sort(order.begin(), order.end());
@@ -85,7 +83,7 @@ std::vector<int> near_uavs(const Solution& solution, int uav) {
 void reconsider(Solution& solution, int uav, long iterations) {
   const std::vector<int> uavs = near_uavs(solution, uav);
   improve(solution, uavs);
-  Search search(solution.instance(), solution.start(), kSeed);
+  Search search(solution.problem(), solution.start(), kSeed);
   search.load(solution.routes(), uavs);
   const double hottest = kHeat * solution.mean_delay();
   constexpr int kSteps = 10;
@@ -97,10 +95,10 @@ void reconsider(Solution& solution, int uav, long iterations) {
 
 }  // namespace
 
-GuidedChoice guided_choice(const Instance& instance, const Start& start,
+GuidedChoice guided_choice(const Problem& problem, const Start& start,
                            const std::vector<Route>& lists, const std::vector<int>& open, int uav,
                            long iterations) {
-  Solution solution(instance, start);
+  Solution solution(problem, start);
   for (const int other : solution.allowed()) solution.set_route(other, lists[other]);
   insert_missing(solution, open);
   if (iterations > 0) reconsider(solution, uav, iterations);
@@ -133,7 +131,7 @@ GuidedChoice guided_choice(const Instance& instance, const Start& start,
 void bind_rollout(nb::module_& module) {
   module.def(
       "guided_choice",
-      [](const Instance& instance, const Vector& free_s, const Matrix& place_m,
+      [](const Problem& problem, const Vector& free_s, const Matrix& place_m,
          const Vector& survived, const Mask& active, const Indices& flat, const Indices& offsets,
          const Mask& open, int uav, long iterations) {
         const StartArrays arrays{free_s, place_m, survived, active};
@@ -141,13 +139,13 @@ void bind_rollout(nb::module_& module) {
         GuidedChoice choice;
         {
           const nb::gil_scoped_release released;
-          choice = guided_choice(instance, arrays.start(instance), lists, open_tasks(open), uav,
+          choice = guided_choice(problem, arrays.start(problem), lists, open_tasks(open), uav,
                                  iterations);
         }
         return std::make_tuple(choice.task, choice.worth, choice.second, choice.planned,
                                choice.valued);
       },
-      nb::arg("instance"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
+      nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"), nb::arg("flat"), nb::arg("offsets"), nb::arg("open"), nb::arg("uav"),
       nb::arg("iterations"));
 }

@@ -18,7 +18,7 @@ struct GuidedChoice {
 
 // Lists name open tasks only. `iterations` > 0 searches around the deciding UAV; otherwise the
 // choice is between the lists as they are and other first tasks.
-GuidedChoice guided_choice(const Instance& instance, const Start& start,
+GuidedChoice guided_choice(const Problem& problem, const Start& start,
                            const std::vector<Route>& lists, const std::vector<int>& open, int uav,
                            long iterations);
 

@@ -56,12 +56,12 @@ def guided_choice(
     Raises:
         ValueError: names the argument that is wrong.
     """
-    if not 0 <= uav < team.mission.n_uav or not np.asarray(team.active)[uav]:
+    if not 0 <= uav < team.problem.n_uav or not np.asarray(team.active)[uav]:
         raise ValueError(f"uav must be the index of an active UAV, not {uav}")
     if iterations < 0:
         raise ValueError(f"iterations must be >= 0, not {iterations}")
     task, worth, second, planned, valued = _kernels.guided_choice(
-        team.mission.kernel,
+        team.problem,
         *team.arguments(),
         *open_lists(team, lists),
         np.asarray(team.open),

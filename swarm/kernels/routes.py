@@ -13,17 +13,17 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from swarm.kernels import _kernels
+from swarm.kernels._kernels import KernelProblem
 
 __all__ = [
     "FloatArray",
-    "RouteArrays",
     "Routes",
     "TeamArrays",
     "flat_lists",
@@ -54,67 +54,6 @@ _ITERATIONS_FOR_FULL_HEAT = 1600.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RouteArrays:
-    """What the mission is, checked once and laid out for route kernels.
-
-    Building it takes time in n_task² · log n_task, about 10 ms for 500 tasks; keep it.
-
-    Raises:
-        ValueError: names the argument whose shape or numbers are wrong.
-    """
-
-    task_enu_m: npt.ArrayLike
-    """(n_task, 3) places [m; east, north, up]."""
-    speed_m_s: npt.ArrayLike
-    """(n_uav,) cruise speeds [m/s]; > 0."""
-    value: npt.ArrayLike
-    """(n_task,) m_i; >= 0."""
-    service_s: npt.ArrayLike
-    """(n_task,) time on the spot [s]; >= 0."""
-    success: npt.ArrayLike
-    """(n_uav, n_task) p within 0..1; 0: incapable, never on the list."""
-    survival: npt.ArrayLike
-    """(n_uav, n_task) probability of surviving the task, within 0..1."""
-    horizon_s: float
-    """D [s]; > 0."""
-    n_uav: int = field(init=False)
-    n_task: int = field(init=False)
-    capable: npt.NDArray[np.bool_] = field(init=False, repr=False)
-    """(n_uav, n_task) success > 0."""
-    kernel: _kernels.RouteInstance = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        speed_m_s = _floats("speed_m_s", self.speed_m_s, (None,))
-        value = _floats("value", self.value, (None,))
-        n_uav, n_task = len(speed_m_s), len(value)
-        task_enu_m = _floats("task_enu_m", self.task_enu_m, (n_task, 3))
-        service_s = _floats("service_s", self.service_s, (n_task,))
-        success = _floats("success", self.success, (n_uav, n_task))
-        survival = _floats("survival", self.survival, (n_uav, n_task))
-        horizon_s = float(self.horizon_s)
-        if not 0.0 < horizon_s < float("inf"):
-            raise ValueError(f"horizon_s must be > 0 and finite, not {horizon_s}")
-        if (speed_m_s <= 0.0).any():
-            raise ValueError(f"speed_m_s must be > 0, not {speed_m_s.min()}")
-        for name, array in (("value", value), ("service_s", service_s)):
-            if (array < 0.0).any():
-                raise ValueError(f"{name} must be >= 0, not {array.min()}")
-        for name, array in (("success", success), ("survival", survival)):
-            if ((array < 0.0) | (array > 1.0)).any():
-                raise ValueError(f"{name} must be within 0..1")
-        kernel = _kernels.RouteInstance(
-            task_enu_m, speed_m_s, value, service_s, success, survival, horizon_s
-        )
-        for name, item in (
-            ("n_uav", n_uav),
-            ("n_task", n_task),
-            ("capable", success > 0.0),
-            ("kernel", kernel),
-        ):
-            object.__setattr__(self, name, item)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class TeamArrays:
     """Where the team stands, checked against the mission.
 
@@ -122,7 +61,9 @@ class TeamArrays:
         ValueError: names the argument whose shape or numbers are wrong.
     """
 
-    mission: RouteArrays
+    problem: KernelProblem
+    """The prepared mission. The first kernel that is asked about it takes time in n_task² ·
+    log n_task to lay it out, about 10 ms for 500 tasks."""
     free_s: npt.ArrayLike
     """(n_uav,) mission time at which each UAV is next free [s]; finite."""
     place_enu_m: npt.ArrayLike
@@ -135,7 +76,7 @@ class TeamArrays:
     """(n_task,) tasks to be put on lists."""
 
     def __post_init__(self) -> None:
-        n_uav, n_task = self.mission.n_uav, self.mission.n_task
+        n_uav, n_task = self.problem.n_uav, self.problem.n_task
         survived = _floats("survived", self.survived, (n_uav,))
         if ((survived < 0.0) | (survived > 1.0)).any():
             raise ValueError("survived must be within 0..1")
@@ -147,19 +88,6 @@ class TeamArrays:
             ("open", _mask("open", self.open, n_task)),
         ):
             object.__setattr__(self, name, array)
-
-    @classmethod
-    def at_start(cls, mission: RouteArrays, start_enu_m: npt.ArrayLike) -> TeamArrays:
-        """Mission time 0, everything open; ``start_enu_m`` is (n_uav, 3) [m]."""
-        n_uav, n_task = mission.n_uav, mission.n_task
-        return cls(
-            mission,
-            np.zeros(n_uav),
-            start_enu_m,
-            np.ones(n_uav),
-            np.ones(n_uav, dtype=np.bool_),
-            np.ones(n_task, dtype=np.bool_),
-        )
 
     def arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
         """Times, places, survival and activity as kernels take them."""
@@ -217,7 +145,7 @@ def optimise_routes(
         raise ValueError(f"threads must be >= 1, not {threads}")
     kernel_threads = (os.cpu_count() or 1) if threads is None else threads
     search = _kernels.RouteSearch(
-        team.mission.kernel,
+        team.problem,
         *team.arguments(),
         *open_lists(team, lists),
         np.asarray(team.open),
@@ -230,7 +158,7 @@ def optimise_routes(
     search.polish(lambda: not time_spent_frac() < _FIRST_POLISH_FRAC)
     lanes = search.n_lane()
     n_open = int(np.sum(team.open))
-    length = team.mission.n_task / max(1, int(np.sum(team.active)))
+    length = team.problem.n_task / max(1, int(np.sum(team.active)))
     most = int(_MOST_IN_SLICE * min(1.0, _LONG_LIST / max(1.0, length)))
     done = 0
     while True:
@@ -264,7 +192,7 @@ def _heat(spent_frac: float, total: float, n_task: int) -> float:
 def improve_routes(team: TeamArrays, lists: Sequence[Sequence[int]]) -> Routes:
     """Lists after local search, in which no move gains any more; tasks stay those on the lists."""
     arrays = open_lists(team, lists)
-    return _routes(*_kernels.improve_routes(team.mission.kernel, *team.arguments(), *arrays))
+    return _routes(*_kernels.improve_routes(team.problem, *team.arguments(), *arrays))
 
 
 def flat_lists(
@@ -291,14 +219,14 @@ def open_lists(
     team: TeamArrays, lists: Sequence[Sequence[int]] | None
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """The lists without what is closed, beyond the UAV or on the list of an inactive UAV."""
-    mission = team.mission
+    problem = team.problem
     if lists is None:
-        return flat_lists([[]] * mission.n_uav, mission.n_uav, mission.n_task)
-    flat, offsets = flat_lists(lists, mission.n_uav, mission.n_task)
-    uav = np.repeat(np.arange(mission.n_uav), np.diff(offsets))
-    keep = np.asarray(team.open)[flat] & np.asarray(team.active)[uav] & mission.capable[uav, flat]
+        return flat_lists([[]] * problem.n_uav, problem.n_uav, problem.n_task)
+    flat, offsets = flat_lists(lists, problem.n_uav, problem.n_task)
+    uav = np.repeat(np.arange(problem.n_uav), np.diff(offsets))
+    keep = np.asarray(team.open)[flat] & np.asarray(team.active)[uav] & problem.capable[uav, flat]
     kept_offsets = np.zeros_like(offsets)
-    np.cumsum(np.bincount(uav[keep], minlength=mission.n_uav), out=kept_offsets[1:])
+    np.cumsum(np.bincount(uav[keep], minlength=problem.n_uav), out=kept_offsets[1:])
     return flat[keep], kept_offsets
 
 
@@ -307,17 +235,13 @@ def _routes(flat: npt.NDArray[np.int64], offsets: npt.NDArray[np.int64]) -> Rout
     return [tasks[begin:end] for begin, end in pairwise(ends)]
 
 
-def _floats(name: str, value: npt.ArrayLike, shape: tuple[int | None, ...]) -> FloatArray:
+def _floats(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     try:
         array = np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be numbers of one shape") from None
-    fits = len(array.shape) == len(shape) and all(
-        want is None or want == have for want, have in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
-        wanted = tuple("any" if n is None else n for n in shape)
-        raise ValueError(f"{name} must have shape {wanted}, not {array.shape}")
+    if array.shape != shape:
+        raise ValueError(f"{name} must have shape {shape}, not {array.shape}")
     if not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, not NaN or infinite")
     return array

@@ -29,8 +29,8 @@ struct StartArrays {
   const Vector& survived;
   const Mask& active;
 
-  Start start(const Instance& instance) const {
-    return Start(instance, free_s.data(), place_m.data(), survived.data(), active.data());
+  Start start(const Problem& problem) const {
+    return Start(problem, free_s.data(), place_m.data(), survived.data(), active.data());
   }
 };
 

@@ -26,25 +26,24 @@ struct Offer {
   std::vector<int> tasks;
   std::vector<double> weight, survival, price, first_s, leg_s, earliest_s, latest_s;
 
-  Offer(const Instance& instance, const Start& start, int uav, const Pricing& pricing)
-      : left_s(instance.horizon_s() - start.free_s[uav]) {
+  Offer(const Problem& problem, const Start& start, int uav, const Pricing& pricing)
+      : left_s(problem.horizon_s() - start.free_s[uav]) {
     const Timetable* table = pricing.timetable;
     const double free_s = start.free_s[uav];
     for (const int task : pricing.open)
-      if (instance.capable(uav, task)) tasks.push_back(task);
+      if (problem.capable(uav, task)) tasks.push_back(task);
     leg_s.reserve(tasks.size() * tasks.size());
     for (const int task : tasks) {
-      weight.push_back(start.survived[uav] * instance.weight(uav, task));
-      survival.push_back(pricing.expansions > 0 ? instance.survival(uav, task) : 1.0);
+      weight.push_back(start.survived[uav] * problem.weight(uav, task));
+      survival.push_back(pricing.expansions > 0 ? problem.survival(uav, task) : 1.0);
       price.push_back(pricing.prices[task]);
       first_s.push_back(table ? table->first_s[table->at(uav, task)]
-                              : start.first_m(uav, task) * instance.pace(uav) +
-                                    instance.service_s(task));
+                              : start.travel_s(uav, task) + problem.service_s(task));
       earliest_s.push_back(table ? table->earliest_s[table->at(uav, task)] - free_s : 0.0);
       latest_s.push_back(table ? table->latest_s[table->at(uav, task)] - free_s : kInfinite);
       for (const int to : tasks)
         leg_s.push_back(table ? table->leg_s[table->at(uav, task) * table->n_task + to]
-                              : instance.leg_s(uav, task, to));
+                              : problem.leg_s(uav, task, to));
     }
   }
 
@@ -299,9 +298,16 @@ class RealLists {
   int best_ = -1;       // its last task
 };
 
-double priced_list(const Instance& instance, const Start& start, int uav, const Pricing& pricing,
+std::vector<int> active_uavs(const Start& start) {
+  std::vector<int> uavs;
+  for (std::size_t uav = 0; uav < start.active.size(); ++uav)
+    if (start.active[uav]) uavs.push_back(static_cast<int>(uav));
+  return uavs;
+}
+
+double priced_list(const Problem& problem, const Start& start, int uav, const Pricing& pricing,
                    std::vector<int>& list, Watch& watch) {
-  const Offer offer(instance, start, uav, pricing);
+  const Offer offer(problem, start, uav, pricing);
   watch.stops_after(static_cast<std::int64_t>(offer.n()) * offer.n() / 2);
   const RelaxedLists relaxed(offer, pricing.bucket_s, watch);
   if (relaxed.last() < 0 || watch.stopped()) return 0.0;
@@ -311,39 +317,33 @@ double priced_list(const Instance& instance, const Start& start, int uav, const 
 
 }  // namespace
 
-std::vector<double> shortest_legs_s(const Instance& instance, const Start& start) {
-  double least_pace = kInfinite;
-  for (int uav = 0; uav < instance.n_uav(); ++uav)
-    if (start.active[uav]) least_pace = std::min(least_pace, instance.pace(uav));
-  std::vector<double> shortest_s(instance.n_task(), kInfinite);
-  if (least_pace == kInfinite) return shortest_s;
-  for (int a = 0; a < instance.n_task(); ++a)
-    for (int b = 0; b < instance.n_task(); ++b)
-      if (a != b)
-        shortest_s[a] = std::min(shortest_s[a], instance.distance_m(a, b) * least_pace +
-                                                    instance.service_s(b));
+std::vector<double> shortest_legs_s(const Problem& problem, const Start& start) {
+  const int fastest = problem.fastest(active_uavs(start));
+  std::vector<double> shortest_s(problem.n_task(), kInfinite);
+  if (fastest < 0) return shortest_s;
+  for (int a = 0; a < problem.n_task(); ++a)
+    for (int b = 0; b < problem.n_task(); ++b)
+      if (a != b) shortest_s[a] = std::min(shortest_s[a], problem.leg_s(fastest, a, b));
   return shortest_s;
 }
 
-double priced_lists(const Instance& instance, const Start& start, const Pricing& pricing,
+double priced_lists(const Problem& problem, const Start& start, const Pricing& pricing,
                     std::vector<int>& visits, Watch& watch) {
-  std::vector<int> uavs;
-  for (int uav = 0; uav < instance.n_uav(); ++uav)
-    if (start.active[uav]) uavs.push_back(uav);
+  const std::vector<int> uavs = active_uavs(start);
   std::vector<std::vector<int>> lists(uavs.size());
   std::vector<double> values(uavs.size(), 0.0);
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t k; (k = next.fetch_add(1)) < uavs.size();)
       if (!watch.stopped())
-        values[k] = priced_list(instance, start, uavs[k], pricing, lists[k], watch);
+        values[k] = priced_list(problem, start, uavs[k], pricing, lists[k], watch);
   };
   std::vector<std::thread> helpers;
   for (int k = 1; k < std::min<int>(pricing.threads, static_cast<int>(uavs.size())); ++k)
     helpers.emplace_back(work);
   work();
   for (std::thread& helper : helpers) helper.join();
-  visits.assign(instance.n_task(), 0);
+  visits.assign(problem.n_task(), 0);
   if (watch.stopped()) return std::numeric_limits<double>::quiet_NaN();
   double sum = 0.0;
   for (std::size_t k = 0; k < uavs.size(); ++k) {

@@ -8,12 +8,12 @@
 #include <cstddef>
 #include <vector>
 
-#include "routes_instance.hpp"
+#include "routes_solution.hpp"
 #include "watch.hpp"
 
 namespace peckorder {
 
-// What each UAV can complete when, and how long it takes there, where the instance's places,
+// What each UAV can complete when, and how long it takes there, where the problem's places,
 // speeds and horizon do not say it all. Rows are UAVs, columns tasks; times count from the mission's
 // begin, whatever `Start` says.
 struct Timetable {
@@ -33,18 +33,18 @@ struct Pricing {
   const std::vector<int>& open;        // tasks
   const std::vector<double>& prices;   // (n_task,)
   double bucket_s;                     // > 0
-  const Timetable* timetable;          // null: as the instance says
+  const Timetable* timetable;          // null: as the problem says
   long expansions;                     // of the search among real lists, per UAV; 0: none
   int threads;
 };
 
 // Per task, the shortest leg from completing it to completing another that any active UAV can fly;
 // infinite without another task or such a UAV [s].
-std::vector<double> shortest_legs_s(const Instance& instance, const Start& start);
+std::vector<double> shortest_legs_s(const Problem& problem, const Start& start);
 
 // Σ over active UAVs of max(0, best relaxed list); visits[i] counts task i on the lists found.
 // The same for any number of threads. NaN once the watch has stopped it.
-double priced_lists(const Instance& instance, const Start& start, const Pricing& pricing,
+double priced_lists(const Problem& problem, const Start& start, const Pricing& pricing,
                     std::vector<int>& visits, Watch& watch);
 
 }  // namespace peckorder

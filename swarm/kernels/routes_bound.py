@@ -66,7 +66,7 @@ def shortest_legs_s(team: TeamArrays) -> FloatArray:
 
     Infinite where there are fewer than two tasks or no active UAV.
     """
-    return _kernels.shortest_legs_s(team.mission.kernel, *team.arguments())
+    return _kernels.shortest_legs_s(team.problem, *team.arguments())
 
 
 def priced_lists(
@@ -102,22 +102,22 @@ def priced_lists(
         ValueError: names the argument that is wrong.
     """
     prices = np.array(price, dtype=np.float64, order="C")
-    if prices.shape != (team.mission.n_task,):
-        raise ValueError(f"price must have shape {(team.mission.n_task,)}, not {prices.shape}")
+    if prices.shape != (team.problem.n_task,):
+        raise ValueError(f"price must have shape {(team.problem.n_task,)}, not {prices.shape}")
     if not (np.isfinite(prices).all() and (prices >= 0.0).all()):
         raise ValueError("price must be finite and >= 0")
     begin_s = np.asarray(team.free_s)[np.asarray(team.active)].min(initial=0.0)
-    most_s = team.mission.horizon_s - begin_s
+    most_s = team.problem.horizon_s - begin_s
     if not (bucket_s > 0.0 and most_s <= bucket_s * MOST_BUCKETS):
         raise ValueError(f"bucket_s must be > 0 and make at most {MOST_BUCKETS} buckets")
-    if timetable is not None and timetable.shape != (team.mission.n_uav, team.mission.n_task):
+    if timetable is not None and timetable.shape != (team.problem.n_uav, team.problem.n_task):
         raise ValueError(f"timetable must not be of shape {timetable.shape}")
     if expansions < 0:
         raise ValueError(f"expansions must be >= 0, not {expansions}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be >= 1, not {threads}")
     return _kernels.priced_lists(
-        team.mission.kernel,
+        team.problem,
         *team.arguments(),
         np.asarray(team.open),
         prices,

@@ -23,10 +23,10 @@ class LocalSearch {
  public:
   LocalSearch(Solution& solution, const std::vector<int>& uavs, Watch& watch)
       : solution_(solution),
-        instance_(solution.instance()),
+        problem_(solution.problem()),
         watch_(watch),
         uavs_(uavs),
-        dirty_(instance_.n_uav(), 1) {
+        dirty_(problem_.n_uav(), 1) {
     if (!uavs.empty()) {
       double sum = 0.0;
       for (const int uav : uavs) sum += std::abs(solution.route_value(uav));
@@ -53,13 +53,13 @@ class LocalSearch {
  private:
   // UAVs b > a whose lists come near a's, where either has changed; idle UAVs come near all.
   std::vector<int> beside(int a, const std::vector<std::uint8_t>& was_dirty) const {
-    std::vector<std::uint8_t> found(instance_.n_uav(), 0);
+    std::vector<std::uint8_t> found(problem_.n_uav(), 0);
     const bool idle = solution_.route(a).empty();
     watch_.stops_after(static_cast<long>(solution_.route(a).size()) * kNearForPair);
     for (const int task : solution_.route(a)) {
-      const int most = std::min(kNearForPair, instance_.n_near());
+      const int most = std::min(kNearForPair, problem_.n_near());
       for (int k = 0; k < most; ++k) {
-        const int uav = solution_.uav_of(instance_.near(task)[k]);
+        const int uav = solution_.uav_of(problem_.near(task)[k]);
         if (uav >= 0) found[uav] = 1;
       }
     }
@@ -71,12 +71,15 @@ class LocalSearch {
     return uavs;
   }
 
-  Segment one(int uav, int task) const { return instance_.task_segment(uav, task); }
+  Segment one(int uav, int task) const {
+    return single(task, problem_.weight(uav, task), problem_.survival(uav, task),
+                  problem_.horizon_s());
+  }
 
   Segment join(int uav, const Segment& a, const Segment& b) const {
     if (a.empty()) return b;
     if (b.empty()) return a;
-    return joined(a, b, instance_.leg_s(uav, a.last, b.first));
+    return joined(a, b, problem_.leg_s(uav, a.last, b.first));
   }
 
   // Present worth of a list from `place` on, seen from the beginning of the list.
@@ -167,7 +170,7 @@ class LocalSearch {
 
   bool able(int uav, const Route& route, int from, int to) const {
     for (int k = from; k < to; ++k)
-      if (!instance_.capable(uav, route[k])) return false;
+      if (!problem_.capable(uav, route[k])) return false;
     return true;
   }
 
@@ -179,7 +182,7 @@ class LocalSearch {
     first_able = size;
     bool able_so_far = true;
     for (int k = size - 1; k >= 0; --k) {
-      able_so_far = able_so_far && instance_.capable(to, route[k]);
+      able_so_far = able_so_far && problem_.capable(to, route[k]);
       if (!able_so_far) break;
       first_able = k;
       tails[k] = join(to, one(to, route[k]), tails[k + 1]);
@@ -196,7 +199,7 @@ class LocalSearch {
       const double now = worth_now(from, i);
       Segment part, turned;
       for (int end = i + 1; end <= size && end - i <= kMostMoved; ++end) {
-        if (!instance_.capable(to, source[end - 1])) break;
+        if (!problem_.capable(to, source[end - 1])) break;
         part = join(to, part, one(to, source[end - 1]));
         turned = join(to, one(to, source[end - 1]), turned);
         const double freed = worth_from(solution_, from, i, Segment{}, end) - now;
@@ -220,11 +223,11 @@ class LocalSearch {
     try_moving(b, a, best, kMoveFrom);
     for (int i = 0; i < n; ++i) {
       if (watch_.stops_after(m + 1)) return false;
-      if (!instance_.capable(b, first[i])) continue;
+      if (!problem_.capable(b, first[i])) continue;
       const Segment given = one(b, first[i]);
       const double now = worth_now(a, i);
       for (int k = 0; k < m; ++k) {
-        if (!instance_.capable(a, second[k])) continue;
+        if (!problem_.capable(a, second[k])) continue;
         const double gain = worth_from(solution_, a, i, one(a, second[k]), i + 1) - now +
                             worth_from(solution_, b, k, given, k + 1) - worth_now(b, k);
         offer(gain, best, kExchange, i, k, 0);
@@ -276,7 +279,7 @@ class LocalSearch {
               kMoveFromTurned, kExchange, kTails };
 
   Solution& solution_;
-  const Instance& instance_;
+  const Problem& problem_;
   Watch& watch_;
   const std::vector<int> uavs_;
   std::vector<std::uint8_t> dirty_;
@@ -302,7 +305,7 @@ double worth_from(const Solution& solution, int uav, int place, const Segment& m
   double worth = middle.worth(begin_s);
   if (!ends) {
     const double delay_s = begin_s + middle.duration_s +
-                           solution.instance().leg_s(uav, middle.last, route[next]) -
+                           solution.problem().leg_s(uav, middle.last, route[next]) -
                            solution.completion_s(route[next]);
     worth += middle.survival *
              (solution.tail_worth(uav, next) - delay_s * solution.tail_slope(uav, next));

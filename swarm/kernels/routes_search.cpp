@@ -13,13 +13,13 @@ constexpr std::uint64_t kBlink = 0x028F5C28F5C28F5Cull;  // 1 % of 2^64
 }  // namespace
 
 void insert_missing(Solution& solution, const std::vector<int>& tasks) {
-  const Instance& instance = solution.instance();
+  const Problem& problem = solution.problem();
   std::vector<std::pair<double, int>> order;
   for (const int task : tasks) {
     if (solution.uav_of(task) >= 0) continue;
     double most = -1.0;
     for (const int uav : solution.allowed())
-      if (instance.capable(uav, task)) most = std::max(most, instance.weight(uav, task));
+      if (problem.capable(uav, task)) most = std::max(most, problem.weight(uav, task));
     if (most >= 0.0) order.emplace_back(-most, task);
   }
   std::sort(order.begin(), order.end());
@@ -29,13 +29,13 @@ void insert_missing(Solution& solution, const std::vector<int>& tasks) {
   }
 }
 
-Search::Search(const Instance& instance, const Start& start, std::uint64_t seed)
-    : current_(instance, start),
+Search::Search(const Problem& problem, const Start& start, std::uint64_t seed)
+    : current_(problem, start),
       random_(seed),
-      best_(instance.n_uav()),
-      is_unsaved_(instance.n_uav(), 0),
-      is_touched_(instance.n_uav(), 0),
-      copies_(instance.n_uav()) {}
+      best_(problem.n_uav()),
+      is_unsaved_(problem.n_uav(), 0),
+      is_touched_(problem.n_uav(), 0),
+      copies_(problem.n_uav()) {}
 
 void Search::load(const std::vector<Route>& routes, const std::vector<int>& uavs) {
   current_.restrict_to(uavs);
@@ -65,11 +65,11 @@ void Search::ruin() {
   const double most_strings = 4.0 * kMeanTorn / (1.0 + longest) - 1.0;
   const int strings = static_cast<int>(random_.uniform() * most_strings + 1.0);
   const int seed = tasks_[random_.below(static_cast<int>(tasks_.size()))];
-  const Instance& instance = current_.instance();
+  const Problem& problem = current_.problem();
   torn_.clear();
   tear(seed, longest);
-  const std::int32_t* near = instance.near(seed);
-  for (int k = 0; k < instance.n_near() && static_cast<int>(touched_.size()) < strings; ++k) {
+  const std::int32_t* near = problem.near(seed);
+  for (int k = 0; k < problem.n_near() && static_cast<int>(touched_.size()) < strings; ++k) {
     const int uav = current_.uav_of(near[k]);
     if (uav >= 0 && !is_touched_[uav]) tear(near[k], longest);
   }
@@ -100,7 +100,7 @@ void Search::tear(int task, double longest) {
 }
 
 void Search::recreate() {
-  const Instance& instance = current_.instance();
+  const Problem& problem = current_.problem();
   const int kind = random_.below(10);
   order_.clear();
   for (const int task : torn_) {
@@ -108,7 +108,7 @@ void Search::recreate() {
     if (kind < 4) {
       key = random_.uniform();
     } else if (kind < 8) {
-      key = -instance.value(task);
+      key = -problem.value(task);
     } else {
       key = current_.completion_s(task) * (kind == 8 ? 1.0 : -1.0);
     }

@@ -19,7 +19,7 @@ void insert_missing(Solution& solution, const std::vector<int>& tasks);
 
 class Search {
  public:
-  Search(const Instance& instance, const Start& start, std::uint64_t seed);
+  Search(const Problem& problem, const Start& start, std::uint64_t seed);
 
   // Work on the lists of these UAVs alone; best := current.
   void load(const std::vector<Route>& routes, const std::vector<int>& uavs);

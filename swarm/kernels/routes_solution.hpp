@@ -3,14 +3,36 @@
 // Leaves out: which changes to try (routes_search.hpp, routes_local.hpp).
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <vector>
 
-#include "routes_instance.hpp"
+#include "problem.hpp"
+#include "segment.hpp"
 
 namespace peckorder {
 
 using Route = std::vector<int>;
+
+// Where each UAV begins. Lays out the problem, whose route kernels all ask for this first.
+class Start {
+ public:
+  std::vector<double> free_s, survived, place_m;  // (n_uav,), (n_uav,), (n_uav, 3)
+  std::vector<std::uint8_t> active;
+
+  Start(const Problem& problem, const double* free_s, const double* place_m,
+        const double* survived, const bool* active);
+
+  // From where it begins to any task.
+  double travel_s(int uav, int task) const { return travel_s_[at(uav, task)]; }
+
+ private:
+  std::size_t at(int uav, int task) const {
+    return static_cast<std::size_t>(task) * free_s.size() + uav;
+  }
+
+  std::vector<double> travel_s_;  // (n_task, n_uav)
+};
 
 struct Insertion {
   int uav = -1;
@@ -20,9 +42,9 @@ struct Insertion {
 
 class Solution {
  public:
-  Solution(const Instance& instance, const Start& start);
+  Solution(const Problem& problem, const Start& start);
 
-  const Instance& instance() const { return *instance_; }
+  const Problem& problem() const { return *problem_; }
   const Start& start() const { return *start_; }
   const Route& route(int uav) const { return routes_[uav]; }
   const std::vector<Route>& routes() const { return routes_; }
@@ -52,10 +74,9 @@ class Solution {
   }
   double reach_s(int uav, int place, int task) const {
     if (place == 0)
-      return start_->free_s[uav] + start_->first_m(uav, task) * instance_->pace(uav) +
-             instance_->service_s(task);
+      return start_->free_s[uav] + start_->travel_s(uav, task) + problem_->service_s(task);
     const int before = routes_[uav][place - 1];
-    return visit_[before].completion_s + instance_->leg_s(uav, before, task);
+    return visit_[before].completion_s + problem_->leg_s(uav, before, task);
   }
   // The rest of the list from `place` on, as flown by its own UAV: slope, and worth as timed.
   double tail_slope(int uav, int place) const {
@@ -75,7 +96,7 @@ class Solution {
 
   void refresh(int uav, int from_place);
 
-  const Instance* instance_;
+  const Problem* problem_;
   const Start* start_;
   std::vector<Route> routes_;
   std::vector<double> value_;
@@ -89,24 +110,24 @@ class Solution {
 template <class Skip>
 Insertion best_insertion(const Solution& solution, int task, Skip&& skip) {
   constexpr int kScanAllBelow = 150;
-  const Instance& instance = solution.instance();
+  const Problem& problem = solution.problem();
   Insertion best;
   const auto offer = [&](int uav, int place) {
     if (skip()) return;
     const double gain = solution.insertion_gain(uav, place, task);
     if (gain > best.gain) best = {uav, place, gain};
   };
-  const bool all = instance.n_task() <= kScanAllBelow;
+  const bool all = problem.n_task() <= kScanAllBelow;
   for (const int uav : solution.allowed()) {
-    if (!instance.capable(uav, task)) continue;
+    if (!problem.capable(uav, task)) continue;
     const int size = static_cast<int>(solution.route(uav).size());
     for (int place = 0; place <= (all ? size : 0); ++place) offer(uav, place);
   }
   if (all) return best;
-  const std::int32_t* near = instance.near(task);
-  for (int k = 0; k < instance.n_near(); ++k) {
+  const std::int32_t* near = problem.near(task);
+  for (int k = 0; k < problem.n_near(); ++k) {
     const int uav = solution.uav_of(near[k]);
-    if (uav < 0 || !instance.capable(uav, task)) continue;
+    if (uav < 0 || !problem.capable(uav, task)) continue;
     const int place = solution.place_of(near[k]);
     if (place > 0) offer(uav, place);
     offer(uav, place + 1);

@@ -27,10 +27,10 @@ double temperature(double hottest, double heat) {
 }
 }  // namespace
 
-TeamSearch::TeamSearch(const Instance& instance, const Start& start, std::vector<Route> lists,
+TeamSearch::TeamSearch(const Problem& problem, const Start& start, std::vector<Route> lists,
                        const std::vector<int>& tasks, std::uint64_t seed)
-    : instance_(instance), start_(start), random_(seed), current_(std::move(lists)) {
-  Solution solution(instance, start);
+    : problem_(problem), start_(start), random_(seed), current_(std::move(lists)) {
+  Solution solution(problem, start);
   uavs_ = solution.allowed();
   for (const int uav : uavs_) solution.set_route(uav, current_[uav]);
   insert_missing(solution, tasks);
@@ -42,7 +42,7 @@ TeamSearch::TeamSearch(const Instance& instance, const Start& start, std::vector
       kMostLanes, std::max(kFewestLanes, static_cast<int>(uavs_.size()) / kUavsPerLane));
   lanes_.reserve(lanes);
   for (int lane = 0; lane < lanes; ++lane) {
-    lanes_.emplace_back(instance, start, random_.bits());
+    lanes_.emplace_back(problem, start, random_.bits());
     if (!divided_) lanes_.back().load(current_, uavs_);
   }
 }
@@ -64,7 +64,7 @@ void TeamSearch::round(long iterations, double heat, int threads) {
 }
 
 void TeamSearch::polish(Watch& watch) {
-  Solution solution(instance_, start_);
+  Solution solution(problem_, start_);
   for (const int uav : uavs_) solution.set_route(uav, best_[uav]);
   improve(solution, uavs_, watch);
   current_ = best_ = solution.routes();
@@ -80,8 +80,8 @@ void TeamSearch::divide() {
   for (const int uav : uavs_) {
     double x = 0.0, y = 0.0;
     for (const int task : current_[uav]) {
-      x += instance_.place_m(task)[0];
-      y += instance_.place_m(task)[1];
+      x += problem_.place_m(task)[0];
+      y += problem_.place_m(task)[1];
     }
     const std::size_t count = current_[uav].size();
     if (count == 0) {

@@ -15,7 +15,7 @@ namespace peckorder {
 
 class TeamSearch {
  public:
-  TeamSearch(const Instance& instance, const Start& start, std::vector<Route> lists,
+  TeamSearch(const Problem& problem, const Start& start, std::vector<Route> lists,
              const std::vector<int>& tasks, std::uint64_t seed);
 
   // `iterations` per lane; heat within 0..1, 1 at the beginning of the annealing, 0 at its end.
@@ -33,7 +33,7 @@ class TeamSearch {
   void divide();
   void join();
 
-  const Instance& instance_;
+  const Problem& problem_;
   const Start& start_;
   Random random_;
   std::vector<int> uavs_;

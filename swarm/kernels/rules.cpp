@@ -52,15 +52,14 @@ Size argmax(const std::vector<double>& values, Size n) {
 // Told that no two arrays overlap, compilers do two tasks or more at once.
 void score_all(Size n, const double* PECKORDER_RESTRICT x_m, const double* PECKORDER_RESTRICT y_m,
                const double* PECKORDER_RESTRICT z_m, const double* PECKORDER_RESTRICT service_s,
-               const double* PECKORDER_RESTRICT weight, const Decider& decider, double speed_m_s,
-               double horizon_s, double* PECKORDER_RESTRICT completion_s,
+               const double* PECKORDER_RESTRICT weight, const Decider& decider,
+               const Problem& problem, double* PECKORDER_RESTRICT completion_s,
                double* PECKORDER_RESTRICT score) {
-    const double x = decider.place_m[0], y = decider.place_m[1], z = decider.place_m[2];
+    const LegsFrom legs = problem.legs_from(decider.uav, decider.place_m);
     const double free_s = decider.free_s, survived = decider.survived;
+    const double horizon_s = problem.horizon_s();
     for (Size i = 0; i < n; ++i) {
-        const double dx = x_m[i] - x, dy = y_m[i] - y, dz = z_m[i] - z;
-        const double travel_s = std::sqrt((dx * dx + dy * dy) + dz * dz) / speed_m_s;
-        const double time_s = (free_s + travel_s) + service_s[i];
+        const double time_s = (free_s + legs.travel_s(x_m[i], y_m[i], z_m[i])) + service_s[i];
         completion_s[i] = time_s;
         score[i] = (horizon_s - time_s) * (survived * weight[i]);
     }
@@ -79,7 +78,7 @@ double largest_but(const std::vector<double>& values, Size n, Size left_out) {
 
 void OpenTasks::assign(const Problem& problem, const std::uint8_t* open) {
     task.clear();
-    for (int t = 0; t < problem.n_task; ++t) {
+    for (int t = 0; t < problem.n_task(); ++t) {
         if (open[t]) task.push_back(t);
     }
     const Size n = task.size();
@@ -88,16 +87,16 @@ void OpenTasks::assign(const Problem& problem, const std::uint8_t* open) {
     z_m.resize(n);
     service_s.resize(n);
     for (Size i = 0; i < n; ++i) {
-        const Size t = static_cast<Size>(task[i]);
-        x_m[i] = problem.x_m[t];
-        y_m[i] = problem.y_m[t];
-        z_m[i] = problem.z_m[t];
-        service_s[i] = problem.service_s[t];
+        const double* place_m = problem.place_m(task[i]);
+        x_m[i] = place_m[0];
+        y_m[i] = place_m[1];
+        z_m[i] = place_m[2];
+        service_s[i] = problem.service_s(task[i]);
     }
 }
 
 void OpenTasks::assign_capable(const Problem& problem, const OpenTasks& all, int uav) {
-    const std::uint8_t* capable = &problem.capable[problem.cell(uav, 0)];
+    const std::uint8_t* capable = problem.abilities(uav);
     const Size most = all.size();
     task.resize(most);
     x_m.resize(most);
@@ -137,7 +136,7 @@ void OpenTasks::remove_task(int which) {
 Choice Workspace::decide(const Problem& problem, const OpenTasks& all, const Decider& decider,
                          RuleCode rule, bool brief) {
     tasks_ = &all;
-    if (!problem.capable_of_all[static_cast<Size>(decider.uav)]) {
+    if (!problem.capable_of_all(decider.uav)) {
         capable_.assign_capable(problem, all, decider.uav);
         tasks_ = &capable_;
     }
@@ -156,19 +155,17 @@ void Workspace::look_out(const Problem& problem, const Decider& decider) {
     completion_s_.resize(n);
     score_.resize(n);
     weight_.resize(n);
-    const double* row = problem.weight.data() + problem.cell(decider.uav, 0);
+    const double* row = problem.weights(decider.uav);
     for (Size i = 0; i < n; ++i) weight_[i] = row[tasks.task[i]];
     score_all(n, tasks.x_m.data(), tasks.y_m.data(), tasks.z_m.data(), tasks.service_s.data(),
-              weight_.data(), decider, problem.speed_m_s[static_cast<Size>(decider.uav)],
-              problem.horizon_s, completion_s_.data(), score_.data());
+              weight_.data(), decider, problem, completion_s_.data(), score_.data());
 }
 
 // Greedy without second and certificate: nothing is kept of a block but its best task.
 Choice Workspace::decide_briefly(const Problem& problem, const Decider& decider) {
     const OpenTasks& tasks = *tasks_;
     const Size n = tasks.size();
-    const double* row = problem.weight.data() + problem.cell(decider.uav, 0);
-    const double speed_m_s = problem.speed_m_s[static_cast<Size>(decider.uav)];
+    const double* row = problem.weights(decider.uav);
     double weight[kBlock], completion_s[kBlock], score[kBlock];
     Choice choice;
     choice.score = -kInfinity;
@@ -177,8 +174,7 @@ Choice Workspace::decide_briefly(const Problem& problem, const Decider& decider)
         const std::int32_t* task = tasks.task.data() + from;
         for (Size i = 0; i < count; ++i) weight[i] = row[task[i]];
         score_all(count, tasks.x_m.data() + from, tasks.y_m.data() + from, tasks.z_m.data() + from,
-                  tasks.service_s.data() + from, weight, decider, speed_m_s, problem.horizon_s,
-                  completion_s, score);
+                  tasks.service_s.data() + from, weight, decider, problem, completion_s, score);
         const double most = largest(score, count);
         // the very first task is taken where no score is above -infinity
         if (!(most > choice.score) && choice.task >= 0) continue;
@@ -255,24 +251,20 @@ Choice Workspace::look_ahead_far(const Problem& problem, const Decider& decider)
     }
     const Size n = picked_.size();
     std::vector<double> weight(n);
+    std::vector<int> toured(n);
     tour_completion_s_.resize(n);
     tour_survival_.resize(n);
-    leg_s_.resize(n * n);
     for (Size i = 0; i < n; ++i) {
-        const Size from = static_cast<Size>(picked_[i]);
-        weight[i] = weight_[from];
-        tour_completion_s_[i] = completion_s_[from];
-        tour_survival_[i] = problem.survival[problem.cell(decider.uav, tasks.task[from])];
-        for (Size j = 0; j < n; ++j) {
-            const int to = tasks.task[static_cast<Size>(picked_[j])];
-            leg_s_[i * n + j] = problem.travel_s(decider.uav, tasks.x_m[from], tasks.y_m[from],
-                                                 tasks.z_m[from], to) +
-                                problem.service_s[static_cast<Size>(to)];
-        }
+        const Size at = static_cast<Size>(picked_[i]);
+        toured[i] = tasks.task[at];
+        weight[i] = weight_[at];
+        tour_completion_s_[i] = completion_s_[at];
+        tour_survival_[i] = problem.survivals(decider.uav)[tasks.task[at]];
     }
-    const GoodTour tour = good_tour({static_cast<int>(n), problem.horizon_s,
+    const std::vector<double> leg_s = problem.legs_s(decider.uav, toured);
+    const GoodTour tour = good_tour({static_cast<int>(n), problem.horizon_s(),
                                      tour_completion_s_.data(), weight.data(),
-                                     tour_survival_.data(), leg_s_.data()});
+                                     tour_survival_.data(), leg_s.data()});
     const Size all = tasks.size(), greedy = argmax(score_, all);
     Size best = static_cast<Size>(picked_[static_cast<Size>(tour.order[0])]);
     double value = tour.value, second = tour.second;
@@ -312,7 +304,7 @@ bool Workspace::certificate(const Problem& problem, const Decider& decider, Size
     if (n == 1) return true;  // one tour only
     const double first = score_[best];
     if (!(first > 0.0)) return false;
-    const double* survival = problem.survival.data() + problem.cell(decider.uav, 0);
+    const double* survival = problem.survivals(decider.uav);
     double highest = 0.0;
     for (Size i = 0; i < n; ++i) highest = std::max(highest, survival[tasks_->task[i]]);
     if (highest > 0.5) return false;  // (1 − λ)/(2 − λ) is at most 1/2 for λ within 0..1
@@ -325,7 +317,7 @@ bool Workspace::certificate(const Problem& problem, const Decider& decider, Size
 bool Workspace::rest_is_worth_flying(const Problem& problem, const Decider& decider, Size best) {
     std::vector<Size> left(tasks_->size());
     std::iota(left.begin(), left.end(), Size{0});
-    const double* survival = problem.survival.data() + problem.cell(decider.uav, 0);
+    const double* survival = problem.survivals(decider.uav);
     double free_s = completion_s_[best], earned = 0.0, survived = 1.0;
     Size at = best;
     left.erase(left.begin() + static_cast<std::ptrdiff_t>(best));
@@ -334,10 +326,9 @@ bool Workspace::rest_is_worth_flying(const Problem& problem, const Decider& deci
         double most = -kInfinity, time_s = free_s;
         for (Size k = 0; k < left.size(); ++k) {
             const Size i = left[k];
-            const double t = (free_s + problem.travel_s(decider.uav, tasks_->x_m[at], tasks_->y_m[at],
-                                                        tasks_->z_m[at], tasks_->task[i])) +
-                             tasks_->service_s[i];
-            const double score = weight_[i] * (problem.horizon_s - t);
+            const double travel_s = problem.travel_s(decider.uav, tasks_->task[at], tasks_->task[i]);
+            const double t = (free_s + travel_s) + tasks_->service_s[i];
+            const double score = weight_[i] * (problem.horizon_s() - t);
             if (score > most) {
                 most = score;
                 chosen = k;
@@ -356,7 +347,7 @@ bool Workspace::rest_is_worth_flying(const Problem& problem, const Decider& deci
 // A table over the decider's tasks or more of them.
 const Workspace::Table& Workspace::table(const Problem& problem, int uav) {
     const std::vector<std::int32_t>& wanted = tasks_->task;
-    tables_.resize(static_cast<Size>(problem.n_uav));
+    tables_.resize(static_cast<Size>(problem.n_uav()));
     Table& known = tables_[static_cast<Size>(uav)];
     if (known.tours && std::includes(known.tasks.begin(), known.tasks.end(), wanted.begin(),
                                      wanted.end())) {
@@ -369,21 +360,16 @@ const Workspace::Table& Workspace::table(const Problem& problem, int uav) {
         table_bytes_ = 0;
     }
     const Size n = wanted.size();
-    std::vector<double> weight(n), survival(n), leg_s(n * n);
+    std::vector<double> weight(n), survival(n);
     for (Size i = 0; i < n; ++i) {
-        const Size from = static_cast<Size>(wanted[i]);
-        weight[i] = problem.weight[problem.cell(uav, wanted[i])];
-        survival[i] = problem.survival[problem.cell(uav, wanted[i])];
-        for (Size j = 0; j < n; ++j) {
-            leg_s[i * n + j] = problem.travel_s(uav, problem.x_m[from], problem.y_m[from],
-                                                problem.z_m[from], wanted[j]) +
-                               problem.service_s[static_cast<Size>(wanted[j])];
-        }
+        weight[i] = problem.weights(uav)[wanted[i]];
+        survival[i] = problem.survivals(uav)[wanted[i]];
     }
+    const std::vector<double> leg_s = problem.legs_s(uav, wanted);
     known.tasks = wanted;
     Watch never;
     known.tours = std::make_unique<TourTable>(static_cast<int>(n), weight.data(), survival.data(),
-                                              leg_s.data(), problem.horizon_s, never);
+                                              leg_s.data(), problem.horizon_s(), never);
     table_bytes_ += known.tours->bytes();
     return known;
 }

@@ -81,7 +81,7 @@ class Workspace {
     const std::vector<double>* values_ = nullptr;  // of each by the rule; none for a long tour
     OpenTasks capable_;
     std::vector<double> completion_s_, score_, weight_;
-    std::vector<double> leg_s_, tour_completion_s_, tour_survival_;
+    std::vector<double> tour_completion_s_, tour_survival_;
     std::vector<std::int32_t> picked_;
     std::vector<Table> tables_;
     std::size_t table_bytes_ = 0;

@@ -2,7 +2,7 @@
 
 A folder made by `unpacked` holds the packages swarm, agent and coordinator as they were
 released, without recordings, status and dashboard. The compiled kernels are those of this
-build: an archive of sources has none, and their interface has not changed since. Leaves out:
+build, since an archive of sources has none, called as those of the release were. Leaves out:
 what the releases say to each other (tests/process/test_mixed_versions.py).
 """
 
@@ -32,6 +32,25 @@ import agent, coordinator, swarm
 for package in (agent, coordinator, swarm):
     assert Path(release) in Path(package.__file__).parents, package
 """
+_KERNELS = """
+from swarm.kernels.present._kernels import *
+from swarm.kernels.present import _kernels
+
+
+def KernelProblem(*, weight, capable, **arrays):
+    value = weight.max(axis=0, initial=0.0)
+    value[value == 0.0] = 1.0
+    return _kernels.KernelProblem(value=value, success=capable * (weight / value), **arrays)
+
+
+def RouteInstance(task_m, speed_m_s, *arrays):
+    return _kernels.KernelProblem(0.0 * speed_m_s[:, None] + task_m[0], task_m, speed_m_s, *arrays)
+
+
+def evaluate_sequences(*arguments):
+    return _kernels.run_sequences(*arguments)[:2]
+"""
+"""The kernels of 0.1.0, which knew two kinds of problem, by those of this build."""
 _COMMAND = "from swarm.cli import console_main\nsys.exit(console_main())\n"
 
 
@@ -50,7 +69,10 @@ def unpacked(version: str, folder: Path) -> Path:
     kernels = find_spec("swarm.kernels._kernels")
     assert kernels is not None
     assert kernels.origin is not None
-    shutil.copy(kernels.origin, release / "swarm" / "kernels")
+    folder = release / "swarm" / "kernels"
+    (folder / "present").mkdir()
+    shutil.copy(kernels.origin, folder / "present")
+    (folder / "_kernels.py").write_text(_KERNELS)
     # Its commands are those it was released with, wherever they have moved since.
     project = tomllib.loads((release / "pyproject.toml").read_text())["project"]
     commands = project["entry-points"]["peckorder.commands"]

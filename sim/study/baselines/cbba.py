@@ -35,15 +35,16 @@ class Insertion:
         problem: the mission.
         state: when and where each UAV is free, and what it has survived; at its start when None.
 
-    Keeps (n_task,) distances for every task that has been on a path: at most n_task² floats.
+    Keeps (n_task,) travel times for every UAV and task that has been on its path.
     """
 
     def __init__(self, problem: Problem, state: TeamState | None = None) -> None:
         self._problem = problem
         self._state = TeamState.at_start(problem) if state is None else state
-        self._from_task_m: dict[int, FloatArray] = {}
-        self._columns_m = np.ascontiguousarray(problem.task_enu_m.T)
-        self._from_start_m = [self._distances_m(place) for place in self._state.place_enu_m]
+        self._from_task_s: dict[tuple[int, int], FloatArray] = {}
+        self._from_start_s = [
+            problem.travel_s(uav, place) for uav, place in enumerate(self._state.place_enu_m)
+        ]
 
     def gains(self, uav: int, path: Sequence[int]) -> tuple[FloatArray, IntArray]:
         """The best insertion of each task into ``path``.
@@ -54,8 +55,7 @@ class Insertion:
             to the earlier place.
         """
         problem = self._problem
-        rows_m = [self._from_start_m[uav], *(self._row_m(task) for task in path)]
-        go_s = np.array(rows_m) / problem.speed_m_s[uav]
+        go_s = np.array([self._from_start_s[uav], *(self._row_s(uav, task) for task in path)])
         nodes = np.array(path, dtype=np.int64)
         legs_s = go_s[np.arange(len(path)), nodes]
         free_s = np.concatenate(
@@ -78,15 +78,12 @@ class Insertion:
         places: IntArray = np.argmax(gain, axis=0)
         return gain[places, np.arange(problem.n_task)], places
 
-    def _row_m(self, task: int) -> FloatArray:
-        row = self._from_task_m.get(task)
+    def _row_s(self, uav: int, task: int) -> FloatArray:
+        row = self._from_task_s.get((uav, task))
         if row is None:
-            row = self._from_task_m[task] = self._distances_m(self._problem.task_enu_m[task])
+            row = self._problem.travel_s(uav, self._problem.task_enu_m[task])
+            self._from_task_s[uav, task] = row
         return row
-
-    def _distances_m(self, place_enu_m: FloatArray) -> FloatArray:
-        distances: FloatArray = np.sqrt(((self._columns_m - place_enu_m[:, None]) ** 2).sum(axis=0))
-        return distances
 
 
 def _from_the_end(terms: FloatArray) -> FloatArray:

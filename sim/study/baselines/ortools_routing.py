@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sim.study.baselines.index_rules import Routes
-from swarm.allocation.problem import FloatArray, IntArray, Problem
+from swarm.allocation.problem import IntArray, Problem
 from swarm.runtime.errors import Fault, InputError
 
 __all__ = ["SHORTFALL", "is_installed", "matrix_bytes", "ortools_routes", "require_installed"]
@@ -115,14 +115,12 @@ def _model(
     weight = problem.weight[:, tasks]
     able = problem.capable[:, tasks]
     scale = _LARGEST_WEIGHT / max(float(weight.max()), 1e-300)
-    places_m = problem.task_enu_m[tasks]
-    between_m = _distances_m(places_m, places_m)
+    between = np.ix_(tasks, tasks)
     transits = []
     for uav in range(problem.n_uav):
-        travel_m = np.zeros((len(tasks) + 1, len(tasks) + 1))
-        travel_m[0, 1:] = _distances_m(problem.start_enu_m[uav : uav + 1], places_m)
-        travel_m[1:, 1:] = between_m
-        time_s = travel_m / problem.speed_m_s[uav]
+        time_s = np.zeros((len(tasks) + 1, len(tasks) + 1))
+        time_s[0, 1:] = problem.travel_s(uav, problem.start_enu_m[uav])[tasks]
+        time_s[1:, 1:] = problem.travel_between_s(uav)[between]
         time_s[:, 1:] += problem.service_s[tasks]
         units = np.rint(time_s * (_UNITS_PER_HORIZON / problem.horizon_s)).astype(np.int64)
         transit = routing.RegisterTransitMatrix(units.tolist())
@@ -150,9 +148,3 @@ def _route(uav: int, tasks: IntArray, manager: Any, routing: Any, solution: Any)
         route.append(int(tasks[manager.IndexToNode(index) - 1]))
         index = solution.Value(routing.NextVar(index))
     return route
-
-
-def _distances_m(from_m: FloatArray, to_m: FloatArray) -> FloatArray:
-    """(n, k) distances between (n, 3) and (k, 3) places [m]."""
-    distances: FloatArray = np.sqrt(((from_m[:, None] - to_m[None]) ** 2).sum(axis=-1))
-    return distances

@@ -45,8 +45,9 @@ from sim.study.policies.roster import Planner
 from sim.world.motion import Point
 from sim.world.uncertainty import Realization
 from swarm.allocation import Problem
-from swarm.allocation.problem import BoolArray, FloatArray, IntArray
-from swarm.kernels.routes import RouteArrays, TeamArrays
+from swarm.allocation.problem import BoolArray, FloatArray, IntArray, straight_m
+from swarm.allocation.rules import team_at_start
+from swarm.kernels.routes import TeamArrays
 from swarm.kernels.routes_bound import Timetable, priced_lists
 from swarm.model import Task, Uav
 
@@ -149,21 +150,13 @@ class _Hindsight:
         lost_s = np.array([fate.lost_at_s.get(uav.id, math.inf) for uav in mission.uavs], float)
         gone_s = np.array([fate.withdrawn_at_s.get(t.id, math.inf) for t in mission.tasks], float)
         start_s, between_s = _flights_s(fate)
-        routes = RouteArrays(
-            problem.task_enu_m,
-            problem.speed_m_s,
-            problem.value,
-            problem.service_s,
-            success,
-            survival,
-            problem.horizon_s,
-        )
+        drawn = replace(problem, success=success, survival=survival)
         earliest_s = np.maximum(appears_s, start_s) + tries * problem.service_s
         latest_s = np.minimum(lost_s[:, None], gone_s) + _SLACK_S
         first_s = start_s + problem.service_s
         return cls(
-            team=TeamArrays.at_start(routes, problem.start_enu_m),
-            worth=success * problem.value,
+            team=team_at_start(drawn),
+            worth=drawn.weight,
             horizon_s=problem.horizon_s,
             earliest_s=earliest_s,
             latest_s=latest_s,
@@ -226,8 +219,8 @@ def _at_its_fastest(fate: Realization, uav: Uav) -> Uav:
 
 def _legs_s(fate: Realization, uav: Uav, starts: list[Point], stops: list[Point]) -> FloatArray:
     """(len(starts), len(stops)) straight flights."""
-    begin, end = np.array(starts, float).reshape(-1, 3), np.array(stops, float).reshape(-1, 3)
-    length_m = np.sqrt(((end[None] - begin[:, None]) ** 2).sum(axis=2))
+    begin, end = np.array(starts, float).reshape(-1, 3).T, np.array(stops, float).reshape(-1, 3).T
+    length_m = straight_m(end[:, None, :] - begin[:, :, None])
     here = uav.position_enu_m
     speed_m_s = np.full(length_m.shape, fate.speed_m_s(uav, None, here, here))
     if fate.wind.speed_m_s > 0.0:

@@ -20,8 +20,8 @@ from sim.study.policies.team import fly_team
 from sim.world.outcome import FlightOutcome
 from sim.world.uncertainty import Realization
 from swarm.allocation import Problem, TeamState, evaluate
-from swarm.allocation.rules import route_arrays, team_arrays
-from swarm.kernels.routes import RouteArrays, optimise_routes
+from swarm.allocation.rules import team_arrays
+from swarm.kernels.routes import optimise_routes
 from swarm.model import TaskId, UavId
 from swarm.runtime.clock import Clock
 
@@ -104,7 +104,6 @@ class CentralOptimiser(ListFollower):
         self._upon = frozenset(upon)
         self._diverts = diverts
         self._plans = 0
-        self._arrays: tuple[Problem, RouteArrays] | None = None
 
     def hear(self, situation: TeamSituation, news: Collection[TeamNews]) -> Collection[int]:
         """Plan anew if the news are worth it."""
@@ -139,7 +138,7 @@ class CentralOptimiser(ListFollower):
             for uav, route in enumerate(self._lists)
         ]
         with self._account.timed():
-            team = team_arrays(self._arrays_of(problem), state, state.active, 0.0)
+            team = team_arrays(problem, state, state.active, 0.0)
             routes, worth = optimise_routes(
                 team,
                 seed=self._seed + self._plans,
@@ -153,11 +152,6 @@ class CentralOptimiser(ListFollower):
                 if worth <= before + _LEAST_GAIN * abs(before):
                     return
         self.put_into_force(routes)
-
-    def _arrays_of(self, problem: Problem) -> RouteArrays:
-        if self._arrays is None or self._arrays[0] is not problem:
-            self._arrays = problem, route_arrays(problem)
-        return self._arrays[1]
 
 
 @dataclass(frozen=True, slots=True)

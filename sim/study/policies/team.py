@@ -27,10 +27,10 @@ from sim.study.policies.situation import (
     as_point,
     between,
 )
-from sim.world.motion import Point
 from sim.world.outcome import FlightOutcome, TaskVisit
 from sim.world.uncertainty import Realization
 from swarm.allocation import Problem, TeamState, rank_of
+from swarm.allocation.problem import straight_m
 from swarm.model import UavId
 
 __all__ = ["fly_team"]
@@ -255,8 +255,8 @@ class _TeamFlight:
         start, true_start = as_point(state.place_enu_m[uav]), self._true_enu_m[uav]
         stop = self._fate.stop_enu_m(who.id, what)
         speed_m_s = self._fate.speed_m_s(who, what.id, true_start, stop)
-        arrives_s = now_s + _distance_m(true_start, stop) / speed_m_s
-        travel_s = _distance_m(start, what.position_enu_m) / who.speed_m_s
+        arrives_s = now_s + float(straight_m(np.subtract(stop, true_start))) / speed_m_s
+        travel_s = float(problem.travel_s(uav, state.place_enu_m[uav])[task])
         leg = TeamLeg(
             task=task,
             start_enu_m=start,
@@ -288,9 +288,3 @@ class _TeamFlight:
             survival=known.survival[:, :n_known],
             horizon_s=known.horizon_s,
         )
-
-
-def _distance_m(start: Point, stop: Point) -> float:
-    """Rounded as everywhere in `swarm.allocation`."""
-    dx_m, dy_m, dz_m = stop[0] - start[0], stop[1] - start[1], stop[2] - start[2]
-    return math.sqrt(dx_m * dx_m + dy_m * dy_m + dz_m * dz_m)

@@ -12,8 +12,7 @@ from coordinator.planner.exact import optimum
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import guided_plan
 from sim.study.generator import random_mission
-from swarm.allocation.rules import route_arrays
-from swarm.kernels.routes import TeamArrays
+from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes_bound import priced_lists, shortest_legs_s
 from tests.support.problems import any_problem, random_problem, table_1
 
@@ -36,7 +35,7 @@ def test_no_bound_is_below_the_optimum(seed: int, n_uav: int, n_task: int) -> No
 def test_any_prices_give_a_bound(seed: int) -> None:
     rng = np.random.default_rng(seed)
     problem = random_problem(rng, 2, 5, horizon_s=float(rng.uniform(2.0, 12.0)))
-    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    team = team_at_start(problem)
     price = rng.uniform(0.0, 20.0, 5)
 
     worth, visits = priced_lists(team, price, shortest_legs_s(team).min() * rng.uniform(0.05, 1.0))
@@ -113,7 +112,7 @@ def test_wrong_arguments_are_refused_by_name(
     name: str, price: list[float], bucket_s: float, threads: int
 ) -> None:
     problem = table_1()
-    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    team = team_at_start(problem)
 
     with pytest.raises(ValueError, match=name):
         priced_lists(team, np.array(price), bucket_s, threads=threads)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import copy
+import gc
 import pickle
 from typing import Any
 
@@ -15,14 +16,34 @@ from tests.support.problems import table_1
 
 def arguments() -> dict[str, Any]:
     problem = table_1()
-    names = ("start_enu_m", "task_enu_m", "speed_m_s", "service_s", "weight", "capable")
+    names = ("start_enu_m", "task_enu_m", "speed_m_s", "value", "service_s", "success")
     return {name: getattr(problem, name) for name in (*names, "survival", "horizon_s")}
 
 
 def test_handle_knows_its_size() -> None:
     handle = prepare(**arguments())
 
-    assert (handle.n_uav, handle.n_task) == (3, 8)
+    assert (handle.n_uav, handle.n_task, handle.horizon_s) == (3, 8, 5.0)
+
+
+def test_handle_knows_who_can_do_what_and_what_it_is_worth() -> None:
+    given = arguments()
+    given["success"] = given["success"].copy()
+    given["success"][1, 2] = 0.0
+    handle = prepare(**given)
+
+    assert np.array_equal(handle.capable, given["success"] > 0.0)
+    assert np.array_equal(handle.weight, given["success"] * given["value"])
+
+
+def test_what_a_handle_shows_outlives_it_and_cannot_be_written() -> None:
+    given = arguments()
+    weight = prepare(**given).weight
+    gc.collect()
+
+    assert np.array_equal(weight, given["success"] * given["value"])
+    with pytest.raises(ValueError, match="read-only"):
+        weight[0, 0] = 1.0
 
 
 @pytest.mark.parametrize(
@@ -42,10 +63,13 @@ def test_handle_knows_its_size() -> None:
         ("speed_m_s", [1j, 1j, 1j]),
         ("service_s", np.full(8, -0.1)),
         ("service_s", np.full(8, np.nan)),
-        ("weight", np.full((3, 8), -1.0)),
-        ("weight", np.ones((8, 3))),
-        ("capable", np.ones((3, 8))),
-        ("capable", np.ones((3, 7), dtype=np.bool_)),
+        ("service_s", np.zeros(7)),
+        ("value", np.full(8, -1.0)),
+        ("value", np.full(8, np.inf)),
+        ("value", [[1.0]]),
+        ("success", np.full((3, 8), 1.1)),
+        ("success", np.full((3, 8), -0.1)),
+        ("success", np.ones((8, 3))),
         ("survival", np.full((3, 8), 1.1)),
         ("survival", np.full((3, 8), np.nan)),
         ("horizon_s", 0.0),

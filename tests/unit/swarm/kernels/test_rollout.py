@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarm.allocation import Problem, TeamState, evaluate, run
 from swarm.allocation.lower_level import Decision
 from swarm.allocation.reference import team_worth
-from swarm.allocation.rules import GuidedRule, route_arrays, team_arrays
+from swarm.allocation.rules import GuidedRule, team_arrays, team_at_start
 from swarm.kernels.rollout import guided_choice
 from swarm.kernels.routes import optimise_routes
 from tests.support.problems import any_problem, random_problem
@@ -54,12 +54,9 @@ def test_undisturbed_the_executed_lists_are_worth_no_less_than_the_published(
 @given(seed=SEEDS)
 def test_lists_without_a_gaining_move_are_kept_to_the_letter(seed: int) -> None:
     problem = random_problem(np.random.default_rng(seed), 4, 25, horizon_s=30.0)
-    team = team_arrays(
-        route_arrays(problem), state := TeamState.at_start(problem), state.active, 0.0
-    )
-    lists, _ = optimise_routes(team, iterations=500)
+    lists, _ = optimise_routes(team_at_start(problem), iterations=500)
 
-    routes, _ = run(problem, state, np.arange(4), rule_of(problem, lists))
+    routes, _ = run(problem, TeamState.at_start(problem), np.arange(4), rule_of(problem, lists))
 
     assert routes == lists
 
@@ -72,7 +69,7 @@ def test_a_choice_is_worth_what_the_whole_team_then_flies(
     problem = any_problem(seed, n_uav, n_task)
     lists = any_lists(problem, np.random.default_rng(seed))
     state = TeamState.at_start(problem)
-    team = team_arrays(route_arrays(problem), state, state.active, 0.0)
+    team = team_arrays(problem, state, state.active, 0.0)
 
     choice = guided_choice(team, lists, 0)
 
@@ -156,7 +153,7 @@ def test_a_wrong_call_is_refused() -> None:
     problem = random_problem(np.random.default_rng(4), 2, 3, horizon_s=30.0)
     state = TeamState.at_start(problem)
     state.active[1] = False
-    team = team_arrays(route_arrays(problem), state, state.active, 0.0)
+    team = team_arrays(problem, state, state.active, 0.0)
 
     for uav in (-1, 1, 2):
         with pytest.raises(ValueError, match="uav"):

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from coordinator.planner.exact import optimum
 from swarm.allocation import Problem, TeamState, evaluate
 from swarm.allocation.reference import best_of_neighbourhood, team_worth
-from swarm.allocation.rules import route_arrays, team_arrays
-from swarm.kernels.routes import RouteArrays, TeamArrays, improve_routes, optimise_routes
+from swarm.allocation.rules import team_arrays
+from swarm.kernels.routes import TeamArrays, improve_routes, optimise_routes
 from tests.support.problems import any_problem, paper_problem, random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -19,7 +19,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 def team_of(problem: Problem, state: TeamState | None = None) -> TeamArrays:
     state = TeamState.at_start(problem) if state is None else state
-    return team_arrays(route_arrays(problem), state, state.active, 0.0)
+    return team_arrays(problem, state, state.active, 0.0)
 
 
 def any_state(problem: Problem, rng: np.random.Generator) -> TeamState:
@@ -159,41 +159,8 @@ def test_it_stops_when_all_is_spent_and_reports_progress() -> None:
     assert worth >= bests[-1] - 1e-9 * worth
 
 
-def arguments() -> dict[str, Any]:
-    return {
-        "task_enu_m": np.zeros((3, 3)),
-        "speed_m_s": np.ones(2),
-        "value": np.ones(3),
-        "service_s": np.zeros(3),
-        "success": np.ones((2, 3)),
-        "survival": np.ones((2, 3)),
-        "horizon_s": 10.0,
-    }
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("task_enu_m", np.zeros((3, 2))),
-        ("task_enu_m", [[0.0, 0.0, np.nan]] * 3),
-        ("speed_m_s", [1.0, -1.0]),
-        ("speed_m_s", [1.0, 0.0]),
-        ("speed_m_s", "fast"),
-        ("value", [[1.0]]),
-        ("value", [1.0, -1.0, 1.0]),
-        ("service_s", [0.0, 0.0]),
-        ("service_s", [0.0, 0.0, -1.0]),
-        ("success", np.full((2, 3), 1.1)),
-        ("success", np.ones((3, 2))),
-        ("survival", np.full((2, 3), -0.1)),
-        ("survival", np.full((2, 3), np.inf)),
-        ("horizon_s", 0.0),
-        ("horizon_s", float("nan")),
-    ],
-)
-def test_a_wrong_mission_is_refused_by_name(name: str, wrong: object) -> None:
-    with pytest.raises(ValueError, match=name):
-        RouteArrays(**(arguments() | {name: wrong}))
+def small() -> Problem:
+    return random_problem(np.random.default_rng(0), 2, 3)
 
 
 @pytest.mark.parametrize(
@@ -215,14 +182,13 @@ def test_a_wrong_state_is_refused_by_name(name: str, wrong: object) -> None:
         "open": np.ones(3, dtype=np.bool_),
     }
     with pytest.raises(ValueError, match=name):
-        TeamArrays(RouteArrays(**arguments()), **(right | {name: wrong}))
+        TeamArrays(small().kernel, **(right | {name: wrong}))
 
 
 @pytest.mark.parametrize("lists", [[[0]], [[0], [3]], [[0], [-1]], [[0, 0], []], [[1], [1]]])
 def test_wrong_lists_are_refused(lists: list[list[int]]) -> None:
-    team = TeamArrays.at_start(RouteArrays(**arguments()), np.zeros((2, 3)))
     with pytest.raises(ValueError, match="lists"):
-        optimise_routes(team, iterations=10, lists=lists)
+        optimise_routes(team_of(small()), iterations=10, lists=lists)
 
 
 @pytest.mark.parametrize(
@@ -236,9 +202,8 @@ def test_wrong_lists_are_refused(lists: list[list[int]]) -> None:
     ],
 )
 def test_wrong_options_are_refused(name: str, options: dict[str, Any]) -> None:
-    team = TeamArrays.at_start(RouteArrays(**arguments()), np.zeros((2, 3)))
     with pytest.raises(ValueError, match=name):
-        optimise_routes(team, **options)
+        optimise_routes(team_of(small()), **options)
 
 
 @settings(deadline=None, max_examples=4)

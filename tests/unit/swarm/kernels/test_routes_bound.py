@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from swarm.allocation import TeamState
 from swarm.allocation.reference import list_worth, timed_list_worth
-from swarm.allocation.rules import route_arrays, team_arrays
-from swarm.kernels.routes import TeamArrays
+from swarm.allocation.rules import team_arrays, team_at_start
 from swarm.kernels.routes_bound import Timetable, priced_lists, shortest_legs_s
 from tests.support.problems import any_problem
 
@@ -28,7 +27,7 @@ def test_no_list_is_worth_more_after_paying(seed: int, n_task: int, share: float
     state.survived[:] = rng.uniform(0.3, 1.0, 2)
     state.place_enu_m[:] = rng.uniform(0.0, 10.0, (2, 3))
     state.active[1] = False
-    team = team_arrays(route_arrays(problem), state, state.active, 0.0)
+    team = team_arrays(problem, state, state.active, 0.0)
     price = rng.uniform(0.0, 10.0, n_task)
 
     worth, visits = priced_lists(team, price, share * shortest_legs_s(team).min())
@@ -47,7 +46,7 @@ def test_with_fine_buckets_one_visit_is_worth_nearly_what_it_is() -> None:
     state.open[:] = False
     task = int(np.flatnonzero(problem.capable[0])[0])
     state.open[task] = True
-    team = team_arrays(route_arrays(problem), state, state.active, 0.0)
+    team = team_arrays(problem, state, state.active, 0.0)
     shortest_s = shortest_legs_s(team).min()
 
     worth, visits = priced_lists(team, np.zeros(6), shortest_s / 1000.0)
@@ -89,7 +88,7 @@ def test_timed_lists_are_bounded_and_searched_as_the_plain_definition_says(
     deadly = rng.random(problem.survival.shape) < 0.2
     problem = replace(problem, survival=np.where(deadly, 0.0, problem.survival))
     timetable = random_timetable(rng, 2, n_task)
-    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    team = team_at_start(problem)
     price = rng.uniform(0.0, 10.0, n_task)
 
     worth, visits = priced_lists(team, price, bucket_s, timetable=timetable, expansions=expansions)
@@ -111,7 +110,7 @@ def test_timed_lists_are_bounded_and_searched_as_the_plain_definition_says(
 
 def test_search_among_real_lists_only_lowers_the_bound() -> None:
     problem = any_problem(7, 3, 12)
-    team = TeamArrays.at_start(route_arrays(problem), problem.start_enu_m)
+    team = team_at_start(problem)
     price, bucket_s = np.full(12, 0.1), shortest_legs_s(team).min() / 2.0
 
     worths = [
@@ -148,7 +147,7 @@ def test_wrong_timetables_are_refused_by_name(name: str, wrong: npt.NDArray[np.f
 def test_told_to_give_up_it_has_no_answer() -> None:
     problem = any_problem(1, 3, 200)
     state = TeamState.at_start(problem)
-    team = team_arrays(route_arrays(problem), state, state.active, 0.0)
+    team = team_arrays(problem, state, state.active, 0.0)
     bucket_s = problem.horizon_s / 400.0
 
     worth, visits = priced_lists(team, np.zeros(200), bucket_s, should_stop=lambda: True)
