@@ -45,10 +45,6 @@ if TYPE_CHECKING:
 __all__ = ["coordinator", "plan"]
 
 
-_BOUND_S, _BOUND_FRAC = 3.0, 0.25
-"""Time `plan` spends on an upper bound [s], and the most of its limit that it keeps for that."""
-
-
 def plan(
     scenario: ScenarioArgument,
     method: Annotated[
@@ -113,7 +109,7 @@ def plan(
     from coordinator.core.publication import FlightLayers, height_warning
     from coordinator.export import require_origin
     from coordinator.planner.exact import ProblemTooLargeError
-    from coordinator.planner.options import after_time, first_of
+    from coordinator.planner.options import BOUND_S, after_time, bound_frac, first_of
     from coordinator.planner.plan import make_plan
     from coordinator.planner.plan_report import plan_as_json, plan_table
     from swarm.runtime.process import EXIT_INTERRUPTED
@@ -135,8 +131,8 @@ def plan(
                 seed=seed,
                 stop=interrupted if limit is None else first_of(limit, interrupted),
                 progress=progress,
-                bound_s=_BOUND_S if bound else None,
-                bound_frac=min(_BOUND_FRAC, _BOUND_S / time_limit_s) if time_limit_s else 0.0,
+                bound_s=BOUND_S if bound else None,
+                bound_frac=bound_frac(time_limit_s),
             )
             told_to_stop = interrupted(0)
     except ProblemTooLargeError as error:
@@ -403,6 +399,7 @@ def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     from coordinator.export import ExportFirmware
     from coordinator.plot import PLOT_SUFFIXES
     from swarm.runtime.errors import remedy_for_name
+    from swarm.runtime.extras import require_extra
 
     faults = []
     methods = method_names()
@@ -413,6 +410,8 @@ def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
         problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
         remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
         faults.append(Fault("--plot", str(plot), problem, remedy))
+    elif plot is not None:
+        require_extra("ground", "--plot")
     firmwares = [known.value for known in ExportFirmware]
     if firmware not in firmwares:
         remedy = remedy_for_name(firmware, firmwares)

@@ -29,6 +29,7 @@ import typer.main
 import swarm
 from swarm.runtime.console import Panels, explain_family, help_text, say
 from swarm.runtime.errors import Fault, InputError, SwarmError
+from swarm.runtime.extras import missing_extra
 
 __all__ = ["COMMAND_GROUP", "check", "console_main", "main"]
 
@@ -64,7 +65,7 @@ def main(
     found = _installed_commands() if commands is None else commands
     stdout = sys.stdout
     try:
-        status = _run(arguments, found)
+        status = _run_or_explain(arguments, found)
         if status == _DONE and _CHECK in arguments and not {"--help", "-h"} & {*arguments}:
             say("these options are right")
     except InputError as error:
@@ -133,6 +134,17 @@ def console_main() -> int:
 def _installed_commands() -> dict[str, EntryPoint]:
     found = entry_points(group=COMMAND_GROUP)
     return {entry.name: entry for entry in sorted(found, key=lambda entry: entry.name)}
+
+
+def _run_or_explain(arguments: list[str], commands: Mapping[str, EntryPoint]) -> int:
+    """Run it; a package that is not installed is told by the extra that brings it."""
+    try:
+        return _run(arguments, commands)
+    except ModuleNotFoundError as error:
+        words = [word for word in arguments if not word.startswith("-")][:1]
+        if (lacking := missing_extra(error, " ".join(["swarm", *words]))) is None:
+            raise
+        raise lacking from error
 
 
 def _run(arguments: list[str], commands: Mapping[str, EntryPoint]) -> int:
@@ -216,7 +228,10 @@ def _load_or_explain(entry: EntryPoint) -> object:
     try:
         return entry.load()
     except (ImportError, AttributeError) as error:
-        reason = str(error)
+        lacking = (
+            missing_extra(error, f"swarm {entry.name}") if isinstance(error, ImportError) else None
+        )
+        reason = str(error if lacking is None else lacking)
 
     def unavailable() -> None:
         raise SwarmError(f"command {entry.name} cannot be loaded: {reason}")

@@ -29,6 +29,7 @@ from agent.core.states import (
 from agent.core.stop_conditions import BusLossTimer, EndCondition, OperatorCommands
 from agent.core.tasking import Tasking
 from agent.core.vehicle_commander import VehicleCommander
+from swarm.protocol.board import RuleMaker, rule_of
 from swarm.protocol.events import (
     Finish,
     KeysReplaced,
@@ -73,6 +74,8 @@ class AgentCore:
         rejoin: take part again, although an earlier life left this flight of the mission.
         without_bus_s: go home when the own link to the bus has been down for that long; None
             to fly on.
+        make_rule: what it decides by in an epoch of that rule and those routes. Every UAV of a
+            fleet needs the same.
     """
 
     def __init__(
@@ -86,6 +89,7 @@ class AgentCore:
         *,
         rejoin: bool = False,
         without_bus_s: float | None = None,
+        make_rule: RuleMaker = rule_of,
     ) -> None:
         self.uav = uav
         self.replica = Replica()
@@ -107,6 +111,7 @@ class AgentCore:
             self._announcer,
             self._machine,
             timing,
+            make_rule,
         )
         self._ending = EndCondition(self.replica, self._mission_view, self._peers, timing)
         self._commander = VehicleCommander(

@@ -34,7 +34,7 @@ from agent.core.states import (
 from swarm.allocation.lower_level import Decision, Rule
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule
-from swarm.protocol.board import TaskState, ranks, rule_of
+from swarm.protocol.board import RuleMaker, TaskState, ranks, rule_of
 from swarm.protocol.events import LogLine
 from swarm.protocol.messages import PlanEpoch, TaskEntry
 from swarm.protocol.registers import Replica
@@ -55,6 +55,7 @@ class Tasking:
         announcer: says what this UAV claims and has done.
         machine: the agent's state.
         timing: timers.
+        make_rule: what a UAV decides by in an epoch of that rule and those routes.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class Tasking:
         announcer: Announcer,
         machine: AgentStateMachine,
         timing: Timing,
+        make_rule: RuleMaker = rule_of,
     ) -> None:
         self._uav = uav
         self._replica = replica
@@ -75,6 +77,7 @@ class Tasking:
         self._machine = machine
         self._timing = timing
         self._choices = ChoiceReporter(uav, replica, announcer)
+        self._make_rule = make_rule
         self._rule: Rule | None = None
         self._rule_basis: object = None
         self._free = FreePeriod(0.0)
@@ -328,7 +331,7 @@ class Tasking:
         basis = epoch.rule, epoch.routes  # numbers are no proof: two coordinators may count alike
         if self._rule_basis == basis:
             return self._rule, []
-        self._rule, self._rule_basis = rule_of(*basis), basis
+        self._rule, self._rule_basis = self._make_rule(*basis), basis
         if self._rule is not None:
             return self._rule, []
         self._announcer.explain(f"cannot decide by rule {epoch.rule}")

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.extras import require_extra
 
 __all__ = [
     "TOKEN_VARIABLE",
@@ -260,8 +261,9 @@ def parse_serve_address(
         must_be_free: whether a port that is taken is a fault now.
 
     Raises:
-        InputError: it is no place, or it is taken.
+        InputError: it is no place, it is taken, or what serves is not installed.
     """
+    require_extra("ground", OPTION)
     match = _PLACE.fullmatch(text)
     if match is None or int(match["port"]) > 0xFFFF:
         problem = f"{text!r} is no place to listen at"

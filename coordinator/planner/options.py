@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from swarm.runtime.clock import Clock
 
 __all__ = [
+    "BOUND_S",
     "Limit",
     "ShouldStop",
     "after_evaluations",
     "after_time",
+    "bound_frac",
     "first_of",
     "method_names",
     "never",
@@ -37,6 +39,17 @@ def online_method_names() -> list[str]:
     from coordinator.planner.plan import ONLINE_METHODS
 
     return list(ONLINE_METHODS)
+
+
+BOUND_S = 3.0
+"""Time spent on an upper bound beside a plan that somebody asked for [s]."""
+_BOUND_FRAC = 0.25
+"""The most of a limit that is kept for that."""
+
+
+def bound_frac(time_limit_s: float | None) -> float:
+    """The share of a limit [s] that is kept for an upper bound; 0 without a limit."""
+    return min(_BOUND_FRAC, BOUND_S / time_limit_s) if time_limit_s else 0.0
 
 
 ShouldStop = Callable[[float], bool]

@@ -26,8 +26,7 @@ from coordinator.planner.options import (
 )
 from coordinator.planner.order_search import search_sequence
 from coordinator.planner.sequence_search import EXHAUSTIVE_UAVS, SearchLimits
-from swarm.allocation import RULE_NAMES, evaluate, rule_by_name
-from swarm.allocation.lower_level import TeamState
+from swarm.allocation import RULE_NAMES, Rule, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule, team_arrays
 from swarm.kernels.lower_level import EXACT_TASKS
@@ -180,7 +179,7 @@ _LONG_LOOKAHEAD_WORK = 60_000
 
 def make_plan(
     mission: Mission,
-    method: str,
+    method: str | Rule,
     *,
     clock: Clock,
     seed: int = 0,
@@ -197,7 +196,7 @@ def make_plan(
 
     Args:
         mission: what to plan; its pop-ups are left out.
-        method: one of `METHODS`.
+        method: one of `METHODS`, or a rule by which UAVs decide in the mission's order.
         clock: measures the elapsed time; nothing is decided by it.
         seed: of ``guided`` and of the local search, which only large fleets need.
         stop: ends planning with the best so far; None means that a search ends after a few
@@ -217,7 +216,7 @@ def make_plan(
         ValueError: there is no such method.
         ProblemTooLargeError: method ``exact`` on a mission too large for it.
     """
-    if method not in METHODS:
+    if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
@@ -244,7 +243,7 @@ def make_plan(
         bound = upper_bound(problem, routes, bound_ends, threads=threads).objective
     return Plan(
         scenario=mission.name,
-        method=method,
+        method=method if isinstance(method, str) else method.name,
         routes=_by_id(problem, routes),
         objective=objective,
         completion_s={
@@ -262,7 +261,7 @@ def make_plan(
 
 def _searched(
     problem: Problem,
-    method: str,
+    method: str | Rule,
     proven: Optimum | None,
     ends: ShouldStop,
     *,
@@ -277,7 +276,7 @@ def _searched(
 
     Args:
         problem: the mission.
-        method: one of `METHODS`.
+        method: one of `METHODS`, or a rule of the user's own.
         proven: the optimum, where it is known.
         ends: the limit of the search.
         seed: of all that is drawn.
@@ -287,6 +286,10 @@ def _searched(
         threads: at most so many.
         modest: spend little on the search for a sequence.
     """
+    if not isinstance(method, str):
+        order = tuple(range(problem.n_uav))
+        start = TeamState.at_start(problem)
+        return run(problem, start, rank_of(order), method, lambda: ends(0.0))[0], order, 1
     if method == "exact" and proven is not None:
         return proven.routes, None, 0
     if method in ("exact", GuidedRule.name):
@@ -315,7 +318,9 @@ def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[UavId, tup
     }
 
 
-def _proven(problem: Problem, method: str, ends: ShouldStop, threads: int | None) -> Optimum | None:
+def _proven(
+    problem: Problem, method: str | Rule, ends: ShouldStop, threads: int | None
+) -> Optimum | None:
     """The optimum where it is asked for or quickly proven; None otherwise, or if stopped."""
     if method == "exact":
         return optimum_before(problem, lambda: ends(0.0), threads=threads)

@@ -31,7 +31,6 @@ __all__ = [
     "Job",
     "RecordingThread",
     "Sink",
-    "recording_or_none",
     "recording_to",
     "virtual_ns",
     "wall_ns",
@@ -257,18 +256,6 @@ def recording_to(
         recorder.close()
         if recorder.lost:
             say(f"{path}: {recorder.fault}")
-
-
-def recording_or_none(
-    path: Path | None,
-    about: RecordingInfo,
-    time_ns: Callable[[float], int],
-    say: Callable[[str], None],
-) -> contextlib.AbstractContextManager[FlightRecorder | None]:
-    """`recording_to`, or nothing where there is no path."""
-    if path is None:
-        return contextlib.nullcontext()
-    return recording_to(path, about, time_ns, say)
 
 
 class FlightRecorder:

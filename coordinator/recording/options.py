@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.extras import require_extra
 
 __all__ = ["RecordOption", "check_new_recording"]
 
@@ -31,8 +32,10 @@ def check_new_recording(path: Path) -> None:
     """Refuse a path at which nothing can be recorded.
 
     Raises:
-        InputError: it has another ending, exists, or its folder does not.
+        InputError: it has another ending, exists, its folder does not, or what records is not
+            installed.
     """
+    require_extra("ground", "--record")
     if path.suffix.lower() != ".mcap":
         problem = f"no recording is called {path.name!r}"
         raise InputError(Fault(str(path), "", problem, "end the name in .mcap"))

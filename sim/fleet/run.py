@@ -13,12 +13,11 @@ import math
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import MissionResult
 from coordinator.planner.plan_report import plan_from_json
-from coordinator.recording.flight_recorder import FlightRecorder
 from sim.fleet.child_process import ChildFailedError, ChildProcess
 from sim.fleet.launcher import Launcher, OnLog, Through
 from sim.fleet.layout import DASHBOARD, LaunchOptions
@@ -31,6 +30,9 @@ from swarm.protocol.messages import MissionPhase
 from swarm.protocol.timing import preset
 from swarm.runtime.clock import ScaledClock
 from swarm.runtime.shell import Shell, join_mission
+
+if TYPE_CHECKING:
+    from coordinator.recording.flight_recorder import FlightRecorder
 
 __all__ = ["OnFrame", "Run", "RunResult", "fly", "open_run"]
 

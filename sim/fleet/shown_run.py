@@ -8,14 +8,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from coordinator.core.publication import FlightLayers, height_warning
-from coordinator.recording.flight_recorder import recording_or_none, wall_ns
-from coordinator.recording.recorder import RecordingInfo
 from coordinator.terminal.live_view import LiveView
 from coordinator.terminal.report import MissionReport
 from sim.fleet.layout import LaunchOptions
@@ -25,6 +25,9 @@ from sim.fleet.security import security_of
 from sim.options import print_report
 from swarm.model import Mission
 from swarm.protocol.timing import Timing
+
+if TYPE_CHECKING:
+    from coordinator.recording.flight_recorder import FlightRecorder
 
 __all__ = ["Outputs", "ShownRun"]
 
@@ -60,7 +63,8 @@ class ShownRun:
         self, mission: Mission, scenario: Path, speedup: float, timing: Timing, outputs: Outputs
     ) -> None:
         self._mission = mission
-        self._about = RecordingInfo(mission.name, timing, speedup, str(scenario))
+        self._scenario = scenario
+        self._timing = timing
         self._speedup = speedup
         self._outputs = outputs
         # With every process's log on the screen, a picture would only be torn apart.
@@ -80,7 +84,7 @@ class ShownRun:
         try:
             with (
                 self._kept or contextlib.nullcontext(),
-                recording_or_none(outputs.record, self._about, wall_ns(), self._say) as recorder,
+                self._recording() as recorder,
                 LiveView(
                     self._console, speedup=self._speedup, secure=options.keys is not None
                 ) as view,
@@ -109,6 +113,16 @@ class ShownRun:
         )
         status = print_report(told, json=outputs.json, report=outputs.report)
         return status or int(recorder is not None and recorder.fault is not None)
+
+    def _recording(self) -> AbstractContextManager[FlightRecorder | None]:
+        """What records the flight; nothing, nor anything imported, where it is not asked for."""
+        if self._outputs.record is None:
+            return contextlib.nullcontext()
+        from coordinator.recording.flight_recorder import recording_to, wall_ns
+        from coordinator.recording.recorder import RecordingInfo
+
+        info = RecordingInfo(self._mission.name, self._timing, self._speedup, str(self._scenario))
+        return recording_to(self._outputs.record, info, wall_ns(), self._say)
 
     def _log(self, name: str, line: str) -> None:
         if self._kept is not None:

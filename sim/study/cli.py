@@ -27,6 +27,7 @@ from sim.options import (
     WithdrawRateOption,
 )
 from swarm.runtime.errors import Fault, InputError, SwarmError
+from swarm.runtime.extras import require_extra
 from swarm.runtime.options import JsonOption
 
 if TYPE_CHECKING:
@@ -213,6 +214,7 @@ def study(
     """
     from rich.console import Console
 
+    require_extra("ground", "swarm study")  # not at the end, when all has been flown
     from sim.study.policies.roster import ROSTER
     from sim.study.progress import StudyProgress
     from sim.study.request import StudyRequest, requested_study

@@ -26,6 +26,7 @@ from sim.study.store import RowStore
 from sim.study.trial import TrialContext, TrialJob, TrialRow, TrialRunner
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import Fault, InputError, SwarmError
+from swarm.runtime.extras import require_extra
 from swarm.scenario.findings import printable
 
 __all__ = ["Fly", "fly_here", "in_processes", "on_dask", "run_study"]
@@ -198,11 +199,9 @@ def on_dask(address: str, timeout_s: float = CONNECT_TIMEOUT_S) -> Fly:
 
 @contextmanager
 def _client(address: str, timeout_s: float) -> Iterator[Any]:
-    try:
-        import distributed
-    except ImportError as error:
-        remedy = "install it with: pip install 'peckorder[study]'"
-        raise InputError(Fault(_OPTION, address, "needs Dask's distributed", remedy)) from error
+    require_extra("study", _OPTION)
+    import distributed
+
     with warnings.catch_warnings(), _silent(*_LOGGERS):
         # The versions that matter here are compared below.
         warnings.simplefilter("ignore", distributed.versions.VersionMismatchWarning)

@@ -21,6 +21,7 @@ from sim.study.policies.roster import PolicyRoster
 from sim.study.study_file import format_study, load_study
 from sim.study.trial import COLUMNS, TrialJob, TrialRow, rows_due
 from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.extras import require_extra
 from swarm.scenario import format_scenario
 
 __all__ = [
@@ -109,11 +110,7 @@ def require_parquet() -> None:
     Raises:
         InputError: pyarrow is not installed.
     """
-    try:
-        import pyarrow.parquet  # noqa: F401 - whether there is one is the question
-    except ImportError as error:
-        remedy = "install it with: pip install 'peckorder[study]'"
-        raise InputError(Fault("--format", "parquet", "needs pyarrow", remedy)) from error
+    require_extra("study", "--format parquet")
 
 
 def replace_text(path: Path, text: str) -> None:

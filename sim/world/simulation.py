@@ -6,16 +6,16 @@ Leaves out: the world itself (sim.world.stochastic_world) and studies of many mi
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from agent.core.agent_core import AgentCore
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import MissionResult
 from coordinator.planner.plan import make_plan
-from coordinator.recording.flight_recorder import recording_to, virtual_ns
-from coordinator.recording.recorder import RecordedCore, RecordingInfo
 from sim.world.outcome import Tally, value_of
+from sim.world.settings import Planner
 from sim.world.stochastic_world import ObserverMaker, StochasticWorld
 from sim.world.uncertainty import Uncertainty
 from sim.world.virtual_world import World
@@ -25,7 +25,7 @@ from swarm.protocol.timing import Timing
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import SwarmError
 
-__all__ = ["SimulatedMission", "recording_simulation", "simulate_mission"]
+__all__ = ["SimulatedMission", "plan_once", "recording_simulation", "simulate_mission"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +43,31 @@ class SimulatedMission:
     """Whether it ended by itself; else somebody would have waited for ever."""
 
 
+def plan_once(make: Planner, made: Iterable[tuple[Mission, Plan]] = ()) -> Planner:
+    """Plan by ``make``, and no mission twice that begins alike.
+
+    Args:
+        make: plans what is known of a mission at its start.
+        made: plans that are there already, and what for.
+    """
+    plans = [(mission.known_at_start(), plan) for mission, plan in made]
+
+    def planner(mission: Mission, method: str, seed: int) -> Plan:
+        known = mission.known_at_start()
+        for earlier, plan in plans:
+            if earlier == known:
+                return plan
+        plan = make(known, method, seed)
+        plans.append((known, plan))
+        return plan
+
+    return planner
+
+
+def _plan_by_method(mission: Mission, method: str, seed: int) -> Plan:
+    return make_plan(mission, method, clock=SystemClock(), seed=seed)
+
+
 def simulate_mission(
     mission: Mission,
     *,
@@ -51,6 +76,8 @@ def simulate_mission(
     uncertainty: Uncertainty,
     coordinator_lost_s: float | None = None,
     make_observer: ObserverMaker | None = None,
+    make_agent: Callable[..., AgentCore] = AgentCore,
+    planner: Planner | None = None,
 ) -> SimulatedMission:
     """Fly ``mission`` in virtual time to its end.
 
@@ -62,19 +89,10 @@ def simulate_mission(
         coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
         make_observer: makes the core that looks on, as for a recording; nothing that is flown
             depends on it.
+        make_agent: makes the core of an agent.
+        planner: makes every plan; `plan_once` with `make_plan` when None.
     """
-    clock = SystemClock()
-    made: list[tuple[Mission, Plan]] = []
-
-    def planner(what: Mission, how: str, with_seed: int) -> Plan:
-        known = what.known_at_start()
-        for earlier, plan in made:
-            if earlier == known:
-                return plan
-        plan = make_plan(known, how, clock=clock, seed=with_seed)
-        made.append((known, plan))
-        return plan
-
+    planner = plan_once(_plan_by_method) if planner is None else planner
     span_s = max(planner(mission, method, seed).completion_s.values(), default=0.0)
     fate = uncertainty.draw(mission, span_s, seed)
     tally = Tally()
@@ -85,6 +103,7 @@ def simulate_mission(
         seed=seed,
         coordinator_lost_s=coordinator_lost_s,
         watch=tally,
+        make_agent=make_agent,
         make_observer=make_observer,
     )
     in_time = flown.run()
@@ -109,6 +128,9 @@ def recording_simulation(
     if path is None:
         yield None
         return
+    from coordinator.recording.flight_recorder import recording_to, virtual_ns
+    from coordinator.recording.recorder import RecordedCore, RecordingInfo
+
     faults: list[str] = []
     with contextlib.ExitStack() as open_files:
 

@@ -8,7 +8,7 @@ judges for itself and passes in by leaving the lost out.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from enum import StrEnum
 from itertools import islice
 
@@ -23,6 +23,7 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
 
 __all__ = [
+    "RuleMaker",
     "TaskBoard",
     "TaskState",
     "after_outcomes",
@@ -241,6 +242,10 @@ def _task_of(entry: TaskEntry) -> Task:
 
 def _order(entry: TaskEntry) -> tuple[int, str]:
     return entry.number, entry.task
+
+
+RuleMaker = Callable[[str, Mapping[str, Sequence[str]]], Rule | None]
+"""The decision rule of an epoch by the name of its rule and its routes; see `rule_of`."""
 
 
 def rule_of(name: str, routes: Mapping[str, Sequence[str]]) -> Rule | None:

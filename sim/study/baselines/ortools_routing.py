@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.study.baselines.index_rules import Routes
 from swarm.allocation.problem import IntArray, Problem
-from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.extras import MissingExtraError
 
 __all__ = ["SHORTFALL", "is_installed", "matrix_bytes", "ortools_routes", "require_installed"]
 
@@ -46,8 +46,7 @@ def require_installed() -> None:
         InputError: OR-Tools is not installed.
     """
     if not is_installed():
-        remedy = "install it with: pip install 'peckorder[bench]'"
-        raise InputError(Fault("--methods", "ortools", "OR-Tools is not installed", remedy))
+        raise MissingExtraError("--methods ortools", "bench")
 
 
 def matrix_bytes(problem: Problem) -> int:

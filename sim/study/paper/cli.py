@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.extras import require_extra
 from swarm.runtime.options import JsonOption, SeedOption
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def reproduce(
         swarm reproduce --problems 300 --plots figures
         swarm reproduce --seed 7 --json
     """
+    require_extra("ground", "swarm reproduce")  # not at the end, when all has been computed
     from sim.study.paper.reproduction import reproduce_paper
     from swarm.kernels.lower_level import default_threads
     from swarm.runtime.clock import SystemClock

@@ -273,5 +273,5 @@ def test_missing_extra_is_named(
     status, out, err = run(capsys, *SMALL[:-2], *CHEAP, *option)
 
     assert (status, out) == (2, "")
-    assert err.endswith("install it with: pip install 'peckorder[study]'\n")
+    assert err.endswith("needs the extra study: pip install 'peckorder[study]'\n")
     assert err.count("\n") == 1
