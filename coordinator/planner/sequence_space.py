@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordinator.planner.assignment import best_assignment
 from swarm.allocation.lower_level import CompiledRule, TeamState, next_decision
 from swarm.allocation.problem import FloatArray, Problem
 from swarm.kernels import lower_level as kernel
@@ -248,8 +249,6 @@ def single_stage(problem: Problem, state: TeamState | None = None) -> SingleStag
         state: where the team stands; at its start when None. UAVs that are not active and tasks
             that are not open take no part.
     """
-    from scipy.optimize import linear_sum_assignment
-
     state = TeamState.at_start(problem) if state is None else state
     scores = np.array([_scores(problem, state, uav) for uav in range(problem.n_uav)]).reshape(
         problem.n_uav, problem.n_task
@@ -257,10 +256,8 @@ def single_stage(problem: Problem, state: TeamState | None = None) -> SingleStag
     possible = problem.capable & state.open & state.active[:, None]
     # one forbidden pair must cost more than any assignment of possible pairs can earn
     forbidden = -(1.0 + 2.0 * min(scores.shape) * float(np.abs(scores).max(initial=0.0)))
-    rows, columns = linear_sum_assignment(np.where(possible, scores, forbidden), maximize=True)
-    tasks: dict[int, int] = {
-        int(uav): int(task) for uav, task in zip(rows, columns, strict=True) if possible[uav, task]
-    }
+    assigned = best_assignment(np.where(possible, scores, forbidden))
+    tasks = {uav: task for uav, task in assigned.items() if possible[uav, task]}
     objective = float(sum(scores[uav, task] for uav, task in tasks.items()))
     sequence = _peel(np.where(possible, scores, -np.inf), tasks)
     held = set(sequence)
