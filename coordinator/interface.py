@@ -11,8 +11,8 @@ from pathlib import Path
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import MissionResult
-from coordinator.planner.options import BOUND_S, METHODS, after_time, bound_frac
-from coordinator.planner.plan import make_plan
+from coordinator.planner.options import BOUND_S, after_time, bound_frac
+from coordinator.planner.plan import METHODS, make_plan
 from swarm.allocation.own_rule import DecisionRule, FunctionRule
 from swarm.interface import Flight
 from swarm.model import Mission, Plan

@@ -16,8 +16,7 @@ from typing import Unpack
 
 from agent.core.agent_core import AgentCore
 from coordinator.interface import flight_of
-from coordinator.planner.options import ONLINE_METHODS
-from coordinator.planner.plan import make_plan
+from coordinator.planner.plan import ONLINE_METHODS, make_plan
 from sim.world.simulation import plan_once, recording_simulation, simulate_mission
 from sim.world.uncertainty import Uncertainty
 from swarm.allocation import Rule
