@@ -98,8 +98,9 @@ sanitize: $(VENV)/.installed-dev
 		PYTHONPATH="$$($(CURDIR)/$(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')" \
 		$(CURDIR)/$(BIN)/python -S -m pytest -q --capture sys --timeout 600 tests/unit/swarm/kernels
 
+# The demo needs no extra; a dashboard, a plot or a recording is what one asks for next.
 $(VENV)/.installed: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[ground]'
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python

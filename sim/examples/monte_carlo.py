@@ -39,5 +39,4 @@ def main(scenario: str = "table-1", trials: int = 20) -> None:
 
 
 if __name__ == "__main__":
-    arguments = sys.argv[1:3]
-    main(*arguments[:1], *map(int, arguments[1:]))
+    main(*sys.argv[1:2]) if len(sys.argv) < 3 else main(sys.argv[1], int(sys.argv[2]))

@@ -3,7 +3,7 @@
     python -m tests.release.audit                  as `make lint` does
     python -m tests.release.audit --must-answer    for a release: no answer is a failure, too
 
-The packages are those that `pip install peckorder` brings, in the versions installed here;
+The packages are those that `pip install 'peckorder[all]'` brings, in the versions installed here;
 pip-audit asks for them. What is known and cannot hurt is explained in pyproject.toml, under
 ``[tool.peckorder.audit.explained]``, by the advisory's id. Exit status 0: nothing else is
 known, or there was nobody to ask, which is said. Leaves out: what only development needs.
@@ -66,8 +66,8 @@ Ask = Callable[[Mapping[str, str], float], str]
 """Given versions by name and a time limit [s], what pip-audit prints as JSON."""
 
 
-def runtime_pins(name: str = "peckorder") -> dict[str, str]:
-    """Installed versions of all that ``name`` needs to run, by name, itself left out.
+def runtime_pins(name: str = "peckorder[all]") -> dict[str, str]:
+    """Installed versions of all that ``name``, extras included, needs to run; itself left out.
 
     Raises:
         PackageNotFoundError: one of them is not installed.
@@ -88,7 +88,7 @@ def runtime_pins(name: str = "peckorder") -> dict[str, str]:
             extras = ("", *wanted.extras)
             if need.marker is None or any(need.marker.evaluate({"extra": each}) for each in extras):
                 waiting.append(need)
-    del pins[canonicalize_name(name)]
+    del pins[canonicalize_name(Requirement(name).name)]
     return dict(sorted(pins.items()))
 
 

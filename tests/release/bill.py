@@ -31,7 +31,7 @@ PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 LEAFLET = "coordinator/dashboard/static/vendor/leaflet/leaflet.js"
 
 
-def install(wheel: Path, folder: Path) -> Path:
+def install(wheel: Path, folder: Path, extra: str = "ground") -> Path:
     """A new environment in ``folder`` with that wheel and what it needs; its interpreter.
 
     Where it installs no compiler is to be found, and not even pip is there afterwards.
@@ -41,7 +41,7 @@ def install(wheel: Path, folder: Path) -> Path:
     pip = [sys.executable, "-m", "pip", "-qq", "--python", str(python)]
     nowhere = {"PATH": str(python.parent), "CC": "/nonexistent", "CXX": "/nonexistent"}
     subprocess.run(
-        [*pip, "install", "--only-binary", ":all:", str(wheel)],
+        [*pip, "install", "--only-binary", ":all:", f"{wheel}[{extra}]"],
         check=True,
         env={**os.environ, **nowhere},
     )

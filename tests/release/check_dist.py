@@ -97,7 +97,7 @@ def _check(source: Path, wheel: Path, rooms: Path) -> None:
     _test(from_wheel, unpacked, rooms)
     venv.create(rooms / "source", with_pip=False, symlinks=True)
     from_source = rooms / "source" / "bin" / "python"
-    _pip(from_source, str(source))
+    _pip(from_source, f"{source}[ground]")
     _use("source distribution", from_source, rooms)
     if _installed(from_source) != _installed(from_wheel):
         raise Failure("wheel and source distribution install different files")
