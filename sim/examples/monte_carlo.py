@@ -39,4 +39,7 @@ def main(scenario: str = "table-1", trials: int = 20) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2]) if len(sys.argv) < 3 else main(sys.argv[1], int(sys.argv[2]))
+    main(
+        sys.argv[1] if len(sys.argv) > 1 else "table-1",
+        int(sys.argv[2]) if len(sys.argv) > 2 else 20,
+    )
