@@ -280,7 +280,7 @@ def print_report(told: MissionReport, *, json: bool, report: Path | None) -> int
 
     from rich.console import Console
 
-    from coordinator.terminal.report import mission_ok, write_report
+    from coordinator.terminal.report import write_report
 
     if json:
         typer.echo(dumps(told.as_json(), allow_nan=False))
@@ -288,4 +288,4 @@ def print_report(told: MissionReport, *, json: bool, report: Path | None) -> int
         told.render(Console(highlight=False))
     if report is not None:  # last: a full disk must not hide the result
         write_report(told, report)
-    return 0 if mission_ok(told.result) else 1
+    return 0 if told.result.is_complete else 1

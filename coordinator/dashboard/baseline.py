@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from coordinator.mission_view.results import lists_objective
 from coordinator.planner.bound import upper_bound
 from coordinator.planner.options import ShouldStop
-from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
 from swarm.protocol.board import mission_of
 from swarm.protocol.messages import MissionPhase
@@ -67,8 +67,5 @@ def baseline_of(replica: Replica, name: str) -> Baseline | None:
         tuple(index[task] for task in epoch.routes.get(uav.id, ())) for uav in mission.uavs
     )
     problem = Problem.from_mission(mission, tasks=tasks)
-    try:
-        objective, _ = evaluate(problem, routes)
-    except ValueError:  # a task is on two lists
-        return None
-    return Baseline(problem, routes, objective)
+    objective = lists_objective(problem, epoch.routes)
+    return None if objective is None else Baseline(problem, routes, objective)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import takewhile
 
@@ -18,15 +17,16 @@ from coordinator.dashboard.baseline import Baseline, baseline_of
 from coordinator.dashboard.rows import AppendOnlyTable, RowTable, as_text
 from coordinator.dashboard.source import CommandRow, DashboardSource
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.presentation import clean, is_trouble, short_names
 from coordinator.mission_view.results import Progress, progress_of
-from coordinator.mission_view.scene import LOST, uav_activity
+from coordinator.mission_view.scene import TAKEN, task_stands
+from coordinator.mission_view.uav_state import LOST, FleetStates, UavState
+from coordinator.mission_view.wording import clean, short_names
 from swarm.allocation.problem import Problem
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskState
-from swarm.protocol.messages import MissionConfig, UavSpec
+from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import abort_command, in_force
-from swarm.protocol.uav_messages import Choice, StatusPhase
+from swarm.protocol.uav_messages import Choice
 
 __all__ = ["PROTOCOL", "Feed", "PageSettings"]
 
@@ -37,8 +37,6 @@ _MEASURES = 8
 """Flights of which it is remembered how they began."""
 _QUIET_LOOKS = 5
 """A row of which only the silence has grown is sent after so many looks."""
-_GONE = (StatusPhase.HOME, StatusPhase.RETURNING, StatusPhase.OUT)
-"""What a UAV still does for all we know once its agent has left in order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +174,7 @@ class Feed:
                 "n": number,
                 "mission_s": _rounded(happening.mission_s, 3),
                 "text": clean(happening.text),
-                "trouble": is_trouble(happening),
+                "trouble": happening.is_trouble,
             }
             self._story.add(as_text(row), self.seq)
         self._told = mission_state.told
@@ -213,7 +211,7 @@ class Feed:
     def _head_of(self, mission_state: MissionState | None, now_s: float) -> dict[str, object]:
         head: dict[str, object] = {"mission_s": None, "phase": None, "link": self._source.link}
         epoch = plan = None
-        counts = dict.fromkeys(("open", "taken", *list(TaskState)[1:]), 0)
+        counts = dict.fromkeys((TaskState.OPEN.value, TAKEN, *list(TaskState)[1:]), 0)
         dropped = Counter[str]()
         present = set[str]()
         if mission_state is not None and mission_state.replica.brief is not None:
@@ -277,7 +275,7 @@ class Feed:
             holder = holders.get(task)
             done = completed.get(task)
             taken = holder is not None
-            counts["taken" if taken and state is TaskState.OPEN else state] += 1
+            counts[task_stands(state, taken=taken)] += 1
             entry = replica.board[task]
             self._tasks.put(
                 task,
@@ -318,55 +316,33 @@ class Feed:
     def _look_at_uavs(
         self, mission_state: MissionState, brief: MissionConfig, now_s: float
     ) -> None:
-        commands, dropped = in_force(mission_state.replica), mission_state.dropped
-        mission_s = mission_state.mission_s(now_s)
+        commands = in_force(mission_state.replica)
+        states = FleetStates(mission_state, now_s)
         for uav in brief.uavs:
             command = commands.get(uav.id)
-            row = _uav_row(
-                mission_state,
-                uav,
-                None if command is None else command.kind,
-                dropped.get(uav.id, {}),
-                now_s,
-                mission_s,
-                self._source.speedup,
-            )
+            kind = None if command is None else command.kind
+            row = _uav_row(states.of(uav.id), kind, self._source.speedup)
             self._uavs.put(uav.id, row, self.seq, but="silent_s")
             self._uavs.touch(uav.id, row, self.seq, _QUIET_LOOKS)
 
 
-def _uav_row(
-    mission_state: MissionState,
-    uav: UavSpec,
-    command: str | None,
-    dropped: Mapping[str, int],
-    now_s: float,
-    mission_s: float | None,
-    speedup: float,
-) -> dict[str, object]:
-    status, claim = mission_state.statuses.get(uav.id), mission_state.replica.claims.get(uav.id)
-    heard_s, present = mission_state.heard_s.get(uav.id), uav.id in mission_state.present
-    does, task = uav_activity(mission_state, uav.id)
-    eta_s = None
-    if not (present or does == LOST):
-        does, task = (does if does in _GONE else "absent"), None
-    elif task is not None and claim is not None and mission_s is not None:
-        eta_s = claim.completion_s - mission_s
+def _uav_row(state: UavState, command: str | None, speedup: float) -> dict[str, object]:
+    age_s = state.link_age_s
     return {
-        "id": uav.id,
-        "does": does,
-        "task": task,
-        "claim": None if claim is None else claim.phase,
-        "eta_s": _rounded(eta_s, 1),
-        "position": None if status is None else _point(status.position_enu_m),
-        "velocity": None if status is None else _point(status.velocity_enu_m_s),
-        "battery": None if status is None else _rounded(status.battery_frac, 3),
-        "silent_s": None if heard_s is None else _rounded((now_s - heard_s) / speedup, 1),
-        "lost": does == LOST,
-        "present": present,
-        "note": "" if status is None else clean(status.note),
+        "id": state.id,
+        "does": state.now_does,
+        "task": state.now_task,
+        "claim": state.claim,
+        "eta_s": _rounded(state.now_eta_s, 1),
+        "position": _point(state.told_enu_m),
+        "velocity": _point(state.velocity_enu_m_s),
+        "battery": _rounded(state.battery_frac, 3),
+        "silent_s": None if age_s is None else _rounded(age_s / speedup, 1),
+        "lost": state.does == LOST,
+        "present": state.there,
+        "note": clean(state.note),
         "command": command,
-        "dropped": dict(dropped),
+        "dropped": dict(state.dropped),
     }
 
 

@@ -18,7 +18,7 @@ from prometheus_client.registry import Collector
 from coordinator.dashboard.hub import Hub
 from coordinator.dashboard.source import DashboardSource
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.scene import LOST, uav_activity
+from coordinator.mission_view.uav_state import LOST, FleetStates
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskState
 from swarm.protocol.messages import MissionConfig, MissionPhase
@@ -152,19 +152,17 @@ def _of_uavs(
         "Messages its agents have dropped, by reason.",
         labels=(*labels, "reason"),
     )
+    states = FleetStates(mission_state, source.now_s())
     for uav in brief.uavs:
-        names = (mission, uav.id)
-        does, _ = uav_activity(mission_state, uav.id)
-        there = uav.id in mission_state.present
-        present.add_metric(names, there)
-        lost.add_metric(names, does == LOST)
-        if there or does == LOST:
-            phase.add_metric((*names, does), 1.0)
-        status, heard_s = mission_state.statuses.get(uav.id), mission_state.heard_s.get(uav.id)
-        if status is not None and status.battery_frac is not None:
-            battery.add_metric(names, status.battery_frac)
-        if heard_s is not None:
-            silence.add_metric(names, (source.now_s() - heard_s) / source.speedup)
+        names, state = (mission, uav.id), states.of(uav.id)
+        present.add_metric(names, state.there)
+        lost.add_metric(names, state.does == LOST)
+        if state.there or state.does == LOST:
+            phase.add_metric((*names, state.does), 1.0)
+        if state.battery_frac is not None:
+            battery.add_metric(names, state.battery_frac)
+        if state.link_age_s is not None:
+            silence.add_metric(names, state.link_age_s / source.speedup)
         tasks.add_metric(names, done.get(uav.id, 0))
     for name, reasons in sorted(mission_state.dropped.items()):
         for reason, number in sorted(reasons.items()):

@@ -1,8 +1,8 @@
 """Observe a mission of which only the name is known, until it is over and nobody is there any more.
 
-It may be flown at a speed-up that whoever joins it has not been told: that is seen from what UAVs
-tell. Leaves out: joining the bus (coordinator.joining), and what is made of what is
-heard (coordinator.mission_view.mission_state).
+It may be flown at a speed-up that whoever joins it has not been told: see
+coordinator.mission_view.pace. Leaves out: joining the bus (coordinator.joining), and what is made
+of what is heard (coordinator.mission_view.mission_state).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from functools import partial
 
 from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.pace import SpeedupEstimator
 from swarm.model import Mission
 from swarm.protocol.board import mission_of
 from swarm.protocol.events import (
@@ -24,41 +25,7 @@ from swarm.protocol.operator_commands import abort_command
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import Status, StatusPhase
 
-__all__ = ["MissionObserver", "SpeedupEstimator", "deserted"]
-
-
-BASELINE_S = 0.8
-"""Two words of one UAV that far apart tell the pace [s of the observer's clock]."""
-
-TOLERANCE = 1.25
-"""Within this factor of 1 the two clocks run alike: what differs is the network's delay."""
-
-
-class SpeedupEstimator:
-    """The pace of a mission, as far as its UAVs have told by when they say what time it is."""
-
-    def __init__(self) -> None:
-        self.pace = 1.0
-        """Mission seconds per second of the observer's clock."""
-        self._first: dict[str, tuple[float, float]] = {}
-        """Of each UAV: when it first told the mission time, and which it told."""
-
-    def told(self, uav: str, now_s: float, mission_s: float) -> float:
-        """The pace, now that ``uav`` says that it is ``mission_s``.
-
-        Args:
-            uav: who says so.
-            now_s: time of the observer's clock [s].
-            mission_s: mission time [s].
-        """
-        first_s, first_mission_s = self._first.setdefault(uav, (now_s, mission_s))
-        if mission_s < first_mission_s:  # another flight
-            self._first[uav] = now_s, mission_s
-        elif now_s - first_s >= BASELINE_S:
-            pace = (mission_s - first_mission_s) / (now_s - first_s)
-            alike = 1.0 / TOLERANCE <= pace <= TOLERANCE
-            self.pace = 1.0 if alike or pace <= 0.0 else pace
-        return self.pace
+__all__ = ["MissionObserver", "deserted"]
 
 
 _UNEVEN = 0.02
@@ -75,6 +42,7 @@ class MissionObserver:
             for ever.
         complete: keep the state's mission like the board, which takes 0.1 s a change for
             100 UAVs and 1000 tasks; else its board alone tells the tasks.
+        explains: tell of everything why.
     """
 
     def __init__(
@@ -84,10 +52,10 @@ class MissionObserver:
         patience_s: float | None,
         *,
         complete: bool = True,
+        explains: bool = False,
     ) -> None:
-        self.mission_state = MissionState(
-            Mission(mission, horizon_s=1.0, uavs=(), tasks=()), timing
-        )
+        unknown = Mission(mission, horizon_s=1.0, uavs=(), tasks=())
+        self.mission_state = MissionState(unknown, timing, explains=explains)
         self._name = mission
         self._patience_s = patience_s
         self._complete = complete

@@ -1,45 +1,27 @@
-"""How a mission looks wherever it is shown: characters, colours, numbers, lines of its story.
+"""How a mission looks wherever it is shown: characters, colours, styles of lines.
 
 States differ in shape, never in colour alone; UAV colours are Okabe and Ito's, as in plots.
-Leaves out: what is told (coordinator.mission_view.mission_state), and where things are put
+Leaves out: what is told (coordinator.mission_view.narrator), and where things are put
 (coordinator.terminal).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swarm.protocol.board import TaskState
+from coordinator.mission_view.story import MissionEvent
+from coordinator.mission_view.wording import clean
 
 __all__ = [
     "ASCII",
     "BAD",
     "UNICODE",
     "Signs",
-    "StoryLine",
-    "clean",
-    "is_routine",
-    "is_trouble",
-    "notable",
-    "short_names",
-    "shown_s",
-    "shown_value",
     "signs_for",
     "story_line",
     "story_style",
-    "told_at",
     "uav_colour",
 ]
-
-
-@dataclass(frozen=True, slots=True)
-class StoryLine:
-    """One line of the story."""
-
-    mission_s: float | None
-    """Mission time [s]; None before the start."""
-    text: str
 
 
 _UAV_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -78,11 +60,10 @@ class Signs:
     braille: bool
     """Whether lines may be drawn with braille characters."""
 
-    def task(self, state: TaskState, taken: bool) -> str:
-        """Sign of a task."""
-        if state is TaskState.OPEN:
-            return self.taken if taken else self.open
-        return self.done if state is TaskState.DONE else self.failed
+    def task(self, stands: str) -> str:
+        """Sign of a task, by how it stands."""
+        signs = {"open": self.open, "taken": self.taken, "done": self.done}
+        return signs.get(stands, self.failed)
 
 
 UNICODE = Signs(
@@ -141,76 +122,18 @@ def uav_colour(number: int) -> str:
     return _UAV_COLOURS[number % len(_UAV_COLOURS)]
 
 
-def short_names(names: Sequence[str]) -> list[str]:
-    """What tells each name from the others: ``uav07`` of many is ``07``.
-
-    The common beginning is cut off, but no number is cut in two.
-    """
-    if len(names) < 2:
-        return list(names)
-    first, last = min(names), max(names)
-    shared = 0
-    while shared < min(len(first), len(last)) and first[shared] == last[shared]:
-        shared += 1
-    while shared > 0 and first[shared - 1].isdigit():
-        shared -= 1
-    return [name[shared:].lstrip("-_.") or name for name in names]
-
-
 _TIME_CELLS = 9
 
 
-def shown_s(time_s: float) -> str:
-    """Seconds with as many digits as anyone reads."""
-    if abs(time_s) < 9.995:
-        return f"{time_s:.2f}"
-    return f"{time_s:.1f}" if abs(time_s) < 999.95 else f"{time_s:.0f}"
-
-
-def shown_value(value: float) -> str:
-    """J with as many digits as anyone reads."""
-    if abs(value) < 1000.0:
-        return f"{value:.2f}"
-    return f"{value:.1f}" if abs(value) < 10_000.0 else f"{value:.0f}"
-
-
-def clean(text: str, *, ascii_only: bool = False) -> str:
-    """``text`` on one line, without anything a terminal would obey."""
-    line = "".join(sign if sign.isprintable() else "?" for sign in " ".join(text.split()))
-    return line.encode("ascii", "replace").decode("ascii") if ascii_only else line
-
-
-def told_at(happening: StoryLine) -> str:
-    """When it happened, in words."""
-    return "start-up" if happening.mission_s is None else f"{shown_s(happening.mission_s)} s"
-
-
-def story_line(happening: StoryLine, *, ascii_only: bool = False) -> str:
+def story_line(event: MissionEvent, *, ascii_only: bool = False) -> str:
     """One line: when, and what."""
-    return f"{told_at(happening):>{_TIME_CELLS}}  {clean(happening.text, ascii_only=ascii_only)}"
+    return f"{event.told_at:>{_TIME_CELLS}}  {clean(event.text, ascii_only=ascii_only)}"
 
 
-def is_routine(happening: StoryLine) -> bool:
-    """Whether it only says that a task was done, as tasks are."""
-    return happening.text.endswith(": done")
-
-
-def is_trouble(happening: StoryLine) -> bool:
-    """Whether something went wrong."""
-    text = happening.text
-    lost = text.endswith(" lost") or " lost;" in text
-    return lost or text.endswith(": failed")
-
-
-def story_style(happening: StoryLine) -> str:
+def story_style(event: MissionEvent) -> str:
     """Style that makes trouble stand out."""
-    if is_trouble(happening):
+    if event.is_trouble:
         return BAD
-    if "took over" in happening.text or happening.text.endswith((" appeared", "no further part")):
+    if event.is_unusual:
         return "yellow"
-    return "" if is_routine(happening) else "bold"
-
-
-def notable(story: Sequence[StoryLine]) -> list[StoryLine]:
-    """The lines that are no routine."""
-    return [happening for happening in story if not is_routine(happening)]
+    return "" if event.is_routine else "bold"

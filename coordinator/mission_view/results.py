@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
-from coordinator.mission_view.presentation import shown_s
+from coordinator.mission_view.wording import counted, listed, shown_s
+from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.protocol.uav_messages import AttemptResult, Outcome
@@ -26,6 +28,7 @@ __all__ = [
     "compare_quantities",
     "compare_routes",
     "deviations",
+    "lists_objective",
     "progress_of",
     "refusals",
     "summary_line",
@@ -57,6 +60,13 @@ class MissionResult:
     """Epochs in which the mission ran; one that a new coordinator restates is the same."""
     added: tuple[TaskId, ...] = ()
     """Tasks that the operator has added to the scenario's, whatever became of them."""
+    done_by: Mapping[TaskId, UavId] = field(default_factory=dict)
+    """Who was the first to do each task."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every task was done or withdrawn."""
+        return not self.failed and not self.open
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +85,29 @@ class Progress:
         """Eq. 1 over the tasks done [value·s]."""
         return self.curve[-1][1] if self.curve else 0.0
 
+    @property
+    def worths(self) -> dict[str, float]:
+        """What each task done has added to J [value·s]."""
+        values = [0.0, *(objective for _, objective in self.curve)]
+        return {
+            task: after - before
+            for task, (before, after) in zip(self.completed, pairwise(values), strict=True)
+        }
+
+
+def lists_objective(problem: Problem, lists: Mapping[str, Sequence[str]]) -> float | None:
+    """J of lists flown from the start as planned [value·s]; tasks the problem lacks count nothing.
+
+    Returns:
+        None where a task is on two lists: what two have visited is, and such lists are no plan.
+    """
+    index = {str(task): number for number, task in enumerate(problem.task_ids)}
+    routes = [
+        [index[task] for task in lists.get(uav, ()) if task in index] for uav in problem.uav_ids
+    ]
+    listed = [task for route in routes for task in route]
+    return evaluate(problem, routes)[0] if len(set(listed)) == len(listed) else None
+
 
 def progress_of(problem: Problem, outcomes: Mapping[tuple[str, str], Outcome]) -> Progress:
     """Eq. 1 along the visits, in the order in which they ended.
@@ -84,7 +117,7 @@ def progress_of(problem: Problem, outcomes: Mapping[tuple[str, str], Outcome]) -
         outcomes: newest of each UAV at each task.
 
     Returns:
-        The same lists, times and J as `coordinator.mission_view.mission_state.MissionState.result`.
+        Lists and times of the `MissionResult`, and the same J but for the order of its sum.
     """
     columns = {str(task): number for number, task in enumerate(problem.task_ids)}
     rows = {str(uav): number for number, uav in enumerate(problem.uav_ids)}
@@ -166,10 +199,7 @@ class ReportFact:
 
     def shown(self, at_most: int | None = None) -> str:
         """Text and ids; of more than ``at_most`` ids the first ones, and how many more."""
-        ids = self.ids if at_most is None else self.ids[:at_most]
-        more = len(self.ids) - len(ids)
-        listed = ", ".join(ids) + (f" and {more} more" if more else "")
-        return ": ".join(part for part in (self.text, listed) if part)
+        return ": ".join(part for part in (self.text, listed(self.ids, at_most)) if part)
 
 
 def compare_routes(
@@ -233,7 +263,7 @@ def summary_line(mission: Mission, plan: Plan | None, result: MissionResult) -> 
     if result.epochs == 0:
         return f"The mission never started: 0 of {n_task} tasks done"
     spent = f"in {shown_s(result.makespan_s)} s of mission time"
-    if not (result.failed or result.open):
+    if result.is_complete:
         every = "The only task" if n_task == 1 else f"All {n_task} tasks"
         exact = all(each.same for each in compare_routes(mission, plan, result))
         return f"{every} done {spent}" + (", every list as planned" if exact else "")
@@ -250,17 +280,17 @@ def deviations(mission: Mission, result: MissionResult) -> list[ReportFact]:
     found = []
     if result.lost_uavs:
         found.append(
-            ReportFact("lost", _count(result.lost_uavs, "UAV"), tuple(result.lost_uavs), True)
+            ReportFact("lost", counted(len(result.lost_uavs), "UAV"), tuple(result.lost_uavs), True)
         )
     if result.failed:
-        found.append(ReportFact("failed", _count(result.failed, "task"), result.failed, True))
+        found.append(ReportFact("failed", counted(len(result.failed), "task"), result.failed, True))
     if result.open:
-        found.append(ReportFact("still open", _count(result.open, "task"), result.open, True))
+        found.append(ReportFact("still open", counted(len(result.open), "task"), result.open, True))
     times_s = result.executed_completion_s
     late = sorted((t for t in times_s if times_s[t] > mission.horizon_s), key=times_s.__getitem__)
     if late:
         ids = tuple(f"{task} at {shown_s(times_s[task])} s" for task in late)
-        text = f"{_count(late, 'task')} after D = {mission.horizon_s:g} s, counting against J"
+        text = f"{counted(len(late), 'task')} after D = {mission.horizon_s:g} s, counting against J"
         found.append(ReportFact("late", text, ids, True))
     if result.duplicate_visits:
         visits = Counter(task for route in result.executed_routes.values() for task in route)
@@ -270,21 +300,19 @@ def deviations(mission: Mission, result: MissionResult) -> list[ReportFact]:
     known = {*result.done, *result.failed, *result.open}
     withdrawn = tuple(task.id for task in mission.tasks if task.id not in known)
     if withdrawn:
-        found.append(ReportFact("withdrawn", _count(withdrawn, "task"), withdrawn))
+        found.append(ReportFact("withdrawn", counted(len(withdrawn), "task"), withdrawn))
     if result.added:
-        found.append(ReportFact("by the operator", _count(result.added, "task"), result.added))
+        found.append(
+            ReportFact("by the operator", counted(len(result.added), "task"), result.added)
+        )
     later = (task.id for task in mission.tasks if task.appears_s > 0.0)
     popups = tuple(task for task in later if task not in result.added)
     if popups:
-        text = f"{_count(popups, 'task')} unknown to the plan"
+        text = f"{counted(len(popups), 'task')} unknown to the plan"
         found.append(ReportFact("pop-ups", text, popups))
     if result.epochs > 1:
         found.append(ReportFact("re-planned", f"{result.epochs} epochs"))
     return found
-
-
-def _count(items: Sequence[str], noun: str) -> str:
-    return f"{len(items)} {noun}" + ("" if len(items) == 1 else "s")
 
 
 _HARMLESS = frozenset({"stale", "not forwarded"})

@@ -26,6 +26,7 @@ from typing import Protocol
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import MissionObserver
+from coordinator.mission_view.uav_state import ABSENT
 from coordinator.operator.commands import (
     CommandHandler,
     CommandRequest,
@@ -323,7 +324,7 @@ class OperatorClient:
         mission_state = self._observer.mission_state
         statuses, present = mission_state.statuses, mission_state.present
         return {
-            uav: statuses[uav].phase.value if uav in present and uav in statuses else "absent"
+            uav: statuses[uav].phase.value if uav in present and uav in statuses else ABSENT
             for uav in (handler.concerned if isinstance(handler, CommandHandler) else ())
         }
 

@@ -1,6 +1,6 @@
 """The story of one task or one UAV of a recorded mission: what happened, why, and what came of it.
 
-Leaves out: finding what happened (coordinator.recording.event_log).
+Leaves out: finding what happened, and the words for it (coordinator.mission_view).
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ from rich.table import Table
 from rich.text import Text
 
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.presentation import BAD, clean, shown_s, shown_value
+from coordinator.mission_view.observation import MissionObserver
+from coordinator.mission_view.presentation import BAD
 from coordinator.mission_view.results import progress_of
-from coordinator.recording.event_log import LoggedEvent, events_of
+from coordinator.mission_view.story import EventKind, MissionEvent
+from coordinator.mission_view.wording import clean, listed, seconds_in_words, shown_value
 from coordinator.recording.reader import Recording
-from coordinator.recording.wording import seconds_in_words
 from swarm.protocol.board import TaskState
 from swarm.protocol.uav_messages import AttemptResult, StatusPhase
 from swarm.runtime.errors import Fault, InputError
@@ -27,7 +28,6 @@ from swarm.runtime.errors import Fault, InputError
 __all__ = ["Explanation", "explain_task", "explain_uav"]
 
 
-_TROUBLE = ("failed", "lost")
 _MOST_NAMED = 12
 _MOST_PASSED_OVER = 3
 """Choices that passed a task over are told so often; of more only the number."""
@@ -41,7 +41,7 @@ class Explanation:
     subject: str
     """``task`` or ``uav``."""
     id: str
-    events: tuple[LoggedEvent, ...]
+    events: tuple[MissionEvent, ...]
     state: str
     """How it stands in the end."""
     worth: float
@@ -58,8 +58,8 @@ class Explanation:
         story.add_column(justify="right", no_wrap=True, style="dim")
         story.add_column()
         for event in self.events:
-            when = "start-up" if event.mission_s is None else f"{shown_s(event.mission_s)} s"
-            story.add_row(when, Text(clean(event.text), BAD if event.kind in _TROUBLE else ""))
+            style = BAD if event.is_trouble else ""
+            story.add_row(event.told_at, Text(clean(event.sentence), style))
         title = Text(f"{noun} {self.id} of mission {self.mission}", "bold")
         ending = Text(clean(self.ending), "bold")
         console.print(Group(title, "", story, "", ending) if self.events else Group(title, ending))
@@ -75,8 +75,8 @@ class Explanation:
             "events": [
                 {
                     "mission_s": event.mission_s,
-                    "kind": event.kind,
-                    "text": event.text,
+                    "kind": event.kind.value,
+                    "text": event.sentence,
                     "uavs": sorted(event.uavs),
                     "tasks": sorted(event.tasks),
                 }
@@ -92,14 +92,15 @@ def explain_task(recording: Recording, task: str) -> Explanation:
     Raises:
         InputError: the recording has no such task.
     """
-    told = events_of(recording)
-    mission_state = told.mission_state
+    mission_state = _explained(recording)
     states = mission_state.board.states
     if task not in states:
         raise _unknown(recording, "--task", task, states)
     objective = mission_state.result().executed_objective
     by, at_s, worth = _worths(mission_state).get(task, ("", 0.0, 0.0))
-    events = _without_most_passings([event for event in told.events if task in event.tasks], task)
+    events = _without_most_passings(
+        [event for event in mission_state.story if task in event.tasks], task
+    )
     state, share = states[task], _share(worth, objective)
     match state:
         case TaskState.DONE:
@@ -132,8 +133,7 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
     Raises:
         InputError: the recording has no such UAV.
     """
-    told = events_of(recording)
-    mission_state = told.mission_state
+    mission_state = _explained(recording)
     fleet = [each.id for each in mission_state.mission.uavs]
     if uav not in fleet:
         raise _unknown(recording, "--uav", uav, fleet)
@@ -153,13 +153,17 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
         state, how = "home", "came home"
     else:
         state, how = "gone", "had left by the end"
-    did = f"did {_named(list(mine))}, worth {_share(worth, objective)}" if mine else "did no task"
-    but = f", failed at {_named(failed)}" if failed else ""
+    did = (
+        f"did {listed(list(mine), _MOST_NAMED)}, worth {_share(worth, objective)}"
+        if mine
+        else "did no task"
+    )
+    but = f", failed at {listed(failed, _MOST_NAMED)}" if failed else ""
     return Explanation(
         mission=recording.mission,
         subject="uav",
         id=uav,
-        events=tuple(event for event in told.events if uav in event.uavs),
+        events=tuple(event for event in mission_state.story if uav in event.uavs),
         state=state,
         worth=worth,
         objective=objective,
@@ -167,12 +171,21 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
     )
 
 
-def _without_most_passings(events: Sequence[LoggedEvent], task: str) -> tuple[LoggedEvent, ...]:
+def _explained(recording: Recording) -> MissionState:
+    """All that was known in the end, its story told with all reasons."""
+    observer = MissionObserver(recording.mission, recording.timing, None, explains=True)
+    observer.start(recording.start_s)
+    for entry in recording.entries:
+        observer.step(entry.fact, entry.now_s)
+    return observer.mission_state
+
+
+def _without_most_passings(events: Sequence[MissionEvent], task: str) -> tuple[MissionEvent, ...]:
     """``events``, with those that passed the task over only as far as one wants to read."""
-    kept: list[LoggedEvent] = []
-    passed: list[LoggedEvent] = []
+    kept: list[MissionEvent] = []
+    passed: list[MissionEvent] = []
     for event in events:
-        if event.kind != "passed over":
+        if event.kind is not EventKind.PASSED_OVER:
             kept.append(event)
             continue
         passed.append(event)
@@ -180,10 +193,8 @@ def _without_most_passings(events: Sequence[LoggedEvent], task: str) -> tuple[Lo
             kept.append(event)
     if (more := len(passed) - _MOST_PASSED_OVER) > 0:
         times = "once" if more == 1 else f"{more} times"
-        text = f"Other tasks were preferred to {task} {times} more by then."
-        kept.append(
-            LoggedEvent(passed[-1].mission_s, "passed over", text, frozenset(), frozenset())
-        )
+        text = f"other tasks were preferred to {task} {times} more by then"
+        kept.append(MissionEvent(passed[-1].mission_s, text, EventKind.PASSED_OVER))
         order = {id(event): place for place, event in enumerate(events)}
         last = order[id(passed[-1])]
         kept.sort(key=lambda event: order.get(id(event), last))
@@ -196,13 +207,8 @@ def _worths(mission_state: MissionState) -> dict[str, tuple[str, float, float]]:
     if problem is None:
         return {}
     progress = progress_of(problem, mission_state.replica.outcomes)
-    found, before = {}, 0.0
-    for (task, (uav, completed_s)), (_, objective) in zip(
-        progress.completed.items(), progress.curve, strict=True
-    ):
-        found[task] = uav, completed_s, objective - before
-        before = objective
-    return found
+    worths = progress.worths
+    return {task: (*by_at, worths[task]) for task, by_at in progress.completed.items()}
 
 
 def _share(worth: float, objective: float) -> str:
@@ -212,12 +218,6 @@ def _share(worth: float, objective: float) -> str:
     return f"{shown_value(worth)} value·s{of_all}"
 
 
-def _named(tasks: Sequence[str]) -> str:
-    shown = ", ".join(tasks[:_MOST_NAMED])
-    more = len(tasks) - _MOST_NAMED
-    return shown if more <= 0 else f"{shown} and {more} more"
-
-
 def _unknown(recording: Recording, option: str, name: str, there: Iterable[str]) -> InputError:
     names = list(there)
     near = difflib.get_close_matches(name, names, n=3)
@@ -225,7 +225,7 @@ def _unknown(recording: Recording, option: str, name: str, there: Iterable[str])
     if near:
         remedy = f"did you mean {' or '.join(near)}?"
     elif names:
-        remedy = f"choose one of {_named(names)}"
+        remedy = f"choose one of {listed(names, _MOST_NAMED)}"
     else:
         remedy = "there are none in it"
     return InputError(Fault(option, name, f"{recording.path} has no such {what}", remedy))

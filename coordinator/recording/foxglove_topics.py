@@ -17,8 +17,9 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.presentation import is_trouble, uav_colour
-from coordinator.mission_view.scene import LOST, Scene, TaskView, UavView, scene_of
+from coordinator.mission_view.presentation import uav_colour
+from coordinator.mission_view.scene import TAKEN, Scene, TaskView, scene_of
+from coordinator.mission_view.uav_state import LOST, UavView
 from coordinator.recording.foxglove_schemas import (
     LOCATION_FIX,
     LOG,
@@ -127,20 +128,11 @@ class FoxgloveTopics:
         if mission_state.replica.brief is None:
             return
         scene = scene_of(mission_state, now_s)
-        layers_m = {uav.id: uav.layer_m for uav in mission_state.replica.brief.uavs}
         yield _progress(mission_state, scene, now_s)
-        yield from self._fixes(
-            scene, Origin(*mission_state.replica.brief.origin), layers_m, time_ns
-        )
+        yield from self._fixes(scene, Origin(*mission_state.replica.brief.origin), time_ns)
         size_m = _size_m(scene)
-        uavs = []
-        for view in scene.uavs:
-            status = mission_state.statuses.get(view.id)
-            velocity_enu_m_s = None if status is None else status.velocity_enu_m_s
-            layer_m = layers_m.get(view.id, 0.0)
-            uavs.append(_uav(view, velocity_enu_m_s, layer_m, size_m, time_ns))
-        yield _scene("uavs", uavs)
-        tasks = tuple((task.id, task.position_enu_m, _state(task)) for task in scene.tasks)
+        yield _scene("uavs", [_uav(view, size_m, time_ns) for view in scene.uavs])
+        tasks = tuple((task.id, task.position_enu_m, task.stands) for task in scene.tasks)
         if tasks != self._tasks:
             self._tasks = tasks
             yield _scene("tasks", _task_entities(scene.tasks, size_m, time_ns))
@@ -156,18 +148,16 @@ class FoxgloveTopics:
     def _story(self, mission_state: MissionState, time_ns: int) -> Iterator[FileMessage]:
         for happening in mission_state.told_since(self._told):
             when = "" if happening.mission_s is None else f"[{happening.mission_s:.2f} s] "
-            level = "warning" if is_trouble(happening) else "info"
+            level = "warning" if happening.is_trouble else "info"
             yield log_line("story", when + happening.text, level, time_ns)
         self._told = mission_state.told
 
-    def _fixes(
-        self, scene: Scene, origin: Origin, layers_m: dict[str, float], time_ns: int
-    ) -> Iterator[FileMessage]:
+    def _fixes(self, scene: Scene, origin: Origin, time_ns: int) -> Iterator[FileMessage]:
         for view in scene.uavs:
-            if self._places.get(view.id) == view.position_enu_m:
+            if self._places.get(view.id) == view.place_enu_m:
                 continue
-            self._places[view.id] = view.position_enu_m
-            at = _raised(view.position_enu_m, layers_m.get(view.id, 0.0))
+            self._places[view.id] = view.place_enu_m
+            at = _raised(view.place_enu_m, view.layer_m)
             fix = location_fix(
                 view.id, time_ns, *wgs84_from_enu(origin, at), _uav_colour(view.number)
             )
@@ -186,7 +176,7 @@ def log_line(name: str, message: str, level: str, time_ns: int) -> FileMessage:
 
 
 def _progress(mission_state: MissionState, scene: Scene, now_s: float) -> FileMessage:
-    plan, epoch = mission_state.plan, mission_state.replica.epoch
+    plan, epoch, counts = mission_state.plan, mission_state.replica.epoch, scene.counts
     progress = _Progress(
         now_s=now_s,
         mission_s=scene.mission_s,
@@ -196,11 +186,11 @@ def _progress(mission_state: MissionState, scene: Scene, now_s: float) -> FileMe
         objective=scene.objective,
         plan_objective=scene.planned_objective,
         bound=plan.bound if scene.optimum is None and plan is not None else scene.optimum,
-        open=scene.count(TaskState.OPEN),
-        taken=scene.count(TaskState.OPEN, taken=True),
-        done=scene.count(TaskState.DONE),
-        failed=scene.count(TaskState.FAILED),
-        withdrawn=scene.count(TaskState.WITHDRAWN),
+        open=counts[TaskState.OPEN],
+        taken=counts[TAKEN],
+        done=counts[TaskState.DONE],
+        failed=counts[TaskState.FAILED],
+        withdrawn=counts[TaskState.WITHDRAWN],
         uavs=len(scene.uavs),
         lost=len(mission_state.lost),
         dropped=scene.dropped,
@@ -212,11 +202,9 @@ def _scene(name: str, entities: list[Json]) -> FileMessage:
     return FileMessage(f"/scene/{name}", SCENE_UPDATE, _bytes(scene_update(entities)))
 
 
-def _uav(
-    view: UavView, velocity_enu_m_s: Point | None, layer_m: float, size_m: float, time_ns: int
-) -> Json:
+def _uav(view: UavView, size_m: float, time_ns: int) -> Json:
     colour = _GREY if view.troubled else _uav_colour(view.number)
-    at = _raised(view.position_enu_m, layer_m)
+    at = _raised(view.place_enu_m, view.layer_m)
     facts = {"does": str(view.does), "task": view.task or "", "note": view.note}
     if view.battery_frac is not None:
         facts["battery"] = f"{view.battery_frac:.0%}"
@@ -226,7 +214,7 @@ def _uav(
         "spheres": [sphere(at, size_m, colour)],
         "texts": [text(_raised(at, size_m), label, _WHITE)],
     }
-    east_m_s, north_m_s, _ = velocity_enu_m_s or (0.0, 0.0, 0.0)
+    east_m_s, north_m_s, _ = view.velocity_enu_m_s or (0.0, 0.0, 0.0)
     if math.hypot(east_m_s, north_m_s) > _STILL_M_S:
         yaw_rad = math.atan2(north_m_s, east_m_s)
         shapes["arrows"] = [arrow(at, yaw_rad, 2.0 * size_m, colour)]
@@ -237,8 +225,10 @@ def _task_entities(tasks: tuple[TaskView, ...], size_m: float, time_ns: int) -> 
     """One entity for each state: what nobody has touched is a ball, what is over a box."""
     entities = []
     for state, colour in _STATE_COLOURS.items():
-        mine = [task.position_enu_m for task in tasks if _state(task) == state]
-        shape, kind = (sphere, "spheres") if state in ("open", "taken") else (cube, "cubes")
+        mine = [task.position_enu_m for task in tasks if task.stands == state]
+        shape, kind = (
+            (sphere, "spheres") if state in (TaskState.OPEN.value, TAKEN) else (cube, "cubes")
+        )
         solids = [shape(at, size_m, colour) for at in mine]
         entities.append(entity(state, FRAME, time_ns, {"tasks": str(len(mine))}, **{kind: solids}))
     if len(tasks) <= MOST_LABELS:
@@ -258,10 +248,6 @@ def _lists(scene: Scene) -> tuple[tuple[str, tuple[Point, ...], Colour], ...]:
         )
         for view in scene.uavs
     )
-
-
-def _state(task: TaskView) -> str:
-    return "taken" if task.taken and task.state is TaskState.OPEN else task.state.value
 
 
 def _size_m(scene: Scene) -> float:

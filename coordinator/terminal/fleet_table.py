@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from rich.cells import set_cell_size
 from rich.text import Text
 
-from coordinator.mission_view.presentation import BAD, Signs, clean, uav_colour
-from coordinator.mission_view.scene import LOST, Scene, UavView
+from coordinator.mission_view.presentation import BAD, Signs, uav_colour
+from coordinator.mission_view.scene import Scene
+from coordinator.mission_view.uav_state import LOST, UavView
+from coordinator.mission_view.wording import clean, command_in_words
 from swarm.model.ids import FLEET
 from swarm.protocol.messages import CommandKind, MissionPhase
-from swarm.protocol.operator_commands import describe_command
 from swarm.protocol.uav_messages import StatusPhase
 
 __all__ = ["alerts", "fit_cells", "fleet_table", "table_width", "task_lists"]
@@ -177,7 +178,7 @@ def _row(uav: UavView, columns: _ColumnWidths, width: int, signs: Signs) -> Text
     row.append(f"{_eta(uav, columns.eta_digits):>{_ETA_CELLS}}{len(uav.flown):>{_DONE_CELLS}}")
     if columns.battery:
         charge = "" if uav.battery_frac is None else f"{100.0 * uav.battery_frac:.0f}%"
-        row.append(f"{charge:>{_BATTERY_CELLS}}", BAD if _low(uav) else "")
+        row.append(f"{charge:>{_BATTERY_CELLS}}", BAD if uav.battery_low else "")
     room = width - row.cell_len - _GAP
     if note and room >= _SHORTEST_NOTE:
         row.append(" " * _GAP + fit_cells(note, room, signs), "dim")
@@ -188,10 +189,6 @@ def _eta(uav: UavView, digits: int) -> str:
     if uav.eta_s is None:
         return ""
     return f"{uav.eta_s:.{digits}f} s" if uav.eta_s > 0.0 else "now"
-
-
-def _low(uav: UavView) -> bool:
-    return uav.battery_frac is not None and uav.battery_frac < 0.2
 
 
 def _urgency(uav: UavView) -> int:
@@ -267,11 +264,7 @@ def _said(scene: Scene) -> list[str]:
     """What the operator has said that is still in force, the abort first."""
     lasting = [command for command in scene.commands if command.kind is not CommandKind.RESUME]
     ordered = sorted(lasting, key=lambda command: command.target != FLEET)
-    whom = {FLEET: "mission"}
-    return [
-        f"{whom.get(command.target, command.target)} {describe_command(command)}"
-        for command in ordered
-    ]
+    return [command_in_words(command) for command in ordered]
 
 
 def _named(names: Sequence[str]) -> str:

@@ -20,16 +20,14 @@ from coordinator.mission_view.observation import deserted
 from coordinator.mission_view.presentation import (
     BAD,
     Signs,
-    StoryLine,
-    clean,
-    is_trouble,
-    shown_value,
     signs_for,
     story_line,
     story_style,
 )
 from coordinator.mission_view.results import refusals
-from coordinator.mission_view.scene import Scene, scene_of
+from coordinator.mission_view.scene import TAKEN, Scene, scene_of
+from coordinator.mission_view.story import MissionEvent
+from coordinator.mission_view.wording import clean, shown_value
 from coordinator.terminal.fleet_table import alerts, fit_cells, fleet_table, table_width, task_lists
 from coordinator.terminal.map_panel import ideal_width, map_panel
 from swarm.protocol.board import TaskState
@@ -270,15 +268,16 @@ def mission_title(
 
 def task_counts(scene: Scene, signs: Signs) -> Text:
     """Tasks by state, which is also the key to their signs."""
-    n_task = len(scene.tasks) - scene.count(TaskState.WITHDRAWN)
+    count = scene.counts
+    withdrawn = count[TaskState.WITHDRAWN]
     parts = [
-        (signs.done, f"{scene.count(TaskState.DONE)} of {n_task} done", ""),
-        (signs.taken, f"{sum(task.taken for task in scene.tasks)} taken", ""),
-        (signs.open, f"{scene.count(TaskState.OPEN)} open", ""),
+        (signs.done, f"{count[TaskState.DONE]} of {len(scene.tasks) - withdrawn} done", ""),
+        (signs.taken, f"{count[TAKEN]} taken", ""),
+        (signs.open, f"{count[TaskState.OPEN]} open", ""),
     ]
-    if failed := scene.count(TaskState.FAILED):
+    if failed := count[TaskState.FAILED]:
         parts.append((signs.failed, f"{failed} failed", BAD))
-    if withdrawn := len(scene.tasks) - n_task:
+    if withdrawn:
         parts.append((" ", f"{withdrawn} withdrawn", "dim"))
     counts = Text()
     for sign, text, style in parts:
@@ -334,8 +333,8 @@ def _story(mission_state: MissionState, width: int, height: int, signs: Signs) -
     return lines + [Text()] * (height - len(lines))
 
 
-def _newest(story: Sequence[StoryLine], count: int) -> list[StoryLine]:
+def _newest(story: Sequence[MissionEvent], count: int) -> list[MissionEvent]:
     """The newest lines; the last things that went wrong stay among them."""
     newest = list(story[-count:])
-    pinned = [line for line in story[:-count] if is_trouble(line)][-max(1, count // 4) :]
+    pinned = [line for line in story[:-count] if line.is_trouble][-max(1, count // 4) :]
     return [*pinned, *newest[len(pinned) :]]

@@ -15,7 +15,8 @@ import numpy as np
 from rich.text import Text
 
 from coordinator.mission_view.presentation import BAD, Signs, uav_colour
-from coordinator.mission_view.scene import Scene, TaskView, UavView
+from coordinator.mission_view.scene import Scene, TaskView
+from coordinator.mission_view.uav_state import UavView
 from swarm.protocol.board import TaskState
 
 __all__ = ["Canvas", "Spot", "ideal_width", "map_panel"]
@@ -160,10 +161,10 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
         canvas.put(view.spot(task.position_enu_m), *_task_look(task, signs))
     # Names of UAVs come first, and the UAVs themselves over everything.
     for uav in scene.uavs:
-        canvas.put(view.spot(uav.position_enu_m), *_uav_look(uav, signs))
+        canvas.put(view.spot(uav.place_enu_m), *_uav_look(uav, signs))
     for uav in _by_urgency(scene):
         style = _uav_look(uav, signs)[1]
-        canvas.name(view.spot(uav.position_enu_m), (uav.id, uav.short), style)
+        canvas.name(view.spot(uav.place_enu_m), (uav.id, uav.short), style)
     longest = max((len(task.id) for task in tasks), default=0)
     if room >= _ROOM_PER_LETTER * (longest + 2):
         for task in tasks:
@@ -213,7 +214,7 @@ def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
         if room < _ROOM_FOR_PLANS or uav.troubled:
             continue
         ahead = [task for task in uav.planned if task != uav.task and task in places]
-        begin = places.get(uav.task, uav.position_enu_m) if uav.task else uav.position_enu_m
+        begin = places.get(uav.task, uav.place_enu_m) if uav.task else uav.place_enu_m
         stops = [begin, *(places[task] for task in ahead)]
         for first, last in pairwise(stops):
             canvas.line(view.spot(first), view.spot(last), _faint(uav), every=4)
@@ -221,12 +222,12 @@ def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
         if room >= _ROOM_FOR_PATHS:
             stops = [uav.start_enu_m, *(places[task] for task in uav.flown if task in places)]
             if uav.busy or uav.troubled:
-                stops.append(uav.position_enu_m)
+                stops.append(uav.place_enu_m)
             for first, last in pairwise(stops):
                 canvas.line(view.spot(first), view.spot(last), uav_colour(uav.number))
         if uav.task is not None and uav.task in places:
             target = view.spot(places[uav.task])
-            canvas.line(view.spot(uav.position_enu_m), target, uav_colour(uav.number), every=2)
+            canvas.line(view.spot(uav.place_enu_m), target, uav_colour(uav.number), every=2)
 
 
 def _faint(uav: UavView) -> str:
@@ -241,7 +242,7 @@ def _weight(task: TaskView) -> int:
 
 
 def _task_look(task: TaskView, signs: Signs) -> tuple[str, str]:
-    sign = signs.task(task.state, task.taken)
+    sign = signs.task(task.stands)
     if task.state is TaskState.FAILED:
         return sign, BAD
     return sign, "bold" if task.uav is None else f"bold {uav_colour(task.uav)}"

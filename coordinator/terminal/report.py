@@ -16,14 +16,7 @@ from typing import Any
 
 from rich.console import Console
 
-from coordinator.mission_view.presentation import (
-    StoryLine,
-    clean,
-    shown_s,
-    shown_value,
-    signs_for,
-    told_at,
-)
+from coordinator.mission_view.presentation import signs_for
 from coordinator.mission_view.results import (
     MissionResult,
     ProtectionSummary,
@@ -33,12 +26,14 @@ from coordinator.mission_view.results import (
     deviations,
     summary_line,
 )
+from coordinator.mission_view.story import MissionEvent
+from coordinator.mission_view.wording import clean, shown_s, shown_value
 from coordinator.planner.plan_report import plan_as_json
 from coordinator.terminal.report_text import report_text
 from swarm.model import Mission, Plan, UavId
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["REPORT_SUFFIXES", "MissionReport", "check_report_path", "mission_ok", "write_report"]
+__all__ = ["REPORT_SUFFIXES", "MissionReport", "check_report_path", "write_report"]
 
 
 REPORT_SUFFIXES = (".json", ".md")
@@ -50,11 +45,6 @@ _LISTS_KEY = (
 _HINT = "More: --report FILE.md has the whole story; --json is for programs."
 
 
-def mission_ok(result: MissionResult) -> bool:
-    """Whether every task was done or withdrawn."""
-    return not result.failed and not result.open
-
-
 @dataclass(frozen=True, slots=True)
 class MissionReport:
     """Everything there is to tell about one mission."""
@@ -63,7 +53,7 @@ class MissionReport:
     plan: Plan | None
     """The offline plan; None if there never was one."""
     result: MissionResult
-    story: tuple[StoryLine, ...]
+    story: tuple[MissionEvent, ...]
     takeoff_s: float | None = None
     """From the first process to mission time 0 [s of the vehicles' clock]."""
     wall_s: float | None = None
@@ -199,7 +189,7 @@ class MissionReport:
         if not self.story:
             return "Nothing was heard."
         rows = ["| mission time | |", "|---:|---|"]
-        rows += [f"| {told_at(line)} | {_escaped(clean(line.text))} |" for line in self.story]
+        rows += [f"| {line.told_at} | {_escaped(clean(line.text))} |" for line in self.story]
         return "\n".join(rows)
 
 

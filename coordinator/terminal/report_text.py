@@ -14,13 +14,7 @@ from rich.text import Text
 from coordinator.mission_view.presentation import (
     BAD,
     Signs,
-    StoryLine,
-    clean,
-    notable,
-    shown_s,
-    shown_value,
     story_style,
-    told_at,
 )
 from coordinator.mission_view.results import (
     MissionResult,
@@ -31,6 +25,8 @@ from coordinator.mission_view.results import (
     compare_routes,
     summary_line,
 )
+from coordinator.mission_view.story import MissionEvent, notable
+from coordinator.mission_view.wording import clean, shown_s, shown_value
 from swarm.model import Mission, Plan
 
 __all__ = ["report_text"]
@@ -47,7 +43,7 @@ def report_text(
     mission: Mission,
     plan: Plan | None,
     result: MissionResult,
-    story: Sequence[StoryLine],
+    story: Sequence[MissionEvent],
     *,
     notes: Sequence[ReportFact],
     hint: str,
@@ -65,10 +61,9 @@ def report_text(
         signs: characters to use.
     """
     ascii_only = not signs.braille
-    good = not (result.failed or result.open)
     headline = Text.assemble(
         (f"{mission.name}: ", "bold"),
-        (summary_line(mission, plan, result), "bold green" if good else BAD),
+        (summary_line(mission, plan, result), "bold green" if result.is_complete else BAD),
     )
     parts: list[RenderableType] = [headline]
     if plan is not None:
@@ -175,12 +170,12 @@ def _notes_table(notes: Sequence[ReportFact], ascii_only: bool) -> Table:
     return table
 
 
-def _story_table(told: Sequence[StoryLine], ascii_only: bool) -> RenderableType:
+def _story_table(told: Sequence[MissionEvent], ascii_only: bool) -> RenderableType:
     table = Table.grid(padding=(0, 2, 0, 0))
     table.add_column(justify="right", no_wrap=True)
     table.add_column()
     for line in told[-_STORY_LINES:]:
         text = clean(line.text, ascii_only=ascii_only)
-        table.add_row(Text(told_at(line)), Text(text, story_style(line)))
+        table.add_row(Text(line.told_at), Text(text, story_style(line)))
     earlier = len(told) - _STORY_LINES
     return Group(Text(f"{earlier} earlier lines", "dim"), table) if earlier > 0 else table

@@ -17,22 +17,17 @@ from rich.table import Table
 from rich.text import Text
 
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.presentation import BAD, Signs, clean, shown_value, uav_colour
-from coordinator.mission_view.scene import LOST, Scene, scene_of, uav_position
+from coordinator.mission_view.presentation import BAD, Signs, uav_colour
+from coordinator.mission_view.scene import TAKEN, Scene, scene_of
+from coordinator.mission_view.uav_state import ABSENT, LOST
+from coordinator.mission_view.wording import clean, command_in_words, shown_value
 from coordinator.terminal.live_view import mission_title, task_counts
 from swarm.model import TaskId, UavId
-from swarm.model.ids import COORDINATOR, FLEET
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskState
 from swarm.protocol.messages import OperatorCommand
-from swarm.protocol.operator_commands import describe_command
-from swarm.protocol.uav_messages import StatusPhase
 
 __all__ = ["MissionStatus", "UavStatus", "mission_status", "status_as_json", "status_table"]
-
-
-ABSENT = "absent"
-GONE_FOR_GOOD = (LOST, StatusPhase.RETURNING, StatusPhase.HOME, StatusPhase.OUT)
-"""What is no less true of a UAV that nothing is heard of any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +49,7 @@ class UavStatus:
     """Since it last said something [s of the observer's clock]; None when it never has."""
     note: str
     dropped: Mapping[str, int]
-    """Messages its agent has dropped, by reason."""
+    """Messages its agents have dropped, by reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,25 +84,21 @@ class MissionStatus:
 def mission_status(mission_state: MissionState, now_s: float) -> MissionStatus:
     """What ``mission_state`` knows at ``now_s``, in its own clock's seconds."""
     scene, epoch = scene_of(mission_state, now_s), mission_state.replica.epoch
-    uavs = []
-    for view in scene.uavs:
-        status = mission_state.statuses.get(view.id)
-        heard_s = mission_state.heard_s.get(view.id)
-        there = view.id in mission_state.present
-        uavs.append(
-            UavStatus(
-                id=view.id,
-                does=view.does if there or view.does in GONE_FOR_GOOD else ABSENT,
-                task=view.task if there else None,
-                eta_s=view.eta_s if there else None,
-                done=len(view.flown),
-                position_enu_m=uav_position(mission_state, view.id),
-                battery_frac=view.battery_frac,
-                link_age_s=None if heard_s is None else now_s - heard_s,
-                note=view.note,
-                dropped={} if status is None else status.dropped,
-            )
+    uavs = [
+        UavStatus(
+            id=view.id,
+            does=view.now_does,
+            task=view.now_task,
+            eta_s=view.now_eta_s,
+            done=len(view.flown),
+            position_enu_m=view.in_layer_enu_m,
+            battery_frac=view.battery_frac,
+            link_age_s=view.link_age_s,
+            note=view.note,
+            dropped=dict(view.dropped),
         )
+        for view in scene.uavs
+    ]
     known = {COORDINATOR, *(uav.id for uav in uavs)}
     return MissionStatus(
         scene=scene,
@@ -121,7 +112,7 @@ def mission_status(mission_state: MissionState, now_s: float) -> MissionStatus:
 def status_as_json(status: MissionStatus) -> dict[str, Any]:
     """``status`` as `swarm status --json` prints it, ready for `json.dumps`."""
     scene = status.scene
-    taken = sum(task.taken for task in scene.tasks)
+    tasks = {state: scene.counts[state] for state in TaskState}
     return {
         "mission": scene.mission.name,
         "phase": scene.phase,
@@ -133,10 +124,8 @@ def status_as_json(status: MissionStatus) -> dict[str, Any]:
         "horizon_s": scene.mission.horizon_s,
         "objective": scene.objective,
         "planned_objective": scene.planned_objective,
-        "tasks": {
-            **{state: _count(scene, state) for state in TaskState},
-            "taken": taken,
-        },
+        "tasks": tasks
+        | {TaskState.OPEN: tasks[TaskState.OPEN] + scene.counts[TAKEN], TAKEN: scene.counts[TAKEN]},
         "link": scene.cut_s is None,
         "coordinator": status.coordinator,
         "others": list(status.others),
@@ -165,8 +154,7 @@ def status_table(status: MissionStatus, width: int, signs: Signs) -> RenderableT
     if status.others:
         facts.add_row("also there", _line(", ".join(status.others), signs))
     for command in status.commands:
-        whom = "mission" if command.target == FLEET else command.target
-        facts.add_row("operator", _line(f"{whom} {describe_command(command)}", signs))
+        facts.add_row("operator", _line(command_in_words(command), signs))
     parts: list[RenderableType] = [mission_title(scene, width, 1.0, signs), facts, ""]
     parts.append(_fleet(status, signs))
     if status.dropped:
@@ -185,17 +173,19 @@ def _fleet(status: MissionStatus, signs: Signs) -> Table:
     table.add_column("heard", justify="right", no_wrap=True)
     table.add_column("dropped", justify="right")
     table.add_column("note")
-    for number, uav in enumerate(status.uavs):
+    for number, (uav, view) in enumerate(zip(status.uavs, status.scene.uavs, strict=True)):
         gone = uav.does in (LOST, ABSENT)
         colour = BAD if gone else f"bold {uav_colour(number)}"
-        low = uav.battery_frac is not None and uav.battery_frac < 0.2
         table.add_row(
             Text(f"{signs.uav_lost if gone else signs.uav} {uav.id}", colour),
             Text(uav.does.upper() if gone else uav.does, BAD if gone else ""),
             uav.task or Text(signs.nothing, "dim"),
             str(uav.done),
             _place(uav.position_enu_m, signs),
-            Text("" if uav.battery_frac is None else f"{uav.battery_frac:.0%}", BAD if low else ""),
+            Text(
+                "" if uav.battery_frac is None else f"{uav.battery_frac:.0%}",
+                BAD if view.battery_low else "",
+            ),
             signs.nothing if uav.link_age_s is None else f"{uav.link_age_s:.1f} s",
             str(sum(uav.dropped.values())),
             _line(uav.note, signs),
@@ -226,7 +216,3 @@ def _place(position_enu_m: tuple[float, float, float] | None, signs: Signs) -> s
 
 def _line(text: str, signs: Signs) -> Text:
     return Text(clean(text, ascii_only=not signs.braille))
-
-
-def _count(scene: Scene, state: TaskState) -> int:
-    return sum(task.state is state for task in scene.tasks)

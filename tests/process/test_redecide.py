@@ -56,7 +56,7 @@ def test_the_recording_of_a_faultless_flight_is_read_by_others_and_agrees_with_i
     assert lists == told["executed_routes"]
 
     of_uav = [event["text"] for event in said("explain", str(file), "--uav", "uav1")["events"]]
-    assert sum(text.startswith("The mission was over") for text in of_uav) == 1
+    assert sum(text.startswith("Mission ends:") for text in of_uav) == 1
 
     again = said("simulate", "--from", str(file))
     assert again["differing"] == []

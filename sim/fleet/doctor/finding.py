@@ -13,7 +13,8 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
-from coordinator.mission_view.presentation import BAD, clean
+from coordinator.mission_view.presentation import BAD
+from coordinator.mission_view.wording import clean
 
 __all__ = ["CheckFinding", "CheckState", "as_json", "fails", "fine", "print_findings", "warns"]
 

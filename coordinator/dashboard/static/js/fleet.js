@@ -5,7 +5,7 @@ import { make, setAttribute, setText } from "./dom.js";
 import { Grid } from "./grid.js";
 import { DOES, NOTHING, byName, number, percent, seconds } from "./words.js";
 
-const LOW_BATTERY = 0.25;
+const LOW_BATTERY = 0.2;
 const LONG_SILENCE_S = 3;
 
 export class FleetTable {

@@ -52,7 +52,7 @@ function line(told) {
   return make(
     "li",
     { class: told.trouble ? "trouble" : null },
-    make("time", {}, told.mission_s === null ? "before" : seconds(told.mission_s)),
+    make("time", {}, told.mission_s === null ? "start-up" : seconds(told.mission_s)),
     told.trouble ? make("i", { role: "img", "aria-label": "trouble:" }, "!") : null,
     make("span", {}, told.text),
   );

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coordinator.mission_view.mission_state import STORY_KEPT, MissionState
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.story import STORY_KEPT
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (
@@ -314,7 +315,7 @@ def test_of_many_new_keys_a_few_are_named() -> None:
     observer = Onlooker().running()
     observer.happen(KeysReplaced(frozenset(f"u{number}" for number in range(9))))
 
-    assert observer.story[-1] == "keys revoked or replaced: u0, u1, u2, u3, u4, …"
+    assert observer.story[-1] == "keys revoked or replaced: u0, u1, u2, u3, u4 and 4 more"
 
 
 def test_what_agents_dropped_is_added_up_over_their_lives() -> None:

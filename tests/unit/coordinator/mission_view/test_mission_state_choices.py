@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coordinator.mission_view.mission_state import CHOICES_KEPT
+from coordinator.mission_view.fleet_reports import CHOICES_KEPT
 from swarm.protocol.events import MessageReceived
 from swarm.protocol.messages import Message, Stamp
 from tests.support.builders import choice, mission, task, uav

@@ -88,7 +88,7 @@ def choice(task: str, left: str | None = None, *, certificate: bool = False) -> 
 
 
 def texts(told: Explanation) -> list[str]:
-    return [event.text for event in told.events]
+    return [event.sentence for event in told.events]
 
 
 def test_a_task_that_was_chosen_claimed_and_done(tape: Tape) -> None:
@@ -100,14 +100,14 @@ def test_a_task_that_was_chosen_claimed_and_done(tape: Tape) -> None:
     told = explain_task(tape.stop(), "t0")
 
     assert texts(told) == [
-        "The coordinator posted t0: value 1, 10 m east of the origin.",
+        "Task t0 posted: value 1, 10 m east of the origin.",
         (
             "u0 chose t0 by the greedy rule of epoch 1, first in the sequence: score 8, against "
             "t1 (6.5); Theorem 5 proves that it was the best for this UAV."
         ),
         "u0 claimed t0, and set off; done at 10.0 s by its reckoning.",
         "Nobody with a better claim objected: u0 held t0.",
-        "u0 did t0 at 10.2 s, 0.25 s later than it had said.",
+        "u0 ended t0: done at 10.2 s, 0.25 s later than it had said.",
     ]
     times_s = [event.mission_s for event in told.events]
     assert times_s[0] is None
@@ -139,9 +139,9 @@ def test_a_task_of_a_lost_uav_is_taken_over(tape: Tape) -> None:
     recording = tape.stop()
 
     told = texts(explain_task(recording, "t0"))
-    assert "u0 was lost on its way; t0 was open again for everyone." in told
+    assert "u0 lost; task t0 is open again." in told
     assert (
-        "u1 claimed t0, taking over from u0 1.50 s after its loss was noticed, and set off; done "
+        "u1 took over t0 from u0 1.50 s after its loss was noticed, and set off; done "
         "at 15.0 s by its reckoning."
     ) in told
     of_uav = explain_uav(recording, "u0")
@@ -156,7 +156,7 @@ def test_turning_aside_is_the_reason_why_a_task_was_given_up(tape: Tape) -> None
     recording = tape.stop()
 
     assert "u0 gave t0 up: it had turned aside to t1." in texts(explain_task(recording, "t0"))
-    assert any("turning aside from t0" in text for text in texts(explain_task(recording, "t1")))
+    assert any("turns aside from t0" in text for text in texts(explain_task(recording, "t1")))
 
 
 def test_an_end_that_is_heard_of_after_the_next_claim_is_no_giving_up(tape: Tape) -> None:
@@ -165,7 +165,7 @@ def test_an_end_that_is_heard_of_after_the_next_claim_is_no_giving_up(tape: Tape
     tape.say("u0", done("t0", 9.0), 9.1)
     told = texts(explain_task(tape.stop(), "t0"))
 
-    assert told[-1] == "u0 did t0 at 9.00 s, just when it had said."
+    assert told[-1] == "u0 ended t0: done at 9.00 s, just when it had said."
     assert not any("gave" in text for text in told)
 
 
@@ -181,13 +181,13 @@ def test_the_operator_is_named_where_it_was_the_operator(tape: Tape) -> None:
 
     told = explain_task(recording, "extra")
     assert texts(told) == [
-        "The operator posted extra: smoke seen: value 3, 5 m south of the origin, service 1.50 s.",
+        "Operator adds task extra: smoke seen; value 3, 5 m south of the origin, service 1.50 s.",
         "u0 claimed extra, and set off; done at 1000 s by its reckoning.",
         "u0 gave extra up, told to hold.",
-        "The operator withdrew extra: false alarm.",
+        "Operator withdraws extra: false alarm.",
     ]
     assert told.ending == "So extra was withdrawn, and is worth nothing."
-    assert "The operator told u0 to hold: traffic." in texts(explain_uav(recording, "u0"))
+    assert "Operator holds u0: traffic." in texts(explain_uav(recording, "u0"))
 
 
 def test_what_the_operator_said_of_an_earlier_flight_is_no_part_of_the_story(tape: Tape) -> None:
@@ -195,8 +195,8 @@ def test_what_the_operator_said_of_an_earlier_flight_is_no_part_of_the_story(tap
     tape.say(OPERATOR, TaskEdit("t0", 0, (0.0, 0.0, 0.0), 1.0, 0.0, None, True, 0, ""), 5.0)
     recording = tape.stop()
 
-    assert not any("operator" in text for text in texts(explain_uav(recording, "u0")))
-    assert not any("operator" in text for text in texts(explain_task(recording, "t0")))
+    assert not any("perator" in text for text in texts(explain_uav(recording, "u0")))
+    assert not any("perator" in text for text in texts(explain_task(recording, "t0")))
 
 
 def test_an_end_that_is_restated_is_told_once(tape: Tape) -> None:
@@ -204,7 +204,7 @@ def test_an_end_that_is_restated_is_told_once(tape: Tape) -> None:
         ended = epoch("u0", phase=MissionPhase.ENDED, number=2, reason="all over")
         tape.say(COORDINATOR, replace(ended, mission_s=mission_s), mission_s)
 
-    assert texts(explain_uav(tape.stop(), "u0")).count("The mission was over: all over.") == 1
+    assert texts(explain_uav(tape.stop(), "u0")).count("Mission ends: all over.") == 1
 
 
 def test_a_failed_attempt_and_the_way_home_are_told(tape: Tape) -> None:
@@ -219,10 +219,10 @@ def test_a_failed_attempt_and_the_way_home_are_told(tape: Tape) -> None:
     recording = tape.stop()
 
     told = explain_task(recording, "t0")
-    assert texts(told)[-1] == "u0 tried t0 and failed at 9.00 s; that was the end of it."
+    assert texts(told)[-1] == "u0 ended t0: failed at 9.00 s; that is the end of it."
     assert told.state == "failed"
     of_uav = explain_uav(recording, "u0")
-    assert texts(of_uav)[-2:] == ["The mission was over: all over.", "u0 was home."]
+    assert texts(of_uav)[-2:] == ["Mission ends: all over.", "u0 is home."]
     assert "failed at t0" in of_uav.ending
 
 

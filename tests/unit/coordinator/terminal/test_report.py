@@ -14,7 +14,7 @@ from rich.console import Console
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.planner.plan_report import plan_as_json
-from coordinator.terminal.report import MissionReport, check_report_path, mission_ok, write_report
+from coordinator.terminal.report import MissionReport, check_report_path, write_report
 from swarm.model import Plan, UavId
 from swarm.protocol.uav_messages import AttemptResult
 from swarm.runtime.errors import InputError
@@ -64,7 +64,7 @@ def test_faultless_mission_is_reported_as_planned() -> None:
     worth = " ".join(next(line for line in text.splitlines() if "objective J" in line).split())
     assert worth == "objective J [value·s] 118.49 118.49 100.00 % 120.33 98.47 %"
     assert "--report" in text.splitlines()[-1]
-    assert mission_ok(report.result)
+    assert report.result.is_complete
 
 
 def test_json_holds_the_plan_and_what_was_flown() -> None:
@@ -113,7 +113,7 @@ def test_what_is_missing_comes_with_ids_and_is_no_success() -> None:
 
     text = rendered(report)
 
-    assert not mission_ok(report.result)
+    assert not report.result.is_complete
     assert "2 of 8 tasks done in 6.20 s of mission time; 1 failed, 5 still open" in text
     assert "1 task: t4" in text
     assert "5 tasks: t1, t5, t6, t7, t8" in text
@@ -133,7 +133,7 @@ def test_withdrawn_tasks_do_not_count_as_missing() -> None:
             teller.end("uav1", task.id, 1.0 + number / 10.0)
     report = report_of(teller.mission_state)
 
-    assert mission_ok(report.result)
+    assert report.result.is_complete
     assert "All 7 tasks done" in report.verdict
     assert "withdrawn" in rendered(report)
 
@@ -152,7 +152,7 @@ def test_mission_that_never_started_has_a_report_too() -> None:
     assert found["scenario"] == "table-1"
     assert found["objective"] is None
     assert "never started" in report.as_markdown()
-    assert not mission_ok(report.result)
+    assert not report.result.is_complete
 
 
 def test_numbers_that_are_not_finite_become_null() -> None:

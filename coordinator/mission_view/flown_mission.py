@@ -1,0 +1,133 @@
+"""The mission that is flown: as it was given, with the operator's tasks, and what came of it.
+
+Leaves out: hearing of tasks and attempts (coordinator.mission_view.mission_state).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from coordinator.mission_view.results import MissionResult, progress_of
+from swarm.allocation.objective import executed_objective
+from swarm.allocation.problem import Problem
+from swarm.model import Mission, Task, TaskId, UavId
+from swarm.protocol.board import TaskBoard, TaskState
+from swarm.protocol.messages import TaskEdit
+
+__all__ = ["FlownMission"]
+
+
+class FlownMission:
+    """One mission as it is flown.
+
+    Args:
+        given: the scenario, pop-ups included.
+        board: what is known of its tasks.
+    """
+
+    def __init__(self, given: Mission, board: TaskBoard) -> None:
+        self._given = given
+        self._mission = given
+        """With what the operator has added to it."""
+        self._scenario = {task.id for task in given.tasks}
+        self._board = board
+        self._replica = board.replica
+        self._revision: Callable[[], Mission] | None = None
+        """Gives the mission anew, as soon as somebody wants to know it."""
+        self._added_s: dict[str, float] = {}
+        """By task that the operator has added: when that was heard [s mission time]."""
+        self._problem: Problem | None = None
+        """Of the mission, as far as it has been wanted."""
+
+    @property
+    def mission(self) -> Mission:
+        """What is being flown, as far as it is known."""
+        if self._revision is not None:
+            self._given, self._revision = self._revision(), None
+            self.complete()
+        return self._mission
+
+    def revise(self, mission: Callable[[], Mission]) -> None:
+        """Take what ``mission`` gives as soon as somebody wants to know."""
+        self._revision = mission
+
+    def edit(self, edit: TaskEdit, mission_s: float) -> None:
+        """Take in what the operator has said of a task; what is of an earlier flight is nothing."""
+        if self._replica.ordered(edit.task) is edit:
+            self._added_s.setdefault(edit.task, mission_s)
+        self.complete()
+
+    def complete(self) -> None:
+        """Put the tasks that the operator has ordered into the mission as it was given."""
+        tasks = {task.id: task for task in self._given.tasks}
+        for order in self._replica.task_orders.values():
+            if self._replica.ordered(order.task) is not order:
+                continue
+            known = tasks.get(TaskId(order.task))
+            if known is None or not order.withdrawn:
+                tasks[TaskId(order.task)] = Task(
+                    TaskId(order.task),
+                    order.position_enu_m,
+                    order.value,
+                    order.service_s,
+                    order.kind,
+                    self._added_s.get(order.task, 0.0) if known is None else known.appears_s,
+                )
+        self._mission = replace(self._given, tasks=tuple(tasks.values()))
+        self._problem = None
+
+    def result(self, *, repeated_visits: int, lost: Sequence[UavId], epochs: int) -> MissionResult:
+        """What has been executed so far.
+
+        Args:
+            repeated_visits: by UAVs to tasks that they had done themselves.
+            lost: UAVs that are.
+            epochs: in which the mission ran.
+        """
+        mission = self.mission
+        if self._problem is None:
+            self._problem = Problem.from_mission(mission)
+        problem = self._problem
+        progress = progress_of(problem, self._replica.outcomes)
+        index = {str(task): number for number, task in enumerate(problem.task_ids)}
+        rows = {str(uav): number for number, uav in enumerate(problem.uav_ids)}
+        nobody = "", float("nan")
+        first = [progress.completed.get(task, nobody) for task in problem.task_ids]
+        objective = executed_objective(
+            problem,
+            [[index[task] for task in route] for route in progress.flown.values()],
+            [completed_s for _, completed_s in first],
+            [rows.get(uav, -1) for uav, _ in first],
+        )
+        done = {
+            task: (UavId(uav), completed_s)
+            for task, (uav, completed_s) in zip(problem.task_ids, first, strict=True)
+            if uav
+        }
+        states = self._board.states
+        visits = sum(map(len, progress.flown.values()))
+        return MissionResult(
+            executed_routes={
+                UavId(uav): tuple(map(TaskId, route)) for uav, route in progress.flown.items()
+            },
+            executed_completion_s={task: completed_s for task, (_, completed_s) in done.items()},
+            executed_objective=objective,
+            done=tuple(done),
+            failed=tuple(t for t in problem.task_ids if states.get(t) is TaskState.FAILED),
+            open=tuple(
+                t
+                for t in problem.task_ids
+                if states.get(t, TaskState.OPEN) is TaskState.OPEN and t not in done
+            ),
+            duplicate_visits=visits - len(done) + repeated_visits,
+            makespan_s=max((completed_s for _, completed_s in done.values()), default=0.0),
+            lost_uavs=tuple(lost),
+            epochs=epochs,
+            added=tuple(
+                task.id
+                for task in mission.tasks
+                if task.id not in self._scenario and task.id not in self._replica.posted
+            ),
+            done_by={task: uav for task, (uav, _) in done.items()},
+        )

@@ -1,0 +1,186 @@
+"""How each UAV of a mission stands: what it does, for how long, where, and how well it is heard.
+
+Whoever shows, measures or records a UAV reads it from here. Leaves out: the rest of a moment
+(coordinator.mission_view.scene).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from coordinator.mission_view.mission_state import MissionState
+from swarm.model import TaskId, UavId
+from swarm.protocol.uav_messages import Claim, ClaimPhase, Status, StatusPhase
+
+__all__ = ["ABSENT", "LOST", "FleetStates", "UavState", "UavView"]
+
+
+Point = tuple[float, float, float]
+
+LOST = "lost"
+STARTING = "starting"
+ABSENT = "absent"
+LOW_BATTERY_FRAC = 0.2
+"""A battery with less is marked wherever it is shown."""
+_UNREADY = (STARTING, StatusPhase.LEARNING, StatusPhase.PREPARING)
+_BUSY = (StatusPhase.FLYING, StatusPhase.SERVING)
+_GONE_FOR_GOOD = (LOST, StatusPhase.RETURNING, StatusPhase.HOME, StatusPhase.OUT)
+"""What is no less true of a UAV that nothing is heard of any more."""
+_PHASES = {ClaimPhase.OUT: StatusPhase.OUT, ClaimPhase.PAUSED: StatusPhase.HOLDING}
+"""What a UAV does that claims nothing, where it is not idle."""
+
+
+@dataclass(frozen=True, slots=True)
+class UavState:
+    """What is known of one UAV."""
+
+    id: UavId
+    does: str
+    """`StatusPhase`, or lost, or starting, as it was last known."""
+    task: TaskId | None
+    """The one it has taken, as it was last known."""
+    eta_s: float | None
+    """Predicted completion of that task, from now [s of mission]."""
+    claim: ClaimPhase | None
+    there: bool
+    """Whether it is believed to be there."""
+    told_enu_m: Point | None
+    """Where it is [m; mission origin] without its height layer; None until it has told."""
+    layer_m: float
+    """Height of that layer above its places."""
+    velocity_enu_m_s: Point | None
+    battery_frac: float | None
+    note: str
+    link_age_s: float | None
+    """Since it last said something [s of the observer's clock]; None when it never has."""
+    silent_s: float | None
+    """The same where it is there, and that is long."""
+    dropped: Mapping[str, int]
+    """Messages its agents have dropped in all their lives, by reason."""
+
+    @property
+    def now_does(self) -> str:
+        """What it does as far as that can be known now: absent where it is not there."""
+        return self.does if self.there or self.does in _GONE_FOR_GOOD else ABSENT
+
+    @property
+    def now_task(self) -> TaskId | None:
+        """Its task; none where it is not there."""
+        return self.task if self.there else None
+
+    @property
+    def now_eta_s(self) -> float | None:
+        """When that is done, from now [s of mission]."""
+        return self.eta_s if self.there else None
+
+    @property
+    def in_layer_enu_m(self) -> Point | None:
+        """Where it is, in its height layer [m; mission origin].
+
+        Agents tell it without the layer, as if all flew at the height of their tasks.
+        """
+        if self.told_enu_m is None:
+            return None
+        east_m, north_m, up_m = self.told_enu_m
+        return east_m, north_m, up_m + self.layer_m
+
+    @property
+    def battery_low(self) -> bool:
+        """Whether its charge is to be watched."""
+        return self.battery_frac is not None and self.battery_frac < LOW_BATTERY_FRAC
+
+    @property
+    def troubled(self) -> bool:
+        """Whether it is gone or takes no part."""
+        return self.does in (LOST, StatusPhase.OUT)
+
+    @property
+    def unready(self) -> bool:
+        """Whether it is not at its start yet."""
+        return self.does in _UNREADY
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is on its way to a task or serves it."""
+        return self.does in _BUSY
+
+
+@dataclass(frozen=True, slots=True)
+class UavView(UavState):
+    """One UAV in a picture, beside the others."""
+
+    short: str
+    """What tells its id from the others."""
+    number: int
+    """Place in the fleet, from 0."""
+    flown: tuple[TaskId, ...]
+    """Tasks it has done, in order."""
+    planned: tuple[TaskId, ...]
+    """Tasks its list has for it that are not over yet."""
+    start_enu_m: Point
+
+    @property
+    def place_enu_m(self) -> Point:
+        """Where it is drawn [m; mission origin], without its height layer."""
+        return self.start_enu_m if self.told_enu_m is None else self.told_enu_m
+
+
+class FleetStates:
+    """Of all UAVs of a mission at one moment; what concerns all is looked up once.
+
+    Args:
+        mission_state: of the mission.
+        now_s: the moment, in its own clock's seconds.
+    """
+
+    def __init__(self, mission_state: MissionState, now_s: float) -> None:
+        brief = mission_state.replica.brief
+        self._layers_m = {} if brief is None else {uav.id: uav.layer_m for uav in brief.uavs}
+        self._dropped = mission_state.dropped
+        self._mission_s = mission_state.mission_s(now_s)
+        self._mission_state = mission_state
+        self._now_s = now_s
+
+    def of(self, uav: str) -> UavState:
+        """How that one stands."""
+        mission_state = self._mission_state
+        status, claim = mission_state.statuses.get(uav), mission_state.replica.claims.get(uav)
+        heard_s = mission_state.heard_s.get(uav)
+        does, task = _activity(mission_state, uav, status, claim)
+        eta_s = None
+        if claim is not None and task is not None and self._mission_s is not None:
+            eta_s = claim.completion_s - self._mission_s
+        return UavState(
+            id=UavId(uav),
+            does=does,
+            task=task,
+            eta_s=eta_s,
+            claim=None if claim is None else claim.phase,
+            there=uav in mission_state.present,
+            told_enu_m=None if status is None else status.position_enu_m,
+            layer_m=self._layers_m.get(uav, 0.0),
+            velocity_enu_m_s=None if status is None else status.velocity_enu_m_s,
+            battery_frac=None if status is None else status.battery_frac,
+            note="" if status is None else status.note,
+            link_age_s=None if heard_s is None else self._now_s - heard_s,
+            silent_s=mission_state.silent_s(uav, self._now_s),
+            dropped=self._dropped.get(uav, {}),
+        )
+
+
+def _activity(
+    mission_state: MissionState, uav: str, status: Status | None, claim: Claim | None
+) -> tuple[str, TaskId | None]:
+    """What a UAV does, and the task it has taken."""
+    does: str = STARTING if status is None else status.phase
+    task = None if claim is None or claim.task is None else TaskId(claim.task)
+    if uav in mission_state.lost and uav not in mission_state.present:
+        return LOST, None
+    if task is not None and does not in _BUSY:
+        does = StatusPhase.FLYING  # claims never lag, status may
+    elif claim is not None and does == STARTING:
+        does = _PHASES.get(claim.phase, StatusPhase.IDLE)
+    elif task is None and does in _BUSY:
+        does = StatusPhase.IDLE
+    return does, task

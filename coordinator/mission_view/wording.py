@@ -1,0 +1,201 @@
+"""The words of a mission: numbers, names, places, the operator's commands, choices and claims.
+
+One way to say each thing, for the story, the terminal, the dashboard and explanations. Leaves
+out: what is told when (coordinator.mission_view.narrator), characters and colours
+(coordinator.mission_view.presentation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from swarm.model.ids import FLEET
+from swarm.protocol.board import claim_strength
+from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit, TaskEntry
+from swarm.protocol.operator_commands import describe_command
+from swarm.protocol.uav_messages import Choice, Claim, ClaimPhase
+
+__all__ = [
+    "because",
+    "choice_in_words",
+    "clean",
+    "command_in_words",
+    "contest_in_words",
+    "counted",
+    "entry_in_words",
+    "lateness_in_words",
+    "listed",
+    "order_in_words",
+    "place_in_words",
+    "seconds_in_words",
+    "short_names",
+    "shown_s",
+    "shown_value",
+    "value_in_words",
+]
+
+
+_PUNCTUAL_S = 0.005
+"""Smaller differences are none."""
+_MOST_RIVALS = 3
+"""Of the tasks that were not taken, so many are named."""
+_ORDINALS = ("first", "second", "third")
+
+
+_ORDERED = {
+    CommandKind.HOLD: "operator holds {}",
+    CommandKind.RESUME: "operator lets {} go on",
+    CommandKind.RETURN: "operator sends {} home",
+    CommandKind.ABORT: "operator aborts the mission",
+}
+
+
+def shown_s(time_s: float) -> str:
+    """Seconds with as many digits as anyone reads."""
+    if abs(time_s) < 9.995:
+        return f"{time_s:.2f}"
+    return f"{time_s:.1f}" if abs(time_s) < 999.95 else f"{time_s:.0f}"
+
+
+def shown_value(value: float) -> str:
+    """J with as many digits as anyone reads."""
+    if abs(value) < 1000.0:
+        return f"{value:.2f}"
+    return f"{value:.1f}" if abs(value) < 10_000.0 else f"{value:.0f}"
+
+
+def clean(text: str, *, ascii_only: bool = False) -> str:
+    """``text`` on one line, without anything a terminal would obey."""
+    line = "".join(sign if sign.isprintable() else "?" for sign in " ".join(text.split()))
+    return line.encode("ascii", "replace").decode("ascii") if ascii_only else line
+
+
+def short_names(names: Sequence[str]) -> list[str]:
+    """What tells each name from the others: ``uav07`` of many is ``07``.
+
+    The common beginning is cut off, but no number is cut in two.
+    """
+    if len(names) < 2:
+        return list(names)
+    first, last = min(names), max(names)
+    shared = 0
+    while shared < min(len(first), len(last)) and first[shared] == last[shared]:
+        shared += 1
+    while shared > 0 and first[shared - 1].isdigit():
+        shared -= 1
+    return [name[shared:].lstrip("-_.") or name for name in names]
+
+
+def listed(names: Sequence[str], at_most: int | None = None) -> str:
+    """Names one after the other; of more than ``at_most`` the first ones, and how many more."""
+    shown = ", ".join(names if at_most is None else names[:at_most])
+    more = 0 if at_most is None else len(names) - at_most
+    return shown if more <= 0 else f"{shown} and {more} more"
+
+
+def counted(many: int, noun: str) -> str:
+    """``1 task``, ``3 tasks``."""
+    return f"{many} {noun}" + ("" if many == 1 else "s")
+
+
+def because(reason: str) -> str:
+    """A reason after what it is the reason for; nothing where there is none."""
+    return f": {reason}" if reason else ""
+
+
+def order_in_words(command: OperatorCommand) -> str:
+    """What the operator does by a command, and why."""
+    return _ORDERED[command.kind].format(command.target) + because(command.reason)
+
+
+def command_in_words(command: OperatorCommand) -> str:
+    """What holds for whom since the operator's command, and why."""
+    whom = "mission" if command.target == FLEET else command.target
+    return f"{whom} {describe_command(command)}"
+
+
+def seconds_in_words(time_s: float) -> str:
+    """A duration, or a moment of mission time."""
+    return f"{shown_s(time_s)} s"
+
+
+def value_in_words(value: float) -> str:
+    """A value or a score."""
+    return f"{value:g}" if value == round(value, 2) and abs(value) < 1000.0 else shown_value(value)
+
+
+def place_in_words(position_enu_m: tuple[float, float, float]) -> str:
+    """Where something is."""
+    east_m, north_m, up_m = position_enu_m
+    parts = [
+        f"{abs(distance_m):.4g} m {name if distance_m >= 0.0 else opposite}"
+        for distance_m, name, opposite in (
+            (east_m, "east", "west"),
+            (north_m, "north", "south"),
+            (up_m, "up", "down"),
+        )
+        if abs(distance_m) >= 0.05
+    ]
+    return f"{', '.join(parts)} of the origin" if parts else "at the origin"
+
+
+def lateness_in_words(late_s: float) -> str:
+    """How the end of an attempt compares with what was predicted."""
+    if abs(late_s) < _PUNCTUAL_S:
+        return ", just when it had said"
+    side = "later" if late_s > 0.0 else "sooner"
+    return f", {seconds_in_words(abs(late_s))} {side} than it had said"
+
+
+def choice_in_words(choice: Choice) -> str:
+    """Why a UAV took a task; follows what it took."""
+    rank = choice.rank + 1
+    place = _ORDINALS[rank - 1] if rank <= len(_ORDINALS) else f"number {rank}"
+    text = f" by the {choice.rule} rule of epoch {choice.epoch}, "
+    text += f"{place} in the sequence: score {value_in_words(choice.score)}"
+    others = [each for each in choice.candidates if each.task != choice.task]
+    if others:
+        named = [f"{each.task} ({value_in_words(each.score)})" for each in others[:_MOST_RIVALS]]
+        more = "" if len(others) <= _MOST_RIVALS else " and others"
+        text += f", against {', '.join(named)}{more}"
+    elif choice.second_score is not None:
+        text += f", against {value_in_words(choice.second_score)} for the next best"
+    else:
+        text += "; there was no other it could take"
+    proof = "; Theorem 5 proves that it was the best for this UAV" if choice.certificate else ""
+    return f"{text}{proof}"
+
+
+def entry_in_words(entry: TaskEntry | TaskEdit) -> str:
+    """What a task on the board is worth, where it is, and what it takes."""
+    service = f", service {seconds_in_words(entry.service_s)}" if entry.service_s else ""
+    kind = f", kind {entry.kind}" if entry.kind else ""
+    where = place_in_words(entry.position_enu_m)
+    return f"value {value_in_words(entry.value)}, {where}{service}{kind}"
+
+
+def contest_in_words(winner: tuple[str, Claim], loser: tuple[str, Claim]) -> str:
+    """Why the first of two claims on one task is the stronger; see swarm.protocol.board."""
+    (uav, claim), (_, other) = winner, loser
+    mine, theirs = claim_strength(*winner), claim_strength(*loser)
+    place = next(place for place in range(4) if mine[place] != theirs[place])
+    proposed = claim.phase is ClaimPhase.PROPOSED
+    match place:
+        case 0:
+            why = "held beats proposed"
+        case 1 if proposed:
+            why = f"it had decided earlier ({_against(claim.decided_s, other.decided_s)})"
+        case 1:
+            why = f"it would be done sooner ({_against(claim.completion_s, other.completion_s)})"
+        case 2:
+            why = f"it ranks higher (number {claim.rank + 1} against {other.rank + 1})"
+        case _:
+            why = "its name comes first, all else being equal"
+    return f"{uav} keeps it, as {why}"
+
+
+def _against(mine_s: float, theirs_s: float) -> str:
+    digits = 2
+    while digits < 6 and round(mine_s, digits) == round(theirs_s, digits):
+        digits += 1
+    return f"{mine_s:.{digits}f} s against {theirs_s:.{digits}f} s"
