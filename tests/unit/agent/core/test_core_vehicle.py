@@ -21,7 +21,9 @@ from agent.core.interface import (
     VehicleReady,
     VehicleReport,
 )
+from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.events import LogLine
+from swarm.protocol.messages import CommandKind, OperatorCommand
 from swarm.protocol.uav_messages import ClaimPhase, StatusPhase
 from tests.support.builders import entry, uav
 from tests.support.lone_agent import LoneAgent, claims, finishes, orders, statuses
@@ -118,6 +120,20 @@ def test_a_vehicle_that_was_silent_and_is_heard_again_is_brought_home() -> None:
     assert orders(later) == []
     assert statuses(later)[-1].note == AGAIN.reason
     assert finishes(agent.happen(Home(), 31.0)) == [0]
+
+
+def test_one_held_on_its_way_home_and_heard_again_after_a_silence_waits_for_nothing_else() -> None:
+    agent = LoneAgent(uav("u0"))
+    agent.fly_to()
+    agent.start_mission()
+    for kind in (CommandKind.RETURN, CommandKind.HOLD):
+        agent.hear(OPERATOR, OperatorCommand("u0", kind, 1, ""))
+    agent.happen(SILENT, 2.0)
+    agent.lose(COORDINATOR, 3.0)  # with nothing left to do, it would leave after a while
+
+    assert orders(agent.happen(AGAIN)) == [Return(AGAIN.reason)]
+    assert finishes(agent.run_until(300.0)) == []
+    assert finishes(agent.happen(Home())) == [0]
 
 
 def test_what_became_of_a_silent_vehicle_is_told_and_it_is_left_to_who_has_it() -> None:
