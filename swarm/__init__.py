@@ -61,16 +61,18 @@ _WHERE = {
 }
 
 
-def __getattr__(name: str) -> object:
-    """Import what is asked for, once."""
-    from importlib import import_module
+if not TYPE_CHECKING:  # a type checker must know no other name
 
-    for module, names in _WHERE.items():
-        if name in names:
-            found: object = getattr(import_module(module), name)
-            globals()[name] = found
-            return found
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    def __getattr__(name: str) -> object:
+        """Import what is asked for, once."""
+        from importlib import import_module
+
+        for module, names in _WHERE.items():
+            if name in names:
+                found: object = getattr(import_module(module), name)
+                globals()[name] = found
+                return found
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

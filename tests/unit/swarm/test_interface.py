@@ -18,7 +18,7 @@ import swarm
 from sim.world.uncertainty import Uncertainty
 from swarm.interface import UncertaintyOptions
 
-UPPER = {
+UPPER: dict[str, Callable[..., Any]] = {
     "plan": coordinator.interface.plan,
     "read_recording": coordinator.interface.read_recording,
     "simulate": sim.interface.simulate,
