@@ -14,7 +14,6 @@ from mcap.reader import make_reader
 from coordinator.recording.playback import Playback
 from coordinator.recording.reader import read_recording
 from coordinator.terminal.status_table import mission_status
-from swarm.protocol.board import TaskState
 from swarm.runtime.errors import InputError
 from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
