@@ -5,13 +5,16 @@ Leaves out: what a study means (sim.study.design), and comments.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, create_model
 
 from sim.study.design import (
     LISTED,
     NUMBERS,
+    PROBABILITIES,
     SWITCHES,
     Factor,
     RandomMissions,
@@ -19,29 +22,24 @@ from sim.study.design import (
     Study,
     right_number,
     unlisted,
-    wrong_number,
     wrong_values,
 )
 from sim.study.policies.roster import PolicyRoster
-from sim.study.table_reader import (
-    TableReader,
-    ValueType,
-    WrongValueError,
-    array,
-    as_switch,
-    as_table,
-    as_tables,
-    as_word,
-    integer,
-    one_of,
-)
 from sim.world.uncertainty import Uncertainty
-from swarm.model.ids import ID_RULE, valid_id
+from swarm.model.ids import ID_RULE
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario, resolve_scenario
 from swarm.scenario.files import read_bytes
-from swarm.scenario.findings import Document, close_match, faults_of, number_of, printable, shown
+from swarm.scenario.findings import Document, Finding, close_match, faults_of, printable, shown
 from swarm.scenario.read import parse_toml
+from swarm.scenario.validation import (
+    Id,
+    Probability,
+    StrictTable,
+    TableShape,
+    known_schema,
+    validate_tables,
+)
 from swarm.scenario.write import toml_float, toml_string
 
 __all__ = [
@@ -70,16 +68,82 @@ MOST_UAVS, MOST_TASKS = 1000, 10_000
 
 _WHAT = "study file"
 
+_Trials = Annotated[int, Field(ge=1, le=MOST_TRIALS)]
+_Amount = Annotated[float, Field(ge=0.0)]
 
-_KEYS: Mapping[str, Sequence[str]] = {
-    "": (
-        *("schema", "name", "trials", "seed", "policies", "reference", "bound"),
-        *("mission", "uncertainty", "vary"),
-    ),
-    "mission": ("scenario", "random"),
-    "random": ("uavs", "tasks"),
-    "uncertainty": (*NUMBERS, *SWITCHES, *LISTED, "reattempt"),
-    "vary": ("what", "values", "trials"),
+
+class _RandomTable(StrictTable):
+    uavs: Annotated[int, Field(ge=1, le=MOST_UAVS)]
+    tasks: Annotated[int, Field(ge=1, le=MOST_TASKS)]
+
+
+class _MissionTable(StrictTable):
+    scenario: Annotated[str, Field(min_length=1)] | None = None
+    random: _RandomTable | None = None
+
+
+class _VaryTable(StrictTable):
+    what: str
+    values: Annotated[list[Any], Field(min_length=1)]
+    """Which of them are right depends on `what`."""
+    trials: _Trials | None = None
+
+
+_UNCERTAIN: dict[str, Any] = {
+    **{name: (Probability if name in PROBABILITIES else _Amount, 0.0) for name in NUMBERS},
+    **dict.fromkeys(SWITCHES, (bool, False)),
+    **dict.fromkeys(LISTED, (dict[str, _Amount], {})),
+    "reattempt": (bool | None, None),
+}
+_UncertaintyTable = create_model("_UncertaintyTable", __base__=StrictTable, **_UNCERTAIN)
+
+
+class _StudyTable(StrictTable):
+    version: Annotated[int, known_schema(SCHEMA)] = Field(alias="schema")
+    name: Id
+    trials: _Trials = DEFAULT_TRIALS
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED)] = 0
+    policies: Annotated[list[str], Field(min_length=1)] | None = None
+    reference: str | None = None
+    bound: bool = True
+    mission: _MissionTable
+    uncertainty: _UncertaintyTable = Field(default_factory=_UncertaintyTable)
+    vary: list[_VaryTable] = Field(default_factory=list)
+
+
+_TABLES: Mapping[tuple[str, ...], TableShape] = {
+    (): TableShape.of("the top", _StudyTable),
+    ("mission",): TableShape.of("[mission]", _MissionTable),
+    ("mission", "random"): TableShape.of("random of [mission]", _RandomTable),
+    ("uncertainty",): TableShape.of("[uncertainty]", _UncertaintyTable),
+    ("vary",): TableShape.of("[[vary]]", _VaryTable),
+}
+_A_MISSION = '[mission] with scenario = "…" or random = { uavs = 10, tasks = 50 }'
+_SWITCH = "true or false"
+_MOMENTS = "a table of ids with a mission time >= 0 each [s]"
+_TRIALS = f"an integer within 1..{MOST_TRIALS}"
+_RIGHT: Mapping[tuple[str, ...], str] = {
+    ("schema",): f"schema = {SCHEMA}",
+    ("name",): f'an id of {ID_RULE}, such as name = "robustness"',
+    ("trials",): _TRIALS,
+    ("seed",): f"an integer within 0..{MOST_SEED}",
+    ("policies",): 'at least one in an array, such as policies = ["guided", "central"]',
+    ("reference",): "one of the policies",
+    ("bound",): _SWITCH,
+    ("mission",): _A_MISSION,
+    ("mission", "scenario"): 'a shipped scenario or a file, such as scenario = "valley-survey"',
+    ("mission", "random"): "random = { uavs = 10, tasks = 50 }",
+    ("mission", "random", "uavs"): f"an integer within 1..{MOST_UAVS}",
+    ("mission", "random", "tasks"): f"an integer within 1..{MOST_TASKS}",
+    ("uncertainty",): "a table [uncertainty]",
+    **{("uncertainty", name): right_number(name) for name in NUMBERS},
+    **{("uncertainty", name): _SWITCH for name in (*SWITCHES, "reattempt")},
+    **dict.fromkeys((("uncertainty", name) for name in LISTED), _MOMENTS),
+    **{("uncertainty", name, "*"): "a mission time >= 0 [s]" for name in LISTED},
+    ("vary",): "a table [[vary]] for each number that is varied",
+    ("vary", "what"): f"one of {', '.join(NUMBERS)}",
+    ("vary", "values"): "at least one in an array, such as values = [0.0, 0.3]",
+    ("vary", "trials"): _TRIALS,
 }
 
 
@@ -102,192 +166,122 @@ def parse_study(data: bytes, source: str, roster: PolicyRoster, folder: Path = P
         folder: where a scenario is looked for, before the shipped ones.
 
     Raises:
-        InputError: with every fault of the file, in its order.
+        InputError: with every fault of the file, in its order, then those of its scenario.
     """
     document = parse_toml(data, source, _WHAT)
-    reader = _Reader(roster, folder)
-    study = reader.study(document)
-    if study is None:
-        raise InputError(*faults_of(document, source, reader.findings))
-    return study
+    study, findings = validate_tables(_StudyTable, document, _TABLES, _RIGHT)
+    findings += [
+        *_wrong_policies(document, roster),
+        *_wrong_mission(document),
+        *_wrong_factors(document),
+    ]
+    missions = None
+    if not any(finding.path[0] == "mission" for finding in findings):
+        try:
+            missions = _missions(document["mission"], folder)
+        except InputError as error:
+            raise InputError(*faults_of(document, source, findings), *error.faults) from error
+        findings += _wrong_ids(document, missions)
+    if study is None or missions is None or findings:
+        raise InputError(*faults_of(document, source, findings))
+    given = study.uncertainty.model_dump(exclude_unset=True)
+    reattempt = given.pop("reattempt", None)
+    return Study(
+        name=study.name,
+        missions=missions,
+        policies=tuple(study.policies or roster.policies),
+        trials=study.trials,
+        seed=study.seed,
+        reference=study.reference,
+        bound=study.bound,
+        uncertainty=Uncertainty(**given),
+        reattempt=reattempt,
+        varied=tuple(Factor(v.what, tuple(map(float, v.values)), v.trials) for v in study.vary),
+    )
 
 
-class _Reader(TableReader):
-    """Reads one document and gathers what is wrong with it."""
+def _missions(table: Any, folder: Path) -> SameMission | RandomMissions:
+    """Those of a table in which nothing is wrong.
 
-    def __init__(self, roster: PolicyRoster, folder: Path) -> None:
-        super().__init__()
-        self._roster = roster
-        self._folder = folder
-
-    def study(self, top: Document) -> Study | None:
-        """The study; None if there are findings."""
-        self.unknown_keys(top, (), _KEYS[""])
-        self.required(top, (), "schema", _SCHEMA)
-        name = self.required(top, (), "name", _NAME)
-        trials = self.optional(top, (), "trials", integer(1, MOST_TRIALS), DEFAULT_TRIALS)
-        seed = self.optional(top, (), "seed", integer(0, MOST_SEED), 0)
-        policies = self._policies(top)
-        reference = self.optional(top, (), "reference", one_of(policies), None)
-        bound = self.optional(top, (), "bound", _SWITCH, default=True)
-        missions = self._missions(top)
-        uncertainty, reattempt = self._uncertainty(top)
-        varied = tuple(self._varied(top))
-        if missions is not None:
-            for key, uav_or_task, ids in unlisted(uncertainty, missions):
-                close = close_match(uav_or_task, ids)
-                remedy = f"did you mean {close!r}?" if close else f"name one such as {ids[0]!r}"
-                self.add(("uncertainty", key, uav_or_task), "is not in the mission", remedy)
-        if self.findings or name is None or missions is None:
-            return None
-        return Study(
-            name=name,
-            missions=missions,
-            policies=policies,
-            trials=trials,
-            seed=seed,
-            reference=reference,
-            bound=bound,
-            uncertainty=uncertainty,
-            reattempt=reattempt,
-            varied=varied,
-        )
-
-    # -- tables ---------------------------------------------------------------------------
-
-    def _policies(self, top: Document) -> tuple[str, ...]:
-        every: list[object] = list(self._roster.policies)
-        names = self.optional(top, (), "policies", array('policies = ["guided", "central"]'), every)
-        for index, name in enumerate(names):
-            if not isinstance(name, str):
-                self.add(
-                    ("policies", index), f"{shown(name)} is not a string in quotes", "name a policy"
-                )
-            elif fault := self._roster.fault(name):
-                self.add(("policies", index), *fault)
-            elif name in names[:index]:
-                self.add(("policies", index), f"{shown(name)} is there twice", "name it once")
-        return tuple(str(name) for name in names)
-
-    def _missions(self, top: Document) -> SameMission | RandomMissions | None:
-        table = self.required(top, (), "mission", _MISSION)
-        if table is None:
-            return None
-        place = ("mission",)
-        self.unknown_keys(table, place, _KEYS["mission"])
-        if "scenario" in table and "random" in table:
-            self.add(place, "has both a scenario and random missions", f"give {_MISSION.right}")
-        elif "scenario" in table:
-            name = self.required(table, place, "scenario", _SCENARIO)
-            return None if name is None else SameMission(load_scenario(self._scenario(name)))
-        elif "random" in table:
-            return self._random_missions(table)
-        elif not table:
-            self.add(place, "is empty", f"give {_MISSION.right}")
-        return None
-
-    def _random_missions(self, table: Document) -> RandomMissions | None:
-        place = ("mission", "random")
-        size = self.required(table, place[:1], "random", _RANDOM)
-        if size is None:
-            return None
-        self.unknown_keys(size, place, _KEYS["random"])
-        uavs = self.required(size, place, "uavs", integer(1, MOST_UAVS))
-        tasks = self.required(size, place, "tasks", integer(1, MOST_TASKS))
-        return None if uavs is None or tasks is None else RandomMissions(uavs, tasks)
-
-    def _scenario(self, name: str) -> Path:
-        beside = self._folder / name
-        return beside if beside.is_file() else resolve_scenario(name)
-
-    def _uncertainty(self, top: Document) -> tuple[Uncertainty, bool | None]:
-        place = ("uncertainty",)
-        table = self.optional(top, (), "uncertainty", _UNCERTAINTY, {})
-        self.unknown_keys(table, place, _KEYS["uncertainty"])
-        before = len(self.findings)
-        given: dict[str, Any] = {}
-        for key in _KEYS["uncertainty"]:
-            if key in table:
-                given[key] = self.required(table, place, key, _kind_of(key))
-        reattempt = given.pop("reattempt", None)
-        return Uncertainty(**given) if len(self.findings) == before else Uncertainty(), reattempt
-
-    def _varied(self, top: Document) -> Iterator[Factor]:
-        seen: set[str] = set()
-        tables: list[object] = self.optional(top, (), "vary", _VARY, [])
-        for index, table in enumerate(tables):
-            place = ("vary", index)
-            if not isinstance(table, Mapping):
-                self.add(place, f"{shown(table)} is not a table", f"give {_VARY.right}")
-                continue
-            self.unknown_keys(table, place, _KEYS["vary"])
-            what = self.required(table, place, "what", one_of(NUMBERS))
-            values = self.required(table, place, "values", array("values = [0.0, 0.3]"))
-            trials = self.optional(table, place, "trials", integer(1, MOST_TRIALS), None)
-            if what is None or values is None:
-                continue
-            if what in seen:
-                self.add((*place, "what"), f"{what} is varied twice", "put its values together")
-            seen.add(what)
-            for at, problem, remedy in wrong_values(what, values):
-                self.add((*place, "values", at), problem, remedy)
-            yield Factor(what, tuple(number_of(value) or 0.0 for value in values), trials)
+    Raises:
+        InputError: the scenario cannot be found or is wrong.
+    """
+    if "random" in table:
+        return RandomMissions(**table["random"])
+    beside = folder / table["scenario"]
+    return SameMission(
+        load_scenario(beside if beside.is_file() else resolve_scenario(table["scenario"]))
+    )
 
 
-def _kind_of(key: str) -> ValueType[Any]:
-    """What a key of ``[uncertainty]`` may be."""
-    if key in NUMBERS:
-        return ValueType(right_number(key), lambda value: _number(key, value))
-    return _TIMES if key in LISTED else _SWITCH
+# -- rules between several places ---------------------------------------------------------
+# They read the document itself and pass over what has the wrong shape, so that one run names
+# every fault.
 
 
-def _number(name: str, value: object) -> float:
-    if problem := wrong_number(name, value):
-        raise WrongValueError(problem)
-    return number_of(value) or 0.0
+def _wrong_policies(document: Document, roster: PolicyRoster) -> Iterator[Finding]:
+    names = document.get("policies", list(roster.policies))
+    if not isinstance(names, list):
+        return
+    for index, name in enumerate(names):
+        if not isinstance(name, str):
+            continue
+        if fault := roster.fault(name):
+            yield Finding(("policies", index), *fault)
+        elif name in names[:index]:
+            yield Finding(("policies", index), f"{shown(name)} is there twice", "name it once")
+    reference = document.get("reference")
+    if isinstance(reference, str) and reference not in names:
+        known = [name for name in names if isinstance(name, str)]
+        yield _not_one_of(("reference",), reference, known)
 
 
-def _schema(value: object) -> int:
-    if isinstance(value, bool) or value != SCHEMA:
-        raise WrongValueError(f"version {shown(value)} of the format is not known")
-    return SCHEMA
+def _wrong_mission(document: Document) -> Iterator[Finding]:
+    table = document.get("mission")
+    if not isinstance(table, Mapping):
+        return
+    if "scenario" in table and "random" in table:
+        problem = "has both a scenario and random missions"
+        yield Finding(("mission",), problem, f"give {_A_MISSION}")
+    elif not table:
+        yield Finding(("mission",), "is empty", f"give {_A_MISSION}")
 
 
-def _id(value: object) -> str:
-    if not isinstance(value, str) or not valid_id(value):
-        raise WrongValueError(f"{shown(value)} is not an id")
-    return value
+def _wrong_factors(document: Document) -> Iterator[Finding]:
+    tables, seen = document.get("vary"), set()
+    for index, table in enumerate(tables if isinstance(tables, list) else ()):
+        what = table.get("what") if isinstance(table, Mapping) else None
+        if not isinstance(what, str):
+            continue
+        place = ("vary", index)
+        if what not in NUMBERS:
+            yield _not_one_of((*place, "what"), what, NUMBERS)
+            continue
+        if what in seen:
+            problem = f"{what} is varied twice"
+            yield Finding((*place, "what"), problem, "put its values together")
+        seen.add(what)
+        values = table.get("values")
+        for at, problem, remedy in wrong_values(what, values if isinstance(values, list) else ()):
+            yield Finding((*place, "values", at), problem, remedy)
 
 
-def _times(value: object) -> dict[str, float]:
-    if not isinstance(value, Mapping):
-        raise WrongValueError(f"{shown(value)} is not a table")
-    for name, moment in value.items():
-        number = number_of(moment)
-        if number is None or number < 0.0:
-            raise WrongValueError(f"{shown(moment)} of {name} is no mission time")
-    return {name: float(moment) for name, moment in value.items()}
+def _wrong_ids(document: Document, missions: SameMission | RandomMissions) -> Iterator[Finding]:
+    table = document.get("uncertainty")
+    listed = {key: table.get(key) for key in LISTED} if isinstance(table, Mapping) else {}
+    there: dict[str, Any] = {
+        key: dict.fromkeys(ids, 0.0) for key, ids in listed.items() if isinstance(ids, Mapping)
+    }
+    for key, uav_or_task, ids in unlisted(Uncertainty(**there), missions):
+        close = close_match(uav_or_task, ids)
+        remedy = f"did you mean {close!r}?" if close else f"name one such as {ids[0]!r}"
+        yield Finding(("uncertainty", key, uav_or_task), "is not in the mission", remedy)
 
 
-_SCHEMA = ValueType(f"schema = {SCHEMA}", _schema)
-
-_NAME = ValueType(f'an id of {ID_RULE}, such as name = "robustness"', _id)
-
-_SWITCH = ValueType("true or false", as_switch)
-
-_SCENARIO = ValueType('a shipped scenario or a file, such as scenario = "valley-survey"', as_word)
-
-_MISSION = ValueType(
-    '[mission] with scenario = "…" or random = { uavs = 10, tasks = 50 }', as_table
-)
-
-_RANDOM = ValueType("random = { uavs = 10, tasks = 50 }", as_table)
-
-_UNCERTAINTY = ValueType("a table [uncertainty]", as_table)
-
-_VARY = ValueType("a table [[vary]] for each number that is varied", as_tables)
-
-_TIMES = ValueType("a table of ids with a mission time >= 0 each [s]", _times)
+def _not_one_of(place: tuple[str | int, ...], name: str, known: Collection[str]) -> Finding:
+    close = close_match(name, known)
+    remedy = f"did you mean {close!r}?" if close else f"give one of {', '.join(known)}"
+    return Finding(place, f"{shown(name)} is not one of them", remedy)
 
 
 def format_study(study: Study, scenario: str) -> str:
