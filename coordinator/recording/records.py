@@ -51,6 +51,7 @@ __all__ = [
     "RecordableFact",
     "RecordingStarted",
     "UnreadableError",
+    "body_name",
     "decode",
     "encode",
     "schema_of",
@@ -242,6 +243,11 @@ SCHEMAS: Final = tuple(_SHAPES)
 """Names of all schemas of facts."""
 
 
+def body_name(body: Body) -> str:
+    """What a message's kind is called outside the source, whatever its class is called."""
+    return _NAMES[type(body)]
+
+
 def schema_of(name: str) -> bytes:
     """The JSON schema by that name."""
     schema = _adapter(name).json_schema()
@@ -283,7 +289,7 @@ def encode(
     """
     match what:
         case MessageReceived(message):
-            name = _NAMES[type(message.body)]
+            name = body_name(message.body)
             said = _SAID[name](
                 message.mission,
                 message.writer,
@@ -341,7 +347,7 @@ def _answer(snapshot: Snapshot) -> Any:
             message.body,
         )
         for message in snapshot.messages
-        if (name := _NAMES[type(message.body)])
+        if (name := body_name(message.body))
     )
     return _Answer(
         snapshot.mission, snapshot.writer, snapshot.incarnation, snapshot.mission_s, messages

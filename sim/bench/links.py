@@ -13,6 +13,7 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from coordinator.recording.records import body_name
 from sim.bench.takeover import far_mission, flying, options_for
 from sim.fleet.faults.recorder import BusEntry
 from sim.fleet.faults.relay import RelayNetwork, RelayQuality
@@ -269,7 +270,7 @@ def _traffic(entries: list[BusEntry], uavs: int, watched_s: float) -> Traffic:
     sizes: Counter[str] = Counter()
     for entry in entries:
         if isinstance(entry.what, Message):
-            kind = type(entry.what.body).__name__
+            kind = body_name(entry.what.body)
             messages[kind] += 1
             sizes[kind] += entry.size_bytes
     return Traffic(uavs, watched_s, dict(messages), dict(sizes))
