@@ -5,14 +5,14 @@ Leaves out: making the plan (coordinator.planner) and drawing it (coordinator.pl
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from swarm.model import Mission, Plan, TaskId, UavId
+from swarm.runtime.table import NONE, Column, ResultTable
 
 __all__ = ["late_tasks", "plan_as_json", "plan_from_json", "plan_table"]
 
@@ -75,27 +75,28 @@ def plan_table(mission: Mission, plan: Plan) -> RenderableType:
         f" by {plan.method}: {len(known.uavs)} UAVs, {len(known.tasks)} tasks,"
         f" horizon D = {mission.horizon_s:g} s",
     )
-    lists = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_edge=False)
-    lists.add_column("UAV", style="bold", no_wrap=True)
-    lists.add_column("tasks", justify="right")
-    lists.add_column(Text("list, each task @ its completion in s"))
-    for uav, route in plan.routes.items():
-        stops = Text()
-        for task in route:
-            time_s = plan.completion_s[task]
-            late_mark = "!" if time_s > mission.horizon_s else ""
-            stops.append(" " if stops else "")
-            stops.append(
-                f"{task}@{_shown_s(time_s, mission.horizon_s)}{late_mark}",
-                style=_LATE if late_mark else "",
-            )
-        lists.add_row(uav, str(len(route)), stops or Text("–", style="dim"))
-    worth = Table.grid(padding=(0, 2, 0, 0))
-    worth.add_column(style="bold", no_wrap=True)
-    worth.add_column()
-    for name, text in _worth(mission, plan, late):
-        worth.add_row(name, text)
+    lists = ResultTable(
+        (
+            Column("UAV", words=True, style="bold"),
+            Column("tasks"),
+            Column("list, each task @ its completion in s", words=True),
+        ),
+        [(uav, len(route), _stops(mission, plan, route)) for uav, route in plan.routes.items()],
+    )
+    worth = ResultTable(
+        (Column("", words=True, style="bold"), Column("", words=True)), _worth(mission, plan, late)
+    )
     return Group(heading, "", lists, "", worth)
+
+
+def _stops(mission: Mission, plan: Plan, route: Sequence[TaskId]) -> Text:
+    stops = Text()
+    for task in route:
+        time_s = plan.completion_s[task]
+        late = time_s > mission.horizon_s
+        text = f"{task}@{_shown_s(time_s, mission.horizon_s)}{'!' if late else ''}"
+        stops.append(" " if stops else "").append(text, style=_LATE if late else "")
+    return stops or Text(NONE, style="dim")
 
 
 def _worth(mission: Mission, plan: Plan, late: list[TaskId]) -> list[tuple[str, str | Text]]:

@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from agent.vehicle.config import BridgeConfig
@@ -32,6 +31,7 @@ from sim.fleet.child_process import ChildProcess
 from swarm.model import Mission, Origin
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.runtime.clock import Clock, SystemClock
+from swarm.runtime.table import Column, ResultTable
 from swarm.scenario.write import format_scenario
 
 __all__ = [
@@ -306,12 +306,10 @@ async def _time_answers(client: _Client, pause_s: float) -> None:
 
 def autopilot_load_as_rich(load: AutopilotLoad) -> RenderableType:
     """Everything for a terminal."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("message", no_wrap=True)
-    table.add_column("asked [Hz]", justify="right", no_wrap=True)
-    table.add_column("delivered", justify="right", no_wrap=True)
-    for stream in load.streams:
-        table.add_row(stream.message, f"{stream.asked_hz:g}", f"{stream.delivered_frac:.2%}")
+    table = ResultTable(
+        (Column("message", words=True), Column("asked", "g", "Hz"), Column("delivered", ".2%")),
+        [(each.message, each.asked_hz, each.delivered_frac) for each in load.streams],
+    )
     answers = "no answer was timed"
     if (
         load.latency_p50_s is not None

@@ -16,7 +16,6 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 import websockets.asyncio.client as websockets
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from sim.bench.links import survey_mission
@@ -26,6 +25,7 @@ from sim.fleet.child_process import ChildFailedError, ChildProcess
 from swarm.bus.config import BusConfig, ClientTopology
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.runtime.clock import Clock, SystemClock
+from swarm.runtime.table import Column, ResultTable
 
 __all__ = [
     "DashboardLoad",
@@ -246,19 +246,29 @@ async def _follow(
 
 def dashboard_load_as_rich(load: DashboardLoad) -> RenderableType:
     """Everything for a terminal."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for name in ("pages", "cores", "RAM", "to each page", "frames", "latency p50", "p99"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for each in load.followings:
-        table.add_row(
-            str(each.clients),
-            f"{each.cores:.3f}",
-            f"{each.memory_bytes / 2**20:.0f} MiB",
-            f"{each.bytes_per_s / 1000.0:.1f} kB/s",
-            f"{each.frames_per_s:.2f}/s",
-            _milliseconds(each.latency_p50_s),
-            _milliseconds(each.latency_p99_s),
-        )
+    table = ResultTable(
+        (
+            Column("pages"),
+            Column("cores", ".3f"),
+            Column("RAM", ".0f", "MiB", 2.0**-20),
+            Column("to each page", ".1f", "kB/s", 1e-3),
+            Column("frames/s", ".2f"),
+            Column("latency p50", ".0f", "ms", 1e3),
+            Column("p99", ".0f", "ms", 1e3),
+        ),
+        [
+            (
+                each.clients,
+                each.cores,
+                each.memory_bytes,
+                each.bytes_per_s,
+                each.frames_per_s,
+                each.latency_p50_s,
+                each.latency_p99_s,
+            )
+            for each in load.followings
+        ],
+    )
     return Group(
         Text(str(load.machine)),
         Text(
@@ -274,7 +284,3 @@ def dashboard_load_as_rich(load: DashboardLoad) -> RenderableType:
 def dashboard_load_as_json(load: DashboardLoad) -> dict[str, object]:
     """Everything for programs, ready for `json.dumps`."""
     return asdict(load)
-
-
-def _milliseconds(time_s: float | None) -> str:
-    return "–" if time_s is None else f"{time_s * 1e3:.0f} ms"

@@ -13,7 +13,6 @@ from itertools import islice
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from sim.bench.machine import MachineInfo, this_machine
@@ -26,6 +25,7 @@ from swarm.kernels.lower_level import GREEDY, default_threads, evaluate_sequence
 from swarm.kernels.routes import optimise_routes
 from swarm.model import TaskId
 from swarm.runtime.clock import Clock
+from swarm.runtime.table import Column, ResultTable
 
 __all__ = ["DecideBench", "DecisionTimes", "decide_as_json", "decide_as_rich", "measure_decisions"]
 
@@ -130,16 +130,18 @@ def measure_decisions(
 
 def decide_as_rich(bench: DecideBench) -> RenderableType:
     """Everything for a terminal."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("rule", no_wrap=True)
-    for heading in ("decisions", "median", "p99", "largest", "first"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for row in bench.times:
-        table.add_row(
-            row.name,
-            str(row.decisions),
-            *(_duration(s) for s in (row.median_s, row.p99_s, row.largest_s, row.first_s)),
-        )
+    headings = ("median", "p99", "largest", "first")
+    table = ResultTable(
+        (
+            Column("rule", words=True),
+            Column("decisions"),
+            *(Column(name, _duration) for name in headings),
+        ),
+        [
+            (row.name, row.decisions, row.median_s, row.p99_s, row.largest_s, row.first_s)
+            for row in bench.times
+        ],
+    )
     return Group(
         Text(str(bench.machine)),
         Text(f"One online decision at {bench.n_uav} × {bench.n_task}, seed {bench.seed}:"),

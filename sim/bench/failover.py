@@ -12,7 +12,6 @@ from enum import StrEnum
 from typing import Any
 
 from rich.console import Group, RenderableType
-from rich.table import Table
 
 from sim.bench.latency import DecisionLatencies, measure_latencies
 from sim.bench.links import (
@@ -29,6 +28,7 @@ from sim.bench.machine import MachineInfo, this_machine
 from sim.bench.takeover import FailureMode, Takeovers, measure_takeovers
 from sim.fleet.layout import BusKind
 from swarm.protocol.timing import LinkKind, preset
+from swarm.runtime.table import Column, ResultTable
 
 __all__ = [
     "FailoverMeasure",
@@ -178,34 +178,12 @@ def failover_as_json(done: FailoverResults) -> dict[str, Any]:
         "machine": asdict(done.machine),
         "seed": done.settings.seed,
         "takeovers": [
-            {
-                "blow": each.blow,
-                "link": each.link,
-                "bus": each.bus,
-                "trials": len(each.times_s) + each.missed,
-                "missed": each.missed,
-                "p50_s": each.quantile_s(0.5),
-                "p99_s": each.quantile_s(0.99),
-                "max_s": each.quantile_s(1.0),
-                "bound_s": bound_s(each.blow, each.link),
-                "times_s": list(each.times_s),
-            }
-            for each in done.takeovers
+            {**record, "times_s": list(each.times_s)}
+            for record, each in zip(
+                _takeovers(done.takeovers).as_records(), done.takeovers, strict=True
+            )
         ],
-        "losses": [
-            {
-                "loss_frac": each.bad.quality.loss_frac,
-                "delay_s": each.bad.quality.delay_s,
-                "link": each.bad.link,
-                "uavs": each.uavs,
-                "watched_s": each.watched_s,
-                "path": each.path,
-                "false_losses": each.losses,
-                "packets": each.packets,
-                "packets_lost": each.dropped,
-            }
-            for each in done.losses
-        ],
+        "losses": _losses(done.losses).as_records(),
         "partitions": [{**asdict(each), "faults": list(each.faults)} for each in done.partitions],
         "traffic": [
             {
@@ -216,18 +194,7 @@ def failover_as_json(done: FailoverResults) -> dict[str, Any]:
             }
             for each in done.traffic
         ],
-        "latencies": [
-            {
-                "method": each.method,
-                "uavs": each.uavs,
-                "tasks": each.tasks,
-                "decisions": len(each.times_s),
-                "p50_s": each.quantile_s(0.5),
-                "p99_s": each.quantile_s(0.99),
-                "max_s": each.quantile_s(1.0),
-            }
-            for each in done.latencies
-        ],
+        "latencies": _latencies(done.latencies).as_records(),
     }
 
 
@@ -250,115 +217,142 @@ def failover_as_rich(done: FailoverResults) -> RenderableType:
     return Group(*parts)
 
 
-def _takeovers(rows: Sequence[Takeovers]) -> Table:
-    table = _table(
+def _takeovers(rows: Sequence[Takeovers]) -> ResultTable:
+    return ResultTable(
+        (
+            *(Column(name, words=True, key=name) for name in ("blow", "link", "bus")),
+            *(Column(name, key=name) for name in ("trials", "missed")),
+            *_quantile_columns(1.0),
+            Column("bound", ".2f", key="bound_s"),
+        ),
+        [
+            (
+                each.blow,
+                each.link,
+                each.bus,
+                len(each.times_s) + each.missed,
+                each.missed,
+                *map(each.quantile_s, _SHARES.values()),
+                bound_s(each.blow, each.link),
+            )
+            for each in rows
+        ],
         "From a blow to another's held claim [s]",
-        ["blow", "link", "bus"],
-        ["trials", "missed", "p50", "p99", "max", "bound"],
     )
-    for each in rows:
-        table.add_row(
-            each.blow,
-            each.link,
-            each.bus,
-            str(len(each.times_s) + each.missed),
-            str(each.missed),
-            *(_shown(each.quantile_s(share), 1.0) for share in (0.5, 0.99, 1.0)),
-            f"{bound_s(each.blow, each.link):.2f}",
-        )
-    return table
 
 
-def _losses(rows: Sequence[FalseLosses]) -> Table:
-    table = _table(
+def _losses(rows: Sequence[FalseLosses]) -> ResultTable:
+    ways = {"tun": "real"}
+    return ResultTable(
+        (
+            Column("loss", ".0%", key="loss_frac"),
+            Column("delay", ".0f", "ms", 1e3, key="delay_s"),
+            Column("link", key="link", words=True),
+            Column("UAVs", key="uavs"),
+            Column("watched", ".0f", "s", key="watched_s"),
+            Column("path", lambda path: ways.get(path, "imitated"), key="path", words=True),
+            Column("false losses", key="false_losses"),
+            Column("packets", _counted, key="packets"),
+            Column("of them lost", _counted, key="packets_lost"),
+        ),
+        [
+            (
+                each.bad.quality.loss_frac,
+                each.bad.quality.delay_s,
+                each.bad.link,
+                each.uavs,
+                each.watched_s,
+                each.path,
+                each.losses,
+                each.packets,
+                each.dropped,
+            )
+            for each in rows
+        ],
         "Living processes taken for lost",
-        ["loss, delay", "link", "path"],
-        ["UAVs", "watched [s]", "packets", "lost", "false losses"],
     )
-    for each in rows:
-        quality = each.bad.quality
-        table.add_row(
-            f"{quality.loss_frac:.0%}, {1e3 * quality.delay_s:.0f} ms",
-            each.bad.link,
-            "real packets" if each.path == "tun" else "imitated",
-            str(each.uavs),
-            f"{each.watched_s:.0f}",
-            str(each.packets) if each.packets else "",
-            str(each.dropped) if each.packets else "",
-            str(each.losses),
-        )
-    return table
 
 
-def _partitions(rows: Sequence[PartitionResult]) -> Table:
-    table = _table(
+def _partitions(rows: Sequence[PartitionResult]) -> ResultTable:
+    return ResultTable(
+        (
+            Column("UAVs"),
+            Column("parted", ".0f", "s"),
+            Column("tasks"),
+            Column("done"),
+            Column("duplicate visits"),
+            Column("agreed after", ".2f", "s"),
+            Column("faults"),
+        ),
+        [
+            (
+                each.uavs,
+                each.parted_s,
+                each.tasks,
+                each.done,
+                each.duplicates,
+                each.agreement_s,
+                len(each.faults),
+            )
+            for each in rows
+        ],
         "A fleet in two halves",
-        [],
-        ["UAVs", "parted [s]", "tasks", "done", "duplicate visits", "agreed after [s]", "faults"],
     )
-    for each in rows:
-        table.add_row(
-            str(each.uavs),
-            f"{each.parted_s:.0f}",
-            str(each.tasks),
-            str(each.done),
-            str(each.duplicates),
-            f"{each.agreement_s:.2f}",
-            str(len(each.faults)),
-        )
-    return table
 
 
-def _traffic(rows: Sequence[Traffic]) -> Table:
-    table = _table(
+def _traffic(rows: Sequence[Traffic]) -> ResultTable:
+    return ResultTable(
+        (
+            Column("UAVs"),
+            Column("messages", ".1f"),
+            Column("of them status", ".1f"),
+            Column("bytes", ".0f"),
+            Column("bytes heard by each agent", ".0f"),
+        ),
+        [
+            (
+                each.uavs,
+                each.messages_per_uav_s,
+                each.messages.get("Status", 0) / each.uavs / each.watched_s,
+                each.bytes_per_uav_s,
+                each.received_bytes_per_uav_s,
+            )
+            for each in rows
+        ],
         "What is said, per UAV and second; payload without headers",
-        [],
-        ["UAVs", "messages", "of them status", "bytes", "bytes heard by each agent"],
     )
-    for each in rows:
-        status = each.messages.get("Status", 0) / each.uavs / each.watched_s
-        table.add_row(
-            str(each.uavs),
-            f"{each.messages_per_uav_s:.1f}",
-            f"{status:.1f}",
-            f"{each.bytes_per_uav_s:.0f}",
-            f"{each.received_bytes_per_uav_s:.0f}",
-        )
-    return table
 
 
-def _latencies(rows: Sequence[DecisionLatencies]) -> Table:
-    table = _table(
+def _latencies(rows: Sequence[DecisionLatencies]) -> ResultTable:
+    return ResultTable(
+        (
+            Column("rule", key="method", words=True),
+            Column("UAVs", key="uavs"),
+            Column("tasks", key="tasks"),
+            Column("decisions", key="decisions"),
+            *_quantile_columns(1e3),
+        ),
+        [
+            (
+                each.method,
+                each.uavs,
+                each.tasks,
+                len(each.times_s),
+                *map(each.quantile_s, _SHARES.values()),
+            )
+            for each in rows
+        ],
         "From the report of an arrival to the next command [ms]",
-        ["rule"],
-        ["UAVs", "tasks", "decisions", "p50", "p99", "max"],
     )
-    for each in rows:
-        table.add_row(
-            each.method,
-            str(each.uavs),
-            str(each.tasks),
-            str(len(each.times_s)),
-            *(_shown(each.quantile_s(share), 1e3) for share in (0.5, 0.99, 1.0)),
-        )
-    return table
 
 
-def _table(title: str, words: Sequence[str], numbers: Sequence[str]) -> Table:
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=None,
-        pad_edge=False,
-        header_style="dim",
-    )
-    for name in words:
-        table.add_column(name)
-    for name in numbers:
-        table.add_column(name, justify="right")
-    return table
+_SHARES = {"p50": 0.5, "p99": 0.99, "max": 1.0}
 
 
-def _shown(time_s: float | None, scale: float) -> str:
-    return "never" if time_s is None else f"{scale * time_s:.2f}"
+def _quantile_columns(scale: float) -> list[Column]:
+    return [Column(name, ".2f", scale=scale, key=f"{name}_s", none="never") for name in _SHARES]
+
+
+def _counted(packets: int) -> str:
+    """None are counted where packets are imitated."""
+    return str(packets or "")

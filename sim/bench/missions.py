@@ -15,7 +15,6 @@ from multiprocessing import get_context
 from time import process_time
 
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from coordinator.planner.plan import make_plan
@@ -27,6 +26,7 @@ from sim.world.outcome import score
 from sim.world.uncertainty import Uncertainty
 from swarm.model import Plan
 from swarm.runtime.clock import Clock, SystemClock
+from swarm.runtime.table import Column, ResultTable
 
 __all__ = [
     "BatchResult",
@@ -152,20 +152,21 @@ def fly_block(which: MissionBatch) -> BatchResult:
 
 def missions_as_rich(bench: MissionsBench) -> RenderableType:
     """Everything for a terminal."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("wall time", "missions/min", "CPU per mission", "planning", "flying"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_row(
-        f"{bench.wall_s:.1f} s",
-        f"{bench.missions_per_min:.0f}",
-        *(
-            f"{1e3 * time_s:.0f} ms"
-            for time_s in (
+    table = ResultTable(
+        (
+            Column("wall time", ".1f", "s"),
+            Column("missions/min", ".0f"),
+            *(Column(name, ".0f", "ms", 1e3) for name in ("CPU per mission", "planning", "flying")),
+        ),
+        [
+            (
+                bench.wall_s,
+                bench.missions_per_min,
                 bench.plan_cpu_s + bench.fly_cpu_s,
                 bench.plan_cpu_s,
                 bench.fly_cpu_s,
             )
-        ),
+        ],
     )
     last = bench.seed + bench.missions - 1
     return Group(

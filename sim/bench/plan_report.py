@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Group, JustifyMethod, RenderableType
-from rich.table import Table
+from rich.console import Group, RenderableType
 from rich.text import Text
 
 from sim.bench.plans import LONG_RUN, MethodSummary, PlanBench, PlanMeasurement, summaries
 from sim.bench.solvers import HORIZON_SHARE, METHODS
 from sim.study.baselines.ortools_routing import SHORTFALL
+from swarm.runtime.table import Column, ResultTable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "PlanTable",
     "as_json",
     "as_markdown",
     "as_rich",
@@ -48,7 +47,7 @@ _RANDOM = (
 _MEASURED = (
     "Each method runs alone, in a process of its own, one after another, with the same limit in "
     "wall time; imports are not counted, and OR-Tools' building of its model comes on top of its "
-    "limit. MiB: peak memory of the whole process, interpreter and mission included. late: tasks "
+    "limit. peak: memory of the whole process, interpreter and mission included. late: tasks "
     "completed after D. guided and greedy use every core, the others one."
 )
 
@@ -60,17 +59,7 @@ _SCALING = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class PlanTable:
-    """A table as text."""
-
-    title: str
-    headings: tuple[str, ...]
-    """The last is that of the notes."""
-    rows: tuple[tuple[str, ...], ...]
-
-
-def comparison_grids(bench: PlanBench) -> list[PlanTable]:
+def comparison_grids(bench: PlanBench) -> list[ResultTable]:
     """One table per case and limit; the long run is told in each of its case."""
     found = summaries(bench)
     long_runs = {s.case: s for s in found if s.method == LONG_RUN}
@@ -82,25 +71,26 @@ def comparison_grids(bench: PlanBench) -> list[PlanTable]:
     for (case, limit_s), group in groups.items():
         long_run = long_runs.get(case)
         rows = [*group, long_run] if long_run is not None else group
-        headings = ["method", "J / best", "worst"]
-        headings += ["J / long run"] if long_run is not None else []
-        headings += ["time [s]", "CPU [s]", "MiB", "late", "notes"]
-        grids.append(
-            PlanTable(
-                f"{case}, {limit_s:g} s",
-                tuple(headings),
-                tuple(_comparison_row(row, long_run is not None) for row in rows),
-            )
-        )
+        columns = [Column("method", words=True), *_ratios("J / best", "worst")]
+        columns += _ratios("J / long run") if long_run is not None else []
+        columns += [
+            Column("time", _duration, "s"),
+            Column("CPU", ".1f", "s"),
+            Column("peak", ".0f", "MiB", 1 / _MIB),
+            Column("late"),
+            Column("notes", words=True),
+        ]
+        found_rows = [_comparison_row(row, long_run is not None) for row in rows]
+        grids.append(ResultTable(columns, found_rows, f"{case}, {limit_s:g} s"))
     return grids
 
 
-def scaling_grid(bench: PlanBench) -> PlanTable:
+def scaling_grid(bench: PlanBench) -> ResultTable:
     """Time to a first plan, growth of J and memory by size."""
-    rows = []
+    rows: list[tuple[object, ...]] = []
     for row in bench.measured:
         if row.objective is None:
-            rows.append((row.case, row.method, *("–",) * 6, row.note))
+            rows.append((row.case, row.method, *[None] * 6, row.note))
             continue
         first = row.trace[0] if row.trace else (row.elapsed_s, row.objective)
         half = [worth for time_s, worth in row.trace if time_s <= row.limit_s / 2.0]
@@ -108,59 +98,46 @@ def scaling_grid(bench: PlanBench) -> PlanTable:
             (
                 row.case,
                 row.method,
-                f"{first[0]:.3f}",
+                first[0],
                 _share(first[1], row.objective),
                 _share(half[-1] if half else None, row.objective),
-                _ratio(row.ratio),
-                f"{row.elapsed_s:.2f}",
-                f"{row.peak_bytes / _MIB:.0f}",
+                row.ratio,
+                row.elapsed_s,
+                row.peak_bytes,
                 row.note,
             )
         )
-    headings = (
-        "size", "method", "first plan [s]", "its J / last", "half time's", "J / best", "time [s]",
-        "MiB", "notes",
-    )  # fmt: skip
-    return PlanTable(_SCALING_TITLE, headings, tuple(rows))
+    columns = (
+        Column("size", words=True),
+        Column("method", words=True),
+        Column("first plan", ".3f", "s"),
+        *_ratios("its J / last", "half time's", "J / best"),
+        Column("time", ".2f", "s"),
+        Column("peak", ".0f", "MiB", 1 / _MIB),
+        Column("notes", words=True),
+    )
+    return ResultTable(columns, rows, _SCALING_TITLE)
 
 
-def as_rich(bench: PlanBench, grids: Sequence[PlanTable]) -> RenderableType:
+def as_rich(bench: PlanBench, grids: Sequence[ResultTable]) -> RenderableType:
     """Everything for a terminal."""
     parts: list[RenderableType] = [Text(str(bench.machine)), Text(_seeds(bench))]
     for grid in grids:
-        table = Table(
-            title=grid.title,
-            title_justify="left",
-            title_style="bold",
-            box=None,
-            pad_edge=False,
-            padding=(0, 2, 0, 0),
-        )
-        for i, heading in enumerate(grid.headings[:-1]):
-            justify: JustifyMethod = "right" if _is_number_column(i, heading) else "left"
-            table.add_column(Text(heading), justify=justify)
-        for row in grid.rows:
-            table.add_row(*(Text(cell) for cell in row[:-1]))
-        told = [Text(f"{_name(row)}: {row[-1]}", style="dim") for row in grid.rows if row[-1]]
-        parts += [Text(), table, *told]
+        # A column of notes would take the width that figures need.
+        figures = ResultTable(grid.columns[:-1], [row[:-1] for row in grid.rows], grid.title)
+        told = [
+            Text(f"{_name(cells)}: {cells[-1]}", style="dim") for cells in grid.cells() if cells[-1]
+        ]
+        parts += [Text(), figures, *told]
     parts += [Text(), *(Text(note) for note in _notes(bench, grids))]
     return Group(*parts)
 
 
-def as_markdown(bench: PlanBench, grids: Sequence[PlanTable]) -> str:
+def as_markdown(bench: PlanBench, grids: Sequence[ResultTable]) -> str:
     """Everything for a document."""
-    lines = [f"Measured on {bench.machine}. {_seeds(bench)}", ""]
-    for grid in grids:
-        rules = [
-            "--:" if _is_number_column(i, heading) else "---"
-            for i, heading in enumerate(grid.headings)
-        ]
-        lines += [f"**{grid.title}**", "", _markdown_row(grid.headings), _markdown_row(rules)]
-        lines += [_markdown_row(row) for row in grid.rows]
-        lines.append("")
-    for note in _notes(bench, grids):
-        lines += [note, ""]
-    return "\n".join(lines)
+    about = f"Measured on {bench.machine}. {_seeds(bench)}"
+    parts = [about, *(grid.as_markdown() for grid in grids), *_notes(bench, grids)]
+    return "\n\n".join(parts) + "\n"
 
 
 def as_json(bench: PlanBench) -> dict[str, object]:
@@ -173,26 +150,34 @@ def as_json(bench: PlanBench) -> dict[str, object]:
     }
 
 
-def _comparison_row(summary: MethodSummary, with_long_run: bool) -> tuple[str, ...]:
+def _comparison_row(summary: MethodSummary, with_long_run: bool) -> tuple[object, ...]:
     if not summary.runs:
-        blanks = 7 if with_long_run else 6
-        return (summary.method, *("–",) * blanks, summary.note)
+        return (summary.method, *[None] * (7 if with_long_run else 6), summary.note)
     notes = summary.note
     if summary.unassigned:
         notes += f"; {summary.unassigned} tasks on no list"
-    cells = [summary.method, _ratio(summary.ratio), _ratio(summary.worst_ratio)]
-    cells += [_ratio(summary.ratio_long)] if with_long_run else []
-    cells += [
-        f"{summary.elapsed_s:.2f}" if summary.elapsed_s >= 0.01 else f"{summary.elapsed_s:.4f}",
-        f"{summary.cpu_s:.1f}",
-        f"{summary.peak_bytes / _MIB:.0f}",
-        str(summary.late),
+    return (
+        summary.method,
+        summary.ratio,
+        summary.worst_ratio,
+        *([summary.ratio_long] if with_long_run else []),
+        summary.elapsed_s,
+        summary.cpu_s,
+        summary.peak_bytes,
+        summary.late,
         notes,
-    ]
-    return tuple(cells)
+    )
 
 
-def _notes(bench: PlanBench, grids: Sequence[PlanTable]) -> list[str]:
+def _ratios(*names: str) -> list[Column]:
+    return [Column(name, ".4f") for name in names]
+
+
+def _duration(time_s: float) -> str:
+    return f"{time_s:.2f}" if time_s >= 0.01 else f"{time_s:.4f}"
+
+
+def _notes(bench: PlanBench, grids: Sequence[ResultTable]) -> list[str]:
     """What the figures mean, as far as it concerns methods and cases that are there."""
     methods = list(dict.fromkeys(row.method for row in bench.measured))
     told = [f"{name}: {METHODS[name].what}" for name in methods if name in METHODS]
@@ -215,25 +200,13 @@ def _is_size(case: str) -> bool:
     return all(part.isdigit() for part in case.split("×")) and "×" in case
 
 
-def _is_number_column(i: int, heading: str) -> bool:
-    return i > 0 and heading not in ("notes", "method")
-
-
 def _name(row: Sequence[str]) -> str:
     """What a note is about: the method, and in a table by size the size too."""
     return f"{row[0]} {row[1]}" if row[1] in METHODS else row[0]
 
 
-def _ratio(ratio: float | None) -> str:
-    return "–" if ratio is None else f"{ratio:.4f}"
-
-
-def _share(worth: float | None, last: float) -> str:
-    return "–" if worth is None or last <= 0.0 else f"{worth / last:.4f}"
-
-
-def _markdown_row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+def _share(worth: float | None, last: float) -> float | None:
+    return None if worth is None or last <= 0.0 else worth / last
 
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#777777")

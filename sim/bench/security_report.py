@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 
 from sim.bench.machine import MachineInfo
 from sim.bench.security import CostFlight, SecureBench, SecurityMode
-from sim.bench.turnaround import TARGET_MS, quantiles_ms
+from sim.bench.turnaround import SHARES, TARGET_MS, quantiles_ms
 from sim.fleet.faults.flood import Flood
 from sim.fleet.faults.forgery import REASONS
+from swarm.runtime.table import Column, ResultTable
 
 __all__ = ["flood_as_json", "flood_as_rich", "secure_as_json", "secure_as_rich"]
 
@@ -91,7 +91,7 @@ def secure_as_rich(machine: MachineInfo, done: SecureBench) -> RenderableType:
     )
     parts: list[RenderableType] = [str(machine), head]
     if done.flights:
-        parts += ["", _costs(done), "", _times(done), "", _flights(done)]
+        parts += ["", _costs(done), "", _turnarounds(done), "", _flights(done)]
     if done.hops_s:
         parts += ["", _hops(done)]
     return Group(*parts, "", *_verdict(done))
@@ -99,68 +99,104 @@ def secure_as_rich(machine: MachineInfo, done: SecureBench) -> RenderableType:
 
 Getter = Callable[[CostFlight, str], float]
 
-_COSTS: tuple[tuple[str, Getter, str, int], ...] = (
-    ("in flight", lambda flight, kind: flight.flight_cpu_s(kind), "s", 2),
-    ("before", lambda flight, kind: flight.start.cpu_s.get(kind, 0.0), "s", 2),
-    ("memory each", lambda flight, kind: flight.whole.memory_bytes.get(kind, 0.0) / 1e6, "MB", 1),
+_COSTS: tuple[tuple[str, Getter, str, str, float], ...] = (
+    ("in flight", lambda flight, kind: flight.flight_cpu_s(kind), ".2f", "s", 1.0),
+    ("before", lambda flight, kind: flight.start.cpu_s.get(kind, 0.0), ".2f", "s", 1.0),
+    (
+        "memory each",
+        lambda flight, kind: flight.whole.memory_bytes.get(kind, 0.0),
+        *(".1f", "MB", 1e-6),
+    ),
 )
-"""What is told of each kind of process: heading, value, unit and digits."""
+"""What is told of each kind of process: name, value, and how it is shown."""
 
 
-def _costs(done: SecureBench) -> Table:
+def _costs(done: SecureBench) -> ResultTable:
     """Processor time and memory, plain beside secure."""
-    headings = [f"{name}, {way}" for name, *_ in _COSTS for way in _UNDISTURBED]
-    table = _table("process", "number", *headings)
-    for kind in _kinds(done):
-        number = max(each.whole.processes.get(kind, 0) for each in done.flights)
-        cells = [
-            f"{_mean(getter(flight, kind) for flight in done.of(way)):.{digits}f} {unit}"
-            for _, getter, unit, digits in _COSTS
-            for way in _UNDISTURBED
+    costs = [
+        Column(f"{name}, {way}", form, unit, scale, none="")
+        for name, _, form, unit, scale in _COSTS
+        for way in _UNDISTURBED
+    ]
+    rows: list[list[object]] = [
+        [
+            kind,
+            max(each.whole.processes.get(kind, 0) for each in done.flights),
+            *(
+                _mean(getter(flight, kind) for flight in done.of(way))
+                for _, getter, *_ in _COSTS
+                for way in _UNDISTURBED
+            ),
         ]
-        table.add_row(kind, str(number), *cells)
-    totals = [f"{_total_s(done.of(way)):.2f} s" for way in _UNDISTURBED]
-    table.add_row("all", "", *totals)
-    return table
+        for kind in _kinds(done)
+    ]
+    totals = [_total_s(done.of(way)) for way in _UNDISTURBED]
+    rows.append(["all", None, *totals, *[None] * (len(costs) - len(totals))])
+    return ResultTable((Column("process", words=True), Column("number", none=""), *costs), rows)
 
 
-def _times(done: SecureBench) -> Table:
+def _turnarounds(done: SecureBench) -> ResultTable:
     """Turnarounds and the time to take off, plain beside secure."""
-    table = _table("next target sent", "arrivals", "p50", "p90", "p99", "max", "take-off after")
-    for way in SecurityMode:
-        flights = done.of(way)
-        if not flights:
-            continue
-        count = sum(len(each.target_ms) for each in flights)
-        takeoff_s = _mean(each.takeoff_wall_s for each in flights)
-        cells = [_ms(time_ms) for time_ms in _target_ms(done, way).values()]
-        table.add_row(way, str(count), *cells, f"{takeoff_s:.1f} s")
-    return table
+    return ResultTable(
+        (
+            Column("next target sent", words=True),
+            Column("arrivals"),
+            *_quantile_columns(),
+            Column("take-off after", ".1f", "s"),
+        ),
+        [
+            (
+                way,
+                sum(len(each.target_ms) for each in flights),
+                *_target_ms(done, way).values(),
+                _mean(each.takeoff_wall_s for each in flights),
+            )
+            for way in SecurityMode
+            if (flights := done.of(way))
+        ],
+    )
 
 
-def _hops(done: SecureBench) -> Table:
-    table = _table("through a router", "claims", "p50", "p90", "p99", "max")
-    for way in _UNDISTURBED:
-        count = str(len(done.hops_s.get(way, ())))
-        cells = [_ms(time_ms) for time_ms in _hop_ms(done, way).values()]
-        table.add_row(way, count, *cells)
-    return table
+def _hops(done: SecureBench) -> ResultTable:
+    return ResultTable(
+        (Column("through a router", words=True), Column("claims"), *_quantile_columns()),
+        [
+            (way, len(done.hops_s.get(way, ())), *_hop_ms(done, way).values())
+            for way in _UNDISTURBED
+        ],
+    )
 
 
-def _flights(done: SecureBench) -> Table:
-    table = _table("flight", "", "tasks done", "lists", "in flight", "p99", "refused", "load")
-    for number, each in enumerate(done.flights, 1):
-        table.add_row(
-            str(number),
-            each.way,
-            f"{each.done} of {each.tasks}",
-            "as planned" if each.as_planned else "differ",
-            f"{sum(each.flight_cpu_s(kind) for kind in _kinds(done)):.2f} s",
-            _ms(quantiles_ms(each.target_ms)["p99"]),
-            str(sum(each.refused.values())),
-            f"{each.load:.1f}",
-        )
-    return table
+def _quantile_columns() -> list[Column]:
+    return [Column(share, ".1f", "ms") for share in SHARES]
+
+
+def _flights(done: SecureBench) -> ResultTable:
+    return ResultTable(
+        (
+            Column("flight"),
+            Column("", words=True),
+            Column("tasks done"),
+            Column("lists", words=True),
+            Column("in flight", ".2f", "s"),
+            Column("p99", ".1f", "ms"),
+            Column("refused"),
+            Column("load", ".1f"),
+        ),
+        [
+            (
+                number,
+                each.way,
+                f"{each.done} of {each.tasks}",
+                "as planned" if each.as_planned else "differ",
+                sum(each.flight_cpu_s(kind) for kind in _kinds(done)),
+                quantiles_ms(each.target_ms)["p99"],
+                sum(each.refused.values()),
+                each.load,
+            )
+            for number, each in enumerate(done.flights, 1)
+        ],
+    )
 
 
 def _verdict(done: SecureBench) -> list[str]:
@@ -211,17 +247,6 @@ def _mean(values: Iterable[float]) -> float:
     return float(np.mean(listed)) if listed else 0.0
 
 
-def _ms(time_ms: float | None) -> str:
-    return "-" if time_ms is None else f"{time_ms:.1f} ms"
-
-
-def _table(*names: str) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for number, name in enumerate(names):
-        table.add_column(name, justify="right" if number else "left", no_wrap=not number)
-    return table
-
-
 def flood_as_json(machine: MachineInfo, seed: int, done: Flood) -> dict[str, Any]:
     """Everything, ready for `json.dumps`."""
     return {
@@ -243,13 +268,17 @@ def flood_as_json(machine: MachineInfo, seed: int, done: Flood) -> dict[str, Any
 
 def flood_as_rich(machine: MachineInfo, seed: int, done: Flood) -> RenderableType:
     """Everything, for people."""
-    sent = _flood_table("kind", "sent", "counted as")
-    for kind, count in done.sent.items():
-        sent.add_row(kind, str(count), REASONS[kind])
-    counted = _flood_table("dropped as", "sent", *done.counted)
-    for reason, expected in done.expected.items():
-        counts = [str(count.get(reason, 0)) for count in done.counted.values()]
-        counted.add_row(reason, str(expected), *counts)
+    sent = ResultTable(
+        (Column("kind", words=True), Column("sent"), Column("counted as", words=True)),
+        [(kind, count, REASONS[kind]) for kind, count in done.sent.items()],
+    )
+    counted = ResultTable(
+        (Column("dropped as", words=True), Column("sent"), *map(Column, done.counted)),
+        [
+            (reason, expected, *(counts.get(reason, 0) for counts in done.counted.values()))
+            for reason, expected in done.expected.items()
+        ],
+    )
     lists = "every list flown as planned" if done.decisions_kept else "lists flown DIFFER"
     fates = "; ".join(done.fates) or "every process lived"
     return Group(
@@ -263,10 +292,3 @@ def flood_as_rich(machine: MachineInfo, seed: int, done: Flood) -> RenderableTyp
         "",
         "nothing has changed and everything was counted" if done.ok else "FAILED",
     )
-
-
-def _flood_table(*names: str) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for name in names:
-        table.add_column(name, justify="left" if name in (names[0], "counted as") else "right")
-    return table

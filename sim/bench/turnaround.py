@@ -17,15 +17,16 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 
 from agent.links.mavlink_vehicle import TURNAROUNDS
 from sim.bench.machine import MachineInfo
 from sim.fleet.layout import LaunchOptions
 from sim.fleet.run import fly
 from swarm.model import Mission
+from swarm.runtime.table import Column, ResultTable
 
 __all__ = [
+    "SHARES",
     "TARGET_MS",
     "TARGET_RATIO",
     "TurnaroundFlight",
@@ -168,16 +169,8 @@ def turnarounds_as_json(machine: MachineInfo, seed: int, done: Turnarounds) -> d
         **{name: _summary(getter, done.rounds) for name, getter in _KINDS.items()},
         "idled": sum(each.idled for each in done.rounds),
         "rounds": [
-            {
-                "makespan_s": each.makespan_s,
-                "planned_s": each.planned_s,
-                "ratio": each.ratio,
-                "done": each.done,
-                "tasks": each.tasks,
-                "load": each.load,
-                **{name: _summary(getter, [each]) for name, getter in _KINDS.items()},
-            }
-            for each in done.rounds
+            {**flight, **{name: _summary(getter, [each]) for name, getter in _KINDS.items()}}
+            for flight, each in zip(_flights(done).as_records(), done.rounds, strict=True)
         ],
     }
 
@@ -197,30 +190,18 @@ def _summary(
 
 def turnarounds_as_rich(machine: MachineInfo, seed: int, done: Turnarounds) -> RenderableType:
     """Everything, for people."""
-    times = Table(box=None, pad_edge=False, header_style="dim")
-    times.add_column("arrival or end of service until")
-    for name in ("count", *(f"{share} [ms]" for share in SHARES)):
-        times.add_column(name, justify="right")
-    for label, getter in (
-        ("next target sent", _KINDS["sent_ms"]),
-        ("its mission in force", _KINDS["in_force_ms"]),
-    ):
-        summary = _summary(getter, done.rounds)
-        if summary["count"]:
-            shown = [f"{summary[share]:.1f}" for share in SHARES]
-            times.add_row(label, f"{summary['count']:.0f}", *shown)
-    flights = Table(box=None, pad_edge=False, header_style="dim")
-    for name in ("flight", "tasks done", "makespan [s]", "planned [s]", "ratio", "load"):
-        flights.add_column(name, justify="right")
-    for number, each in enumerate(done.rounds, 1):
-        flights.add_row(
-            str(number),
-            f"{each.done} of {each.tasks}",
-            f"{each.makespan_s:.2f}",
-            "-" if each.planned_s is None else f"{each.planned_s:.2f}",
-            "-" if each.ratio is None else f"{each.ratio:.4f}",
-            f"{each.load:.1f}",
-        )
+    summaries = {
+        "next target sent": _summary(_KINDS["sent_ms"], done.rounds),
+        "its mission in force": _summary(_KINDS["in_force_ms"], done.rounds),
+    }
+    times = ResultTable(
+        (
+            Column("arrival or end of service until", words=True),
+            Column("count"),
+            *(Column(share, ".1f", "ms") for share in SHARES),
+        ),
+        [(until, *found.values()) for until, found in summaries.items() if found["count"]],
+    )
     return Group(
         str(machine),
         f"{done.scenario}, {done.uavs} UAVs at {done.speedup:g} times wall speed, "
@@ -229,7 +210,25 @@ def turnarounds_as_rich(machine: MachineInfo, seed: int, done: Turnarounds) -> R
         times,
         f"besides {sum(each.idled for each in done.rounds)} after finding nothing to do at first",
         "",
-        flights,
+        _flights(done),
         "",
         f"wanted: p99 of next target sent below {TARGET_MS:g} ms, ratio at most {TARGET_RATIO:g}",
+    )
+
+
+def _flights(done: Turnarounds) -> ResultTable:
+    return ResultTable(
+        (
+            Column("flight"),
+            Column("makespan", ".2f", "s", key="makespan_s"),
+            Column("planned", ".2f", "s", key="planned_s"),
+            Column("ratio", ".4f", key="ratio"),
+            Column("tasks done", key="done"),
+            Column("of", key="tasks"),
+            Column("load", ".1f", key="load"),
+        ),
+        [
+            (n, each.makespan_s, each.planned_s, each.ratio, each.done, each.tasks, each.load)
+            for n, each in enumerate(done.rounds, 1)
+        ],
     )

@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console, ConsoleOptions, JustifyMethod, RenderResult
-from rich.table import Table
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
 from sim.study.statistics import Estimate
@@ -29,6 +28,7 @@ from sim.study.style import (
 from sim.study.summary import PointSummary, PolicyResult, StudySummary, WallTimes
 from sim.study.trial import BOUND
 from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.table import Column, ResultTable
 from swarm.scenario.files import decode, read_bytes
 from swarm.scenario.findings import printable
 
@@ -38,25 +38,10 @@ __all__ = ["MarkedFile", "TerminalTables", "as_markdown"]
 _GAP = 2
 
 
-@dataclass(frozen=True, slots=True)
-class StudyTable:
-    """A table as text; the first column names policies, the others are numbers."""
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str = ""
-
-
 def as_markdown(summary: StudySummary, *, every_setting: bool = False) -> str:
     """Tables for a document, with what they are of above them."""
     parts = ["\n".join(_about(summary))]
-    for grid in _grids(summary, every_setting=every_setting):
-        rows = [grid.headings, ("---", *("---:",) * (len(grid.headings) - 1)), *grid.rows]
-        cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
-        parts.append(f"**{grid.title}**")
-        parts.append("\n".join(f"| {' | '.join(row)} |" for row in cells))
-        parts += [grid.note] if grid.note else []
+    parts += [each.as_markdown() for each in _grids(summary, every_setting=every_setting)]
     what = summary.about.what
     said = [f"- `{name}`: {what[name]}" for name in summary.policies if name in what]
     parts += ["\n".join(said)] if said else []
@@ -75,23 +60,14 @@ class TerminalTables:
             yield Text(line.replace("`", ""))
         for grid in _grids(self.summary, every_setting=False):
             for part in _fitting(grid, options.max_width):
-                table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
-                for place, heading in enumerate(part.headings):
-                    justify: JustifyMethod = "right" if place else "left"
-                    table.add_column(Text(heading), justify=justify, no_wrap=True)
-                for row in part.rows:
-                    table.add_row(*(Text(cell) for cell in row))
                 yield Text()
-                yield Text(part.title, style="bold")
-                yield table
-            if grid.note:
-                yield Text(grid.note)
+                yield part
 
 
 # -- tables -----------------------------------------------------------------------------
 
 
-def _grids(summary: StudySummary, *, every_setting: bool) -> Iterator[StudyTable]:
+def _grids(summary: StudySummary, *, every_setting: bool) -> Iterator[ResultTable]:
     own = summary.own
     if own is not None:
         yield from _of_setting(summary, own)
@@ -106,7 +82,7 @@ def _grids(summary: StudySummary, *, every_setting: bool) -> Iterator[StudyTable
                 yield from _of_setting(summary, each)
 
 
-def _of_setting(summary: StudySummary, setting: PointSummary) -> Iterator[StudyTable]:
+def _of_setting(summary: StudySummary, setting: PointSummary) -> Iterator[ResultTable]:
     """Two tables: values, and what happened."""
     where = _where(summary, setting)
     found = [setting.policies[name] for name in summary.policies if name in setting.policies]
@@ -141,7 +117,7 @@ def _of_setting(summary: StudySummary, setting: PointSummary) -> Iterator[StudyT
     )
 
 
-def _times(summary: StudySummary, setting: PointSummary) -> StudyTable | None:
+def _times(summary: StudySummary, setting: PointSummary) -> ResultTable | None:
     found = [setting.policies[name] for name in summary.policies if name in setting.policies]
     timed = [each for each in found if each.wall is not None]
     if not timed:
@@ -161,7 +137,7 @@ def _times(summary: StudySummary, setting: PointSummary) -> StudyTable | None:
     )
 
 
-def _against(summary: StudySummary, vary: str, settings: Sequence[PointSummary]) -> StudyTable:
+def _against(summary: StudySummary, vary: str, settings: Sequence[PointSummary]) -> ResultTable:
     """Ratios against the values of one quantity."""
     quantity = QUANTITIES[vary]
     rows = [
@@ -173,10 +149,10 @@ def _against(summary: StudySummary, vary: str, settings: Sequence[PointSummary])
     ]
     reference = [each.policies.get(summary.reference) for each in settings]
     values = [NONE if each is None else number_text(each.value.value) for each in reference]
-    return StudyTable(
-        title=f"J / {summary.reference}'s against {quantity.name} ({trials_text(settings)})",
-        headings=("policy", *(quantity.text(each.at or 0.0) for each in settings)),
-        rows=(*rows, (f"J of {summary.reference} [value·s]", *values)),
+    return _table(
+        ("policy", *(quantity.text(each.at or 0.0) for each in settings)),
+        (*rows, (f"J of {summary.reference} [value·s]", *values)),
+        f"J / {summary.reference}'s against {quantity.name} ({trials_text(settings)})",
     )
 
 
@@ -186,26 +162,38 @@ def _grid(
     found: Sequence[PolicyResult],
     columns: Sequence[tuple[str, Callable[[PolicyResult], str]]],
     note: str = "",
-) -> StudyTable:
-    return StudyTable(
-        title=title,
-        headings=("policy", *(heading for heading, _ in columns)),
-        rows=tuple((policy_label(summary, m.policy), *(of(m) for _, of in columns)) for m in found),
-        note=note,
+) -> ResultTable:
+    return _table(
+        ("policy", *(heading for heading, _ in columns)),
+        [(policy_label(summary, m.policy), *(of(m) for _, of in columns)) for m in found],
+        title,
+        note,
     )
 
 
-def _fitting(grid: StudyTable, width: int) -> Iterator[StudyTable]:
+def _table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], title: str, note: str = ""
+) -> ResultTable:
+    """The first column names policies, the others are numbers as text."""
+    policy, *numbers = headings
+    return ResultTable((Column(policy, words=True), *map(Column, numbers)), rows, title, note)
+
+
+def _fitting(grid: ResultTable, width: int) -> Iterator[ResultTable]:
     """The same in as few parts as fit, each with the policies, and about as wide as each other."""
-    table = [grid.headings, *grid.rows]
+    table = [[column.heading for column in grid.columns], *grid.cells()]
     name, *widths = (max(map(len, column)) + _GAP for column in zip(*table, strict=True))
     room = max(0, width - name + _GAP)
     fewest = len(_filled(widths, room))
     parts = next(p for most in range(room + 1) if len(p := _filled(widths, most)) == fewest)
     for part in parts:
-        cut = [(row[0], *(row[1 + place] for place in part)) for row in table]
-        title = grid.title if part is parts[0] else f"{grid.title}, continued"
-        yield StudyTable(title, cut[0], tuple(cut[1:]))
+        places = (0, *(1 + place for place in part))
+        yield ResultTable(
+            [grid.columns[place] for place in places],
+            [[row[place] for place in places] for row in grid.rows],
+            grid.title if part is parts[0] else f"{grid.title}, continued",
+            grid.note if part is parts[-1] else "",
+        )
 
 
 def _filled(widths: Sequence[int], room: int) -> list[list[int]]:

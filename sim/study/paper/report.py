@@ -10,17 +10,16 @@ from itertools import starmap
 from pathlib import Path
 
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from sim.study.paper.random_problems import READINGS, STUDIED, Average, Reading
 from sim.study.paper.reproduction import MethodTimes, Reproduction
 from sim.study.paper.tables import RULES, SequenceValue, lists_text
+from swarm.runtime.table import Column, ResultTable
 
 __all__ = ["reproduction_text"]
 
 
-_NONE = "–"
 _SCALES = {"worst": "worst plan 0, optimum 1", "ratio": "J / optimum"}
 _SEQUENCES = {
     "best": "best of the sequences",
@@ -44,21 +43,37 @@ def reproduction_text(found: Reproduction, drawn: Sequence[Path] = ()) -> Render
 
 def _table_part(found: Reproduction) -> list[RenderableType]:
     table, paper = found.table, found.expected.paper
-    plans = _grid("J [value·s]", "ours>", "paper>", "lists (UAV 1)(UAV 2)(UAV 3)")
-
-    def plan(name: str, method: str, papers: object = _NONE) -> None:
-        objective = table.plans[method].objective
-        plans.add_row(name, f"{objective:.4f}", str(papers), lists_text(table.lists(method)))
-
-    plan("optimum, proven", "exact", paper.optimum)
-    plans.add_row("hierarchical plan", _NONE, str(paper.hierarchical), "ours, by rule:")
-    for rule in RULES:
-        plan(f"  {rule}, best sequence", rule)
-    plan("guided", "guided")
-    plans.add_row("worst plan", f"{table.worst:.4f}", _NONE, "")
-    sequences = _grid("sequence", "greedy>", "lists", "lookahead>", "lists")
-    for pair in zip(*(table.of_rule(rule) for rule in RULES), strict=True):
-        sequences.add_row(_sequence(pair[0]), *(cell for each in pair for cell in _cells(each)))
+    papers: list[tuple[str, str | None, object]] = [
+        ("optimum, proven", "exact", paper.optimum),
+        ("hierarchical plan", None, paper.hierarchical),
+        *((f"  {rule}, best sequence", rule, None) for rule in RULES),
+        ("guided", "guided", None),
+    ]
+    rows = [
+        (name, None, figure, "ours, by rule:")
+        if method is None
+        else (name, table.plans[method].objective, figure, lists_text(table.lists(method)))
+        for name, method, figure in papers
+    ]
+    plans = ResultTable(
+        (
+            Column("J [value·s]", words=True),
+            Column("ours", ".4f"),
+            Column("paper", str),
+            Column("lists (UAV 1)(UAV 2)(UAV 3)", words=True),
+        ),
+        [*rows, ("worst plan", table.worst, None, "")],
+    )
+    sequences = ResultTable(
+        (
+            Column("sequence", words=True),
+            *(column for rule in RULES for column in (Column(rule, ".4f"), _lists_column())),
+        ),
+        [
+            (_sequence(pair[0]), *(cell for each in pair for cell in (each.objective, each.lists)))
+            for pair in zip(*(table.of_rule(rule) for rule in RULES), strict=True)
+        ],
+    )
     horizons = ", ".join(starmap(_horizon_text, table.optimum_at_horizon.items()))
     n_uav, n_task = len(table.mission.uavs), len(table.mission.tasks)
     return [
@@ -92,21 +107,21 @@ def _why_not_hierarchical(found: Reproduction) -> str:
 
 def _random_part(found: Reproduction) -> list[RenderableType]:
     random, paper = found.random, found.expected.paper
-    averages = _grid("method", "ours, 95 % interval>", "lowest>", "paper>", "ours − paper>")
+    averages = []
     for method in STUDIED:
         average, figure = random.average(method), paper.normalised.get(method)
-        averages.add_row(
-            method,
-            _average(average),
-            f"{random.normalised(method).min():.3f}",
-            str(figure or _NONE),
-            _NONE if figure is None else f"{average.mean - figure.value:+.3f}",
+        over = None if figure is None else average.mean - figure.value
+        lowest = random.normalised(method).min()
+        averages.append((method, _average(average), float(lowest), figure, over))
+    readings: list[tuple[object, ...]] = [
+        (
+            _SCALES[reading.scale],
+            _SEQUENCES[reading.sequence],
+            *(float(random.read(rule, reading).mean()) for rule in RULES),
         )
-    readings = _grid("what may be averaged", "", "greedy>", "lookahead>")
-    for reading in READINGS:
-        values = [f"{random.read(rule, reading).mean():.3f}" for rule in RULES]
-        readings.add_row(_SCALES[reading.scale], _SEQUENCES[reading.sequence], *values)
-    readings.add_row("the paper reports", "", *(str(paper.normalised[rule]) for rule in RULES))
+        for reading in READINGS
+    ]
+    readings.append(("the paper reports", "", *(str(paper.normalised[rule]) for rule in RULES)))
     noun = "problem" if len(random.problems) == 1 else "problems"
     return [
         _head(f"{len(random.problems)} random {noun}, seed {random.seed}"),
@@ -116,9 +131,25 @@ def _random_part(found: Reproduction) -> list[RenderableType]:
             "by their best sequence, guided by its planned lists."
         ),
         "",
-        averages,
+        ResultTable(
+            (
+                Column("method", words=True),
+                Column("ours, 95 % interval"),
+                Column("lowest", ".3f"),
+                Column("paper", str),
+                Column("ours − paper", "+.3f"),
+            ),
+            averages,
+        ),
         "",
-        readings,
+        ResultTable(
+            (
+                Column("what may be averaged", words=True),
+                Column("", words=True),
+                *(Column(rule, ".3f") for rule in RULES),
+            ),
+            readings,
+        ),
         "",
         _said(_why_not_average(found)),
         "",
@@ -148,14 +179,19 @@ def _why_not_average(found: Reproduction) -> str:
 
 
 def _times_part(times: MethodTimes, machine: str) -> list[RenderableType]:
-    rows = _grid("time for one problem", "median>", "of greedy's>")
     names = {
         "optimum": "optimum, dynamic programming",
         "lookahead": "lookahead, all sequences",
         "greedy": "greedy, all sequences",
     }
-    for method, name in names.items():
-        rows.add_row(name, f"{1e6 * times.median_s[method]:.1f} µs", f"{times.ratio(method):.2f} ×")
+    rows = ResultTable(
+        (
+            Column("time for one problem", words=True),
+            Column("median", ".1f", "µs", 1e6),
+            Column("of greedy's", "{:.2f} ×".format),
+        ),
+        [(name, times.median_s[method], times.ratio(method)) for method, name in names.items()],
+    )
     return [
         _head("Times relative to each other"),
         rows,
@@ -171,9 +207,10 @@ def _times_part(times: MethodTimes, machine: str) -> list[RenderableType]:
 
 
 def _theorems_part(found: Reproduction) -> list[RenderableType]:
-    rows = _grid("against brute force", "violations>", "cases>")
-    for theorem in found.theorems:
-        rows.add_row(theorem.name, str(theorem.violations), str(theorem.cases))
+    rows = ResultTable(
+        (Column("against brute force", words=True), Column("violations"), Column("cases")),
+        [(theorem.name, theorem.violations, theorem.cases) for theorem in found.theorems],
+    )
     said = [_said(f"{each.name}: {each.claim} ({each.remark}).") for each in found.theorems]
     return [_head("Theorems"), rows, "", *said, ""]
 
@@ -198,9 +235,10 @@ def _verdict_part(found: Reproduction) -> list[RenderableType]:
     spent = f"{found.elapsed_s:.1f} s"
     if not failed:
         return [Text(f"All {len(checks)} checks hold; {spent}.", style="bold green")]
-    rows = _grid("failed check", "ours>", "expected>")
-    for check in failed:
-        rows.add_row(check.name, check.ours, check.expected)
+    rows = ResultTable(
+        (Column("failed check", words=True), Column("ours"), Column("expected")),
+        [(check.name, check.ours, check.expected) for check in failed],
+    )
     return [
         rows,
         "",
@@ -208,14 +246,8 @@ def _verdict_part(found: Reproduction) -> list[RenderableType]:
     ]
 
 
-def _grid(*columns: str) -> Table:
-    """Columns named so; a trailing > aligns one to the right."""
-    grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for column in columns:
-        right = column.endswith(">")
-        name = Text(column.removesuffix(">"))  # brackets of units are no markup
-        grid.add_column(name, justify="right" if right else "left")
-    return grid
+def _lists_column() -> Column:
+    return Column("lists", lists_text, words=True)
 
 
 def _head(text: str) -> Text:
@@ -229,10 +261,6 @@ def _said(text: str) -> Text:
 
 def _sequence(each: SequenceValue) -> str:
     return f"({', '.join(str(uav) for uav in each.sequence)})"
-
-
-def _cells(each: SequenceValue) -> tuple[str, str]:
-    return f"{each.objective:.4f}", lists_text(each.lists)
 
 
 def _horizon_text(horizon_s: float, value: float) -> str:

@@ -56,8 +56,8 @@ def test_everything_measured_is_shown_in_80_columns() -> None:
     assert "seed 7" in lines
     assert "kill normal router 2 0 0.51 0.53 0.53 1.00" in lines
     assert "hang clean mesh 2 1 1.20 never never 4.00" in lines
-    assert "5%, 30 ms normal real packets 5 120 4000 200 0" in lines
-    assert "20%, 100 ms bad imitated 5 120 3" in lines
+    assert "5% 30 normal 5 120 real 0 4000 200" in lines
+    assert "20% 100 bad 5 120 imitated 3" in lines
     assert "10 30 120 120 17 0.80 0" in lines
     assert "10 6.0 5.0 1100 1000" in lines
     assert "guided 5 40 2 2.00 4.00 4.00" in lines

@@ -10,7 +10,6 @@ import pytest
 from rich.console import Console
 
 from sim.bench.plan_report import (
-    PlanTable,
     as_json,
     as_markdown,
     as_rich,
@@ -24,6 +23,7 @@ from sim.bench.plans import LONG_RUN, PlanBench, measure_plans
 from sim.bench.solvers import MissionSource, PlanningJob, PlanningRun, run_job
 from sim.study.baselines.ortools_routing import SHORTFALL
 from swarm.runtime.clock import SystemClock
+from swarm.runtime.table import ResultTable
 
 
 def in_process(job: PlanningJob) -> PlanningRun:
@@ -43,7 +43,7 @@ def scaling() -> PlanBench:
     return measure_plans(sources, ["guided", "greedy"], [0.1], [0], run=in_process)
 
 
-def told(bench: PlanBench, grids: list[PlanTable], width: int = 80) -> str:
+def told(bench: PlanBench, grids: list[ResultTable], width: int = 80) -> str:
     stream = io.StringIO()
     Console(file=stream, width=width).print(as_rich(bench, grids))
     return stream.getvalue()
@@ -56,14 +56,14 @@ def test_a_table_per_case_and_limit(bench: PlanBench) -> None:
     ]  # fmt: skip
     for grid in grids:
         assert [row[0] for row in grid.rows] == ["guided", "ortools", "exact", LONG_RUN]
-        assert {len(row) for row in grid.rows} == {len(grid.headings)}
-    assert grids[0].rows[2][1] == "1.0000"
-    assert grids[2].rows[2][1:-1] == ("–",) * 7
-    assert grids[2].rows[2][-1] == "too large to prove"
+        assert {len(row) for row in grid.rows} == {len(grid.columns)}
+    assert grids[0].cells()[2][1] == "1.0000"
+    assert grids[2].cells()[2][1:-1] == ["–"] * 7
+    assert grids[2].cells()[2][-1] == "too large to prove"
 
 
 def test_without_a_long_run_nothing_is_compared_with_it(scaling: PlanBench) -> None:
-    assert "J / long run" not in comparison_grids(scaling)[0].headings
+    assert "J / long run" not in [each.name for each in comparison_grids(scaling)[0].columns]
 
 
 def test_terminals_of_80_columns_show_all_figures(bench: PlanBench) -> None:
@@ -81,7 +81,7 @@ def test_markdown_has_the_same_tables(bench: PlanBench) -> None:
     assert text.count("| --- | --: |") == 4
     for grid in grids:
         assert f"**{grid.title}**" in text
-        for row in grid.rows:
+        for row in grid.cells():
             assert "| " + " | ".join(row) + " |" in text
     assert SHORTFALL in text
     assert str(bench.machine) in text
@@ -100,7 +100,7 @@ def test_scaling_tells_the_first_plan_and_memory(scaling: PlanBench) -> None:
     assert [row[:2] for row in grid.rows] == [
         ("3×8", "guided"), ("3×8", "greedy"), ("3×20", "guided"), ("3×20", "greedy")
     ]  # fmt: skip
-    for row in grid.rows:
+    for row in grid.cells():
         assert 0.0 < float(row[3]) <= 1.0
         assert float(row[7]) > 1.0
     text = told(scaling, [grid])
@@ -112,7 +112,7 @@ def test_scaling_tells_the_first_plan_and_memory(scaling: PlanBench) -> None:
 def test_refused_sizes_stay_in_the_scaling_table() -> None:
     source = ("2×30", MissionSource(n_uav=2, n_task=30))
     grid = scaling_grid(measure_plans([source], ["exact"], [0.1], [0], run=in_process))
-    assert grid.rows == (("2×30", "exact", *("–",) * 6, "too large to prove"),)
+    assert grid.cells() == [["2×30", "exact", *["–"] * 6, "too large to prove"]]
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
