@@ -116,7 +116,7 @@ def test_missing_ortools_is_told_when_it_was_asked_for(
 ) -> None:
     monkeypatch.setattr(ortools_routing, "is_installed", lambda: False)
     assert swarm("plan", "--methods", "ortools", "--sizes", "2x5") == 2
-    assert "OR-Tools is not installed; install it with: pip" in capsys.readouterr().err
+    assert "--methods ortools needs the extra bench: pip install" in capsys.readouterr().err
 
 
 def test_files_that_cannot_be_written_are_told(

@@ -21,15 +21,18 @@ def offered(
     return capsys.readouterr().out.split()
 
 
+ONLINE = {"greedy", "lookahead", "nearest", "value-per-time", "guided"}
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [
         ("swarm re", {"reproduce", "resume", "return"}),
         ("swarm plan v", {"valley-popups", "valley-survey"}),
         ("swarm plan --meth", {"--method"}),
-        ("swarm plan table-1 --method ", {"greedy", "lookahead", "guided", "exact"}),
+        ("swarm plan table-1 --method ", {*ONLINE, "exact"}),
         ("swarm simulate table-1 --method g", {"greedy", "guided"}),
-        ("swarm coordinator table-1 --method ", {"greedy", "lookahead", "guided"}),
+        ("swarm coordinator table-1 --method ", ONLINE),
         ("swarm status --bus ", {"mesh", "router"}),
         ("swarm status --link ", {"clean", "normal", "bad"}),
         ("swarm run table-1 --bus ", {"auto", "mesh", "router"}),

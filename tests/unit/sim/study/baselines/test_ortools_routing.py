@@ -50,6 +50,6 @@ def test_memory_of_the_matrices_is_estimated() -> None:
 
 def test_absence_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ortools_routing, "is_installed", lambda: False)
-    with pytest.raises(InputError, match="OR-Tools is not installed; install it with") as caught:
+    with pytest.raises(InputError, match="ortools needs the extra bench: pip install") as caught:
         require_installed()
     assert "\n" not in str(caught.value)
