@@ -64,7 +64,7 @@ PRELOADED = (
     "swarm.runtime.store",
 )
 """What routers, autopilots, coordinators and agents import, also inside their commands."""
-PRELOADED_FOR_KEYS = ("swarm.bus.tls", "swarm.bus.tls", "swarm.identity.certificates")
+PRELOADED_FOR_KEYS = ("swarm.bus.tls", "swarm.identity.certificates")
 """What they import besides when they have keys."""
 
 _PR_SET_CHILD_SUBREAPER = 36

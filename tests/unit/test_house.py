@@ -79,6 +79,22 @@ def test_a_module_is_one_idea_neither_a_fragment_nor_a_book() -> None:
     assert max(lines) <= 500
 
 
+def test_every_file_that_a_page_names_is_there() -> None:
+    pages = [ROOT / "README.md", *(ROOT / ".github").glob("*.md")]
+    for folder in (*PACKAGES, "deploy", "tests"):
+        pages += (ROOT / folder).rglob("*.md")
+    names = {path.name for folder in (*PACKAGES, "tests") for path in (ROOT / folder).rglob("*.*")}
+    missing = []
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        for file in re.findall(r"`([\w./-]+\.(?:py|hpp|cpp))`", text):
+            places = (page.parent / file, ROOT / file)
+            if not any(place.exists() for place in places) and ("/" in file or file not in names):
+                missing.append((str(page.relative_to(ROOT)), file))
+
+    assert missing == []
+
+
 def test_a_claim_is_followed_in_twenty_files() -> None:
     """From the step that decides to another agent's replica and to the bytes for the autopilot.
 
