@@ -19,8 +19,8 @@ def test_lies_that_a_router_passes_on_are_seen_through_and_counted_by_every_uav(
     assert flight.fates == ()
     assert len(flight.result.done) == 8
     assert flight.result.executed_routes == flight.planned
-    assert min(flight.lies[trick] for trick in Trick) > 0
-    assert flight.questions > 0
+    assert min(flight.lies[trick] for trick in Trick) > 10
+    assert flight.questions > 10
     for uav, counts in flight.dropped.items():
         for reason in ("not signed", "wrongly signed", "not the signer's to say"):
-            assert counts.get(reason, 0) > 0, (uav, counts)
+            assert counts.get(reason, 0) > 10, (uav, counts)
