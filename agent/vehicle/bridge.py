@@ -2,8 +2,8 @@
 
 It waits for the configured vehicle, prepares it, flies it from order to order and
 brings it home. It commands no other vehicle, does not fight a pilot and trusts what it
-sees over what was acknowledged. Leaves out: transports (agent.links.link), waiting
-(agent.links.mavlink_vehicle) and what to fly to (agent.core.agent_core).
+sees over what was acknowledged. What it makes the vehicle do stands in one slot, its activity
+(agent.vehicle.activity); which follows which, in agent.vehicle.transitions.
 
 The vehicle is *handed over* when a pilot or a failsafe changes its mode, when it
 disarms, reboots, ends its flight or loses its position, or when it falls silent. From
@@ -19,22 +19,22 @@ from functools import partial
 
 from agent.core.interface import (
     GoTo,
-    HandOverExplained,
-    HeardAgain,
     Hold,
     Prepare,
     Return,
     ReturnAdvised,
     Telemetry,
 )
-from agent.vehicle.activity import Activity, FlightPhase, OrderHandler
-from agent.vehicle.activity_runner import ActivityRunner
+from agent.vehicle.activity import Activity, FlightPhase, Idle
 from agent.vehicle.codec import MavlinkCodec
 from agent.vehicle.commands import CommandEnded
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.contact import Contact, StreamRequests
 from agent.vehicle.firmware import firmware_of
+from agent.vehicle.hand_over import HandOver, HandOverReason, LinkLoss, hand_over
 from agent.vehicle.messages import CommandAck, DecodedMessage, GroundHeartbeat, Heartbeat, Position
+from agent.vehicle.preparing import Preparing
+from agent.vehicle.returning import Returning
 from agent.vehicle.session import (
     BridgeAction,
     BridgeEvent,
@@ -46,7 +46,8 @@ from agent.vehicle.session import (
 )
 from agent.vehicle.signing import Signing
 from agent.vehicle.state import PositionNews
-from agent.vehicle.supervision import HandOverReason, intervention
+from agent.vehicle.supervision import intervention
+from agent.vehicle.transitions import follow, follow_mission, obey
 from swarm.model.frames import enu_from_wgs84
 from swarm.protocol.timing import StallDetector
 
@@ -63,11 +64,10 @@ class Bridge:
         self.strange_heartbeats = 0
         """Heartbeats dropped in flight: another kind of vehicle, under the same ids."""
         self._session = VehicleSession(config, signing)
-        self._activity = Activity(self._session)
-        self._order_handler = OrderHandler(self._session, self._activity)
-        self._runner = ActivityRunner(self._session, self._activity, self._order_handler)
+        self._activity: Activity = Idle(self._session)
         self._streams: StreamRequests | None = None
         self._heartbeat_at_s = -math.inf
+        self._raises_jerk = False
         self._stall_detector = StallDetector(config.silence_timeout_s / 2.0)
 
     @property
@@ -103,7 +103,7 @@ class Bridge:
                 for heard in session.codec.decode(data, source, now_s):
                     self._hear(heard)
             case Prepare() | GoTo() | Hold() | Return():
-                self._order_handler.obey(event)
+                self._activity = obey(self._activity, event, session)
             case LinkOpened():
                 session.contact.link_up = True
                 session.codec.reset_link()
@@ -119,15 +119,17 @@ class Bridge:
 
     def next_deadline_s(self) -> float:
         """When to step with `TimePassed` if nothing else happens before."""
-        session = self._session
-        deadlines_s = [self._heartbeat_at_s, self._runner.next_deadline_s()]
+        session, activity = self._session, self._activity
+        deadlines_s = [
+            self._heartbeat_at_s,
+            activity.next_deadline_s(),
+            session.mission_deadline_s(),
+        ]
         if (commands_s := session.commands.next_deadline_s()) is not None:
             deadlines_s.append(commands_s)
         silent_at_s = session.vehicle.silent_at_s(self.config.silence_timeout_s)
-        if silent_at_s is not None and self._activity.in_our_hands() and not session.silent:
+        if silent_at_s is not None and activity.in_our_hands and not session.silent:
             deadlines_s.append(silent_at_s)
-        if self._activity.explanation is not None:
-            deadlines_s.append(self._activity.explanation.due_s)
         return min(deadlines_s)
 
     # What is heard.
@@ -138,8 +140,6 @@ class Bridge:
             return
         session.vehicle.heard_at_s = session.now_s
         session.safety.on_message(message, session.now_s)
-        if self._activity.loss is not None:
-            self._activity.loss.on_message(message)
         if self._streams is not None:
             self._streams.on_message(message, session.now_s)
         match message:
@@ -153,12 +153,18 @@ class Bridge:
                 self._on_ended(ended)
             case _:
                 session.vehicle.on_message(message, session.now_s)
-                self._runner.on_message(message)
+                session.on_message(message)
+        self._activity.on_message(message)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Go on with what follows, if the activity has ended."""
+        self._activity = follow(self._activity, self._session)
 
     def _on_heartbeat(self, heartbeat: Heartbeat) -> None:
         session, before = self._session, self._session.vehicle.heartbeat
         if (
-            self._activity.in_our_hands()
+            self._activity.in_our_hands
             and session.firmware
             and not session.firmware.flies(heartbeat)
         ):
@@ -176,14 +182,16 @@ class Bridge:
             firmware = firmware_of(heartbeat)
             self._streams = StreamRequests(self.config, firmware) if firmware else None
             session.meet(firmware)
-            self._activity.forget_preparation()
+            session.commands.cancel_all()
+            if isinstance(self._activity, Preparing):
+                self._activity.begin_anew()
         self._check_authority(heartbeat)
         self._check_guards()
 
     def _check_authority(self, heartbeat: Heartbeat) -> None:
         """Hand over a vehicle that somebody else flies now."""
         session, activity = self._session, self._activity
-        if session.firmware is None or not activity.in_our_hands():
+        if session.firmware is None or not activity.in_our_hands:
             return
         why = partial(
             intervention,
@@ -195,31 +203,27 @@ class Bridge:
         )
         reason = why(session.now_s)
         if reason is not None:
-            activity.hand_over(reason)
-            activity.explanation = HandOverReason(reason, why, session.now_s)
+            explanation = HandOverReason(reason, why, session.now_s)
+            self._activity = hand_over(session, reason, explanation=explanation)
 
     def _check_guards(self) -> None:
         """Let go of a vehicle that has lost its way, and advise one in trouble to go home."""
         session, activity = self._session, self._activity
         firmware, now_s = session.firmware, session.now_s
-        if (
-            firmware is None
-            or not activity.in_our_hands()
-            or not firmware.airborne(session.vehicle)
-        ):
+        if firmware is None or not activity.in_our_hands or not firmware.airborne(session.vehicle):
             return
-        returning = activity.returning if activity.phase is FlightPhase.RETURNING else None
-        if returning is not None and not returning.on_detour:
+        returning = activity if isinstance(activity, Returning) else None
+        if returning is not None and returning.flies_home:
             return
         lost = session.safety.position_lost(now_s)
         if lost is not None and returning is None:
-            activity.hand_over(lost)
+            self._activity = hand_over(session, lost)
             return
         advice = lost or session.safety.advice(session.vehicle, firmware, now_s)
         if advice is None:
             return
         if returning is not None:
-            session.say(*returning.go_straight(now_s))
+            returning.go_straight()
         session.report(ReturnAdvised(advice))
 
     def _on_position(self, position: Position) -> None:
@@ -239,47 +243,35 @@ class Bridge:
             self.config.origin, position.lat_deg, position.lon_deg, position.alt_m
         )
         fault = session.firmware.position_fault(session.vehicle) if session.firmware else None
+        session.place_enu_m = place_enu_m
         session.safety.on_position(place_enu_m, fault, session.now_s)
         velocity, battery_frac = position.velocity_enu_m_s, session.vehicle.battery_frac
         session.report(Telemetry(place_enu_m, velocity, battery_frac))
         if fault is None:  # nothing is judged by a place that the vehicle itself distrusts
             session.position_filter.on_position(place_enu_m, session.now_s)
-            self._runner.on_position(position, place_enu_m)
+            if session.mission is not None:
+                session.mission.on_position(place_enu_m, session.now_s)
+            self._activity.on_position(position)
+            self._settle()
 
     def _on_reboot(self) -> None:
         """Forget what is no longer true of an autopilot that began anew."""
-        if self._activity.loss is not None:
-            self._activity.loss = None
-            self._session.report(HandOverExplained("heard again: the autopilot rebooted"))
-        self._runner.on_reboot()
+        if self._activity.in_our_hands:
+            self._activity = hand_over(self._session, "the autopilot rebooted")
+        elif isinstance(self._activity, HandOver | Preparing):
+            self._activity.on_reboot()
         self._session.forget_vehicle()
         self._streams = None
 
     def _on_ended(self, ended: list[CommandEnded]) -> None:
-        if self._streams is not None:
-            for one in ended:
-                self._streams.on_ended(one, self._session.now_s)
-        self._runner.on_ended(ended)
-
-    def _explain(self) -> None:
-        """Complete the reason of a hand-over once the words for it have had their time."""
-        explanation = self._activity.explanation
-        if explanation is None or self._session.now_s < explanation.due_s:
-            return
-        self._activity.explanation = None
-        if (reason := explanation.better()) is not None:
-            self._session.report(HandOverExplained(reason))
-
-    def _look_for_lost(self) -> None:
-        """Take a vehicle back that is heard again as it was left, or say what became of it."""
-        loss = self._activity.loss
-        news = None if loss is None else loss.news()
-        if isinstance(news, HeardAgain):
-            self._activity.take_back()
-        elif news is not None:
-            self._activity.loss = None
-        if news is not None:
-            self._session.report(news)
+        session = self._session
+        for one in ended:
+            if self._streams is not None:
+                self._streams.on_ended(one, session.now_s)
+            if session.mission is not None:
+                session.mission.on_ended(one, session.now_s)
+            self._activity.on_ended(one)
+            self._settle()
 
     # What time brings.
 
@@ -291,10 +283,34 @@ class Bridge:
         out, ended = session.commands.on_time(now_s)
         session.say(*out)
         self._on_ended(ended)
-        if session.silent and self._activity.in_our_hands():
-            self._activity.lose()
-        self._explain()
-        self._look_for_lost()
-        if self._streams is not None and not session.silent:
-            session.say(*self._streams.advance(session.commands, now_s))
-        self._runner.advance()
+        if session.silent and self._activity.in_our_hands:
+            self._lose()
+        if not session.silent:
+            if self._streams is not None:
+                session.say(*self._streams.advance(session.commands, now_s))
+            session.advance_mission()
+            self._settle()
+            self._activity = follow_mission(self._activity, session)
+            self._advance_override()
+        self._activity.advance()
+        self._settle()
+
+    def _lose(self) -> None:
+        """Command nothing any more to a vehicle that is not heard, and look for it."""
+        session = self._session
+        loss = LinkLoss(session, tuple(session.sent_to_enu_m))
+        self._activity = hand_over(session, session.vehicle.silence(session.now_s), loss=loss)
+
+    def _advance_override(self) -> None:
+        """Raise the limit of jerk from its preparation on, until it is told to go home."""
+        session, activity = self._session, self._activity
+        if isinstance(activity, Preparing):
+            self._raises_jerk = True
+        elif activity.flies_home or not activity.in_our_hands:
+            self._raises_jerk = False
+        if session.override is None:
+            return
+        session.override.want(self._raises_jerk and activity.in_our_hands)
+        session.say(*session.override.advance(session.now_s))
+        if complaint := session.override.take_complaint():
+            session.tell_caution(complaint)

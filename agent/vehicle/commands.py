@@ -12,6 +12,7 @@ Protocol: https://mavlink.io/en/services/command.html
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
@@ -23,6 +24,7 @@ __all__ = [
     "CommandOutcome",
     "CommandPolicy",
     "CommandQueue",
+    "RepeatedCommand",
     "VehicleCommand",
     "result_text",
 ]
@@ -243,3 +245,61 @@ class CommandQueue:
     ) -> tuple[list[VehicleCommand], list[CommandEnded]]:
         over = CommandEnded(line.popleft().tag, ending, result)
         return (self._transmit(line[0], now_s) if line else []), [over]
+
+
+class RepeatedCommand:
+    """What a vehicle is told until the effect is seen, but not for ever.
+
+    Args:
+        tag: its commands'.
+        commands: carries them.
+        tries: how often.
+        effect_timeout_s: wait for the effect of an accepted command to be seen.
+        retry_delay_s: pause after any other outcome.
+    """
+
+    def __init__(
+        self,
+        tag: str,
+        commands: CommandQueue,
+        tries: int,
+        effect_timeout_s: float,
+        retry_delay_s: float,
+    ) -> None:
+        self._tag = tag
+        self._commands = commands
+        self._tries = tries
+        self._effect_timeout_s = effect_timeout_s
+        self._retry_delay_s = retry_delay_s
+        self._next_s = -math.inf
+        self.given = 0
+        """How often it was given."""
+        self.refused = False
+        """The last was not accepted."""
+        self.result: int | None = None
+        """MAV_RESULT of the last; None without an acknowledgement."""
+
+    def on_ended(self, ended: CommandEnded, now_s: float) -> bool:
+        """Take the outcome of a command; whether it is an acceptance of this one."""
+        if ended.tag != self._tag or not self.given:
+            return False
+        self.refused, self.result = ended.ending is not CommandOutcome.ACCEPTED, ended.result
+        self.wait(now_s)
+        return not self.refused
+
+    def wait(self, now_s: float) -> None:
+        """Give the vehicle its time."""
+        self._next_s = now_s + (self._retry_delay_s if self.refused else self._effect_timeout_s)
+
+    def give(self, message: VehicleCommand, now_s: float) -> list[VehicleCommand] | None:
+        """What to transmit now; None if it was given often enough."""
+        if self._commands.pending(self._tag) or now_s < self._next_s:
+            return []
+        if self.given >= self._tries:
+            return None
+        self.given += 1
+        return self._commands.send(self._tag, message, now_s)
+
+    def cancel(self, now_s: float) -> list[VehicleCommand]:
+        """Its effect is seen."""
+        return self._commands.cancel(self._tag, now_s)

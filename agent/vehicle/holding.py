@@ -3,8 +3,7 @@
 Out of a mission, a return or a takeoff in a mode of its own, the guided mode stops the
 vehicle. In the guided mode the firmware's own pause does, which needs no place; where there
 is none, a target at the place where the vehicle is, if what it told before bears that out,
-or the nearest within the fence. All are told again until the effect is seen. Leaves out:
-what was under way before, and who may order it (agent.vehicle.activity_runner).
+or the nearest within the fence. All are told again until the effect is seen.
 """
 
 from __future__ import annotations
@@ -12,19 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from agent.core.interface import Hold
+from agent.core.interface import Hold, Prepare
+from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import (
     CommandEnded,
-    CommandOutcome,
-    CommandQueue,
+    RepeatedCommand,
     VehicleCommand,
     result_text,
 )
-from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.leg import TARGET_TAG
-from agent.vehicle.messages import Heartbeat, Landed, Outbound, Position
-from agent.vehicle.state import PositionFilter, VehicleState
+from agent.vehicle.messages import Heartbeat, Landed, Position
+from agent.vehicle.returning import Returning
+from agent.vehicle.session import VehicleSession
 from swarm.model.frames import wgs84_from_enu
 
 __all__ = ["Holding", "modes_to_leave"]
@@ -32,46 +31,48 @@ __all__ = ["Holding", "modes_to_leave"]
 
 Point = tuple[float, float, float]
 
-_MODE_TAG = "hold mode"
-_DISARM_TAG = "disarm"
 
-
-class Holding:
-    """Carries out one `Hold`.
+class Holding(Activity):
+    """Stops the vehicle: carries out one `Hold`.
 
     Args:
-        order: the order.
-        config: patience.
-        commands: carries what is told.
+        session: with the vehicle.
         firmware: what flies it.
-        speed_m_s: cruise speed, for firmwares that take it with every target.
+        order: the order.
         leaves: whether a mode is one that the vehicle flies on our orders, and may be
             taken out of.
         motors_asked: the vehicle may be about to arm.
+        returning: what goes on if the vehicle cannot be stopped.
+        prepare_next: ordered of a vehicle that has to be stopped first.
     """
+
+    phase = FlightPhase.HOLDING
+    polls = True
 
     def __init__(
         self,
-        order: Hold,
-        config: BridgeConfig,
-        commands: CommandQueue,
+        session: VehicleSession,
         firmware: Firmware,
-        speed_m_s: float,
+        order: Hold,
         leaves: Callable[[int], bool],
         *,
         motors_asked: bool = False,
+        returning: Returning | None = None,
+        prepare_next: Prepare | None = None,
     ) -> None:
+        super().__init__(session)
         self.order = order
-        self._config = config
-        self._commands = commands
+        self.returning = returning
+        self.prepare_next = prepare_next
         self._firmware = firmware
-        self._speed_m_s = speed_m_s
         self._leaves = leaves
         self._motors_asked = motors_asked
-        self._tries: dict[str, int] = {}
-        self._next_s: dict[str, float] = {}
-        self._refusal = ""
-        self._stop: VehicleCommand | None = None
+        config, commands = session.config, session.commands
+        waits_s = (config.effect_timeout_s, config.retry_delay_s)
+        self._mode = RepeatedCommand("hold mode", commands, config.mode_tries, *waits_s)
+        self._disarm = RepeatedCommand("disarm", commands, config.mode_tries, *waits_s)
+        self._stop = RepeatedCommand(TARGET_TAG, commands, config.mode_tries, *waits_s)
+        self._stop_message: VehicleCommand | None = None
         """What stops it in the guided mode, once known."""
         self._lost_since_s: float | None = None
         self._told = False
@@ -83,76 +84,84 @@ class Holding:
         self.failure: str | None = None
         """Why it does not stop; None while it may."""
 
-    def expects(self, custom_mode: int) -> bool:
+    @property
+    def flies_home(self) -> bool:
+        """Whether it was on the shortest way home."""
+        return self.returning is not None and self.returning.flies_home
+
+    @property
+    def may_disarm(self) -> bool:
+        """On the ground, or where a return may be about to land it."""
+        return self.returning is not None or not self.aloft
+
+    def expects(self, heartbeat: Heartbeat) -> bool:
         """Whether that mode fits; anything else is somebody else's doing."""
+        return not heartbeat.armed or self.expects_mode(heartbeat.custom_mode)
+
+    def expects_mode(self, custom_mode: int) -> bool:
+        """Whether that mode of an armed vehicle fits."""
         if self._firmware.is_commanded(custom_mode):
             self._guided_seen = True
             return True
         return not self._guided_seen and self._leaves(custom_mode)
 
-    def on_ended(self, ended: CommandEnded, now_s: float) -> None:
+    def on_ended(self, ended: CommandEnded) -> None:
         """Take a command's outcome."""
-        if ended.tag not in self._tries:
-            return
-        accepted = ended.ending is CommandOutcome.ACCEPTED
-        self._refusal = "" if accepted else result_text(ended.result)
-        wait_s = self._config.effect_timeout_s if accepted else self._config.retry_delay_s
-        self._next_s[ended.tag] = now_s + wait_s
-        if accepted and ended.tag == TARGET_TAG:
-            self._told = True
-        elif accepted and ended.tag == _DISARM_TAG:
+        now_s = self._session.now_s
+        self._mode.on_ended(ended, now_s)
+        self._told |= self._stop.on_ended(ended, now_s)
+        if self._disarm.on_ended(ended, now_s):
             self._motors_asked = False
 
     def on_position(self, position: Position) -> None:
         """See whether it has stopped."""
-        slow = math.hypot(*position.velocity_enu_m_s) <= self._config.arrival_speed_m_s
+        arrival_speed_m_s = self._session.config.arrival_speed_m_s
+        slow = math.hypot(*position.velocity_enu_m_s) <= arrival_speed_m_s
         if self._told and self._guided_seen and slow:
             self.done = True
 
-    def advance(
-        self, vehicle: VehicleState, heartbeat: Heartbeat, where: PositionFilter, now_s: float
-    ) -> list[Outbound]:
+    def advance(self) -> None:
         """Tell the vehicle what is still to be told."""
-        if self.done or self.failure is not None:
-            return []
+        vehicle, heartbeat = self._session.vehicle, self._session.vehicle.heartbeat
+        if self.done or self.failure is not None or heartbeat is None:
+            return
         self.aloft = heartbeat.armed and vehicle.landed is not Landed.ON_GROUND
         if not heartbeat.armed and not self._motors_asked:
             self.done = True
-            return []
-        if not self.aloft:
-            return self._ask(_DISARM_TAG, self._firmware.disarm(), now_s)
-        if not self._firmware.is_commanded(heartbeat.custom_mode):
+        elif not self.aloft:
+            self._tell(self._disarm, self._firmware.disarm())
+        elif not self._firmware.is_commanded(heartbeat.custom_mode):
             # The guided mode begins with a stop, which is given the time to be seen.
             self._told = True
-            self._next_s[TARGET_TAG] = now_s + self._config.effect_timeout_s
-            return self._ask(_MODE_TAG, self._firmware.set_commanded_mode(), now_s)
-        self._guided_seen = True
-        if self._stop is None:
-            self._stop = self._firmware.pause() or self._stay_at(where, now_s)
-        return [] if self._stop is None else self._ask(TARGET_TAG, self._stop, now_s)
+            self._stop.wait(self._session.now_s)
+            self._tell(self._mode, self._firmware.set_commanded_mode())
+        else:
+            self._guided_seen = True
+            if self._stop_message is None:
+                self._stop_message = self._firmware.pause() or self._stay()
+            if self._stop_message is not None:
+                self._tell(self._stop, self._stop_message)
 
-    def _stay_at(self, where: PositionFilter, now_s: float) -> VehicleCommand | None:
+    def _stay(self) -> VehicleCommand | None:
         """A target where the vehicle is; None while that is not known."""
-        place_m = where.place_m(now_s - self._config.stream_timeout_s)
-        if place_m is not None:
-            place = wgs84_from_enu(self._config.origin, self._config.within_fence(place_m))
-            return self._firmware.reposition(*place, self._speed_m_s)
+        session, config = self._session, self._session.config
+        place_enu_m = session.position_filter.place_m(session.now_s - config.stream_timeout_s)
+        if place_enu_m is not None:
+            place = wgs84_from_enu(config.origin, config.within_fence(place_enu_m))
+            return self._firmware.reposition(*place, session.cruise_speed_m_s)
         if self._lost_since_s is None:
-            self._lost_since_s = now_s
-        elif now_s - self._lost_since_s >= self._config.position_timeout_s:
+            self._lost_since_s = session.now_s
+        elif session.now_s - self._lost_since_s >= config.position_timeout_s:
             self.failure = "the places that it tells are too far apart to stop it at one"
         return None
 
-    def _ask(self, tag: str, command: VehicleCommand, now_s: float) -> list[Outbound]:
-        if self._commands.pending(tag) or now_s < self._next_s.get(tag, -math.inf):
-            return []
-        tries = self._tries.get(tag, 0)
-        if tries >= self._config.mode_tries:
-            why = f": {self._refusal}" if self._refusal else ""
-            self.failure = f"the vehicle was told to stop {tries} times and goes on{why}"
-            return []
-        self._tries[tag] = tries + 1
-        return [*self._commands.send(tag, command, now_s)]
+    def _tell(self, command: RepeatedCommand, message: VehicleCommand) -> None:
+        out = command.give(message, self._session.now_s)
+        if out is None:
+            why = f": {result_text(command.result)}" if command.refused else ""
+            self.failure = f"the vehicle was told to stop {command.given} times and goes on{why}"
+        else:
+            self._session.say(*out)
 
 
 def modes_to_leave(

@@ -3,8 +3,7 @@
 Arrival is judged by the vehicle's own position and speed against this target, and only after
 the vehicle took it: a vehicle that still flies elsewhere has not arrived, wherever it happens
 to be. One that never comes to rest at a mission's target, as in strong wind, has arrived too if
-it says that it reached the item and is near. Leaves out: when a target may be taken
-(agent.vehicle.activity), and the mission itself (agent.vehicle.onboard_mission).
+it says that it reached the item and is near.
 """
 
 from __future__ import annotations
@@ -15,10 +14,11 @@ from enum import Enum, auto
 from typing import Protocol
 
 from agent.core.interface import Arrived, GoTo, HandedOver, Refused
+from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
-from agent.vehicle.messages import CommandInt, Inbound, Outbound, StatusText
+from agent.vehicle.messages import CommandInt, Inbound, Outbound, Position, StatusText
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import wgs84_from_enu
@@ -27,10 +27,10 @@ __all__ = [
     "TARGET_TAG",
     "ArrivalDetector",
     "ArrivalState",
+    "Flying",
     "Leg",
     "MissionLeg",
     "RepositionLeg",
-    "Target",
 ]
 
 
@@ -277,23 +277,22 @@ class MissionLeg:
         return []
 
 
-class Target:
-    """Carries out one `GoTo`.
+class Flying(Activity):
+    """Flies to a target: carries out one `GoTo`.
 
     Args:
-        order: the order.
         session: with the vehicle.
         firmware: what flies it.
-        speed_m_s: cruise speed.
+        order: the order.
     """
 
-    def __init__(
-        self, order: GoTo, session: VehicleSession, firmware: Firmware, speed_m_s: float
-    ) -> None:
+    phase = FlightPhase.FLYING
+
+    def __init__(self, session: VehicleSession, firmware: Firmware, order: GoTo) -> None:
+        super().__init__(session)
         self._order = order
-        self._session = session
         self._firmware = firmware
-        self._leg = _leg_to(order, session, firmware, speed_m_s)
+        self._leg = _leg_to(order, session, firmware)
 
     def start(self) -> None:
         """Tell the vehicle, in place of whatever it was told before."""
@@ -308,12 +307,13 @@ class Target:
         if isinstance(message, StatusText) and self._firmware.ignores_target(message.text):
             self._leg.ignored(message.text)
 
-    def on_position(self, place_enu_m: Point, velocity_enu_m_s: Point) -> None:
-        """Judge arrival."""
-        out: Sequence[Outbound] = self._leg.on_position(
-            place_enu_m, velocity_enu_m_s, self._session.now_s
-        )
-        self._session.say(*out)
+    def on_position(self, position: Position) -> None:
+        """Judge speed and arrival."""
+        session, velocity_enu_m_s = self._session, position.velocity_enu_m_s
+        told_m_s = session.cruise_speed_m_s
+        if remark := session.cruise_watch.judge(velocity_enu_m_s, told_m_s, session.now_s):
+            session.tell_caution(remark)
+        session.say(*self._leg.on_position(session.place_enu_m, velocity_enu_m_s, session.now_s))
 
     def outcome(self) -> Arrived | HandedOver | Refused | None:
         """How the leg ended; None while it is under way."""
@@ -327,8 +327,9 @@ class Target:
         return Refused(self._order, self._session.in_its_words(failure))
 
 
-def _leg_to(order: GoTo, session: VehicleSession, firmware: Firmware, speed_m_s: float) -> Leg:
+def _leg_to(order: GoTo, session: VehicleSession, firmware: Firmware) -> Leg:
     target_enu_m, config = order.position_enu_m, session.config
+    speed_m_s = session.cruise_speed_m_s
     if session.mission is not None:
         return MissionLeg(target_enu_m, order.stay_s, speed_m_s, config, session.mission)
     place = wgs84_from_enu(config.origin, target_enu_m)

@@ -1,14 +1,16 @@
-"""What is read from a vehicle and set on it before it flies.
+"""What is read from a vehicle, set on it and judged before it flies.
 
 Read: what it does when its agent falls silent and when its battery is low, from its parameters,
 by all the names they have had. Simulated autopilots of ours say that they are, and are flown as
 they are. Set: the cruise speed, by command, or by the parameter if the command is refused.
-Leaves out: what the parameters mean (agent.vehicle.firmware), and when either is done
-(agent.vehicle.preparation).
+Judged: whether the start can be reached from where the vehicle stands.
 """
 
 from __future__ import annotations
 
+import math
+
+from agent.core.interface import Prepare
 from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.firmware.failsafes import Failsafes
@@ -20,9 +22,17 @@ from agent.vehicle.messages import (
     ParameterRead,
     ParameterSet,
     ParameterValue,
+    Position,
 )
+from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
 
-__all__ = ["CruiseSpeedSetting", "FailsafeCheck", "FailsafeReading"]
+__all__ = [
+    "CruiseSpeedSetting",
+    "FailsafeCheck",
+    "FailsafeReading",
+    "home_alt_m",
+    "start_fault",
+]
 
 
 _SIMULATED = "SWARM_SIMULATED"
@@ -233,3 +243,42 @@ class CruiseSpeedSetting:
         if self._name is None:
             return [ParameterRead(name) for name in self._values]
         return [ParameterSet(self._name, self._values[self._name])]
+
+
+_NULL_ISLAND = ", near 0° N 0° E: a PX4 before 1.16 starts its own simulator there"
+
+
+def home_alt_m(position: Position) -> float:
+    """Home's height above mean sea level, of which the vehicle's two heights differ [m]."""
+    return position.alt_m - position.relative_alt_m
+
+
+def start_fault(order: Prepare, position: Position, config: BridgeConfig) -> str | None:
+    """Why the start cannot be reached from where the vehicle stands; None if it can."""
+    east_m, north_m, _ = enu_from_wgs84(
+        config.origin, position.lat_deg, position.lon_deg, position.alt_m
+    )
+    distance_m = math.hypot(east_m, north_m)
+    if distance_m > config.fence_radius_m:
+        cause = _NULL_ISLAND if max(abs(position.lat_deg), abs(position.lon_deg)) < 1.0 else ""
+        return f"the vehicle stands {distance_m / 1e3:.1f} km from the mission's origin{cause}"
+    home_m = home_alt_m(position)
+    east_m, north_m, _ = order.position_enu_m
+    if order.ground_up_m is not None:
+        _, _, ground_alt_m = wgs84_from_enu(config.origin, (east_m, north_m, order.ground_up_m))
+        if not abs(home_m - ground_alt_m) <= config.home_tolerance_m:
+            return (
+                f"home is at {home_m:.0f} m above sea level, the scenario says "
+                f"{ground_alt_m:.0f} m there: correct [origin] alt_m, or position_m"
+            )
+    _, _, start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
+    height_m = start_alt_m - home_m
+    if height_m < config.takeoff_min_m:
+        return (
+            f"the start lies {height_m:.1f} m above the vehicle's home, "
+            f"at least {config.takeoff_min_m:g} m are needed"
+        )
+    # Start and home both lie within the fence, or one of the two heights told is wrong.
+    if height_m > 2.0 * config.fence_height_m:
+        return f"the start lies {height_m:.0f} m above the vehicle's home"
+    return None

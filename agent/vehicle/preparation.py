@@ -6,9 +6,9 @@ already need no cases of their own. A vehicle that somebody else armed or flies 
 for, and once it is disarmed it does not start by itself. Every step has a limit. A vehicle
 that is resumed in the air keeps its old target meanwhile: only its speed is set, and not
 even that if it flies a mission of ours. Commanded by missions, it gets one that ends at home
-while it stands on the ground, and is not ready before it flies it. Leaves out: who may give
-the vehicle orders (agent.vehicle.bridge), and what counts as consent to fly it
-(agent.vehicle.supervision).
+while it stands on the ground, and is not ready before it flies it. What counts as consent to fly
+a vehicle stands in agent.vehicle.supervision, and what it is asked beforehand in
+agent.vehicle.preflight.
 """
 
 from __future__ import annotations
@@ -19,23 +19,24 @@ from dataclasses import dataclass
 from agent.core.interface import Prepare
 from agent.vehicle.commands import (
     CommandEnded,
-    CommandOutcome,
-    CommandQueue,
+    RepeatedCommand,
     VehicleCommand,
     result_text,
 )
-from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.leg import RepositionLeg
 from agent.vehicle.messages import Heartbeat, Inbound, Landed, Outbound, Position, StatusText
 from agent.vehicle.onboard_mission import OnboardMission
-from agent.vehicle.preflight import CruiseSpeedSetting, FailsafeCheck
+from agent.vehicle.preflight import CruiseSpeedSetting, FailsafeCheck, home_alt_m, start_fault
+from agent.vehicle.session import VehicleSession
 from agent.vehicle.state import VehicleState
-from agent.vehicle.supervision import PilotConsent, SafetyMonitor
-from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
+from agent.vehicle.supervision import PilotConsent
+from swarm.model.frames import wgs84_from_enu
 
 __all__ = ["Preparation"]
 
+
+Point = tuple[float, float, float]
 
 _CLIMB_PROGRESS_M = 0.2
 _CLIMB_TOLERANCE_FRAC = 0.05
@@ -51,64 +52,51 @@ _CAME_DOWN = (
 )
 _CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
 _ARMED_BY_OTHERS = "somebody else armed it and disarmed it again; prepare it again to take off"
-_NULL_ISLAND = ", near 0° N 0° E: a PX4 before 1.16 starts its own simulator there"
 _FLOWN_BY_PILOT = "its pilot flew and landed it; prepare it again to take off"
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Step:
     """One thing that is asked of the vehicle until it is seen, but not for ever."""
 
-    tag: str
     what: str
-    limit: int
-    effect_timeout_s: float
-    """Wait for the effect of an accepted command to be seen."""
-    count: int = 0
-    next_at_s: float = -math.inf
-    accepted: bool = True
-    result: int | None = None
-    """MAV_RESULT of the last answer, if it was not accepted."""
+    command: RepeatedCommand
 
 
 class Preparation:
-    """Carries out one `Prepare`.
+    """The steps of one preparation of one vehicle.
 
     Args:
-        order: the order.
-        config: patience.
-        commands: carries what is told.
+        session: with the vehicle; its mission may stand there since an earlier life.
         firmware: what flies it.
-        mission: what stands on the vehicle, perhaps since an earlier life; None if missions
-            are not our way to command it.
+        order: the order.
         ours: the vehicle flies, or may fly, on our orders already.
     """
 
     def __init__(
-        self,
-        order: Prepare,
-        config: BridgeConfig,
-        commands: CommandQueue,
-        firmware: Firmware,
-        safety: SafetyMonitor,
-        mission: OnboardMission | None = None,
-        *,
-        ours: bool = False,
+        self, session: VehicleSession, firmware: Firmware, order: Prepare, *, ours: bool
     ) -> None:
+        config, commands = session.config, session.commands
         self._order = order
-        self._mission = mission
+        self._mission = session.mission
         self._config = config
         self._commands = commands
         self._firmware = firmware
-        self._safety = safety
+        self._safety = session.safety
         _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
-        wait_s = config.effect_timeout_s
-        mode = firmware.commanded_mode_name
-        self._mode = _Step("mode", f"setting {mode}", config.mode_tries, wait_s)
-        self._arm = _Step("arm", "arming", config.arm_tries, wait_s)
+        wait_s, delay_s = config.effect_timeout_s, config.retry_delay_s
+        self._mode = _Step(
+            f"setting {firmware.commanded_mode_name}",
+            RepeatedCommand("mode", commands, config.mode_tries, wait_s, delay_s),
+        )
+        self._arm = _Step(
+            "arming", RepeatedCommand("arm", commands, config.arm_tries, wait_s, delay_s)
+        )
         # ArduCopter spools up for 3 to 4 s before it leaves the ground.
-        self._takeoff = _Step("takeoff", "takeoff", config.takeoff_tries, 2.0 * wait_s)
-        self._steps = {step.tag: step for step in (self._mode, self._arm, self._takeoff)}
+        self._takeoff = _Step(
+            "takeoff",
+            RepeatedCommand("takeoff", commands, config.takeoff_tries, 2.0 * wait_s, delay_s),
+        )
         self._highest_m = -math.inf
         self._climbed_at_s = math.inf
         self._climbing = False
@@ -138,21 +126,17 @@ class Preparation:
     @property
     def engaged(self) -> bool:
         """Whether the motors run, or may run, because of us."""
-        return self._arm.count > 0 or self._flew
+        return self._arm.command.given > 0 or self._flew
 
     @property
     def took_off(self) -> bool:
         """Whether takeoff was asked for."""
-        return self._takeoff.count > 0
+        return self._takeoff.command.given > 0
 
     def on_ended(self, ended: CommandEnded, now_s: float) -> list[Outbound]:
         """Take a command's outcome."""
-        step = self._steps.get(ended.tag)
-        if step is not None:
-            accepted = ended.ending is CommandOutcome.ACCEPTED
-            step.accepted, step.result = accepted, ended.result
-            wait_s = step.effect_timeout_s if accepted else self._config.retry_delay_s
-            step.next_at_s = now_s + wait_s
+        for step in (self._mode, self._arm, self._takeoff):
+            step.command.on_ended(ended, now_s)
         if self._leg is not None:
             self._leg.on_ended(ended)
         return self._speed.on_ended(ended, now_s)
@@ -165,16 +149,13 @@ class Preparation:
             leg.ignored(message.text)
         return self._speed.on_message(message, now_s)
 
-    def on_position(self, position: Position, now_s: float) -> list[Outbound]:
+    def on_position(self, position: Position, place_enu_m: Point, now_s: float) -> list[Outbound]:
         """Take a fresh position: climb and arrival show in it."""
         if position.alt_m > self._highest_m + _CLIMB_PROGRESS_M:
             self._highest_m = position.alt_m
             self._climbed_at_s = now_s
         if self._leg is None:
             return []
-        place_enu_m = enu_from_wgs84(
-            self._config.origin, position.lat_deg, position.lon_deg, position.alt_m
-        )
         return [*self._leg.on_position(place_enu_m, position.velocity_enu_m_s, now_s)]
 
     def advance(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
@@ -221,8 +202,8 @@ class Preparation:
             return self._take_off(position, vehicle, now_s)
         self._flew = True
         # Repeated now, it would interrupt what follows.
-        out: list[Outbound] = [*self._commands.cancel(self._takeoff.tag, now_s)]
-        if self._arm.count:  # what it does without us may not have been read to the end
+        out: list[Outbound] = [*self._takeoff.command.cancel(now_s)]
+        if self._arm.command.given:  # what it does without us may not have been read to the end
             out += self._failsafes.ask(now_s)
         if self._climbing and not self._high_enough(position, now_s):
             return out
@@ -252,14 +233,14 @@ class Preparation:
     def _start_motors(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
         if self._flew:
             return self._fail("the vehicle disarmed after takeoff")
-        if self._order.left_in_air and not self._arm.count:
+        if self._order.left_in_air and not self._arm.command.given:
             return self._fail(_CAME_DOWN)
         unready = self._firmware.unready(vehicle)
         if unready is None and (arming_objection := self._safety.arming_objection(vehicle, now_s)):
             return self._wait(arming_objection)
         if unready is not None:
             return self._wait(self._with_warning(unready, vehicle, now_s))
-        if vehicle.position is not None and (fault := self._misplaced(vehicle.position)):
+        if vehicle.position is not None and (fault := self._start_fault(vehicle.position)):
             return self._fail(fault)
         if objection := self._failsafes.objection:
             return self._wait(objection)
@@ -268,35 +249,8 @@ class Preparation:
         self._consent.arm()
         return self._ask(self._arm, self._firmware.arm(), vehicle, now_s)
 
-    def _misplaced(self, position: Position) -> str | None:
-        """Why the start cannot be reached from where the vehicle stands; None if it can."""
-        config = self._config
-        east_m, north_m, _ = enu_from_wgs84(
-            config.origin, position.lat_deg, position.lon_deg, position.alt_m
-        )
-        distance_m = math.hypot(east_m, north_m)
-        if distance_m > config.fence_radius_m:
-            cause = _NULL_ISLAND if max(abs(position.lat_deg), abs(position.lon_deg)) < 1.0 else ""
-            return f"the vehicle stands {distance_m / 1e3:.1f} km from the mission's origin{cause}"
-        home_alt_m, ground_up_m = _home_alt_m(position), self._order.ground_up_m
-        if ground_up_m is not None:
-            east_m, north_m, _ = self._order.position_enu_m
-            _, _, ground_alt_m = wgs84_from_enu(config.origin, (east_m, north_m, ground_up_m))
-            if not abs(home_alt_m - ground_alt_m) <= config.home_tolerance_m:
-                return (
-                    f"home is at {home_alt_m:.0f} m above sea level, the scenario says "
-                    f"{ground_alt_m:.0f} m there: correct [origin] alt_m, or position_m"
-                )
-        height_m = self._start_alt_m - home_alt_m
-        if height_m < config.takeoff_min_m:
-            return (
-                f"the start lies {height_m:.1f} m above the vehicle's home, "
-                f"at least {config.takeoff_min_m:g} m are needed"
-            )
-        # Start and home both lie within the fence, or one of the two heights told is wrong.
-        if height_m > 2.0 * config.fence_height_m:
-            return f"the start lies {height_m:.0f} m above the vehicle's home"
-        return None
+    def _start_fault(self, position: Position) -> str | None:
+        return start_fault(self._order, position, self._config)
 
     def _take_off(self, position: Position, vehicle: VehicleState, now_s: float) -> list[Outbound]:
         self._climbing = True
@@ -305,11 +259,11 @@ class Preparation:
         # Also here, as a vehicle found armed on the ground comes straight to takeoff.
         if arming_objection := self._safety.arming_objection(vehicle, now_s):
             return self._wait(arming_objection)
-        if fault := self._misplaced(position):
+        if fault := self._start_fault(position):
             return self._fail(fault)
         if self._mission is not None and not self._mission.is_uploaded and not self.took_off:
             return self._upload_way_home(self._mission, now_s)
-        command = self._firmware.takeoff(self._start_alt_m, _home_alt_m(position))
+        command = self._firmware.takeoff(self._start_alt_m, home_alt_m(position))
         return self._ask(self._takeoff, command, vehicle, now_s)
 
     def _follow_takeoff(self, now_s: float) -> list[Outbound]:
@@ -347,7 +301,7 @@ class Preparation:
         return self._mission.look(now_s)
 
     def _high_enough(self, position: Position, now_s: float) -> bool:
-        height_m = self._start_alt_m - _home_alt_m(position)
+        height_m = self._start_alt_m - home_alt_m(position)
         tolerance_m = max(
             self._config.acceptance_radius_m, _CLIMB_TOLERANCE_M, _CLIMB_TOLERANCE_FRAC * height_m
         )
@@ -428,22 +382,20 @@ class Preparation:
     def _ask(
         self, step: _Step, command: VehicleCommand, vehicle: VehicleState, now_s: float
     ) -> list[Outbound]:
-        refusal = ""
-        if not step.accepted:
+        refusal, repeated = "", step.command
+        if repeated.refused:
             # Of modes and motors nothing depends on a place.
             of_place = step is self._takeoff
-            words = self._firmware.place_refusal(vehicle, step.result) if of_place else None
-            refusal = words or result_text(step.result)
+            words = self._firmware.place_refusal(vehicle, repeated.result) if of_place else None
+            refusal = words or result_text(repeated.result)
             if text := vehicle.telling_warning(now_s):
                 refusal = f"{refusal}: {text}"
         self._wait(f"{step.what} refused ({refusal}), trying again" if refusal else step.what)
-        if self._commands.pending(step.tag) or now_s < step.next_at_s:
-            return []
-        if step.count >= step.limit:
+        out = repeated.give(command, now_s)
+        if out is None:
             why = f"last answer: {refusal}" if refusal else "its effect was never seen to stay"
-            return self._fail(f"{step.what} failed {step.count} times; {why}")
-        step.count += 1
-        return [*self._commands.send(step.tag, command, now_s)]
+            return self._fail(f"{step.what} failed {repeated.given} times; {why}")
+        return [*out]
 
     def _wait(self, reason: str) -> list[Outbound]:
         self.waiting_for = reason
@@ -452,8 +404,3 @@ class Preparation:
     def _fail(self, reason: str) -> list[Outbound]:
         self.failure = reason
         return []
-
-
-def _home_alt_m(position: Position) -> float:
-    """Home's height above mean sea level, of which the vehicle's two heights differ."""
-    return position.alt_m - position.relative_alt_m

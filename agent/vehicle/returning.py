@@ -2,8 +2,7 @@
 
 Return modes fly at a height of the vehicle's own, in which the layers of a fleet vanish. So a
 vehicle that has the time is first told to fly to where it started, in its own layer, and
-returns from there. Whatever goes wrong ends that part at once, as home matters more. Leaves
-out: who may order it and what a landing is (agent.vehicle.bridge).
+returns from there. Whatever goes wrong ends that part at once, as home matters more.
 """
 
 from __future__ import annotations
@@ -11,17 +10,20 @@ from __future__ import annotations
 import math
 
 from agent.core.interface import Return
-from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue, result_text
-from agent.vehicle.config import BridgeConfig
+from agent.vehicle.activity import Activity, FlightPhase
+from agent.vehicle.commands import (
+    CommandEnded,
+    CommandOutcome,
+    RepeatedCommand,
+    result_text,
+)
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.leg import TARGET_TAG, ArrivalDetector, ArrivalState
-from agent.vehicle.messages import Heartbeat, Outbound
+from agent.vehicle.messages import Heartbeat, Landed, Outbound, Position
+from agent.vehicle.session import VehicleSession
 from swarm.model.frames import wgs84_from_enu
 
 __all__ = ["ReturnVia", "Returning"]
-
-
-_RETURN_TAG = "return"
 
 
 Point = tuple[float, float, float]
@@ -30,110 +32,73 @@ _DISARMED_LONG_S = 5.0
 """A vehicle disarmed for that long is down, even if it does not say that it landed."""
 
 
-class Returning:
-    """Carries out one `Return`.
+class Returning(Activity):
+    """Brings the vehicle home: carries out one `Return`.
 
     Args:
-        order: the order.
-        config: patience.
-        commands: carries the mode.
+        session: with the vehicle.
         firmware: what flies it.
-        from_mission: the vehicle may fly a mission of ours.
+        order: the order.
         return_via: flies it to a place first; None if it returns from where it is.
     """
 
+    phase = FlightPhase.RETURNING
+    polls = True
+
     def __init__(
         self,
-        order: Return,
-        config: BridgeConfig,
-        commands: CommandQueue,
+        session: VehicleSession,
         firmware: Firmware,
-        *,
-        from_mission: bool = False,
+        order: Return,
         return_via: ReturnVia | None = None,
     ) -> None:
+        super().__init__(session)
         self.order = order
-        self._from_mission = from_mission
+        self._from_mission = session.mission is not None
         self._return_via = return_via
-        self._config = config
-        self._commands = commands
         self._firmware = firmware
-        self._tries = 0
-        self._next_at_s = -math.inf
+        config = session.config
+        self._mode = RepeatedCommand(
+            "return",
+            session.commands,
+            config.mode_tries,
+            config.effect_timeout_s,
+            config.retry_delay_s,
+        )
         self._disarmed_since_s: float | None = None
         self._seen = self._told_seen = False
-        self._refusal = "never seen in the heartbeat"
         self.failure: str | None = None
         """Why the vehicle does not return; None while it may."""
 
-    def on_ended(self, ended: CommandEnded, now_s: float) -> None:
+    @property
+    def flies_home(self) -> bool:
+        """Whether it does not fly to a place first."""
+        return self._return_via is None
+
+    @property
+    def may_disarm(self) -> bool:
+        """It lands."""
+        return True
+
+    def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of a command."""
         if self._return_via is not None:
-            self._return_via.on_ended(ended, now_s)
-        if ended.tag != _RETURN_TAG:
-            return
-        if ended.ending is CommandOutcome.ACCEPTED:
-            self._next_at_s = now_s + self._config.effect_timeout_s
-        else:
-            self._refusal = result_text(ended.result)
-            self._next_at_s = now_s + self._config.retry_delay_s
+            self._return_via.on_ended(ended, self._session.now_s)
+        self._mode.on_ended(ended, self._session.now_s)
 
-    def expects(self, custom_mode: int) -> bool:
+    def expects(self, heartbeat: Heartbeat) -> bool:
         """Whether that mode fits the return; anything else is somebody else's doing."""
-        if self._firmware.is_returning(custom_mode):
+        if not heartbeat.armed:
+            return True
+        mode = heartbeat.custom_mode
+        if self._firmware.is_returning(mode):
             self._seen = True
             return True
         if self._return_via is not None:
-            return self._return_via.expects(custom_mode, from_mission=self._from_mission)
-        return self._obeys(custom_mode) and not self._seen
+            return self._return_via.expects(mode, from_mission=self._from_mission)
+        return self.obeys(mode) and not self._seen
 
-    def has_begun(self) -> bool:
-        """Whether the return mode has been seen; true once."""
-        news, self._told_seen = self._seen and not self._told_seen, self._seen
-        return news
-
-    @property
-    def on_detour(self) -> bool:
-        """Whether it flies to a place first."""
-        return self._return_via is not None
-
-    def go_straight(self, now_s: float) -> list[Outbound]:
-        """Return from where the vehicle is."""
-        return_via, self._return_via = self._return_via, None
-        return [] if return_via is None else return_via.end(now_s)
-
-    def on_position(self, place_enu_m: Point, velocity_enu_m_s: Point, now_s: float) -> None:
-        """See whether it is where it flies to first."""
-        if self._return_via is not None:
-            self._return_via.on_position(place_enu_m, velocity_enu_m_s, now_s)
-
-    def advance(self, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
-        """Set the mode as long as it is not seen and the vehicle still takes our orders."""
-        out: list[Outbound] = []
-        if self._return_via is not None:
-            if not self._seen:
-                out = self._return_via.advance(heartbeat, now_s)
-            if not (self._return_via.done or self._seen):
-                return out
-            out += self.go_straight(now_s)
-        return out + self._set_mode(heartbeat, now_s)
-
-    def _set_mode(self, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
-        if heartbeat.armed:
-            self._disarmed_since_s = None
-        elif self._disarmed_since_s is None:
-            self._disarmed_since_s = now_s
-        if not heartbeat.armed or not self._obeys(heartbeat.custom_mode):
-            return []
-        if self._commands.pending(_RETURN_TAG) or now_s < self._next_at_s:
-            return []
-        if self._tries >= self._config.mode_tries:
-            self.failure = f"the return mode cannot be set ({self._refusal})"
-            return []
-        self._tries += 1
-        return [*self._commands.send(_RETURN_TAG, self._firmware.set_return_mode(), now_s)]
-
-    def _obeys(self, custom_mode: int) -> bool:
+    def obeys(self, custom_mode: int) -> bool:
         """Whether the vehicle takes our orders in that mode, be it still taking off on one."""
         firmware = self._firmware
         return (
@@ -142,10 +107,57 @@ class Returning:
             or (self._from_mission and firmware.is_mission(custom_mode))
         )
 
-    def disarmed_long(self, now_s: float) -> bool:
-        """Whether the motors have stood still for a while."""
-        since_s = self._disarmed_since_s
-        return since_s is not None and now_s - since_s >= _DISARMED_LONG_S
+    def has_begun(self) -> bool:
+        """Whether the return mode has been seen; true once."""
+        news, self._told_seen = self._seen and not self._told_seen, self._seen
+        return news
+
+    def go_straight(self) -> None:
+        """Return from where the vehicle is."""
+        return_via, self._return_via = self._return_via, None
+        if return_via is not None:
+            self._session.say(*return_via.end(self._session.now_s))
+
+    def on_position(self, position: Position) -> None:
+        """See whether it is where it flies to first."""
+        if self._return_via is not None:
+            session, velocity_enu_m_s = self._session, position.velocity_enu_m_s
+            self._return_via.on_position(session.place_enu_m, velocity_enu_m_s, session.now_s)
+
+    def advance(self) -> None:
+        """Set the mode as long as it is not seen and the vehicle still takes our orders."""
+        session, heartbeat = self._session, self._session.vehicle.heartbeat
+        if heartbeat is None:
+            return
+        if self._return_via is not None:
+            if not self._seen:
+                session.say(*self._return_via.advance(heartbeat, session.now_s))
+            if not (self._return_via.done or self._seen):
+                return
+            self.go_straight()
+        if heartbeat.armed:
+            self._disarmed_since_s = None
+        elif self._disarmed_since_s is None:
+            self._disarmed_since_s = session.now_s
+        if not heartbeat.armed or not self.obeys(heartbeat.custom_mode):
+            return
+        out = self._mode.give(self._firmware.set_return_mode(), session.now_s)
+        if out is None:
+            seen = "never seen in the heartbeat"
+            why = result_text(self._mode.result) if self._mode.refused else seen
+            self.failure = f"the return mode cannot be set ({why})"
+        else:
+            session.say(*out)
+
+    @property
+    def is_down(self) -> bool:
+        """Whether the vehicle has landed, and its motors stand still."""
+        session, since_s = self._session, self._disarmed_since_s
+        if session.vehicle.heartbeat is None or session.vehicle.armed:
+            return False
+        if session.vehicle.landed in (Landed.ON_GROUND, Landed.UNDEFINED):
+            return True
+        return since_s is not None and session.now_s - since_s >= _DISARMED_LONG_S
 
 
 _MODE_TAG = "homeward mode"
@@ -166,34 +178,25 @@ class ReturnVia:
     """Flies to one place on the way home.
 
     Args:
+        session: with the vehicle.
+        firmware: what flies it.
         via_enu_m: where to [m; mission origin].
         place_enu_m: where the vehicle is.
-        speed_m_s: cruise speed; 0 if it is not known.
-        config: radius, speed and patience.
-        commands: carries what is told.
-        firmware: what flies it.
-        now_s: now.
     """
 
     def __init__(
-        self,
-        via_enu_m: Point,
-        place_enu_m: Point,
-        speed_m_s: float,
-        config: BridgeConfig,
-        commands: CommandQueue,
-        firmware: Firmware,
-        now_s: float,
+        self, session: VehicleSession, firmware: Firmware, via_enu_m: Point, place_enu_m: Point
     ) -> None:
+        config, speed_m_s = session.config, session.cruise_speed_m_s
         self._config = config
-        self._commands = commands
+        self._commands = session.commands
         self._firmware = firmware
         self._arrival = ArrivalDetector(via_enu_m, config)
         place = wgs84_from_enu(config.origin, via_enu_m)
         known = speed_m_s > 0.0
         self._target = firmware.reposition(*place, speed_m_s if known else _UNKNOWN_SPEED_M_S)
         flight_s = math.dist(place_enu_m, via_enu_m) / (speed_m_s if known else _SLOWEST_M_S)
-        self._until_s = now_s + _START_S + _PATIENCE * flight_s
+        self._until_s = session.now_s + _START_S + _PATIENCE * flight_s
         self._mode_until_s: float | None = None
         self._mode_seen = self._told = self._accepted = False
         self.done = False

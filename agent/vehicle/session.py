@@ -1,49 +1,38 @@
 """The session with one vehicle: how to speak to it, and whether it is known what it does.
 
-Holds what everything shares that commands the vehicle. A vehicle of which nothing is known yet
-is looked at before an order is carried out. One that was handed over for its silence is taken
-back once it is heard again, if it flies as it was left. Left alone it would hover until its
-battery is empty: our heartbeats keep its own failsafe for a lost ground station from acting,
-and many have none. Anything else means that somebody else, or a failsafe, has it. Leaves out:
-what is said and why (agent.vehicle.activity_runner).
+Holds what all activities share; what is said and why is theirs (agent.vehicle.activity).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections import deque
+from collections.abc import Hashable
 from dataclasses import dataclass
 
-from agent.core.interface import (
-    HandOverExplained,
-    HeardAgain,
-    Hold,
-    Return,
-    VehicleOrder,
-    VehicleReport,
-)
+from agent.core.interface import Caution, NotReady, VehicleOrder, VehicleReport
 from agent.vehicle.codec import MavlinkCodec
 from agent.vehicle.commands import CommandQueue
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.contact import Contact
 from agent.vehicle.firmware.profile import Firmware
-from agent.vehicle.messages import ExtendedState, Heartbeat, Inbound, Landed, Outbound
+from agent.vehicle.messages import Inbound, Outbound
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.parameter_override import ParameterOverride
 from agent.vehicle.signing import Signing
 from agent.vehicle.state import PositionFilter, VehicleState
-from agent.vehicle.supervision import SafetyMonitor, intervention
+from agent.vehicle.supervision import CruiseWatch, SafetyMonitor
+from swarm.protocol.timing import earliest
 
 __all__ = [
+    "POLL_S",
     "BridgeAction",
     "BridgeEvent",
     "BytesReceived",
     "LinkClosed",
-    "LinkLoss",
     "LinkOpened",
     "SendBytes",
     "TimePassed",
-    "VehicleSearch",
     "VehicleSession",
 ]
 
@@ -79,9 +68,16 @@ class SendBytes:
     data: bytes
 
 
+Point = tuple[float, float, float]
+
 BridgeEvent = BytesReceived | TimePassed | LinkOpened | LinkClosed | VehicleOrder
 
 BridgeAction = SendBytes | VehicleReport
+
+POLL_S = 0.25
+"""While something is waited for, look that often even if nothing is heard."""
+
+_PLACES = 2
 
 
 class VehicleSession:
@@ -110,8 +106,17 @@ class VehicleSession:
         """What stands on the vehicle; None if missions are not our way to command it."""
         self.override: ParameterOverride | None = None
         """What is another parameter during a flight; None if nothing is."""
+        self.cruise_speed_m_s = 0.0
+        """Of the last preparation; 0 before the first."""
+        self.cruise_watch = CruiseWatch()
+        self.place_enu_m = (math.nan, math.nan, math.nan)
+        """Where the vehicle is, by its newest position [m; mission origin]."""
+        self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
+        """Where the vehicle was last told to fly: of the newest it may not have heard."""
         self.now_s = 0.0
         self._actions: list[BridgeAction] = []
+        self._told_not_ready: str | None = None
+        self._told_caution: str | None = None
 
     @property
     def silent(self) -> bool:
@@ -171,6 +176,30 @@ class VehicleSession:
             and not self.flies_for_us(heartbeat.custom_mode)
         )
 
+    def on_message(self, message: Inbound) -> None:
+        """Pass on what is no heartbeat, position or acknowledgement."""
+        if self.mission is not None:
+            self.say(*self.mission.on_message(message, self.now_s))
+        if self.override is not None:
+            self.override.on_message(message)
+
+    def advance_mission(self) -> None:
+        """Carry on what stands on the vehicle, or is on its way there."""
+        heartbeat, heard_s = self.vehicle.heartbeat, self.vehicle.heartbeat_at_s
+        if self.mission is not None and heartbeat is not None and heard_s is not None:
+            self.say(*self.mission.advance(heartbeat, heard_s, self.now_s))
+
+    def mission_deadline_s(self) -> float:
+        """When mission or parameter may have something to do."""
+        if self.mission is not None and self.mission.is_starting:
+            return self.now_s + POLL_S
+        override = None if self.silent else self.override
+        due_s = earliest(
+            None if self.mission is None else self.mission.next_deadline_s(),
+            None if override is None else override.next_deadline_s(),
+        )
+        return math.inf if due_s is None else max(due_s, self.now_s)
+
     def in_its_words(self, failure: str) -> str:
         """A failure, and what the autopilot has said about it lately."""
         text = self.vehicle.telling_warning(self.now_s)
@@ -184,6 +213,22 @@ class VehicleSession:
         """To whoever gave the orders."""
         self._actions.append(report)
 
+    def tell_not_ready(self, reason: str) -> None:
+        """Report what the vehicle is waited for, once."""
+        if reason != self._told_not_ready:
+            self._told_not_ready = reason
+            self.report(NotReady(reason))
+
+    def tell_caution(self, reason: str) -> None:
+        """Report what people should know of the vehicle, once."""
+        if reason != self._told_caution:
+            self._told_caution = reason
+            self.report(Caution(reason))
+
+    def tell_anew(self) -> None:
+        """Another wait begins: what was told may be told again."""
+        self._told_not_ready = self._told_caution = None
+
     def take_actions(self) -> list[BridgeAction]:
         """What was said and reported, in order, once."""
         actions, self._actions = self._actions, []
@@ -196,175 +241,3 @@ class VehicleSession:
         self.position_filter = PositionFilter()
         self.firmware = self.mission = self.override = None
         self.commands.cancel_all()
-
-
-_UNHEARD_TIMEOUTS = 3.0
-"""A vehicle that may be in the air has that many silence timeouts to be heard at all."""
-
-
-class VehicleSearch:
-    """Finds out what there is to know before an order can be carried out.
-
-    Args:
-        order: to be carried out then.
-        session: with the vehicle.
-    """
-
-    def __init__(self, order: Return | Hold, session: VehicleSession) -> None:
-        self.order = order
-        self._session = session
-        self._until_s = session.now_s + _UNHEARD_TIMEOUTS * session.config.silence_timeout_s
-
-    @property
-    def in_vain(self) -> bool:
-        """Whether the vehicle has had its time."""
-        return self._session.now_s >= self._until_s
-
-    def advance(self) -> str | None:
-        """What is still to be learned, in words; None if it is enough."""
-        return self._session.missing() or self._unclear()
-
-    def _unclear(self) -> str | None:
-        session = self._session
-        if not session.vehicle.armed:
-            return None
-        if isinstance(self.order, Hold) and session.vehicle.landed is Landed.UNDEFINED:
-            return "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
-        if session.mission is not None and session.flies_unknown_mission():
-            session.say(*session.mission.look(session.now_s))
-            return "reading the mission that the vehicle flies"
-        return None
-
-
-Point = tuple[float, float, float]
-
-
-_LOOK_S = 3.0
-"""It is watched for that long: what comes first may have waited in a link for a while."""
-
-_HEARTBEATS = 3
-
-_FRESH_S = 1.5
-"""A place older than that, and than the watch, is not where it is now."""
-
-_DOUBT_S = 10.0
-"""What is not explained by our orders may be so soon: a vehicle that overshoots comes back."""
-
-_ASTRAY_M = 25.0
-"""A vehicle farther than that from everywhere on its way was led there by somebody else:
-braking and turning at speed take it less far."""
-
-
-class LinkLoss:
-    """One vehicle that fell silent while it was ours.
-
-    Args:
-        session: with the vehicle, as it was last heard.
-        sent_to_enu_m: where it may be flying to [m; mission origin].
-    """
-
-    def __init__(self, session: VehicleSession, sent_to_enu_m: Sequence[Point]) -> None:
-        heartbeat = session.vehicle.heartbeat
-        self._session = session
-        self._mode = None if heartbeat is None else heartbeat.custom_mode
-        self._lost_s = session.vehicle.heard_at_s or session.now_s
-        self._place_enu_m = session.position_filter.place_m(-math.inf)
-        self._sent_to_enu_m = sent_to_enu_m
-        self._begin_anew()
-
-    def _begin_anew(self) -> None:
-        self._heard_s: float | None = None
-        self._heartbeats = 0
-        self._tells_whether_it_flies = False
-
-    def on_message(self, message: Inbound) -> None:
-        """Note what is fresh."""
-        match message:
-            case Heartbeat():
-                self._heartbeats += 1
-            case ExtendedState(landed) if landed is not Landed.UNDEFINED:
-                self._tells_whether_it_flies = True
-            case _:
-                pass
-
-    def news(self) -> HeardAgain | HandOverExplained | None:
-        """What became of it; None as long as that is not known."""
-        session, heartbeat = self._session, self._session.vehicle.heartbeat
-        if session.silent:
-            self._begin_anew()
-            return None
-        if not self._heartbeats or heartbeat is None:
-            return None
-        if self._heard_s is None:
-            self._heard_s = session.now_s
-        if (why := self._taken(heartbeat)) is not None:
-            return HandOverExplained(f"{self._heard_again}: {why}")
-        watched_s = session.now_s - self._heard_s
-        place_enu_m = session.position_filter.place_m(session.now_s - _FRESH_S)
-        position = session.vehicle.position
-        known = self._heartbeats >= _HEARTBEATS and self._tells_whether_it_flies
-        if watched_s < _LOOK_S or not known or place_enu_m is None or position is None:
-            return None
-        if self._is_on_its_way(place_enu_m, position.velocity_enu_m_s):
-            return HeardAgain(f"{self._heard_again}, as it was left")
-        if watched_s < _LOOK_S + _DOUBT_S:
-            return None
-        return HandOverExplained(f"{self._heard_again}: somebody else has moved it")
-
-    @property
-    def _heard_again(self) -> str:
-        heard_s = self._session.now_s if self._heard_s is None else self._heard_s
-        return f"heard again after {heard_s - self._lost_s:.0f} s"
-
-    def _taken(self, heartbeat: Heartbeat) -> str | None:
-        """Why it is not to be commanded, by its heartbeat; None if it may be."""
-        session, firmware, mode = self._session, self._session.firmware, heartbeat.custom_mode
-        if firmware is None or self._mode is None:
-            return "it is not known what it is"
-        if self._tells_whether_it_flies and not firmware.airborne(session.vehicle):
-            return "it stands on the ground"
-        if heartbeat.armed and firmware.is_returning(mode):
-            return f"it returns or lands by itself, in {firmware.mode_name(mode)}"
-        if heartbeat.armed and firmware.is_mission(mode) and mode == self._mode:
-            return "it flies its mission, which ends at home"
-        # A takeoff ends in the guided mode by itself.
-        ours = (mode, self._mode) if firmware.is_taking_off(self._mode) else (self._mode,)
-        expected = mode in ours and (firmware.is_commanded(mode) or firmware.is_taking_off(mode))
-        return intervention(
-            session.vehicle, heartbeat, firmware, session.now_s, expected=expected, may_disarm=False
-        )
-
-    def _is_on_its_way(self, place_enu_m: Point, velocity_enu_m_s: Point) -> bool:
-        """Whether our orders explain where it is, and where it flies."""
-        if self._place_enu_m is None:
-            return False
-        still = math.hypot(*velocity_enu_m_s) <= self._session.config.arrival_speed_m_s
-        if still:
-            # Somewhere between, somebody has stopped it.
-            ends = (self._place_enu_m, *self._sent_to_enu_m)
-            return any(_near(place_enu_m, end, end) for end in ends)
-        return any(
-            _near(place_enu_m, self._place_enu_m, end)
-            and _leads_to(end, place_enu_m, velocity_enu_m_s)
-            for end in self._sent_to_enu_m
-        )
-
-
-def _leads_to(end_m: Point, place_m: Point, velocity_m_s: Point) -> bool:
-    """Whether the way left gets shorter."""
-    parts = zip(velocity_m_s, end_m, place_m, strict=True)
-    return sum(speed_m_s * (end - place) for speed_m_s, end, place in parts) > 0.0
-
-
-def _near(place_m: Point, from_m: Point, to_m: Point) -> bool:
-    """Whether a place lies along a way, at one of its heights or between them."""
-    (east_m, north_m, up_m), (to_east_m, to_north_m, to_up_m) = place_m, to_m
-    way_east_m, way_north_m = to_east_m - from_m[0], to_north_m - from_m[1]
-    length2 = way_east_m**2 + way_north_m**2
-    along = (east_m - from_m[0]) * way_east_m + (north_m - from_m[1]) * way_north_m
-    share = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 1.0
-    aside_m = math.hypot(
-        east_m - from_m[0] - share * way_east_m, north_m - from_m[1] - share * way_north_m
-    )
-    low_m, high_m = sorted((from_m[2], to_up_m))
-    return aside_m <= _ASTRAY_M and low_m - _ASTRAY_M <= up_m <= high_m + _ASTRAY_M

@@ -4,15 +4,13 @@ Who flies it is told from heartbeats, the only thing that every change of comman
 vehicle that is found armed may be commanded only with its pilot's consent. Battery, fence,
 position and the autopilot's alarms: each judgement is debounced, because readings err, and
 comes with a reason that a person understands; each is told once a flight, the battery again
-whenever its charge has halved, since the return may have been broken off. Leaves out: what is
-done about it (agent.vehicle.bridge).
+whenever its charge has halved, since the return may have been broken off.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
 
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
@@ -21,7 +19,7 @@ from agent.vehicle.state import VehicleState
 
 __all__ = [
     "TERMINATED",
-    "HandOverReason",
+    "CruiseWatch",
     "PilotConsent",
     "SafetyMonitor",
     "intervention",
@@ -30,10 +28,6 @@ __all__ = [
 
 
 TERMINATED = "the flight was terminated"
-
-_WORDS_LATE_S = 0.5
-"""So much later than the mode the words may come that say why a failsafe set it. ArduCopter
-tells the mode first, some milliseconds before, on a link that loses nothing."""
 
 _STATE_CRITICAL, _STATE_EMERGENCY, _STATE_TERMINATION = 5, 6, 8
 
@@ -79,28 +73,6 @@ def intervention(
     else:
         who = "its pilot"
     return f"{who} switched it to {firmware.mode_name(mode)}{said}"
-
-
-class HandOverReason:
-    """Why a vehicle was handed over, told in full once the words for it have come.
-
-    Args:
-        told: the reason, as far as it was known at once.
-        why: what it is, by all that was said until then and since.
-        now_s: when it was handed over.
-    """
-
-    def __init__(self, told: str, why: Callable[[float], str | None], now_s: float) -> None:
-        self._told = told
-        self._why = why
-        self._at_s = now_s
-        self.due_s = now_s + _WORDS_LATE_S
-        """By then all has been said."""
-
-    def better(self) -> str | None:
-        """The reason in full; None if it was known at once."""
-        reason = self._why(self._at_s)
-        return None if reason == self._told else reason
 
 
 class PilotConsent:
@@ -290,3 +262,52 @@ class SafetyMonitor:
             return None
         why = f" ({self._position_fault})" if self._position_fault else ""
         return f"no valid position for {timeout_s:g} s{why}"
+
+
+_STEADY_S = 3.0
+"""A speed kept for that long is the one that is flown."""
+
+_STEADY_FRAC = 0.03
+"""How much a steady speed may change meanwhile."""
+
+_SHORT_FRAC = 0.9
+"""Of the speed told, below which it is not reached."""
+
+_LEAST_FRAC = 0.3
+"""Of the speed told, below which the vehicle is doing something else than cruising."""
+
+_STEEPEST = 0.3
+"""Climb per way flown, beyond which the climb sets the speed."""
+
+
+class CruiseWatch:
+    """Compares steady ground speeds with the one told, and says once when they fall short."""
+
+    def __init__(self) -> None:
+        self._since_s = math.inf
+        self._first_m_s = 0.0
+        self._told = False
+
+    def judge(
+        self, velocity_enu_m_s: tuple[float, float, float], told_m_s: float, now_s: float
+    ) -> str | None:
+        """Take a velocity on the way to a target; what to tell people, or None.
+
+        Args:
+            velocity_enu_m_s: over ground [m/s].
+            told_m_s: cruise speed that was asked for [m/s].
+            now_s: now.
+        """
+        east_m_s, north_m_s, up_m_s = velocity_enu_m_s
+        speed_m_s = math.hypot(east_m_s, north_m_s)
+        cruising = speed_m_s >= _LEAST_FRAC * told_m_s and abs(up_m_s) <= _STEEPEST * speed_m_s
+        steady = abs(speed_m_s - self._first_m_s) <= _STEADY_FRAC * self._first_m_s
+        if self._told or not cruising or not steady or speed_m_s >= _SHORT_FRAC * told_m_s:
+            self._since_s, self._first_m_s = now_s, speed_m_s
+            return None
+        if now_s - self._since_s < _STEADY_S:
+            return None
+        self._told = True
+        return (
+            f"it flies at {speed_m_s:.1f} m/s, asked for {told_m_s:g}: its own limits forbid more"
+        )

@@ -86,8 +86,12 @@ class Misled(Bridge):
 
     def __init__(self, phase: FlightPhase, action: BridgeAction) -> None:
         super().__init__(CONFIG)
-        self._activity.phase = phase
+        self._phase = phase
         self._action = action
+
+    @property
+    def phase(self) -> FlightPhase:
+        return self._phase
 
     def step(self, event: BridgeEvent, now_s: float) -> list[BridgeAction]:
         super().step(event, now_s)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from agent.core.interface import GoTo
-from agent.vehicle.activity_runner import CruiseWatch
+from agent.vehicle.supervision import CruiseWatch
 from tests.support.bridge_flight import BridgeFlight
 
 

@@ -1,0 +1,422 @@
+"""Which activity of one vehicle follows which: the only place that says so.
+
+An activity follows by an order, by the end of the one before, or because the mission on board
+did something by itself. An order that cannot be carried out is refused, and one for a vehicle
+of which nothing is known yet waits until it has been looked at.
+"""
+
+from __future__ import annotations
+
+import math
+
+from agent.core.interface import (
+    GoTo,
+    HandedOver,
+    Held,
+    Hold,
+    Home,
+    Prepare,
+    Refused,
+    Return,
+    ReturnAdvised,
+    ReturnBegun,
+    VehicleOrder,
+    VehicleReady,
+)
+from agent.vehicle.activity import Activity, FlightPhase, Hovering, Idle
+from agent.vehicle.config import BridgeConfig
+from agent.vehicle.firmware.profile import Firmware
+from agent.vehicle.hand_over import HandOver, hand_over
+from agent.vehicle.holding import Holding, modes_to_leave
+from agent.vehicle.leg import Flying
+from agent.vehicle.messages import Landed
+from agent.vehicle.preparing import Preparing
+from agent.vehicle.returning import Returning, ReturnVia
+from agent.vehicle.session import VehicleSession
+
+__all__ = ["follow", "follow_mission", "obey"]
+
+
+_UNHEARD_TIMEOUTS = 3.0
+"""A vehicle that may be in the air has that many silence timeouts to be heard at all."""
+
+
+class Searching(Activity):
+    """Finds out what there is to know before an order can be carried out.
+
+    Args:
+        session: with the vehicle.
+        order: to be carried out then.
+    """
+
+    phase = FlightPhase.IDLE
+    polls = True
+
+    def __init__(self, session: VehicleSession, order: Return | Hold) -> None:
+        super().__init__(session)
+        self.order = order
+        self.unclear: str | None = "not looked at yet"
+        """What is still to be learned, in words; None if it is enough."""
+        self.in_vain = False
+        """The vehicle has had its time."""
+        self._until_s = session.now_s + _UNHEARD_TIMEOUTS * session.config.silence_timeout_s
+        session.tell_anew()
+
+    @property
+    def in_our_hands(self) -> bool:
+        """Not known."""
+        return False
+
+    def advance(self) -> None:
+        """Look, and say what is waited for."""
+        self.unclear = self._session.missing() or self._doubt()
+        self.in_vain = self.unclear is not None and self._session.now_s >= self._until_s
+        if self.unclear is not None and not self.in_vain:
+            self._session.tell_not_ready(self.unclear)
+
+    def _doubt(self) -> str | None:
+        session = self._session
+        if not session.vehicle.armed:
+            return None
+        if isinstance(self.order, Hold) and session.vehicle.landed is Landed.UNDEFINED:
+            return "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
+        if session.mission is not None and session.flies_unknown_mission():
+            session.say(*session.mission.look(session.now_s))
+            return "reading the mission that the vehicle flies"
+        return None
+
+
+def obey(activity: Activity, order: VehicleOrder, session: VehicleSession) -> Activity:
+    """Carry an order out, or refuse it."""
+    match order:
+        case Prepare():
+            return _prepare(activity, order, session)
+        case GoTo():
+            return _go_to(activity, order, session)
+        case Hold():
+            return _hold(activity, order, session)
+        case Return():
+            return _return_home(activity, order, session)
+
+
+def follow(activity: Activity, session: VehicleSession) -> Activity:
+    """What comes after an activity that has ended; itself while it goes on."""
+    match activity:
+        case Flying():
+            return _after_leg(activity, session)
+        case Preparing() if activity.done or activity.failure is not None:
+            return _after_preparation(activity, session)
+        case Holding() if activity.done or activity.failure is not None:
+            return _after_hold(activity, session)
+        case Returning():
+            return _after_return(activity, session)
+        case Searching() if activity.unclear is None or activity.in_vain:
+            return _after_search(activity, session)
+        case HandOver(taken_back=True):
+            return Hovering(session)
+        case _:
+            return activity
+
+
+def follow_mission(activity: Activity, session: VehicleSession) -> Activity:
+    """What follows from what the mission on board did by itself."""
+    mission, firmware = session.mission, session.firmware
+    if mission is None or firmware is None or not isinstance(activity, Hovering | Flying):
+        return activity
+    if mission.coming_home:
+        reason = "nothing followed its last target in time, so it comes home by itself"
+        session.commands.cancel_all()
+        session.say(*mission.call_off(session.now_s))
+        session.report(ReturnAdvised(reason))
+        return _come_home(Return(reason), firmware, session)
+    if mission.unverified:
+        return _begin_holding(activity, Hold("which mission it flies is not known"), session)
+    return activity
+
+
+# By orders.
+
+
+def _prepare(activity: Activity, order: Prepare, session: VehicleSession) -> Activity:
+    """Prepare a vehicle for flight; one that takes no targets is stopped first."""
+    if fault := _fault_of(order, session.config):
+        session.report(Refused(order, fault))
+        return activity
+    if _must_stop_first(activity, session) and not session.silent:
+        return _begin_holding(activity, Hold("to be prepared anew"), session, prepare_next=order)
+    ours = activity.in_our_hands
+    session.commands.cancel_all()
+    session.forget_mission()
+    session.safety.begin()
+    session.cruise_speed_m_s = order.speed_m_s
+    session.sent_to_enu_m.append(order.position_enu_m)
+    session.tell_anew()
+    return Preparing(session, order, ours=ours)
+
+
+def _must_stop_first(activity: Activity, session: VehicleSession) -> bool:
+    """Whether the vehicle flies on our orders, but takes no targets."""
+    firmware, heartbeat = session.firmware, session.vehicle.heartbeat
+    return (
+        isinstance(activity, Returning | Holding)
+        and firmware is not None
+        and heartbeat is not None
+        and heartbeat.armed
+        and not firmware.is_commanded(heartbeat.custom_mode)
+        and session.vehicle.landed is not Landed.ON_GROUND
+    )
+
+
+def _go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
+    match activity:
+        case Hovering() | Flying():
+            takes_targets = True
+        case Holding(returning=None) if session.mission is not None:
+            takes_targets = True
+        case Holding():
+            takes_targets = not _must_stop_first(activity, session)
+        case _:
+            takes_targets = False
+    if not takes_targets or session.firmware is None:
+        session.report(Refused(order, f"the vehicle is {activity.phase.value}"))
+        return activity
+    if fault := _fault_of(order, session.config):
+        session.report(Refused(order, fault))
+        return activity
+    if isinstance(activity, Holding):
+        session.commands.cancel_all()
+    flying = Flying(session, session.firmware, order)
+    session.sent_to_enu_m.append(order.position_enu_m)
+    flying.start()
+    return flying
+
+
+def _hold(activity: Activity, order: Hold, session: VehicleSession) -> Activity:
+    if isinstance(activity, HandOver):
+        session.report(Refused(order, f"the vehicle is {activity.phase.value}"))
+    elif not activity.in_our_hands:
+        # It may fly on the orders of an earlier life, or be somebody else's.
+        session.commands.cancel_all()
+        return Searching(session, order)
+    elif session.silent:
+        session.report(Refused(order, "the autopilot is silent"))
+    elif session.vehicle.armed or _return_under_way(activity) is None:
+        return _begin_holding(activity, order, session)
+    return activity
+
+
+def _return_under_way(activity: Activity) -> Returning | None:
+    """The return that is carried out, or would go on if the vehicle could not be stopped."""
+    match activity:
+        case Returning():
+            return activity
+        case Holding(returning=returning):
+            return returning
+        case _:
+            return None
+
+
+def _begin_holding(
+    activity: Activity, order: Hold, session: VehicleSession, prepare_next: Prepare | None = None
+) -> Activity:
+    """Stop a vehicle that flies on our orders, or is about to."""
+    firmware, heartbeat, mission = session.firmware, session.vehicle.heartbeat, session.mission
+    if firmware is None or heartbeat is None:
+        return activity
+    preparing = isinstance(activity, Preparing)
+    returning = _return_under_way(activity)
+    leaves = modes_to_leave(
+        firmware,
+        heartbeat.custom_mode,
+        took_off=activity.took_off,
+        on_missions=mission is not None and (not preparing or mission.may_be_flown),
+        returning=returning is not None,
+    )
+    session.commands.cancel_all()
+    if mission is not None:
+        mission.suspend()
+    return Holding(
+        session,
+        firmware,
+        order,
+        leaves,
+        motors_asked=preparing and activity.in_our_hands,
+        returning=returning,
+        prepare_next=prepare_next,
+    )
+
+
+def _return_home(activity: Activity, order: Return, session: VehicleSession) -> Activity:
+    """Bring a vehicle home, unless it is down, somebody else's, or not known well enough."""
+    if isinstance(activity, Returning):
+        if order.via_enu_m is None:
+            activity.go_straight()
+        return activity
+    session.commands.cancel_all()
+    firmware, heartbeat, mission = session.firmware, session.vehicle.heartbeat, session.mission
+    if firmware is None or heartbeat is None:
+        if order.resume:
+            return Searching(session, order)
+        session.report(Home())
+        return Idle(session)
+    if session.flies_unknown_mission():
+        return Searching(session, order)
+    mode = heartbeat.custom_mode
+    took_off = activity.took_off or isinstance(activity, Hovering | Flying | Holding)
+    taking_off = firmware.is_taking_off(mode) and (took_off or order.resume)
+    on_mission = mission is not None and (
+        session.flies_for_us(mode)
+        or (isinstance(activity, Holding) and activity.expects_mode(mode))
+    )
+    commanded = firmware.is_commanded(mode) or taking_off or on_mission
+    if mission is not None:
+        session.say(*mission.call_off(session.now_s))
+    if not (heartbeat.armed and (took_off or firmware.airborne(session.vehicle) is not False)):
+        # That it was armed may not have been heard yet.
+        motors_asked = isinstance(activity, Preparing) and activity.in_our_hands
+        if commanded and (heartbeat.armed or motors_asked):
+            session.say(*session.commands.send("disarm", firmware.disarm(), session.now_s))
+        session.report(Home())
+        return Idle(session)
+    if session.silent:
+        return _refuse_return(order, "the autopilot is silent", session)
+    if not (commanded or firmware.is_returning(mode)):
+        return hand_over(session, f"its pilot flies it in {firmware.mode_name(mode)}")
+    return _come_home(order, firmware, session)
+
+
+def _come_home(order: Return, firmware: Firmware, session: VehicleSession) -> Activity:
+    """Bring home a vehicle that flies and obeys, or returns already."""
+    return Returning(session, firmware, order, _return_via(order, firmware, session))
+
+
+def _return_via(order: Return, firmware: Firmware, session: VehicleSession) -> ReturnVia | None:
+    """The way to where the order says to fly first; None if there is none to be taken."""
+    heartbeat, config, via_enu_m = session.vehicle.heartbeat, session.config, order.via_enu_m
+    place_enu_m = session.position_filter.place_m(session.now_s - config.stream_timeout_s)
+    if via_enu_m is None or heartbeat is None or place_enu_m is None:
+        return None
+    mode = heartbeat.custom_mode
+    obeys = firmware.is_commanded(mode) or firmware.is_mission(mode)
+    if not (obeys and firmware.airborne(session.vehicle)) or config.out_of_bounds(via_enu_m):
+        return None
+    return ReturnVia(session, firmware, via_enu_m, place_enu_m)
+
+
+def _refuse_return(order: Return, reason: str, session: VehicleSession) -> Activity:
+    """Say that it cannot be brought home, and leave it alone."""
+    session.report(Refused(order, reason))
+    return HandOver(session)
+
+
+def _fault_of(order: Prepare | GoTo, config: BridgeConfig) -> str | None:
+    """Why an order must not be carried out, in words; None if it may be."""
+    if fault := config.out_of_bounds(order.position_enu_m):
+        return fault
+    match order:
+        case Prepare(speed_m_s=speed_m_s) if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
+            return f"speed {speed_m_s} m/s is not > 0"
+        case GoTo(stay_s=stay_s) if not (math.isfinite(stay_s) and stay_s >= 0.0):
+            return f"a stay of {stay_s} s is not >= 0"
+        case _:
+            return None
+
+
+# By the end of the activity before.
+
+
+def _after_search(search: Searching, session: VehicleSession) -> Activity:
+    order, unclear = search.order, search.unclear
+    if unclear is None:
+        if isinstance(order, Return):
+            return _return_home(search, order, session)
+        return _hold_found(search, order, session)
+    session.commands.cancel_all()
+    if isinstance(order, Return):
+        return _refuse_return(order, unclear, session)
+    session.report(Refused(order, unclear))
+    return Idle(session)
+
+
+def _hold_found(search: Searching, order: Hold, session: VehicleSession) -> Activity:
+    """Stop a vehicle that an earlier life left in the air."""
+    firmware, heartbeat = session.firmware, session.vehicle.heartbeat
+    aloft = session.vehicle.landed is not Landed.ON_GROUND
+    if firmware is None or heartbeat is None or not (heartbeat.armed and aloft):
+        session.report(Held())
+        return Idle(session)
+    mode = heartbeat.custom_mode
+    if session.flies_for_us(mode) or firmware.is_taking_off(mode):
+        return _begin_holding(search, order, session)
+    session.report(Refused(order, f"its pilot flies it in {firmware.mode_name(mode)}"))
+    return Idle(session)
+
+
+def _after_preparation(preparing: Preparing, session: VehicleSession) -> Activity:
+    heartbeat, firmware, mission = session.vehicle.heartbeat, session.firmware, session.mission
+    session.commands.cancel_all()
+    failure = preparing.failure
+    if failure is None:
+        if mission is not None:
+            mission.wait_there()
+        session.report(VehicleReady())
+        return Hovering(session)
+    flies = session.vehicle.armed and firmware is not None and firmware.airborne(session.vehicle)
+    if flies and heartbeat is not None and preparing.obeys(heartbeat.custom_mode):
+        session.report(ReturnAdvised(failure))  # nobody else would bring it down
+        return Hovering(session)
+    if mission is not None:
+        mission.stand_down()  # an upload is still ended, never left half
+    session.report(Refused(preparing.order, failure))
+    return Idle(session)
+
+
+def _after_leg(flying: Flying, session: VehicleSession) -> Activity:
+    outcome = flying.outcome()
+    if outcome is None:
+        return flying
+    if isinstance(outcome, HandedOver):
+        return hand_over(session, outcome.reason)
+    if session.mission is not None:
+        session.mission.wait_there()
+    session.report(outcome)
+    return Hovering(session)
+
+
+def _after_hold(holding: Holding, session: VehicleSession) -> Activity:
+    mission, returning, prepare = session.mission, holding.returning, holding.prepare_next
+    session.commands.cancel_all()
+    after = Hovering(session) if holding.aloft else Idle(session)
+    if holding.failure is not None:
+        if mission is not None and returning is None:
+            mission.carry_on()
+        failure = session.in_its_words(holding.failure)
+        session.report(Refused(holding.order, failure))
+        if prepare is not None:
+            session.report(Refused(prepare, failure))
+        if returning is None:
+            return after
+        returning.go_straight()
+        return returning
+    if mission is not None:
+        mission.stand_down()
+    if prepare is not None:
+        return _prepare(after, prepare, session)
+    # It may have landed before it could be stopped.
+    session.report(Home() if returning is not None and not holding.aloft else Held())
+    return after
+
+
+def _after_return(returning: Returning, session: VehicleSession) -> Activity:
+    if returning.has_begun():
+        session.report(ReturnBegun())
+    if returning.is_down:
+        session.commands.cancel_all()
+        session.report(Home())
+        return Idle(session)
+    if returning.failure is not None:
+        session.commands.cancel_all()
+        failure = session.in_its_words(returning.failure)
+        session.report(Refused(returning.order, failure))
+        return Hovering(session)
+    return returning
