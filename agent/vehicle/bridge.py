@@ -173,8 +173,7 @@ class Bridge:
         if (
             before is not None
             and session.firmware is not None
-            and session.firmware.has_booted(before)
-            and not session.firmware.has_booted(heartbeat)
+            and session.firmware.has_rebooted(before, heartbeat)
         ):
             self._on_reboot()
         session.vehicle.on_message(heartbeat, session.now_s)

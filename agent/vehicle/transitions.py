@@ -8,6 +8,7 @@ of which nothing is known yet waits until it has been looked at.
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from agent.core.interface import (
     GoTo,
@@ -34,7 +35,27 @@ from agent.vehicle.preparing import Preparing
 from agent.vehicle.returning import Returning, ReturnVia
 from agent.vehicle.session import VehicleSession
 
-__all__ = ["follow", "follow_mission", "obey"]
+__all__ = ["SUCCESSORS", "follow", "follow_mission", "obey"]
+
+
+_IN_THE_AIR = {FlightPhase.HOLDING, FlightPhase.RETURNING, FlightPhase.PREPARING}
+_LET_GO = {FlightPhase.IDLE, FlightPhase.HANDED_OVER}
+
+SUCCESSORS: Final[dict[FlightPhase, frozenset[FlightPhase]]] = {
+    FlightPhase.IDLE: frozenset({*_IN_THE_AIR, FlightPhase.HANDED_OVER}),
+    FlightPhase.PREPARING: frozenset({FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}),
+    FlightPhase.HOVERING: frozenset({FlightPhase.FLYING, *_IN_THE_AIR, *_LET_GO}),
+    FlightPhase.FLYING: frozenset({FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}),
+    FlightPhase.HOLDING: frozenset(
+        {FlightPhase.HOVERING, FlightPhase.FLYING, *_IN_THE_AIR, *_LET_GO}
+    ),
+    FlightPhase.RETURNING: frozenset({FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}),
+    FlightPhase.HANDED_OVER: frozenset(
+        {FlightPhase.PREPARING, FlightPhase.RETURNING, FlightPhase.HOVERING, FlightPhase.IDLE}
+    ),
+}
+"""What may follow which within one step: nothing is flown to that was not prepared, and a
+vehicle that was handed over is neither sent anywhere nor stopped."""
 
 
 _UNHEARD_TIMEOUTS = 3.0

@@ -16,6 +16,7 @@
 7. It reports what was asked for: the leg under way, once; numbers that are numbers.
 8. It wants to be called again within a heartbeat's interval, and not at once for ever.
 9. It remembers no more for hearing more.
+10. What it makes the vehicle do next may follow what it made it do before.
 
 Leaves out: whether it does anything useful.
 """
@@ -50,6 +51,7 @@ from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.firmware.px4 import Px4Copter
 from agent.vehicle.session import BridgeAction, BridgeEvent, SendBytes, TimePassed
+from agent.vehicle.transitions import SUCCESSORS
 from swarm.model.frames import enu_from_wgs84
 from tests.support.fake_copter import (
     ARM,
@@ -182,6 +184,8 @@ class BridgeWatch:
         actions = self.bridge.step(event, now_s)
         self.fake = _FAKES.get(type(self.bridge._session.firmware), self.fake)
         after = self.bridge.phase
+        follows = after is before or after in SUCCESSORS[before]
+        hold(follows, f"{after.value} follows {before.value}")
         for action in actions:
             if isinstance(action, SendBytes):
                 self._look_at(self._decoded(action.data), before, after)

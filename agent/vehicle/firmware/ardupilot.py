@@ -173,6 +173,10 @@ class ArduCopter(Copter):
         """STANDBY or beyond; a mode set earlier is acknowledged and then overwritten."""
         return heartbeat.system_status >= _STATE_STANDBY
 
+    def has_rebooted(self, before: Heartbeat, heartbeat: Heartbeat) -> bool:
+        """It was past booting, and is not any more."""
+        return self.has_booted(before) and not self.has_booted(heartbeat)
+
     def airborne(self, vehicle: VehicleState) -> bool:
         """By EXTENDED_SYS_STATE; before it comes, by the heartbeat's ACTIVE."""
         if vehicle.landed is not Landed.UNDEFINED:

@@ -117,6 +117,10 @@ class Firmware(Protocol):
         """Whether the autopilot is past booting and calibrating."""
         ...
 
+    def has_rebooted(self, before: Heartbeat, heartbeat: Heartbeat) -> bool:
+        """Whether the autopilot began anew between two heartbeats, as far as they tell."""
+        ...
+
     def airborne(self, vehicle: VehicleState) -> bool | None:
         """Whether the vehicle is off the ground; None if it has not told yet."""
         ...

@@ -179,6 +179,13 @@ class Px4Copter(Copter):
         """STANDBY or beyond; before, the state is "uninitialised"."""
         return heartbeat.system_status >= _STATE_STANDBY
 
+    def has_rebooted(self, before: Heartbeat, heartbeat: Heartbeat) -> bool:
+        """It flew, and is "uninitialised": disarmed, it is so whenever its checks fail.
+
+        A reboot on the ground shows in its time since boot.
+        """
+        return before.armed and not self.has_booted(heartbeat)
+
     def airborne(self, vehicle: VehicleState) -> bool | None:
         """By EXTENDED_SYS_STATE alone: the heartbeat is ACTIVE on the ground too, once armed."""
         if vehicle.landed is Landed.UNDEFINED:

@@ -86,7 +86,7 @@ class Misled(Bridge):
 
     def __init__(self, phase: FlightPhase, action: BridgeAction) -> None:
         super().__init__(CONFIG)
-        self._phase = phase
+        self._phase = self.next_phase = phase
         self._action = action
 
     @property
@@ -95,6 +95,7 @@ class Misled(Bridge):
 
     def step(self, event: BridgeEvent, now_s: float) -> list[BridgeAction]:
         super().step(event, now_s)
+        self._phase = self.next_phase
         return [self._action]
 
 
@@ -127,6 +128,15 @@ def test_what_must_not_be_is_noticed(
 ) -> None:
     with pytest.raises(BrokenError, match=complaint):
         BridgeWatch(Misled(phase, action), FakeCopter).step(LinkOpened(), 0.0)
+
+
+def test_an_activity_that_must_not_follow_is_noticed() -> None:
+    bridge = Misled(FlightPhase.HANDED_OVER, SendBytes(encoded(GroundHeartbeat())))
+    watch = BridgeWatch(bridge, FakeCopter)
+    watch.step(LinkOpened(), 0.0)
+    bridge.next_phase = FlightPhase.FLYING
+    with pytest.raises(BrokenError, match="flying follows handed over"):
+        watch.step(TimePassed(), 0.1)
 
 
 def test_a_word_after_a_hand_over_is_noticed() -> None:

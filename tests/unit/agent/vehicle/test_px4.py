@@ -36,6 +36,7 @@ from agent.vehicle.messages import (
 from agent.vehicle.session import BytesReceived
 from agent.vehicle.state import VehicleState
 from tests.support.bridge_flight import ORIGIN, START, BridgeFlight
+from tests.support.fake_copter import INTERVAL
 from tests.support.fake_px4 import AUTO_LOITER, AUTO_TAKEOFF, POSCTL, FakePx4
 from tests.support.mavlink_frames import frame, rebuilt, recorded
 
@@ -100,6 +101,21 @@ def test_a_recorded_px4_boots_and_then_is_ready() -> None:
     assert FLAVOUR.unready(vehicle) == "waiting for a position"
     vehicle.on_position(of(Position, MISSION)[-1])
     assert FLAVOUR.unready(vehicle) is None
+
+
+def test_checks_that_fail_while_it_stands_are_no_reboot() -> None:
+    flight = BridgeFlight(FakePx4(ORIGIN, ready_s=20.0))
+    flight.order(START)
+    while not flight.copter.count()[INTERVAL]:
+        flight.step()
+    flight.run(5.0)
+    flight.copter.heard.clear()
+    for status in (0, 3, 0, None):
+        flight.copter.system_status = status
+        flight.copter.heartbeat()
+        flight.step()
+    assert not flight.copter.count()[INTERVAL]  # streams are asked for anew after a reboot
+    flight.run_until(VehicleReady())
 
 
 def test_a_recorded_flight_is_told_from_standing_armed() -> None:
