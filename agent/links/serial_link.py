@@ -1,13 +1,13 @@
-"""Serial links on POSIX systems, with what the standard library has.
-
-Leaves out: baud rates that termios does not name, and other operating systems.
-"""
+"""Serial links, opened and set by pyserial, at any baud rate that the port's driver takes."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import os
+import sys
+
+import serial
 
 from agent.links.link import ByteLink, LinkListener
 from agent.vehicle.config import SerialAddress
@@ -16,14 +16,9 @@ from swarm.runtime.errors import Fault, InputError
 __all__ = ["SerialLink"]
 
 
-try:
+if sys.platform != "win32":
     import fcntl
     import termios
-    import tty
-except ImportError:  # not POSIX
-    _POSIX = False
-else:
-    _POSIX = True
 
 _CHUNK_BYTES = 4096
 
@@ -32,12 +27,12 @@ class SerialLink(ByteLink):
     """A serial port of a real autopilot.
 
     Raises:
-        InputError: the baud rate is unknown here, or there are no serial ports at all.
+        InputError: there are no serial links on this system.
     """
 
     def __init__(self, address: SerialAddress, listener: LinkListener) -> None:
         super().__init__(str(address), listener)
-        if not _POSIX:
+        if sys.platform == "win32":  # whose event loop does not wait for ports
             raise InputError(
                 Fault(
                     str(address),
@@ -46,44 +41,28 @@ class SerialLink(ByteLink):
                     "use tcp: or udpout: through a MAVLink router",
                 )
             )
-        speed = getattr(termios, f"B{address.baud}", None)
-        if speed is None:
-            raise InputError(
-                Fault(
-                    str(address),
-                    "",
-                    f"{address.baud} is no baud rate of this system",
-                    "give one such as 57600, 115200 or 921600",
-                )
-            )
-        self._device = address.device
-        self._speed: int = speed
-        self._file: int | None = None
+        self._address = address
+        self._port: serial.Serial | None = None
 
     async def _open(self) -> None:
-        file = os.open(self._device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        device, baud = self._address.device, self._address.baud
         try:
-            # No second process may speak to the same vehicle.
-            fcntl.ioctl(file, termios.TIOCEXCL)
-            tty.setraw(file)
-            settings = termios.tcgetattr(file)
-            settings[4] = settings[5] = self._speed
-            termios.tcsetattr(file, termios.TCSANOW, settings)
-            termios.tcflush(file, termios.TCIFLUSH)
+            port = serial.Serial(device, baud, timeout=0.0, exclusive=True)
+        except (ValueError, OverflowError) as error:
+            raise OSError(f"{device} does not take {baud} baud") from error
         except termios.error as error:
-            os.close(file)
-            raise OSError(f"{self._device} is no serial port") from error
-        except OSError:
-            os.close(file)
-            raise
-        self._file = file
-        asyncio.get_running_loop().add_reader(file, self._on_readable)
+            raise OSError(f"{device} is no serial port") from error
+        self._port = port
+        fcntl.ioctl(port.fileno(), termios.TIOCEXCL)  # nobody else may speak to the same vehicle
+        asyncio.get_running_loop().add_reader(port.fileno(), self._on_readable)
+
+    # Bytes are passed by hand: pyserial's own writing waits without end for a port that is full.
 
     def _on_readable(self) -> None:
-        if self._file is None:
+        if self._port is None:
             return
         try:
-            data = os.read(self._file, _CHUNK_BYTES)
+            data = os.read(self._port.fileno(), _CHUNK_BYTES)
         except BlockingIOError:
             return
         except OSError:
@@ -95,27 +74,27 @@ class SerialLink(ByteLink):
             self._lost.set()
 
     def _write(self, data: bytes) -> bool:
-        if self._file is None:
+        if self._port is None:
             return False
         try:
-            return os.write(self._file, data) == len(data)
+            return os.write(self._port.fileno(), data) == len(data)
         except OSError:
             return False  # full, or gone: reading will notice
 
     def discard(self) -> None:
         """Throw away what the port has not sent yet; it stays open."""
-        if self._file is not None:
-            with contextlib.suppress(OSError, termios.error):  # gone: reading will notice
-                termios.tcflush(self._file, termios.TCOFLUSH)
+        if self._port is not None:
+            with contextlib.suppress(OSError, termios.error):
+                self._port.reset_output_buffer()  # gone: reading will notice
 
     def _stop_reading(self) -> None:
-        if self._file is not None:
-            asyncio.get_running_loop().remove_reader(self._file)
+        if self._port is not None:
+            asyncio.get_running_loop().remove_reader(self._port.fileno())
 
     def _shut(self) -> None:
-        if self._file is not None:
+        if self._port is not None:
             self._stop_reading()
             self.discard()  # closing would wait until it is sent
             with contextlib.suppress(OSError):
-                os.close(self._file)
-            self._file = None
+                self._port.close()
+            self._port = None

@@ -10,9 +10,11 @@ import pty
 import socket
 from collections.abc import AsyncIterator, Callable, Coroutine, Hashable
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import ParamSpec
 
 import pytest
+from structlog.testing import capture_logs
 
 from agent.core.interface import (
     Arrived,
@@ -29,7 +31,6 @@ from agent.links.link import ByteLink, open_link
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig, parse_link
 from swarm.runtime.clock import ScaledClock
-from swarm.runtime.errors import InputError
 from tests.support.bridge_flight import ORIGIN, START
 from tests.support.fake_copter import INTERVAL, FakeCopter
 
@@ -316,9 +317,39 @@ async def test_serial_device_that_is_missing_is_waited_for() -> None:
     assert (listener.ups, listener.downs) == (0, 0)
 
 
-def test_unknown_baud_rate_is_refused_at_once() -> None:
-    with pytest.raises(InputError, match="12345 is no baud rate"):
-        open_link(parse_link("serial:/dev/ttyS0:12345"), Listener())
+@in_loop
+async def test_any_baud_rate_that_the_driver_takes_will_do() -> None:
+    far, near = pty.openpty()
+    listener = Listener()
+    async with opened(f"serial:{os.ttyname(near)}:420000", listener) as link:  # as of ExpressLRS
+        os.close(near)
+        await until(lambda: listener.ups == 1)
+        link.send(b"told")
+        assert os.read(far, 4096) == b"told"
+    os.close(far)
+
+
+@in_loop
+async def test_a_port_is_opened_by_one_link_only() -> None:
+    far, near = pty.openpty()
+    first, second = Listener(), Listener()
+    async with opened(f"serial:{os.ttyname(near)}:115200", first):
+        await until(lambda: first.ups == 1)
+        async with opened(f"serial:{os.ttyname(near)}:115200", second):
+            await asyncio.sleep(0.2)
+            assert second.ups == 0
+    os.close(near)
+    os.close(far)
+
+
+@in_loop
+async def test_what_is_no_serial_port_is_named(tmp_path: Path) -> None:
+    (tmp_path / "notes").write_text("")
+    listener = Listener()
+    with capture_logs() as logs:
+        async with opened(f"serial:{tmp_path / 'notes'}:57600", listener):
+            await until(lambda: any("notes" in str(line) for line in logs))
+    assert listener.ups == 0
 
 
 class ServedCopter(asyncio.Protocol):

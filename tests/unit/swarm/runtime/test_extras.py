@@ -19,7 +19,7 @@ from swarm.runtime.extras import EXTRAS, MissingExtraError, missing_extra, requi
 ROOT = Path(__file__).parents[4]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 OWN = {"swarm", "agent", "coordinator", "sim"}
-MODULES = {"eclipse_zenoh": "zenoh"}
+MODULES = {"eclipse_zenoh": "zenoh", "pyserial": "serial"}
 """Packages whose module has another name."""
 
 BASE = """
