@@ -29,18 +29,26 @@ Problem::Problem(const MissionArrays& arrays)
       service_s_(arrays.service_s, arrays.service_s + n_task_) {
     for (const double speed_m_s : speed_m_s_) pace_s_m_.push_back(1.0 / speed_m_s);
     by_uav_ = table();
+    // Through local pointers: for all the compiler knows, a byte that is stored in a table could be
+    // one of this object, whose members it would read anew for every cell.
+    const double* const value = value_.data();
+    const int n_task = n_task_;
     for (int uav = 0; uav < n_uav_; ++uav) {
-        bool all = true;
-        for (int task = 0; task < n_task_; ++task) {
-            const std::size_t cell = row(uav) + task;
-            const bool capable = arrays.success[cell] > 0.0;
-            by_uav_.weight[cell] = arrays.success[cell] * value_[task];
-            by_uav_.survival[cell] = arrays.survival[cell];
-            by_uav_.capable[cell] = capable;
-            all = all && capable;
-            certain_ = certain_ && (arrays.survival[cell] == 1.0 || !capable);
+        const double* const success = arrays.success + row(uav);
+        const double* const survival = arrays.survival + row(uav);
+        double* const weight = by_uav_.weight.data() + row(uav);
+        std::uint8_t* const capable = by_uav_.capable.data() + row(uav);
+        bool all = true, certain = true;
+        for (int task = 0; task < n_task; ++task) weight[task] = success[task] * value[task];
+        for (int task = 0; task < n_task; ++task) {
+            const bool can = success[task] > 0.0;
+            capable[task] = can;
+            all &= can;
+            certain &= !can | (survival[task] == 1.0);
         }
+        std::copy(survival, survival + n_task, by_uav_.survival.data() + row(uav));
         capable_of_all_.push_back(all);
+        certain_ = certain_ && certain;
     }
 }
 
@@ -143,7 +151,11 @@ constexpr double kLeast = std::numeric_limits<double>::denorm_min();
 template <typename Array>
 void require_all(const char* name, const Array& array, double low, double high,
                  const char* range) {
+    bool right = true;  // without a way out, which would keep the loop from being vectorised
     for (std::size_t i = 0; i < array.size(); ++i) {
+        right &= (array.data()[i] >= low) & (array.data()[i] <= high);
+    }
+    for (std::size_t i = 0; !right && i < array.size(); ++i) {
         require_within(name, array.data()[i], low, high, range);
     }
 }
