@@ -12,9 +12,9 @@ import numpy as np
 
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
 from swarm.bus.loopback import free_loopback_endpoints
-from swarm.bus.memory import MemoryNetwork
 from swarm.bus.port import Bus, BusEvent, LinkUp, Sample, TokenSeen
 from swarm.bus.zenoh_bus import open_zenoh_bus
+from tests.support.memory_bus import MemoryNetwork
 
 LIMIT_S = 10.0
 """Longest wait for anything that must happen."""

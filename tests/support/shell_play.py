@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from typing import TypeVar
 
-from swarm.bus.memory import MemoryBus
 from swarm.bus.port import BusEvent
+from tests.support.memory_bus import MemoryBus
 
 __all__ = ["LIMIT_S", "HandClock", "play", "take_until", "until"]
 

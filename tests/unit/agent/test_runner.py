@@ -24,7 +24,6 @@ from agent.core.interface import (
     VehicleReport,
 )
 from agent.runner import run_agent, seat_or_stop
-from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import Bus, BusEvent, Sample, TokenGone, TokenSeen
 from swarm.model import Origin
 from swarm.model.ids import COORDINATOR
@@ -38,6 +37,7 @@ from swarm.runtime.errors import BusError
 from swarm.runtime.process import StopRequest
 from swarm.runtime.shell import join_mission
 from tests.support.builders import IDLE, MISSION, brief, epoch, message, uav
+from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import HandClock, play, take_until, until
 
 KEYS = KeySpace(MISSION)

@@ -15,7 +15,6 @@ from coordinator.core.active import CoordinatorCore
 from coordinator.core.publication import FlightLayers
 from coordinator.daemon import run_coordinator
 from coordinator.planner.options import ShouldStop
-from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import BusEvent, Sample
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
@@ -27,6 +26,7 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.runtime.shell import join_mission
 from tests.support.builders import IDLE, MISSION, OUT, done, held, message, mission, task, uav
+from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import LIMIT_S, HandClock, play, take_until, until
 
 KEYS = KeySpace(MISSION)

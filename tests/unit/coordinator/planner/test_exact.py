@@ -12,7 +12,8 @@ from coordinator.planner.exact import (
     optimum,
     worst_value,
 )
-from swarm.allocation import evaluate, reference
+from swarm.allocation import evaluate
+from tests.support import reference
 from tests.support.problems import any_problem, random_problem, table_1
 
 

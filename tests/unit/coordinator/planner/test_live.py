@@ -17,12 +17,11 @@ from coordinator.planner.online import (
     replan,
 )
 from coordinator.planner.options import ShouldStop, after_evaluations, never
-from swarm.allocation import reference
 from swarm.allocation.objective import evaluate
-from swarm.allocation.reference import team_worth
 from swarm.protocol.board import TaskBoard
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import Claim, ClaimPhase
+from tests.support import reference
 from tests.support.builders import (
     IDLE,
     MISSION,
@@ -37,6 +36,7 @@ from tests.support.builders import (
     task,
     uav,
 )
+from tests.support.reference import team_worth
 from tests.support.running_mission import RunningMission
 
 GREEDY = EpochPolicy("greedy", (), {})

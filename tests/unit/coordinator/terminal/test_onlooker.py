@@ -8,7 +8,6 @@ import pytest
 
 from coordinator.joining import find_missions
 from coordinator.mission_view.observation import MissionObserver
-from swarm.bus.memory import MemoryNetwork
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (
     Ask,
@@ -22,6 +21,7 @@ from swarm.protocol.events import (
 from swarm.protocol.messages import Snapshot
 from swarm.protocol.timing import Timing
 from tests.support.builders import MISSION, brief, entry, epoch, message, status, uav
+from tests.support.memory_bus import MemoryNetwork
 
 BRIEF = message(COORDINATOR, brief(uav("u0"), uav("u1")))
 REGISTERS = (BRIEF, message(COORDINATOR, entry("t0")), message(COORDINATOR, epoch("u0", "u1")))

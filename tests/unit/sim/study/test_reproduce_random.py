@@ -16,7 +16,7 @@ from sim.study.paper.random_problems import (
     reproduce_random,
 )
 from sim.study.paper.tables import Expectations, PaperFigures, Printed
-from swarm.allocation import reference
+from tests.support import reference
 from tests.support.problems import table_1
 
 

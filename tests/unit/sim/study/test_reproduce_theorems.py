@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim.study.paper.theorems import TheoremResult, allocations, check_theorems
-from swarm.allocation import reference
+from tests.support import reference
 from tests.support.problems import random_problem, table_1
 
 

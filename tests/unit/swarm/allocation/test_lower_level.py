@@ -15,11 +15,11 @@ from swarm.allocation import (
     evaluate,
     next_decision,
     rank_of,
-    reference,
     rule_by_name,
     run,
 )
 from swarm.allocation.problem import FloatArray
+from tests.support import reference
 from tests.support.problems import any_problem, random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)

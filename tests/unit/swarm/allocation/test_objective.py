@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.allocation import TeamState, evaluate, executed_objective, reference
-from swarm.allocation.reference import team_worth
+from swarm.allocation import TeamState, evaluate, executed_objective
+from tests.support import reference
 from tests.support.problems import any_problem, random_problem, table_1
+from tests.support.reference import team_worth
 
 
 def random_routes(rng: np.random.Generator, n_uav: int, n_task: int) -> list[list[int]]:

@@ -7,8 +7,8 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
+from tests.support.memory_bus import MemoryBus, MemoryNetwork
 
 
 def run(scenario: Callable[[MemoryNetwork, MemoryBus, MemoryBus], Awaitable[None]]) -> None:

@@ -6,7 +6,6 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import replace
 
-from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.identity.announcer import RosterAnnouncer, roster_message
 from swarm.identity.roster import Roster, RosterEntry
 from swarm.protocol.events import (
@@ -24,6 +23,7 @@ from swarm.runtime.clock import ScaledClock
 from swarm.runtime.shell import Shell, join_mission
 from tests.support.builders import MISSION
 from tests.support.keyring import Keyring
+from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import play
 
 UAVS = ("u0", "u1", "u2")

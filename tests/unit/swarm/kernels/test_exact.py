@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm.allocation import evaluate, reference
+from swarm.allocation import evaluate
 from swarm.kernels.exact import MOST_TASKS, MOST_UNCERTAIN_TASKS, optimum
+from tests.support import reference
 from tests.support.problems import any_problem, random_problem
 
 SEEDS = st.integers(0, 2**32 - 1)

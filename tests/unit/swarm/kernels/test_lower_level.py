@@ -14,7 +14,6 @@ from swarm.allocation import (
     decisions,
     evaluate,
     rank_of,
-    reference,
     rule_by_name,
     run,
 )
@@ -31,6 +30,7 @@ from swarm.kernels.lower_level import (
     valued,
 )
 from swarm.kernels.lower_level import run as run_compiled
+from tests.support import reference
 from tests.support.problems import any_problem, line_of_tasks, random_problem, table_1
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from swarm.allocation import Problem, TeamState, evaluate, run
 from swarm.allocation.lower_level import Decision
-from swarm.allocation.reference import team_worth
 from swarm.allocation.rules import GuidedRule, team_arrays, team_at_start
 from swarm.kernels.rollout import guided_choice
 from swarm.kernels.routes import optimise_routes
 from tests.support.problems import any_problem, random_problem
+from tests.support.reference import team_worth
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from coordinator.planner.exact import optimum
 from swarm.allocation import Problem, TeamState, evaluate
-from swarm.allocation.reference import best_of_neighbourhood, team_worth
 from swarm.allocation.rules import team_arrays
 from swarm.kernels.routes import TeamArrays, improve_routes, optimise_routes
 from tests.support.problems import any_problem, paper_problem, random_problem, table_1
+from tests.support.reference import best_of_neighbourhood, team_worth
 
 SEEDS = st.integers(0, 2**32 - 1)
 

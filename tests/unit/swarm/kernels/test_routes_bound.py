@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import TeamState
-from swarm.allocation.reference import list_worth, timed_list_worth
 from swarm.allocation.rules import team_arrays, team_at_start
 from swarm.kernels.routes_bound import Timetable, priced_lists, shortest_legs_s
 from tests.support.problems import any_problem
+from tests.support.reference import list_worth, timed_list_worth
 
 
 @settings(deadline=None, max_examples=60)

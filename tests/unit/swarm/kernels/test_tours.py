@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm.allocation import reference
 from swarm.allocation.problem import FloatArray
 from swarm.kernels._kernels import TourTable
-from swarm.kernels.tours import good_tour, tour_table
+from tests.support import reference
 from tests.support.problems import random_problem
+from tests.support.tours import good_tour, tour_table
 
 SEEDS = st.integers(0, 2**32 - 1)
 TourProblem = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import msgpack
 
-from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import Query, Sample
 from swarm.model.ids import AUTHORITY, COORDINATOR
 from swarm.protocol.codec import Codec
@@ -35,6 +34,7 @@ from swarm.runtime.shell import Shell, join_mission
 from swarm.runtime.state_exchange import MOST_REFUSED, UNREAD
 from tests.support.builders import MISSION, epoch, held, message
 from tests.support.keyring import Keyring
+from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import HandClock, play, until
 
 KEYS = KeySpace(MISSION)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import pytest
 
 from swarm.bus.admission import MOST_STRANGERS, TOO_MANY_NAMES
-from swarm.bus.memory import MemoryBus, MemoryNetwork
 from swarm.bus.port import Query, Sample, TokenGone, TokenSeen
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.codec import Codec
@@ -49,6 +48,7 @@ from tests.support.builders import (
     status,
     uav,
 )
+from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import HandClock, play, take_until, until
 
 KEYS = KeySpace(MISSION)

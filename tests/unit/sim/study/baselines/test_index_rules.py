@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from sim.study.baselines.index_rules import Routes, makespan_s, nearest_first, value_per_time
 from swarm.allocation import Problem, TeamState, rank_of
 from swarm.allocation.index_rules import NEAREST, VALUE_PER_TIME, IndexRule
-from swarm.allocation.reference import completion_s
 from tests.support.problems import random_problem, table_1
+from tests.support.reference import completion_s
 
 
 def by_hand(problem: Problem, sequence: list[int], rule: str) -> Routes:

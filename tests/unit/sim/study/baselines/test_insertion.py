@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from sim.study.baselines.cbba import Insertion
 from swarm.allocation import TeamState, evaluate
-from swarm.allocation.reference import objective
 from tests.support.problems import random_problem
+from tests.support.reference import objective
 
 
 @given(seed=st.integers(0, 2**32 - 1))

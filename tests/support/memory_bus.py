@@ -223,7 +223,7 @@ class MemoryBus:
         """Where everything arrives."""
         return self._seat.inbox
 
-    def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:  # noqa: ARG002 - nothing is ever dropped here
+    def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:
         """Send ``payload`` on ``key``."""
         self._check_open()
         check_payload(payload)
