@@ -1,7 +1,4 @@
-"""Allocation as pure functions: objective, lower level, decision rules, certificate.
-
-Leaves out: the search for a priority sequence (coordinator.planner) and all I/O.
-"""
+"""Allocation as pure functions: objective, lower level, decision rules, certificate."""
 
 from swarm.allocation.lower_level import (
     Decision,

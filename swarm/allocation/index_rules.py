@@ -1,9 +1,8 @@
 """Decision rules that rank the open tasks by a number, the index, and take the first.
 
 A rule of your own is a function that gives an index for each task, and its entry in
-`INDEX_RULES`: from then on plans, simulations, runs and agents know it by its name. They fit the
-lower level of Fig. 1 as they are. Leaves out: what the other UAVs do, survival, the horizon, and
-what lies beyond the next task.
+`INDEX_RULES`: from then on plans, simulations, runs and agents know it by its name. It sees neither
+the other UAVs nor survival, the horizon, or what lies beyond the next task.
 """
 
 from __future__ import annotations
@@ -36,39 +35,21 @@ class IndexRule:
     ) -> Decision | None:
         """The next task of ``uav``; ``rank`` plays no part."""
         del rank
-        tasks, scores, travel_s = self._scores(problem, state, uav)
-        if not len(tasks):
+        ranked = self.valued(problem, state, uav, 2)
+        if not ranked:
             return None
-        best = int(np.argmax(scores))
-        task = int(tasks[best])
-        decided_s = float(state.free_s[uav])
-        others = np.delete(scores, best)
-        return Decision(
-            uav=uav,
-            task=task,
-            decided_s=decided_s,
-            completion_s=float((decided_s + travel_s[task]) + problem.service_s[task]),
-            score=float(scores[best]),
-            second_score=float(others.max()) if len(others) else None,
-            certificate=False,
-            exact=True,
-        )
+        (task, score), *others = ranked
+        second_score = others[0][1] if others else None
+        return Decision.of(problem, state, uav, task, score, second_score=second_score, exact=True)
 
     def valued(
         self, problem: Problem, state: TeamState, uav: int, most: int
     ) -> tuple[tuple[int, float], ...]:
         """Tasks with their index, the one it decides on first; so many at the most."""
-        tasks, scores, _ = self._scores(problem, state, uav)
+        tasks = np.flatnonzero(state.open & problem.capable[uav])
+        scores = self.index(problem, uav, problem.travel_s(uav, state.place_enu_m[uav]))[tasks]
         best_first = np.argsort(-scores, kind="stable")[:most]
         return tuple((int(tasks[place]), float(scores[place])) for place in best_first)
-
-    def _scores(
-        self, problem: Problem, state: TeamState, uav: int
-    ) -> tuple[IntArray, FloatArray, FloatArray]:
-        """(k,) tasks open to it, (k,) their indices, (n_task,) travel times to all [s]."""
-        tasks = np.flatnonzero(state.open & problem.capable[uav])
-        travel_s = problem.travel_s(uav, state.place_enu_m[uav])
-        return tasks, self.index(problem, uav, travel_s)[tasks], travel_s
 
 
 def _nearness(problem: Problem, uav: int, travel_s: FloatArray) -> FloatArray:

@@ -3,7 +3,7 @@
 The UAV that is free earliest decides next; at equal times the one earlier in the
 priority sequence; then the smaller index. Used unchanged by the offline planner and
 by every agent: decision by decision with any rule, or as one compiled run with a rule
-that a kernel knows. Leaves out: how a UAV chooses (`swarm.allocation.rules`).
+that a kernel knows.
 """
 
 from __future__ import annotations
@@ -55,11 +55,8 @@ class TeamState:
 
     def __post_init__(self) -> None:
         n_uav = len(self.free_s)
-        for name, shape in (
-            ("place_enu_m", (n_uav, 3)),
-            ("survived", (n_uav,)),
-            ("active", (n_uav,)),
-        ):
+        shapes = {"place_enu_m": (n_uav, 3), "survived": (n_uav,), "active": (n_uav,)}
+        for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name} must have shape {shape}")
 
@@ -98,9 +95,8 @@ class Decision:
     """One UAV's choice of its next task."""
 
     uav: int
-    """Index of the deciding UAV."""
     task: int
-    """Index of the task it takes."""
+    """Indices of the deciding UAV and of the task it takes."""
     decided_s: float
     """Mission time of the decision: when the UAV became free [s]."""
     completion_s: float
@@ -117,6 +113,25 @@ class Decision:
     """Tasks the rule compared on the way, with their scores: this one, then the others, best first.
     Empty where comparing them one by one would take longer than deciding; see `CompiledRule`."""
 
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        state: TeamState,
+        uav: int,
+        task: int,
+        score: float,
+        *,
+        second_score: float | None = None,
+        exact: bool = False,
+        valued: tuple[tuple[int, float], ...] = (),
+    ) -> Decision:
+        """``uav``, whose turn it is in ``state``, takes ``task``; without a certificate."""
+        decided_s = float(state.free_s[uav])
+        travel_s = problem.travel_along_s(uav, state.place_enu_m[uav], [task])[0]
+        completion_s = float((decided_s + travel_s) + problem.service_s[task])
+        return cls(uav, task, decided_s, completion_s, score, second_score, False, exact, valued)
+
 
 class Rule(Protocol):
     """A decision rule: a pure function of the shared state."""
@@ -124,13 +139,11 @@ class Rule(Protocol):
     @property
     def name(self) -> str:
         """Name under which plans and epochs refer to the rule."""
-        ...
 
     def decide(
         self, problem: Problem, state: TeamState, rank: IntArray, uav: int
     ) -> Decision | None:
         """The next task of ``uav``; None when no open task is one it is capable of."""
-        ...
 
 
 @runtime_checkable
@@ -141,7 +154,6 @@ class ScoringRule(Rule, Protocol):
         self, problem: Problem, state: TeamState, uav: int, most: int
     ) -> tuple[tuple[int, float], ...]:
         """`Decision.valued` of what it would decide; so many tasks at the most."""
-        ...
 
 
 @runtime_checkable
@@ -151,7 +163,6 @@ class CompiledRule(ScoringRule, Protocol):
     @property
     def code(self) -> RuleCode:
         """Its name to them."""
-        ...
 
 
 def rank_of(sequence: Sequence[int]) -> IntArray:
@@ -171,11 +182,7 @@ def rank_of(sequence: Sequence[int]) -> IntArray:
 def decisions(problem: Problem, state: TeamState, rank: IntArray, rule: Rule) -> Iterator[Decision]:
     """Decide in the order of Fig. 1 until no active UAV has an open task it is capable of.
 
-    Args:
-        problem: the mission.
-        state: where the team stands; left unchanged.
-        rank: (n_uav,) place of each UAV in the priority sequence; smaller decides first.
-        rule: how each UAV chooses.
+    ``state`` is left unchanged; ``rank`` is as `rank_of` gives it.
     """
     state = state.copy()
     queue = [
@@ -216,16 +223,12 @@ def run(
     rule: Rule,
     should_stop: Callable[[], bool] | None = None,
 ) -> tuple[list[list[int]], FloatArray]:
-    """All decisions as lists.
+    """All decisions as lists, as `decisions` takes them.
 
-    Args:
-        problem: the mission.
-        state: where the team stands; left unchanged.
-        rank: (n_uav,) place of each UAV in the priority sequence; smaller decides first.
-        rule: how each UAV chooses.
-        should_stop: asked every few milliseconds, or between the decisions of a rule that is not
-            compiled. Once it says so the decisions left are greedy, or are not taken.
+    Once ``should_stop``, asked every few milliseconds, or between the decisions of a rule that is
+    not compiled, says so, the decisions left are greedy, or are not taken.
 
+    Returns:
     Returns:
         Task indices per UAV in order of execution, and (n_task,) completion times [s], NaN for
         tasks nobody took.

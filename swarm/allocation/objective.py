@@ -1,7 +1,7 @@
 """Eq. 1: what ordered task lists are worth, planned or as executed.
 
 J = Σ p · S · m · (D − t), with S the probability that the UAV survived every task
-before this one on its list. Leaves out: finding good lists.
+before this one on its list.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Decision rules of the user's own: a function from a UAV's turn to the task that it takes.
 
 Every UAV works out what those before it are going to decide, so a rule must give the same answer
-for the same turn, in whatever process. Leaves out: the rules of the project
-(swarm.allocation.rules).
+for the same turn, in whatever process.
 """
 
 from __future__ import annotations
@@ -147,16 +146,7 @@ class FunctionRule:
             return None
         turn = Turn(problem, state.copy(), uav, self.kinds)  # whoever keeps it keeps this moment
         chosen = self.function(turn)
-        column = turn.index(chosen)
-        if chosen is None or column is None:
+        task = turn.index(chosen)
+        if chosen is None or task is None:
             return None
-        return Decision(
-            uav=uav,
-            task=column,
-            decided_s=turn.now_s,
-            completion_s=turn.completion_s(chosen),
-            score=turn.gain(chosen),
-            second_score=None,
-            certificate=False,
-            exact=False,
-        )
+        return Decision.of(problem, state, uav, task, turn.gain(chosen))

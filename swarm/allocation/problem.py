@@ -1,19 +1,19 @@
 """A mission as arrays: what allocation computes with, validated once.
 
-Rows are UAVs, columns are tasks, in the order of the ids. Leaves out: what has
-happened so far (`swarm.allocation.lower_level.TeamState`) and every decision.
+Rows are UAVs, columns are tasks, in the order of the ids.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from swarm.kernels._kernels import KernelProblem
-from swarm.kernels.problem import converted, prepare
+from swarm.kernels.arrays import converted
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.mission import chances
 
@@ -34,6 +34,14 @@ _COLUMNS: Mapping[str, int] = {
     "survival": 2,
 }
 """Arrays that a problem is made of, with their axes."""
+_TASK_AXIS: Mapping[str, int] = {
+    "task_enu_m": 0,
+    "value": 0,
+    "service_s": 0,
+    "success": 1,
+    "survival": 1,
+}
+"""Those that say something of tasks, and along which axis."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +84,8 @@ class Problem:
     def __post_init__(self) -> None:
         for name in ("uav_ids", "task_ids"):
             ids = tuple(getattr(self, name))
-            _require_distinct(name, ids)
+            if len(set(ids)) != len(ids):
+                raise ValueError(f"{name} must differ from each other: {list(ids)}")
             object.__setattr__(self, name, ids)
         for name, n_axes in _COLUMNS.items():
             self._freeze(name, converted(name, getattr(self, name), np.float64, n_axes).copy())
@@ -84,14 +93,11 @@ class Problem:
             if len(getattr(self, name)) != n:  # all other shapes are held against these two
                 raise ValueError(f"{name} must have shape {(n,)}, not {getattr(self, name).shape}")
         object.__setattr__(self, "horizon_s", float(self.horizon_s))
-        columns = {name: getattr(self, name) for name in _COLUMNS}
-        kernel = prepare(**columns, horizon_s=self.horizon_s)
-        for name, item in (
-            ("kernel", kernel),
-            ("capable", kernel.capable),
-            ("weight", kernel.weight),
-        ):
-            object.__setattr__(self, name, item)
+        arrays = {name: getattr(self, name) for name in _COLUMNS}
+        kernel = KernelProblem(**arrays, horizon_s=self.horizon_s)
+        object.__setattr__(self, "kernel", kernel)
+        object.__setattr__(self, "capable", kernel.capable)
+        object.__setattr__(self, "weight", kernel.weight)
         self._freeze("_task_columns_m", np.ascontiguousarray(self.task_enu_m.T))
 
     def __reduce__(self) -> tuple[type[Problem], tuple[object, ...]]:
@@ -113,18 +119,14 @@ class Problem:
             tasks: columns in this order; the mission's own, pop-ups included, when None.
         """
         rows = tuple(mission.uavs if uavs is None else uavs)
-        columns = _columns(mission, rows, mission.tasks if tasks is None else tasks)
+        columns = tuple(mission.tasks if tasks is None else tasks)
         return cls(
             uav_ids=tuple(uav.id for uav in rows),
-            task_ids=columns.ids,
+            task_ids=tuple(task.id for task in columns),
             start_enu_m=np.array([u.position_enu_m for u in rows], float).reshape(-1, 3),
-            task_enu_m=columns.place_enu_m,
             speed_m_s=np.array([u.speed_m_s for u in rows], float),
-            value=columns.value,
-            service_s=columns.service_s,
-            success=columns.success,
-            survival=columns.survival,
             horizon_s=mission.horizon_s,
+            **_of_tasks(mission, rows, columns),
         )
 
     def with_tasks(self, mission: Mission, tasks: Sequence[Task], known: Sequence[int]) -> Problem:
@@ -136,18 +138,14 @@ class Problem:
             known: (n_task,) of each the index of its column here; -1 of a new one.
         """
         fresh = [task for task, index in zip(tasks, known, strict=True) if index < 0]
-        new = _columns(mission, mission.uavs, fresh)
+        new = _of_tasks(mission, mission.uavs, fresh)
         index = np.array(known, dtype=np.int64)
         index[index < 0] = np.arange(self.n_task, self.n_task + len(fresh))
-        return replace(
-            self,
-            task_ids=tuple(task.id for task in tasks),
-            task_enu_m=np.concatenate([self.task_enu_m, new.place_enu_m])[index],
-            value=np.concatenate([self.value, new.value])[index],
-            service_s=np.concatenate([self.service_s, new.service_s])[index],
-            success=np.concatenate([self.success, new.success], axis=1)[:, index],
-            survival=np.concatenate([self.survival, new.survival], axis=1)[:, index],
-        )
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(self, name), new[name]], axis).take(index, axis)
+            for name, axis in _TASK_AXIS.items()
+        }
+        return replace(self, task_ids=tuple(task.id for task in tasks), **arrays)
 
     @property
     def n_uav(self) -> int:
@@ -222,35 +220,20 @@ def straight_m(offset_m: FloatArray) -> FloatArray:
     return length_m
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Columns:
-    """What a problem says of its tasks; shapes as there."""
-
-    ids: tuple[TaskId, ...]
-    place_enu_m: FloatArray
-    value: FloatArray
-    service_s: FloatArray
-    success: FloatArray
-    survival: FloatArray
-
-
-def _columns(mission: Mission, uavs: Sequence[Uav], tasks: Sequence[Task]) -> _Columns:
+def _of_tasks(
+    mission: Mission, uavs: Sequence[Uav], tasks: Sequence[Task]
+) -> dict[str, FloatArray]:
+    """The arrays of `_TASK_AXIS`."""
     shape = (len(uavs), len(tasks))
 
     def table(by_uav: Iterable[Mapping[str, float]], default: float) -> FloatArray:
         found = [chances(given, tasks, default) for given in by_uav]
         return np.array(found, float).reshape(shape)
 
-    return _Columns(
-        ids=tuple(task.id for task in tasks),
-        place_enu_m=np.array([t.position_enu_m for t in tasks], float).reshape(-1, 3),
-        value=np.array([t.value for t in tasks], float),
-        service_s=np.array([t.service_s for t in tasks], float),
-        success=table((uav.success for uav in uavs), mission.success_default),
-        survival=table((uav.survival for uav in uavs), mission.survival_default),
-    )
-
-
-def _require_distinct(name: str, ids: Sequence[str]) -> None:
-    if len(set(ids)) != len(ids):
-        raise ValueError(f"{name} must differ from each other: {list(ids)}")
+    return {
+        "task_enu_m": np.array([t.position_enu_m for t in tasks], float).reshape(-1, 3),
+        "value": np.array([t.value for t in tasks], float),
+        "service_s": np.array([t.service_s for t in tasks], float),
+        "success": table((uav.success for uav in uavs), mission.success_default),
+        "survival": table((uav.survival for uav in uavs), mission.survival_default),
+    }

@@ -128,17 +128,13 @@ class GuidedRule:
         choice = self._choice(problem, state, rank, uav)
         if choice.task is None:
             return None
-        task, now_s = choice.task, float(state.free_s[uav])
-        travel_s = problem.travel_s(uav, state.place_enu_m[uav])[task]
-        return Decision(
-            uav=uav,
-            task=task,
-            decided_s=now_s,
-            completion_s=float((now_s + travel_s) + problem.service_s[task]),
-            score=choice.worth,
+        return Decision.of(
+            problem,
+            state,
+            uav,
+            choice.task,
+            choice.worth,
             second_score=choice.second_worth,
-            certificate=False,
-            exact=False,
             valued=choice.valued,
         )
 

@@ -2,13 +2,13 @@
 
 A pure function of the roster. Routers use it for their clients and for each other, peers of a
 mesh for their neighbours; a client needs none, as only routers' certificates serve. Whoever
-is in no rule says and hears nothing. Leaves out: who is let in at all (TLS and the door,
-swarm.bus.tls), and what is checked again in every process (swarm.protocol.seal).
+is in no rule says and hears nothing. What is said is checked again in every process
+(swarm.protocol.seal).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from swarm.identity.roster import Role, Roster, RosterEntry
@@ -99,10 +99,9 @@ def _control(roster: Roster, keys: KeySpace) -> dict[str, Any]:
 
 
 def _writers(
-    entries: Iterable[RosterEntry], keys: KeySpace
+    entries: Sequence[RosterEntry], keys: KeySpace
 ) -> Iterable[tuple[str, list[str], list[str], str | None]]:
     """Who writes: a word for it, common names, keys to put on, and the name it lives by."""
-    entries = tuple(entries)
     for entry in entries:
         if entry.role is Role.UAV:
             mine = f"{keys.root}/uav/{entry.name}/**"

@@ -3,8 +3,7 @@
 Honest processes stay far below the limits, in mission seconds, so that a mission flown
 faster than the wall may say as much; who floods loses its own words, not those of others.
 What an honest one loses in a storm comes back: registers are repeated, and told to whoever
-asks. Leaves out: what the routers hold back already (swarm.bus.access), and the size of what
-is said (swarm.protocol.codec).
+asks.
 """
 
 from __future__ import annotations
@@ -16,7 +15,14 @@ from typing import Final
 from swarm.bus.port import BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
 from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.seal import NOT_SIGNED, NOT_THE_SIGNERS, SIGNER_UNKNOWN, Seal, open_envelope
+from swarm.protocol.seal import (
+    NOT_SIGNED,
+    NOT_THE_SIGNERS,
+    SIGNER_UNKNOWN,
+    Envelope,
+    Seal,
+    open_envelope,
+)
 from swarm.protocol.sync import Question
 
 __all__ = [
@@ -53,7 +59,7 @@ a router passes on 50 a second of each neighbour."""
 QUESTION_HZ, QUESTION_BURST = 100.0, 1000
 """Questions of everybody together, where nobody knows who asks."""
 _NOBODY: Final = ""
-_NO_UAVS: Final = (AUTHORITY, COORDINATOR, OPERATOR, _NOBODY)
+_SEATS: Final = (AUTHORITY, COORDINATOR, OPERATOR)
 _KEPT_QUESTIONS: Final = 4096
 
 
@@ -105,11 +111,6 @@ class AdmissionControl:
     nobody uses up what another may say but by its forged name, for which it needs the key of
     that other one at the routers. Else it is whose key it is, and anybody can make names up: of
     those only so many count, but for the UAVs that the brief names, which no flood shuts out.
-
-    Args:
-        keys: of the mission.
-        seal: of the process; None without keys.
-        now_s: its clock [s].
     """
 
     def __init__(self, keys: KeySpace, seal: Seal | None, now_s: Callable[[], float]) -> None:
@@ -124,9 +125,10 @@ class AdmissionControl:
         self._uavs = RateLimiter(UAV_HZ, UAV_BURST)
         self._seats = RateLimiter(SEAT_HZ, SEAT_BURST)
         self._tokens = RateLimiter(TOKEN_HZ, TOKEN_BURST)
-        claimed = seal is not None
-        self._questions = RateLimiter(
-            CLAIMED_HZ if claimed else QUESTION_HZ, CLAIMED_BURST if claimed else QUESTION_BURST
+        self._questions = (
+            RateLimiter(QUESTION_HZ, QUESTION_BURST)
+            if seal is None
+            else RateLimiter(CLAIMED_HZ, CLAIMED_BURST)
         )
 
     def admits(self, event: BusEvent) -> bool:
@@ -151,23 +153,20 @@ class AdmissionControl:
         writer = self._keys.writer_of(key) or _NOBODY
         if self._seal is None or writer == AUTHORITY:
             return self._too_many_names(writer) or self._too_many(writer, writer)
-        envelope = open_envelope(payload)
-        if envelope is None:
-            return NOT_SIGNED
-        if self._seal.roster.entry(envelope.signer) is None:
-            return SIGNER_UNKNOWN
+        envelope = self._envelope(payload)
+        if isinstance(envelope, str):
+            return envelope
         if not self._seal.may_speak_for(envelope.signer, writer):
             return NOT_THE_SIGNERS
         return self._too_many(writer, envelope.signer)
 
     def _too_many(self, writer: str, source: str) -> str | None:
-        seat = writer in (AUTHORITY, COORDINATOR, OPERATOR)
-        limiter = self._seats if seat else self._uavs
+        limiter = self._seats if writer in _SEATS else self._uavs
         return None if limiter.allows(source, self._now_s()) else TOO_MANY
 
     def _too_many_names(self, writer: str) -> str | None:
         """Why ``writer`` does not count as one more UAV; None if it does, or is none."""
-        if writer in _NO_UAVS or writer in self._strangers or writer in self.fleet:
+        if writer in (*_SEATS, _NOBODY) or writer in self._strangers or writer in self.fleet:
             return None
         if len(self._strangers) >= MOST_STRANGERS:
             return TOO_MANY_NAMES
@@ -177,13 +176,19 @@ class AdmissionControl:
     def _fault_of_question(self, payload: bytes) -> str | None:
         source = _NOBODY
         if self._seal is not None:
-            envelope = open_envelope(payload)
-            if envelope is None:
-                return NOT_SIGNED
-            if self._seal.roster.entry(envelope.signer) is None:
-                return SIGNER_UNKNOWN
+            envelope = self._envelope(payload)
+            if isinstance(envelope, str):
+                return envelope
             source = envelope.signer
         return None if self._questions.allows(source, self._now_s()) else TOO_MANY
+
+    def _envelope(self, payload: bytes) -> Envelope | str:
+        """What claims to be signed by somebody of the roster; else why it is not looked at."""
+        envelope = open_envelope(payload)
+        if envelope is None:
+            return NOT_SIGNED
+        known = self._seal is not None and self._seal.roster.entry(envelope.signer) is not None
+        return envelope if known else SIGNER_UNKNOWN
 
     def _fault_of_token(self, key: str) -> str | None:
         writer = self._keys.writer_of_token(key) or _NOBODY
@@ -199,9 +204,6 @@ class QuestionFilter:
 
     They count only now, so that nobody uses up what another may ask by its forged name, nor by
     saying its questions again. Where nobody signs, `AdmissionControl` alone counts.
-
-    Args:
-        now_s: clock of the process [s].
     """
 
     def __init__(self, now_s: Callable[[], float]) -> None:

@@ -1,7 +1,4 @@
-"""The command ``swarm router``.
-
-Leaves out: the router itself (swarm.bus.router).
-"""
+"""The command ``swarm router``."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """How a process reaches the others: settings, checked when made.
 
 Also which endpoints nobody else can listen in on: those on this machine, and encrypted ones.
-Leaves out: what Zenoh is told in the end (swarm.bus.zenoh_session).
 """
 
 from __future__ import annotations
@@ -63,25 +62,17 @@ def is_encrypted(endpoint: str) -> bool:
     return endpoint.startswith(("tls/", "quic/"))
 
 
-MIN_LEASE_S = 0.2
-
-MAX_LEASE_S = 60.0
-
+MIN_LEASE_S, MAX_LEASE_S = 0.2, 60.0
 DEFAULT_LEASE_S = PRESETS[LinkKind.NORMAL].lease_s
-
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
-
 DEFAULT_SECURE_ROUTER = "tls/127.0.0.1:7447"
 """The one with keys."""
-
 
 # udp is left out: over it, Zenoh's "reliable" does not retransmit.
 ENDPOINT = re.compile(
     r"(?:tcp|tls|quic|ws)/(?:\[[0-9A-Fa-f:.%\w]+\]|[^\s:/?#\[\]]+):(\d{1,5})(?:[?#]\S*)?"
 )
-
 UNIX_ENDPOINT = re.compile(r"unixsock-stream/\S+")
-
 ENDPOINT_REMEDY = "write PROTOCOL/HOST:PORT with tcp, tls, quic or ws, as in tcp/127.0.0.1:7447"
 
 

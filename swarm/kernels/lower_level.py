@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelProblem
-from swarm.kernels.problem import converted
+from swarm.kernels.arrays import converted
 
 __all__ = [
     "EXACT_TASKS",

@@ -4,7 +4,7 @@ Large-neighbourhood search with annealing (slack induction by string removals, C
 Vanden Berghe 2020, doi:10.1287/trsc.2019.0914) and local search, on segments joined in O(1)
 (Silva et al. 2012, doi:10.1016/j.ejor.2012.03.044; Vidal et al. 2014,
 doi:10.1016/j.ejor.2013.09.045). What segments are worth is defined plainly in
-`tests.support.reference`. Leaves out: the clock and the decision when to stop, which
+`swarm.allocation.reference`. Leaves out: the clock and the decision when to stop, which
 are the caller's; proofs of quality (`coordinator.planner.bound`).
 """
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import TourTable
-from swarm.kernels.problem import converted
+from swarm.kernels.arrays import converted
 
 __all__ = ["good_tour", "tour_table"]
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm.allocation import TeamState
+from swarm.allocation import Problem, TeamState
+from swarm.kernels._kernels import KernelProblem
 from swarm.kernels.lower_level import GREEDY, decide
-from swarm.kernels.problem import prepare
 from tests.support.problems import table_1
 
 
@@ -18,6 +18,11 @@ def arguments() -> dict[str, Any]:
     problem = table_1()
     names = ("start_enu_m", "task_enu_m", "speed_m_s", "value", "service_s", "success")
     return {name: getattr(problem, name) for name in (*names, "survival", "horizon_s")}
+
+
+def prepare(**given: Any) -> KernelProblem:
+    named = table_1()
+    return Problem(uav_ids=named.uav_ids, task_ids=named.task_ids, **given).kernel
 
 
 def test_handle_knows_its_size() -> None:
