@@ -2,8 +2,7 @@
 
 A command has one parameter ``seat: ConnectionOptions = DEFAULT_CONNECTION`` and is decorated
 with `with_connection_options`; on the command line it has the options of the fields of
-`ConnectionOptions` instead. Leaves out: what they mean for a session (swarm.bus.config), and
-the router's own options (swarm.bus.cli).
+`ConnectionOptions` instead.
 """
 
 from __future__ import annotations
@@ -43,7 +42,6 @@ RUN = "run"
 """What `--bus` is told for a run of this machine; ``run:PID`` for one of several."""
 _DIAL_S = 0.1
 _TCP = re.compile(r"(?:tcp|tls)/(\[[^\]]+\]|[^:]+):(\d+)")
-
 _PARAMETER = "seat"
 
 
@@ -103,7 +101,6 @@ class ConnectionOptions:
         return self._beside(runs[0], operator=operator)
 
     def _beside(self, run: LocalRun, *, operator: bool) -> ConnectionOptions:
-        """A seat on the bus of ``run``."""
         folder = run.operator_keys if operator else run.viewer_keys
         keys = None if folder is None else self.keys or Path(folder)
         if keys is not None and not os.access(keys, os.R_OK | os.X_OK):

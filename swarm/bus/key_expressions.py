@@ -2,8 +2,8 @@
 
 A key is chunks joined by ``/``. In an expression the chunk ``*`` stands for any one
 chunk and ``**`` for any number of them, none included. Neither stands for a chunk
-that starts with ``@``. Leaves out: Zenoh's ``$*``, wildcards inside a chunk, which
-no key of ours needs. Source: https://zenoh.io/docs/manual/abstractions/#key-expression
+that starts with ``@``. Zenoh's ``$*``, wildcards inside a chunk, is left out: no key of ours needs
+it. Source: https://zenoh.io/docs/manual/abstractions/#key-expression
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 __all__ = ["check_key", "check_key_expr", "intersects"]
-
 
 ANY_CHUNK = "*"
 ANY_CHUNKS = "**"

@@ -4,8 +4,7 @@
 that this user alone can read and write, ``$XDG_RUNTIME_DIR/peckorder`` or ``peckorder-UID`` where
 temporary files go, and takes the file back when it ends. A file whose process has died is removed
 by who comes next; one of somebody else, or that others could have written, is not read. Keys are
-named there, never told: whoever cannot read their folder has none. Leaves out: which run a command
-means (swarm.bus.connection).
+named there, never told: whoever cannot read their folder has none.
 """
 
 from __future__ import annotations
@@ -15,15 +14,13 @@ import os
 import stat
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
-from json import dumps, loads
+from dataclasses import asdict, dataclass
+from json import dumps
 from pathlib import Path
-from typing import Any
 
 from swarm.protocol.timing import LinkKind
 
 __all__ = ["LocalRun", "announced", "begun", "local_runs"]
-
 
 _LONGEST = 1 << 16
 """Bytes of a file: 1000 endpoints have room."""
@@ -137,12 +134,17 @@ def _write(file: Path, run: LocalRun) -> None:
     """The whole file at once, readable by this user alone."""
     handle, name = tempfile.mkstemp(dir=file.parent)  # made with mode 0600
     with os.fdopen(handle, "w", encoding="utf-8") as new:
-        new.write(dumps({field: getattr(run, field) for field in run.__slots__}))
+        new.write(dumps(asdict(run)))
     Path(name).rename(file)
 
 
 def _read(file: Path) -> LocalRun | None:
-    """What ``file`` tells; None if it is not this user's own, or tells nothing of the kind."""
+    """What ``file`` tells; None if it is not this user's own, or tells nothing of the kind.
+
+    What a later release tells besides is passed over.
+    """
+    from pydantic import TypeAdapter
+
     try:
         handle = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
@@ -152,38 +154,9 @@ def _read(file: Path) -> LocalRun | None:
         if not stat.S_ISREG(found.st_mode) or _not_private(found) is not None:
             return None
         try:
-            return _parsed(loads(opened.read(_LONGEST)))
-        except (ValueError, TypeError, KeyError, OSError, RecursionError):
+            return TypeAdapter(LocalRun).validate_json(opened.read(_LONGEST), strict=True)
+        except (ValueError, OSError):
             return None
-
-
-def _parsed(told: dict[str, Any]) -> LocalRun:
-    """One run; what a later release tells besides is passed over.
-
-    Raises:
-        KeyError: something is missing.
-        TypeError: something is of the wrong kind.
-        ValueError: it has a kind of link that is not known here.
-    """
-    keys = told["viewer_keys"], told["operator_keys"]
-    begun_, endpoints = told["begun"], tuple(told["endpoints"])
-    texts = (told["mission"], *endpoints, *(each for each in keys if each is not None))
-    flags = told["mesh"], told["unencrypted"]
-    numbers = (told["pid"], *([] if begun_ is None else [begun_]))
-    for kind, values in ((str, texts), (bool, flags), (int, numbers)):
-        if not all(type(value) is kind for value in values):
-            raise TypeError(f"a {kind.__name__} was expected among {values}")
-    return LocalRun(
-        pid=told["pid"],
-        begun=begun_,
-        mission=told["mission"],
-        mesh=told["mesh"],
-        endpoints=endpoints,
-        link=LinkKind(told["link"]),
-        viewer_keys=keys[0],
-        operator_keys=keys[1],
-        unencrypted=told["unencrypted"],
-    )
 
 
 def _lives(pid: int) -> bool:

@@ -1,7 +1,4 @@
-"""Loopback addresses for processes that are about to start.
-
-Leaves out: addresses of a real network, which the user names.
-"""
+"""Loopback addresses for processes that are about to start."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """What the runtime asks of a bus, whatever carries it.
 
-Leaves out: what is said (swarm.protocol) and how it travels (swarm.bus.memory,
-swarm.bus.zenoh_bus, sim.world.network). Every implementation passes tests/contract/.
-Keys and key expressions are those of swarm.bus.key_expressions.
+Every implementation passes tests/contract/ (swarm.bus.zenoh_bus, sim.world.network,
+tests.support.memory_bus). Keys and key expressions are those of swarm.bus.key_expressions.
 
 A bus hands everything that happens to one bounded `Inbox`, in order of arrival,
 from whichever thread; nothing of the runtime is ever called on a bus thread.
@@ -228,14 +227,12 @@ class Bus(Protocol):
     @property
     def inbox(self) -> Inbox:
         """Where everything arrives."""
-        ...
 
     @property
     def seal(self) -> Seal | None:
         """What the others believe whoever sits here by, and it them; None without keys.
 
         A bus carries what it is given: whoever sits there seals and unseals it."""
-        ...
 
     def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:
         """Send ``payload`` on ``key``; never waits for the network.
@@ -248,7 +245,6 @@ class Bus(Protocol):
             ValueError: ``key`` is not a concrete key, or ``payload`` is longer than
                 `MAX_PAYLOAD_BYTES`.
         """
-        ...
 
     def subscribe(self, key_expr: str, *, latest: bool = False) -> None:
         """Receive a `Sample` for everything others publish on ``key_expr``.
@@ -256,25 +252,21 @@ class Bus(Protocol):
         Own publications do not come back. ``latest`` keeps only the newest
         unread sample of each key.
         """
-        ...
 
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token on ``key`` until this process or its link ends.
 
         Two holders of one key look like one: it is gone when both are.
         """
-        ...
 
     def watch_tokens(self, key_expr: str) -> None:
         """Receive `TokenSeen` for tokens there are and will be, and `TokenGone`.
 
         Tokens on keys held by this bus itself are not told.
         """
-        ...
 
     def serve(self, key: str) -> None:
         """Receive a `Query` whenever somebody else asks on ``key``."""
-        ...
 
     async def query(
         self, key_expr: str, payload: bytes = b"", *, timeout_s: float
@@ -282,18 +274,11 @@ class Bus(Protocol):
         """Ask all others who serve a key matching ``key_expr``; never later than the timeout.
 
         Answers that came in time are returned, in order of arrival; whoever is too
-        late is left out.
-
-        Args:
-            key_expr: whom to ask.
-            payload: goes with the question, no longer than `MAX_PAYLOAD_BYTES`.
-            timeout_s: how long to wait for the slowest.
+        late is left out. ``payload`` is no longer than `MAX_PAYLOAD_BYTES`.
         """
-        ...
 
     def close(self) -> None:
         """Send what is published, undeclare everything and leave.
 
         Returns within a few seconds whatever the network.
         """
-        ...

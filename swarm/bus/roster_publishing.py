@@ -1,7 +1,6 @@
 """Changes who belongs to a mission while it flies: opens a seat, makes the change, and tells.
 
-The seat comes first, so that nothing is changed where nobody can be told. Leaves out: what is
-said and asked (swarm.identity.announcer).
+The seat comes first, so that nothing is changed where nobody can be told.
 """
 
 from __future__ import annotations

@@ -33,10 +33,8 @@ __all__ = ["RosterKeeper", "Router", "open_router"]
 
 LOOK_S = 1.0
 """How often the folder is looked into [wall s]."""
-
 TELL_S = 30.0
 """How often the roster is repeated on the bus [wall s]."""
-
 FLOOD_HZ, FLOOD_BURST = 500.0, 3000
 """What a UAV may say, samples and changes of its token together, before it is shut out; an honest
 one says some 10 a second, and up to 1000 at once when a partition heals."""
@@ -88,9 +86,7 @@ class RosterKeeper:
         A UAV alone: the coordinator's token is that of several machines. May be called on any
         thread.
 
-        Args:
-            entry: of the roster by which they were let in; None if they are not in it.
-            now_s: now.
+        thread. ``entry`` is that of the roster by which they were let in.
         """
         if entry is None or entry.role is not Role.UAV:
             return None
@@ -130,11 +126,7 @@ class RosterKeeper:
             self._log.debug("the roster cannot be read", problem=fault.strerror or str(fault))
 
     async def wait_for_change(self, tell: Callable[[str, bytes], None]) -> None:
-        """Return as soon as others are to be let in than the last time; repeats the roster.
-
-        Args:
-            tell: says something on a key.
-        """
+        """Return as soon as others are to be let in than the last time; ``tell`` the roster."""
         loop = asyncio.get_running_loop()
         tell_at_s = loop.time() + self._look_s  # those who were linked before are back by then
         while not self._changed.is_set():
@@ -169,11 +161,8 @@ class RosterKeeper:
 
 
 OPEN_LIMIT_S = 10.0
-
 CLOSE_LIMIT_S = 2.0
-
 INFO_LIMIT_S = 2.0
-
 AGAIN_S = 0.05
 """Between tries to listen where the session before has hardly left."""
 

@@ -2,8 +2,7 @@
 
 TLS refuses who has no certificate of the mission's authority, or an expired one; the door of a
 router who has one that is revoked. Zenoh only tells that there is no link: a TLS handshake of
-our own tells why. Leaves out: the keys themselves (swarm.identity), what is signed
-(swarm.protocol.seal), and what each may say (swarm.bus.access).
+our own tells why.
 """
 
 from __future__ import annotations
@@ -34,15 +33,11 @@ __all__ = ["accepts", "door_of", "secure", "secure_settings", "why_refused", "wi
 
 
 _TLS: Final = "transport/link/tls"
-
 _DOOR: Final = "transport/auth/usrpwd"
-
 SEATS_PER_IDENTITY: Final = 8
 """Sessions at once, such as that of an agent and those of commands on the same machine."""
-
 EXPIRES_SOON_S: Final = 86_400.0
 """Keys that expire sooner might do so in flight."""
-
 PENDING: Final = 100
 """Sessions that are being opened at once."""
 
@@ -150,14 +145,10 @@ def _require_server(identity: Identity) -> None:
 
 DIAL_S = 3.0
 """How long a connection may take [wall s]."""
-
 ALERT_S = 1.0
 """How long an alert may take after a handshake that succeeded [wall s]."""
-
 _TLS_ENDPOINT = re.compile(r"tls/(\[[^\]]+\]|[^:]+):(\d+)")
-
 _TCP_ENDPOINT = re.compile(r"tcp/(\[[^\]]+\]|[^:]+):(\d+)")
-
 _NOT_YET_VALID, _EXPIRED = 9, 10
 """Verdicts on a certificate (OpenSSL, X509_V_ERR_…)."""
 
@@ -165,9 +156,7 @@ _NOT_YET_VALID, _EXPIRED = 9, 10
 async def why_refused(endpoints: Sequence[str], identity: Identity) -> str:
     """The likeliest reason, in words; of the first endpoint that somebody listens at.
 
-    Args:
-        endpoints: of routers, which a session could not be opened with.
-        identity: of the session.
+    ``endpoints`` are those of routers, which a session of ``identity`` could not be opened with.
     """
     if unix_s() > identity.not_after_s:
         return f"the own certificate expired on {shown_time(identity.not_after_s)}"
@@ -185,10 +174,8 @@ async def why_refused(endpoints: Sequence[str], identity: Identity) -> str:
 
 
 async def with_keys_only(endpoints: Sequence[str]) -> str:
-    """Why a process without keys is not let in, in words; empty if it is not for that.
-
-    Args:
-        endpoints: of routers, which a session could not be opened with.
+    """Why a process without keys is not let in by the routers at ``endpoints``, in words; empty if
+    it is not for that.
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname = False

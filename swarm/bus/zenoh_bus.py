@@ -4,8 +4,7 @@ All calls into Zenoh are made by one writer thread, since a congested or dead ne
 makes them wait for half a second per link; all that comes back arrives on Zenoh's
 threads and goes straight to the inbox. Callbacks are direct: an indirect one has a
 Python thread of its own that keeps the process from exiting while a session hangs,
-and is no faster into asyncio (measured). Leaves out: the session's configuration
-(swarm.bus.zenoh_session).
+and is no faster into asyncio (measured).
 """
 
 from __future__ import annotations
@@ -95,31 +94,22 @@ async def open_zenoh_bus(
 
 async def _open(config: BusConfig, timeout_s: float) -> zenoh.Session:
     settings, identity = _zenoh_config(config), config.identity
-    if identity is None:
-        return await _open_without_keys(settings, timeout_s)
-    # Loaded by those alone that have keys.
-    from swarm.bus.tls import secure, why_refused
-
     mode = mode_of(settings)
-    secure(settings, identity, mode, identity.roster)
+    if identity is not None:  # the others need not load this
+        from swarm.bus.tls import secure
+
+        secure(settings, identity, mode, identity.roster)
     try:
         return await open_session(settings, timeout_s=timeout_s)
     except BusError as fault:
+        from swarm.bus.tls import why_refused, with_keys_only
+
         routers = endpoints_of(settings, "connect")
         if mode != "client" or not routers:
             raise
-        reason = await why_refused(routers, identity)
-        raise BusError(f"cannot reach the bus within {timeout_s:g} s: {reason}") from fault
-
-
-async def _open_without_keys(settings: zenoh.Config, timeout_s: float) -> zenoh.Session:
-    try:
-        return await open_session(settings, timeout_s=timeout_s)
-    except BusError as fault:
-        from swarm.bus.tls import with_keys_only
-
-        reason = await with_keys_only(endpoints_of(settings, "connect"))
-        if mode_of(settings) != "client" or not reason:
+        if identity is not None:
+            reason = await why_refused(routers, identity)
+        elif not (reason := await with_keys_only(routers)):
             raise
         raise BusError(f"cannot reach the bus within {timeout_s:g} s: {reason}") from fault
 
