@@ -9,7 +9,7 @@ help (swarm.runtime.console).
 Exit status: 0 done; 1 the mission or check failed, or an error at run time;
 2 wrong usage or input, one line each on standard error; 130 interrupted. An
 unexpected exception leaves `main` as it is, so that the interpreter ends with
-its traceback and 1. Leaves out: every subcommand.
+its traceback and 1.
 """
 
 from __future__ import annotations
@@ -52,14 +52,11 @@ Examples:
 def main(
     argv: Sequence[str] | None = None, commands: Mapping[str, EntryPoint] | None = None
 ) -> int:
-    """Run one command line and say how it ended.
+    """Run one command line and say how it ended, by its exit status.
 
     Args:
         argv: arguments after ``swarm``; those of this process if None.
         commands: subcommands by name; the installed ones if None.
-
-    Returns:
-        The exit status.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     found = _installed_commands() if commands is None else commands
@@ -91,11 +88,8 @@ def main(
 def check(arguments: Sequence[str]) -> Mapping[str, Any]:
     """See whether a command line is right, by the very command it is for; nothing is begun.
 
-    Args:
-        arguments: after ``swarm``, of a command that has ``--check``.
-
-    Returns:
-        What every parameter of the command comes to, defaults included.
+    ``arguments`` are those after ``swarm``, of a command that has ``--check``. Gives what every
+    parameter of the command comes to, defaults included.
 
     Raises:
         InputError: something is wrong with it.

@@ -3,7 +3,7 @@
 Missions and plans are data of this package; planning, flying and recordings are not. So a
 function that needs an upper package finds it by an entry point of the group
 ``peckorder.interface``, as `swarm.cli` finds its commands: nothing here imports upwards, and
-everything is imported when it is called. Leaves out: how anything is done.
+everything is imported when it is called.
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ __all__ = [
     "read_recording",
     "simulate",
 ]
-
 
 INTERFACE_GROUP = "peckorder.interface"
 

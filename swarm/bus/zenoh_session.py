@@ -32,19 +32,13 @@ __all__ = [
 
 OPEN_TIMEOUT_S = 2.0
 """How long an endpoint that does not answer delays the next one; a bad link needs about 1 s."""
-
 KEEP_ALIVES_PER_LEASE = 4
-
 RECONNECT_FIRST_S = 0.1
-
 RECONNECT_SLOWEST_S = 0.5
-
 BLOCKED_CLOSE_S = 0.5
 """A link whose queue does not move for this long is closed, so that one hung reader holds
 the others up no longer."""
-
 HEADERS_BYTES = 64 << 10
-
 DEFAULT_MODE = "peer"
 """Of a Zenoh configuration file that names none."""
 

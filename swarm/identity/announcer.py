@@ -3,7 +3,7 @@
 A core: it says the roster, asks everyone what they know, and goes by the answers: who has the
 same roster leaves it out of its answer, who has another one tells it. It ends when everyone
 whose token was seen has it, or when its patience does. Routers, viewers and whoever is out of
-reach confirm nothing. Leaves out: the seat on the bus (swarm.bus.roster_publishing).
+reach confirm nothing.
 """
 
 from __future__ import annotations

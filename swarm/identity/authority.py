@@ -12,7 +12,7 @@
 Every change writes in that order what it touches: generations are used up first and the
 roster is in force before a folder is handed out, so that whatever interrupts it, no two
 certificates bear one name and no two rosters one version; the same command again mends the
-rest. Leaves out: the command line (swarm.identity.cli).
+rest.
 """
 
 from __future__ import annotations
@@ -81,20 +81,17 @@ __all__ = [
 
 
 MAVLINK_TABLE_FILE: Final = "mavlink-keys.csv"
-
 DAY_S: Final = 86_400
 EARLY_S: Final = DAY_S
 """How far a certificate's beginning lies back, for machines whose clocks are behind."""
 _RESTORE: Final = "put a copy of the authority's folder back"
-_OWN_FILES: Final = frozenset(
-    {
-        AUTHORITY_KEY_FILE,
-        AUTHORITY_FILE,
-        DOOR_KEY_FILE,
-        ISSUED_FILE,
-        ROSTER_FILE,
-        MAVLINK_TABLE_FILE,
-    }
+_OWN_FILES: Final = (
+    AUTHORITY_KEY_FILE,
+    AUTHORITY_FILE,
+    DOOR_KEY_FILE,
+    ISSUED_FILE,
+    ROSTER_FILE,
+    MAVLINK_TABLE_FILE,
 )
 
 
@@ -157,15 +154,13 @@ class Authority:
     ) -> Roster:
         """Give each of ``names`` a certificate of the next generation, in a folder of its own.
 
-        A UAV keeps its MAVLink key, unless it was revoked since it got that.
+        Those in force get a new one in place of the old. A UAV keeps its MAVLink key, unless it was
+        revoked since it got that. Gives the roster now in force.
 
         Args:
-            names: role by name; those in force get a new certificate in place of the old.
+            names: role by name.
             now_s: wall time [unix s].
             days: how long they are valid; the authority's own custom if None.
-
-        Returns:
-            The roster now in force.
 
         Raises:
             InputError: a name is no use, or had another role before.
@@ -315,11 +310,9 @@ class Authority:
 
     def _read(self) -> tuple[Ledger, Roster]:
         """What changes."""
-        directory = self.directory
-        ledger = decoded(directory / ISSUED_FILE, decode_ledger, _RESTORE)
-        roster = decoded(
-            directory / ROSTER_FILE, lambda data: decode_roster(data, self.public_key), _RESTORE
-        )
+        ledger = decoded(self.directory / ISSUED_FILE, decode_ledger, _RESTORE)
+        path = self.directory / ROSTER_FILE
+        roster = decoded(path, lambda data: decode_roster(data, self.public_key), _RESTORE)
         return ledger, roster
 
     def _write_ledger(self, ledger: Ledger) -> None:

@@ -3,7 +3,6 @@
 All keys are Ed25519. Who may be dialled (a router, or everyone of a mesh) gets serverAuth
 besides clientAuth, so that nobody else can pass for a router. Names of machines are not
 certified: addresses change, and a mission's authority issues to nobody but the fleet.
-Leaves out: files (swarm.identity.folder), and who gets what (swarm.identity.authority).
 """
 
 from __future__ import annotations
@@ -62,16 +61,10 @@ def issue_certificate(
     not_after_s: int,
     server: bool,
 ) -> x509.Certificate:
-    """A certificate for the holder of ``public_key``.
+    """A certificate of ``authority`` for the holder of ``public_key``.
 
-    Args:
-        authority: certificate of the issuer.
-        authority_key: its key.
-        public_key: whom it is for.
-        common_name: ``<name>@<generation>``; at most 64 characters.
-        not_before_s: from when it is valid [unix s].
-        not_after_s: until when [unix s].
-        server: whether others may dial it.
+    ``common_name`` is ``<name>@<generation>``, of at most 64 characters; ``server`` is whether
+    others may dial it. Instants are in unix s.
     """
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
     usages = [ExtendedKeyUsageOID.CLIENT_AUTH]
@@ -134,11 +127,7 @@ def key_pem(key: Ed25519PrivateKey) -> bytes:
 
 
 def read_certificate(data: bytes) -> x509.Certificate:
-    """The certificate in ``data``.
-
-    Raises:
-        ValueError: there is none.
-    """
+    """The certificate in ``data``; ValueError if there is none."""
     try:
         return x509.load_pem_x509_certificate(data)
     except ValueError:
@@ -146,11 +135,7 @@ def read_certificate(data: bytes) -> x509.Certificate:
 
 
 def read_key(data: bytes) -> Ed25519PrivateKey:
-    """The private key in ``data``.
-
-    Raises:
-        ValueError: there is none, or one of another kind.
-    """
+    """The private key in ``data``; ValueError if there is none, or one of another kind."""
     try:
         key = serialization.load_pem_private_key(data, None)
     except (ValueError, TypeError):  # the reason might quote the key

@@ -1,8 +1,4 @@
-"""Changes an authority's folder and, if it is told where, a running fleet along with it.
-
-Leaves out: the options (swarm.identity.cli), and the seat on the bus
-(swarm.bus.roster_publishing).
-"""
+"""Changes an authority's folder and, if it is told where, a running fleet along with it."""
 
 from __future__ import annotations
 
@@ -79,17 +75,9 @@ def enact(
     names: Collection[str],
     publish: Publish = _publish,
 ) -> str:
-    """Make a change of ``names``, and tell the fleet if there is one to be told.
+    """Make ``change`` of ``names``, and tell the ``fleet`` if there is one to be told.
 
-    Args:
-        authority: whose folder is changed.
-        change: makes it.
-        fleet: where it is told.
-        names: whose keys change.
-        publish: tells it; see `swarm.bus.roster_publishing.publish`.
-
-    Returns:
-        A line about who knows of it.
+    ``publish`` tells it: `swarm.bus.roster_publishing.publish`. Gives a line about who knows of it.
 
     Raises:
         InputError: it cannot be made, or told.

@@ -1,8 +1,4 @@
-"""The commands `swarm keys init`, `add`, `revoke`, `renew`, `publish` and `list`.
-
-Leaves out: what they do (swarm.identity.founding, swarm.identity.authority), and telling a
-running fleet (swarm.bus.roster_publishing).
-"""
+"""The commands `swarm keys init`, `add`, `revoke`, `renew`, `publish` and `list`."""
 
 from __future__ import annotations
 

@@ -9,8 +9,6 @@
     roster.json                    who belongs to the mission; replaced by newer ones
     door.key                       routers only: by which they know everyone's password
     mavlink.key                    UAVs only: the key of the link to the autopilot
-
-Leaves out: making what is in there (swarm.identity.authority).
 """
 
 from __future__ import annotations
@@ -108,10 +106,7 @@ class Identity:
         return self.folder / MAVLINK_KEY_FILE if self.role is Role.UAV else None
 
     def keep_roster(self, data: bytes) -> Roster:
-        """Put the roster ``data`` into the folder, unless a newer one is there.
-
-        Returns:
-            The roster in ``data``.
+        """Put the roster ``data``, which it gives, into the folder, unless a newer one is there.
 
         Raises:
             ValueError: it is not a roster of this mission, signed by its authority.
@@ -149,35 +144,31 @@ def load_identity(
         InputError: something is missing, open to others, damaged, expired, not valid yet,
             revoked, or not what it must be.
     """
-    from swarm.identity.certificates import (
-        common_name_of,
-        issued_by,
-        public_bytes,
-        read_certificate,
-        read_key,
-    )
+    from swarm.identity import certificates as pem
 
     label = _label(path)
     is_name, role = str(label["name"]), Role(label["role"])
     _require(path, label, name=name, roles=roles, mission=mission)
-    authority = decoded(path / AUTHORITY_FILE, read_certificate, _REINSTALL)
-    certificate = decoded(path / CERTIFICATE_FILE, read_certificate, _REINSTALL)
-    if not issued_by(certificate, authority):
+    authority = decoded(path / AUTHORITY_FILE, pem.read_certificate, _REINSTALL)
+    certificate = decoded(path / CERTIFICATE_FILE, pem.read_certificate, _REINSTALL)
+    if not pem.issued_by(certificate, authority):
         raise _fault(path / CERTIFICATE_FILE, f"is not issued by the {AUTHORITY_FILE} beside it")
+    not_after_s = int(certificate.not_valid_after_utc.timestamp())
     _require_time(
         path / CERTIFICATE_FILE,
         int(certificate.not_valid_before_utc.timestamp()),
-        int(certificate.not_valid_after_utc.timestamp()),
+        not_after_s,
         unix_s() if now_s is None else now_s,
         is_name,
     )
-    key = decoded(path / PRIVATE_KEY_FILE, read_key, _REINSTALL, secret=True)
-    authority_public_key = checked(path / AUTHORITY_FILE, public_bytes, authority, _REINSTALL)
-    if public_bytes(key) != checked(path / CERTIFICATE_FILE, public_bytes, certificate, _REINSTALL):
+    key = decoded(path / PRIVATE_KEY_FILE, pem.read_key, _REINSTALL, secret=True)
+    public_key = checked(path / AUTHORITY_FILE, pem.public_bytes, authority, _REINSTALL)
+    certified = checked(path / CERTIFICATE_FILE, pem.public_bytes, certificate, _REINSTALL)
+    if pem.public_bytes(key) != certified:
         raise _fault(path / PRIVATE_KEY_FILE, f"is not the key of the {CERTIFICATE_FILE} beside it")
     roster = decoded(
         path / ROSTER_FILE,
-        lambda data: _decode_roster(data, authority_public_key, str(label["mission"])),
+        lambda data: _decode_roster(data, public_key, str(label["mission"])),
         _REINSTALL,
     )
     identity = Identity(
@@ -186,8 +177,8 @@ def load_identity(
         role=role,
         generation=int(label["generation"]),
         mission=str(label["mission"]),
-        not_after_s=int(certificate.not_valid_after_utc.timestamp()),
-        authority_public_key=authority_public_key,
+        not_after_s=not_after_s,
+        authority_public_key=public_key,
         roster=roster,
         private_key=key,
         password=decoded(path / DOOR_PASSWORD_FILE, _hex_text, _REINSTALL, secret=True),
@@ -195,10 +186,10 @@ def load_identity(
         if role is Role.ROUTER
         else None,
     )
-    if common_name_of(certificate) != identity.common_name:
-        problem = f"is for {common_name_of(certificate)!r}, {IDENTITY_FILE} for"
+    if (common_name := pem.common_name_of(certificate)) != identity.common_name:
+        problem = f"is for {common_name!r}, {IDENTITY_FILE} for"
         raise _fault(path / CERTIFICATE_FILE, f"{problem} {identity.common_name!r}")
-    _require_in_force(identity, public_bytes(key))
+    _require_in_force(identity, certified)
     if identity.mavlink_key_path is not None:
         read_private(identity.mavlink_key_path, _REINSTALL)
     return identity

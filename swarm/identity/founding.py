@@ -1,7 +1,4 @@
-"""Founds the authority of a mission, with an identity for everyone of the fleet.
-
-Leaves out: what becomes of it later (swarm.identity.authority).
-"""
+"""Founds the authority of a mission, with an identity for everyone of the fleet."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ from swarm.identity.authority import (
 from swarm.identity.folder import AUTHORITY_FILE, AUTHORITY_KEY_FILE, DOOR_KEY_FILE, ROSTER_FILE
 from swarm.identity.ledger import ISSUED_FILE, Ledger, encode_ledger
 from swarm.identity.private_files import make_private_folder, write_private
-from swarm.identity.roster import SERIES_BYTES, Roster, encode_roster, fleet_names
+from swarm.identity.roster import SERIES_BYTES, Role, Roster, encode_roster, fleet_names
 from swarm.identity.shared_secrets import encode_table
 from swarm.runtime.errors import Fault, InputError
 
@@ -56,10 +53,10 @@ def found_authority(
         mission: name of the mission.
         uavs: ids.
         now_s: wall time [unix s].
-        coordinators: how many, each for a machine of its own.
-        routers: likewise.
-        dashboards: viewers, likewise.
-        operators: likewise.
+        coordinators: how many, each for a machine of its own, as of the others.
+        routers: how many.
+        dashboards: how many viewers.
+        operators: how many.
         days: how long certificates are valid.
         mesh: whether all shall be dialled, not only routers.
 
@@ -69,14 +66,14 @@ def found_authority(
     """
     remedy = "name the UAV otherwise in the scenario"
     ledger = Ledger(mission, max(1, round(days)), mesh, {})
+    counts = {
+        Role.COORDINATOR: coordinators,
+        Role.ROUTER: routers,
+        Role.VIEWER: dashboards,
+        Role.OPERATOR: operators,
+    }
     try:
-        names = fleet_names(
-            uavs,
-            coordinators=coordinators,
-            routers=routers,
-            dashboards=dashboards,
-            operators=operators,
-        )
+        names = fleet_names(uavs, counts)
     except ValueError as fault:
         raise InputError(Fault(mission, "", str(fault), remedy)) from None
     require_fit(names, ledger, mission, remedy)

@@ -1,7 +1,6 @@
 """What an authority remembers of all names it ever issued for: role and newest generation.
 
 So the certificate that follows a revoked one bears another name. It holds no secrets.
-Leaves out: who is in force, which the roster says.
 """
 
 from __future__ import annotations
@@ -62,18 +61,14 @@ class Ledger:
 
 def encode_ledger(ledger: Ledger) -> bytes:
     """As text for people, one name a line."""
-    head = {
-        "format": _FORMAT,
-        "mission": ledger.mission,
-        "days": ledger.days,
-        "mesh": ledger.mesh,
-    }
+    days, mesh = json.dumps(ledger.days), json.dumps(ledger.mesh)
     issued = ",\n  ".join(
         f"{json.dumps(name)}: {json.dumps([str(each.role), each.generation])}"
         for name, each in sorted(ledger.issued.items())
     )
-    lines = "".join(f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in head.items())
-    return f'{{\n{lines} "issued": {{\n  {issued}\n }}\n}}\n'.encode("ascii")
+    head = f' "format": {json.dumps(_FORMAT)},\n "mission": {json.dumps(ledger.mission)},\n'
+    text = f'{{\n{head} "days": {days},\n "mesh": {mesh},\n "issued": {{\n  {issued}\n }}\n}}\n'
+    return text.encode("ascii")
 
 
 def decode_ledger(data: bytes) -> Ledger:

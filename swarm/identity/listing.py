@@ -1,6 +1,6 @@
 """Who has which keys, until when, and what needs attention: as rows, a table or JSON.
 
-It reads and shows nothing secret. Leaves out: changing anything (swarm.identity.authority).
+It reads and shows nothing secret.
 """
 
 from __future__ import annotations
@@ -10,16 +10,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from swarm.identity.folder import AUTHORITY_FILE, ROSTER_FILE
 from swarm.identity.ledger import ISSUED_FILE, Issued, decode_ledger
 from swarm.identity.private_files import checked, decoded
 from swarm.identity.roster import Role, Roster, decode_roster
 from swarm.runtime.errors import Fault, InputError
-
-if TYPE_CHECKING:
-    from rich.table import Table
+from swarm.runtime.table import Column, ResultTable
 
 __all__ = [
     "SOON_DAYS",
@@ -106,18 +104,19 @@ def listing_rows(roster: Roster, issued: Mapping[str, Issued], now_s: float) -> 
     return sorted(rows, key=lambda row: (roles.index(row.role), len(row.name), row.name))
 
 
-def listing_table(rows: list[IdentityRow]) -> Table:
+def listing_table(rows: list[IdentityRow]) -> ResultTable:
     """The rows for a terminal."""
-    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for title in ("name", "role", "generation", "expires", ""):
-        table.add_column(title, justify="right" if title == "generation" else "left", no_wrap=True)
+    titles = ("name", "role", "generation", "expires", "")
+    columns = [Column(title, words=title != "generation") for title in titles]
+    cells = []
     for row in rows:
-        style = {"expired": "red", "expires soon": "yellow", "revoked": "dim"}.get(row.state)
+        style = {"expired": "red", "expires soon": "yellow", "revoked": "dim"}.get(row.state, "")
         ends = "" if row.not_after_s is None else _date(row.not_after_s)
-        table.add_row(row.name, row.role, str(row.generation), ends, _words(row), style=style)
-    return table
+        words = (row.name, row.role, str(row.generation), ends, _words(row))
+        cells.append([Text(word, style) for word in words])
+    return ResultTable(columns, cells)
 
 
 def attention(rows: list[IdentityRow], folder: str) -> str | None:
@@ -136,21 +135,12 @@ def attention(rows: list[IdentityRow], folder: str) -> str | None:
 
 def listing_as_json(roster: Roster, rows: list[IdentityRow]) -> dict[str, Any]:
     """The same for programs."""
+    keys = ("name", "role", "generation", "state", "not_after_s", "days_left")
     return {
         "mission": roster.mission,
         "series": roster.series.hex(),
         "version": roster.version,
-        "identities": [
-            {
-                "name": row.name,
-                "role": str(row.role),
-                "generation": row.generation,
-                "state": row.state,
-                "not_after_s": row.not_after_s,
-                "days_left": row.days_left,
-            }
-            for row in rows
-        ],
+        "identities": [{key: getattr(row, key) for key in keys} for row in rows],
     }
 
 

@@ -30,26 +30,17 @@ __all__ = [
 
 
 _FILE_MODE = 0o600
-
 _FOLDER_MODE = 0o700
 
 
 def make_private_folder(path: Path) -> None:
-    """Make the folder ``path``; those above it must be there.
-
-    Raises:
-        OSError: it cannot be made, or is there already.
-    """
+    """Make the folder ``path``; those above it must be there."""
     path.mkdir(mode=_FOLDER_MODE)
     path.chmod(_FOLDER_MODE)
 
 
 def write_private(path: Path, data: bytes) -> None:
-    """Make the file ``path``; it may be empty after a loss of power.
-
-    Raises:
-        OSError: it cannot be made, or is there already.
-    """
+    """Make the file ``path``; it may be empty after a loss of power."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
     with os.fdopen(os.open(path, flags, _FILE_MODE), "wb") as file:
         os.fchmod(file.fileno(), _FILE_MODE)
@@ -57,11 +48,7 @@ def write_private(path: Path, data: bytes) -> None:
 
 
 def replace_private(path: Path, data: bytes) -> None:
-    """Put ``data`` in the place of the file ``path``: whole or not at all.
-
-    Raises:
-        OSError: it cannot be written.
-    """
+    """Put ``data`` in the place of the file ``path``: whole or not at all."""
     draft = _beside(path)
     try:
         write_private(draft, data)
@@ -78,9 +65,6 @@ def swap_in_folder(path: Path, files: dict[str, bytes]) -> None:
     """Put a private folder with ``files`` in the place of ``path``, which need not be there.
 
     After a loss of power it may be the old one, or hold empty files.
-
-    Raises:
-        OSError: it cannot be written.
     """
     draft, old = _beside(path), _beside(path)
     make_private_folder(draft)
@@ -111,10 +95,7 @@ def sync(path: Path) -> None:
 
 
 T = TypeVar("T")
-
 U = TypeVar("U")
-
-
 _LONGEST_FILE_BYTES: Final = 1 << 22
 
 
@@ -134,11 +115,7 @@ def decoded(path: Path, decode: Callable[[bytes], T], remedy: str, *, secret: bo
 
 
 def read_private(path: Path, remedy: str) -> bytes:
-    """What is in a file that nobody else may be able to read.
-
-    Raises:
-        InputError: it cannot be read, or is open to others.
-    """
+    """What is in a file that nobody else may be able to read; raises as `decoded` does."""
     return _read_file(path, remedy, secret=True)
 
 

@@ -6,15 +6,13 @@ and public key; who was revoked is not in it. It travels as bytes, on the bus an
     {"signature":"<128 hex digits>","roster":{"format":"peckorder roster 1",…}}
 
 The signature is that of the authority over a context of its own and the exact bytes of the
-inner object; it is checked before anything inside is read. Leaves out: the authority that
-makes rosters (swarm.identity.authority) and what follows from a role on the bus
-(swarm.bus.access, swarm.protocol.seal).
+inner object; it is checked before anything inside is read.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import pairwise
@@ -68,20 +66,12 @@ def numbered(first: str, count: int) -> Iterator[str]:
         yield first if number == 1 else f"{first}-{number}"
 
 
-def fleet_names(
-    uavs: Sequence[str], *, coordinators: int, routers: int, dashboards: int, operators: int
-) -> dict[str, Role]:
-    """Role by name of a whole fleet.
+def fleet_names(uavs: Sequence[str], counts: Mapping[Role, int]) -> dict[str, Role]:
+    """Role by name of a whole fleet, of which there are so many of each role but UAVs.
 
     Raises:
         ValueError: two of them would have one name.
     """
-    counts = {
-        Role.COORDINATOR: coordinators,
-        Role.ROUTER: routers,
-        Role.VIEWER: dashboards,
-        Role.OPERATOR: operators,
-    }
     names = dict.fromkeys(uavs, Role.UAV)
     if len(names) != len(uavs):
         raise ValueError("UAV ids must differ")
@@ -94,29 +84,17 @@ def fleet_names(
 
 
 KEY_BYTES: Final = 32
-
 SERIES_BYTES: Final = 16
-
 LONGEST_COMMON_NAME: Final = 64
 """Characters that X.509 allows (RFC 5280, ub-common-name)."""
-
 LONGEST_ROSTER_BYTES: Final = 1 << 20
-
-
 _FORMAT: Final = "peckorder roster 1"
-
 _CONTEXT: Final = b"peckorder roster 1\n"
-
 _SIGNATURE_BYTES: Final = 64
-
 _BEFORE: Final = b'{"signature":"'
-
 _BETWEEN: Final = b'","roster":'
-
 _AFTER: Final = b"}\n"
-
 _ROSTER_AT: Final = len(_BEFORE) + 2 * _SIGNATURE_BYTES + len(_BETWEEN)
-
 _NEWEST_S: Final = 1 << 40
 
 
@@ -226,14 +204,10 @@ def encode_roster(roster: Roster, authority: Ed25519PrivateKey) -> bytes:
 
 
 def decode_roster(data: bytes, authority_public_key: bytes) -> Roster:
-    """The roster in ``data``.
-
-    Args:
-        data: as `encode_roster` made it.
-        authority_public_key: Ed25519, 32 bytes; whose signature it must bear.
+    """The roster in ``data``, as `encode_roster` made it.
 
     Raises:
-        ValueError: it is no roster, or not signed by that authority.
+        ValueError: it is no roster, or not signed by the authority of that Ed25519 key.
     """
     inner = _verified(data, authority_public_key)
     try:

@@ -42,9 +42,7 @@ def door_dictionary(roster: Roster, door_secret: bytes) -> dict[str, str]:
 
 
 _COLUMNS = ["uav", "pass_phrase", "key"]
-
 _LETTERS = string.ascii_letters + string.digits
-
 _PHRASE_LETTERS = 32
 
 

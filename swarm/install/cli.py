@@ -1,7 +1,4 @@
-"""The commands `swarm install agent`, `coordinator`, `router` and `dashboard`.
-
-Leaves out: what is installed (swarm.install.installation), and how (swarm.install.machine).
-"""
+"""The commands `swarm install agent`, `coordinator`, `router` and `dashboard`."""
 
 from __future__ import annotations
 

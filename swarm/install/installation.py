@@ -1,7 +1,6 @@
 """What a service needs on a machine: its files, and the command line it is started by.
 
-The options are kept in a file that systemd reads. Leaves out: putting it there
-(swarm.install.machine).
+The options are kept in a file that systemd reads.
 """
 
 from __future__ import annotations
@@ -52,11 +51,8 @@ __all__ = [
 
 
 VARIABLE: Final = "SWARM_OPTIONS"
-
 _LINE = re.compile(rf"^{VARIABLE}=((?:.*\\\n)*.*)$", re.MULTILINE)
-
 _ESCAPED = re.compile(r'([\\"`$])')
-
 _UNESCAPED = re.compile(r'\\([\\"`$])')
 
 
@@ -73,12 +69,10 @@ def option_value(words: Sequence[str], option: str) -> str | None:
 def replaced(words: Sequence[str], option: str, value: str) -> list[str]:
     """The command line with another value of ``option``, which is added if it is not there."""
     kept: list[str] = []
-    skip = False
-    for word in words:
-        if skip:
-            skip = False
-        elif word == option:
-            skip = True
+    left = iter(words)
+    for word in left:
+        if word == option:
+            next(left, None)
         elif not word.startswith(f"{option}="):
             kept.append(word)
     return [*kept, option, value]
@@ -129,11 +123,8 @@ _KEY_FILES: Final = (
 )
 
 _OPEN, _PRIVATE = 0o644, 0o600
-
 _LOWEST_PORT = 1024
-
 _SERIAL_CLASSES: Final = ("ttyACM", "ttyUSB", "ttyAMA", "ttyS")
-
 _LONGEST_BYTES = 1 << 20
 
 

@@ -2,8 +2,7 @@
 
 A file is written beside its place and renamed into it, and left alone when it is right
 already. What is below the state's folder belongs to the services: a link that one of them has
-put there is not followed, or it could have any file of the machine given to it. Leaves out:
-what has to be there (swarm.install.installation).
+put there is not followed, or it could have any file of the machine given to it.
 """
 
 from __future__ import annotations

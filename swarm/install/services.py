@@ -1,7 +1,6 @@
 """What of each kind of process goes where: unit, user, folders, and options that name files.
 
-The units themselves lie in ``units/``. Leaves out: putting anything there
-(swarm.install.installation).
+The units themselves lie in ``units/``.
 """
 
 from __future__ import annotations
@@ -58,7 +57,8 @@ class ServiceKind:
     @property
     def unit_file(self) -> str:
         """The unit's file."""
-        return f"peckorder-{self.command}{'@' if self.per_uav else ''}.service"
+        at = "@" if self.per_uav else ""
+        return f"peckorder-{self.command}{at}.service"
 
 
 KINDS: Final[Mapping[str, ServiceKind]] = {
@@ -72,10 +72,7 @@ KINDS: Final[Mapping[str, ServiceKind]] = {
             settings={"--bus": ".json5"},
         ),
         ServiceKind(
-            "coordinator",
-            has_state=True,
-            starts_at_boot=False,
-            settings={"--bus": ".json5"},
+            "coordinator", has_state=True, starts_at_boot=False, settings={"--bus": ".json5"}
         ),
         ServiceKind("router", settings={"--config": ".json5"}),
         ServiceKind("dashboard", secrets={"--token-file": "token"}, settings={"--bus": ".json5"}),

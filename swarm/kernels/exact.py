@@ -1,7 +1,4 @@
-"""The exact optimum of eq. 1 by dynamic programming over subsets.
-
-Leaves out: the clock, which is the caller's.
-"""
+"""The exact optimum of eq. 1 by dynamic programming over subsets."""
 
 from __future__ import annotations
 

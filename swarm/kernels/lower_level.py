@@ -1,7 +1,9 @@
 """Decisions of UAVs, one by one, as whole runs of Fig. 1, and for many sequences at once.
 
-A UAV that is free at infinity takes no decision. Leaves out: rules that are not compiled
-(`swarm.allocation.lower_level` runs any) and the search for a sequence.
+A UAV that is free at infinity takes no decision. In what follows ``team`` says where the team
+stands and is left unchanged, a rank is a (n_uav,) place of each UAV in the priority sequence, of
+which the smaller decides first, and ``should_stop`` is asked every few milliseconds. A wrong shape
+or number raises a ValueError that names its argument.
 """
 
 from __future__ import annotations
@@ -84,14 +86,7 @@ def decide(problem: KernelProblem, team: Team, uav: int, rule: RuleCode) -> Fiel
     Ties go to the smaller task index. The certificate is Theorem 5's. Lookahead beyond
     `EXACT_TASKS` tasks is a beam search with local search, and then not exact unless certified.
 
-    Args:
-        problem: the prepared mission.
-        team: where the team stands; only the row of ``uav`` and the open tasks are read.
-        uav: index of the deciding UAV.
-        rule: `GREEDY` or `LOOKAHEAD`.
-
-    Raises:
-        ValueError: names the argument whose shape or numbers are wrong.
+    Of ``team`` only the row of ``uav`` and the open tasks are read.
     """
     try:
         return _kernels.decide(
@@ -106,19 +101,8 @@ def valued(
 ) -> list[tuple[int, float]]:
     """What ``rule`` makes of the tasks that `decide` chooses from [value·s].
 
-    Args:
-        problem: the prepared mission.
-        team: as for `decide`.
-        uav: index of the deciding UAV.
-        rule: `GREEDY` or `LOOKAHEAD`.
-        most: so many tasks at the most; >= 1.
-
-    Returns:
-        Tasks and their scores, the one that `decide` takes first, then the others from the best on.
-        Lookahead beyond `EXACT_TASKS` tasks values that one alone.
-
-    Raises:
-        ValueError: names the argument whose shape or numbers are wrong.
+    Gives at most ``most`` tasks and their scores, the one that `decide` takes first, then the
+    others from the best on. Lookahead beyond `EXACT_TASKS` tasks values that one alone.
     """
     return _kernels.valued(problem, *_converted(team)[:4], uav, rule, most)
 
@@ -130,20 +114,10 @@ def run(
     rule: RuleCode,
     should_stop: Callable[[], bool] | None = None,
 ) -> tuple[_Ints, _Ints, _Floats, _Floats]:
-    """All decisions of Fig. 1 from ``team`` on, in order.
-
-    Args:
-        problem: the prepared mission.
-        team: where the team stands; left unchanged.
-        rank: (n_uav,) place of each UAV in the priority sequence; smaller decides first.
-        rule: `GREEDY` or `LOOKAHEAD`.
-        should_stop: asked every few milliseconds; once it says so the decisions left are greedy.
+    """All decisions of Fig. 1 from ``team`` on, in order; once it is to stop, greedy ones.
 
     Returns:
         (k,) UAVs, (k,) the tasks they take, (k,) completion times [s], (k,) scores [value·s].
-
-    Raises:
-        ValueError: names the argument whose shape or numbers are wrong.
     """
     ranks = converted("rank", rank, np.int64, 1)
     return _kernels.run(problem, *_converted(team), ranks, rule, should_stop)
@@ -156,22 +130,7 @@ def evaluate_sequences(
     rule: RuleCode,
     threads: int | None = None,
 ) -> tuple[_Floats, _Bools]:
-    """J of the lower level for many priority sequences; the same with any number of threads.
-
-    Args:
-        problem: the prepared mission.
-        team: where the team stands; left unchanged.
-        ranks: (k, n_uav) a row for every sequence, as for `run`.
-        rule: `GREEDY` or `LOOKAHEAD`.
-        threads: how many work at it; as many as there are processors when None.
-
-    Returns:
-        (k,) Σ of eq. 1 over the decisions taken, added in their order [value·s], and (k,) whether
-        the sequence mattered after the first round: two UAVs were free at the same time later.
-
-    Raises:
-        ValueError: names the argument whose shape or numbers are wrong.
-    """
+    """`Runs.objective` and `Runs.tied` of `run_sequences`."""
     objective, tied, *_ = run_sequences(problem, team, ranks, rule, threads)
     return objective, tied
 
@@ -183,7 +142,7 @@ class Runs(NamedTuple):
     """(k,) Σ of eq. 1 over the decisions taken, added in their order [value·s]; NaN of what was
     not begun."""
     tied: _Bools
-    """(k,) whether the sequence mattered after the first round."""
+    """(k,) whether the sequence mattered after the first round: two UAVs were free at one time."""
     by_rule: _Bools
     """(k,) whether all decisions were taken, and by the rule."""
     uavs: _Ints
@@ -208,19 +167,11 @@ def run_sequences(
     threads: int | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> Runs:
-    """What many priority sequences lead to; see `evaluate_sequences`.
+    """What many priority sequences lead to; the same with any number of threads.
 
-    Args:
-        problem: the prepared mission.
-        team: where the team stands; left unchanged.
-        ranks: (k, n_uav) a row for every sequence, as for `run`.
-        rule: `GREEDY` or `LOOKAHEAD`.
-        threads: how many work at it; as many as there are processors when None.
-        should_stop: asked every few milliseconds; once it says so, what is under way, and the first
-            one at any rate, ends with greedy decisions, and no other begins.
-
-    Raises:
-        ValueError: names the argument whose shape or numbers are wrong.
+    ``ranks`` are (k, n_uav), a row for every sequence; as many ``threads`` as there are processors
+    when None. Once it is to stop, what is under way, and the first one at any rate, ends with
+    greedy decisions, and no other begins.
     """
     rows = converted("rank", ranks, np.int64, 2)
     count = default_threads() if threads is None else threads
@@ -237,14 +188,8 @@ def first_rounds(
 ) -> _Ints:
     """What each UAV takes if all active ones decide once, in the order of their ranks alone.
 
-    Arguments as for `run_sequences`.
-
-    Returns:
-        (k, n_uav) task indices; -1 for UAVs that take nothing, `UNDONE` all along the rows that it
-        was told to stop before.
-
-    Raises:
-        ValueError: names the argument whose shape or numbers are wrong.
+    Arguments are those of `run_sequences`. Gives (k, n_uav) task indices; -1 for UAVs that take
+    nothing, `UNDONE` all along the rows that it was told to stop before.
     """
     rows = converted("rank", ranks, np.int64, 2)
     count = default_threads() if threads is None else threads

@@ -5,7 +5,6 @@ J gains most". Since that policy leaves nothing to chance, simulating the whole 
 with another first task is a change of at most two lists, valued in microseconds. Rollout of a
 sequentially consistent base policy never does worse than it (Bertsekas, Tsitsiklis and Wu 1997,
 doi:10.1023/A:1009635226865); fortified: the plan is left only for what is strictly better.
-Leaves out: which lists are published (`coordinator.planner.plan`).
 """
 
 from __future__ import annotations

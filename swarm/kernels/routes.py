@@ -4,8 +4,7 @@ Large-neighbourhood search with annealing (slack induction by string removals, C
 Vanden Berghe 2020, doi:10.1287/trsc.2019.0914) and local search, on segments joined in O(1)
 (Silva et al. 2012, doi:10.1016/j.ejor.2012.03.044; Vidal et al. 2014,
 doi:10.1016/j.ejor.2013.09.045). What segments are worth is defined plainly in
-`swarm.allocation.reference`. Leaves out: the clock and the decision when to stop, which
-are the caller's; proofs of quality (`coordinator.planner.bound`).
+`tests.support.reference`.
 """
 
 from __future__ import annotations
@@ -80,13 +79,14 @@ class TeamArrays:
         survived = _floats("survived", self.survived, (n_uav,))
         if ((survived < 0.0) | (survived > 1.0)).any():
             raise ValueError("survived must be within 0..1")
-        for name, array in (
-            ("free_s", _floats("free_s", self.free_s, (n_uav,))),
-            ("place_enu_m", _floats("place_enu_m", self.place_enu_m, (n_uav, 3))),
-            ("survived", survived),
-            ("active", _mask("active", self.active, n_uav)),
-            ("open", _mask("open", self.open, n_task)),
-        ):
+        arrays = {
+            "free_s": _floats("free_s", self.free_s, (n_uav,)),
+            "place_enu_m": _floats("place_enu_m", self.place_enu_m, (n_uav, 3)),
+            "survived": survived,
+            "active": _mask("active", self.active, n_uav),
+            "open": _mask("open", self.open, n_task),
+        }
+        for name, array in arrays.items():
             object.__setattr__(self, name, array)
 
     def arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
@@ -145,11 +145,7 @@ def optimise_routes(
         raise ValueError(f"threads must be >= 1, not {threads}")
     kernel_threads = (os.cpu_count() or 1) if threads is None else threads
     search = _kernels.RouteSearch(
-        team.problem,
-        *team.arguments(),
-        *open_lists(team, lists),
-        np.asarray(team.open),
-        seed,
+        team.problem, *team.arguments(), *open_lists(team, lists), np.asarray(team.open), seed
     )
 
     def time_spent_frac() -> float:
