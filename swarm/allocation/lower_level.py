@@ -229,7 +229,6 @@ def run(
     not compiled, says so, the decisions left are greedy, or are not taken.
 
     Returns:
-    Returns:
         Task indices per UAV in order of execution, and (n_task,) completion times [s], NaN for
         tasks nobody took.
     """

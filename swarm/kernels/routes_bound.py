@@ -6,7 +6,6 @@ From that relaxation a search among real lists may go on, with exact times, S as
 every task once: best-first, by what a list is worth so far and what the relaxation can still add.
 Where it is cut short, the most that is left counts, so what is found is never below the best
 list's worth.
-Leaves out: how prices are found.
 """
 
 from __future__ import annotations

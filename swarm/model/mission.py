@@ -1,7 +1,4 @@
-"""A mission: its UAVs, its tasks, its horizon and its defaults.
-
-Leaves out: plans for it (swarm.model.plan).
-"""
+"""A mission: its UAVs, its tasks, its horizon and its defaults."""
 
 from __future__ import annotations
 
@@ -136,10 +133,7 @@ class Mission:
 def chances(table: Mapping[str, float], tasks: Iterable[Task], default: float) -> list[float]:
     """One UAV's probability at each of ``tasks``.
 
-    Args:
-        table: its probabilities by task id or kind; the id wins.
-        tasks: which.
-        default: where the table says nothing.
+    By its ``table`` of task ids and kinds, of which the id wins; else the ``default``.
     """
     if not table:
         return [default for _ in tasks]

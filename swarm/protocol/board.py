@@ -2,8 +2,8 @@
 
 One UAV wins a task wherever the registers are equal. Held beats proposed. Proposed against
 proposed: earlier decision, then rank, then id. Held against held, which takes a partition:
-earlier predicted completion, then rank, then id. Leaves out: who is alive, which each process
-judges for itself and passes in by leaving the lost out.
+earlier predicted completion, then rank, then id. Who is alive each process judges for itself, and
+passes in by leaving the lost out.
 """
 
 from __future__ import annotations
@@ -74,9 +74,7 @@ class TaskState(StrEnum):
 def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
     """Open tasks that some UAV taking part in the mission is capable of, in board order.
 
-    Args:
-        board: of the mission.
-        present: writers believed alive; the lost take no part.
+    ``present`` are the writers believed alive; the lost take no part.
     """
     problem = board.problem
     if problem is None:

@@ -3,8 +3,7 @@
 `decode` never raises on what came from the network: whatever is not a valid
 message of this mission, on the key that belongs to its writer, is None and
 counted under a reason. With a `Seal`, what its writer has not signed is dropped
-before anything of it is parsed; see swarm.protocol.seal. Leaves out: whether a message
-is news (swarm.protocol).
+before anything of it is parsed; see swarm.protocol.seal.
 
 **Releases that differ.** Everything may grow at its end: a message or snapshot by parts,
 a body by fields. An older release passes over what it does not know, and repeats it when it
@@ -119,9 +118,8 @@ class Codec:
         seal = self._seal
         if seal is None or isinstance(message.body, SignedRoster):
             return said
-        envelope = message.envelope
-        if envelope is not None and seal.is_genuine(envelope):
-            return envelope
+        if (known := message.envelope) is not None and seal.is_genuine(known):
+            return known
         if not seal.may_speak_for(seal.name, message.writer):
             return None
         envelope = seal.wrap(said)
@@ -168,12 +166,8 @@ class Codec:
         return message
 
     def decode_snapshot(self, key: str, data: bytes, bond: bytes = b"") -> Snapshot | None:
-        """The snapshot in ``data``, answered on ``key``; bad registers in it are left out.
-
-        Args:
-            key: of who answers.
-            data: the answer.
-            bond: of the question, where the bus has keys.
+        """The snapshot in ``data``, answered on ``key`` to the question of that ``bond``; bad
+        registers in it are left out.
         """
         opened = self.open_answer(key, data, bond)
         if opened is None:
@@ -310,9 +304,7 @@ class Codec:
         if not isinstance(parts, tuple) or len(parts) < 6:
             raise UnacceptableError("malformed")
         version, mission, writer, incarnation, mission_s, registers = parts[:6]
-        _require(version == SCHEMA_VERSION, "unknown version")
-        _require(mission == self._mission, "another mission")
-        _require(isinstance(writer, str) and valid_id(writer), "malformed")
+        self._require_ours(version, mission, writer)
         _require(key == self._keys.state(writer), "said on another's key")
         _require(type(incarnation) is int and 0 <= incarnation <= MAX_COUNT, "malformed")
         known = isinstance(mission_s, float) and abs(mission_s) <= LATEST_S
@@ -324,9 +316,7 @@ class Codec:
         if not isinstance(parts, tuple) or len(parts) < 7:
             raise UnacceptableError("malformed")
         version, mission, writer, incarnation, counter, kind, fields = parts[:7]
-        _require(version == SCHEMA_VERSION, "unknown version")
-        _require(mission == self._mission, "another mission")
-        _require(isinstance(writer, str) and valid_id(writer), "malformed")
+        self._require_ours(version, mission, writer)
         if not isinstance(kind, str) or kind not in KINDS:
             raise UnacceptableError("unknown kind")
         if not isinstance(fields, dict):
@@ -341,6 +331,11 @@ class Codec:
             raise UnacceptableError("malformed") from None
         _require(_may_say(writer, body), "said on another's key")
         return Message(mission, writer, stamp, body)
+
+    def _require_ours(self, version: object, mission: object, writer: object) -> None:
+        _require(version == SCHEMA_VERSION, "unknown version")
+        _require(mission == self._mission, "another mission")
+        _require(isinstance(writer, str) and valid_id(writer), "malformed")
 
     def _understood(
         self, kind: str, fields: Mapping[str, object], known: Sequence[str]

@@ -1,7 +1,7 @@
 """Messages to MessagePack, and MessagePack from the network to plain values.
 
 Written: the bytes of a bus without keys, and what fits into them. Read: no more than the
-length of the bytes is worth. Leaves out: checking, and envelopes (swarm.protocol.codec).
+length of the bytes is worth.
 """
 
 from __future__ import annotations
@@ -49,13 +49,9 @@ __all__ = [
 
 
 SMALL_LIMIT_BYTES: Final = 4 * 1024
-
 LARGE_LIMIT_BYTES: Final = 1024 * 1024
-
 SNAPSHOT_LIMIT_BYTES: Final = 4 * 1024 * 1024
 """As much as a bus carries at once."""
-
-
 KINDS: Final[dict[str, type[Body]]] = {
     "brief": MissionConfig,
     "epoch": PlanEpoch,
@@ -69,15 +65,12 @@ KINDS: Final[dict[str, type[Body]]] = {
     "start": StartWithout,
     "roster": SignedRoster,
 }
-
 NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in KINDS.items()}
-
 FIELDS: Final[dict[type, tuple[str, ...]]] = {
     part: tuple(field.name for field in dataclasses.fields(part))
     for part in (*KINDS.values(), UavSpec, ChoiceBasis, Candidate)
 }
 """Of everything that a message is made of."""
-
 LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
 
 
@@ -109,12 +102,8 @@ def fit(
 ) -> Snapshot:
     """``snapshot``, without some of the registers when there is no room for all.
 
-    Those of its own writer stay before those of others, for which others answer too.
-
-    Args:
-        snapshot: to be shortened.
-        limit_bytes: how long it may be.
-        as_bytes: what becomes of each message in it.
+    Those of its own writer stay before those of others, for which others answer too. ``as_bytes``
+    is what becomes of each message in it.
     """
     parts = [as_bytes(message) for message in snapshot.messages]
     if len(snapshot_bytes(snapshot, parts)) <= limit_bytes:
@@ -183,9 +172,7 @@ BYTES_EACH: Final = 8
 def unpacked(data: bytes, most: int | None = None) -> object:
     """What ``data`` holds, with tuples for arrays; None when it is not MessagePack.
 
-    Args:
-        data: from the network.
-        most: of arrays and maps in it; by default as many as its length is worth.
+    At ``most`` so many arrays and maps are in it; by default as many as its length is worth.
     """
     hooks = {}
     if len(data) > SMALL_LIMIT_BYTES:

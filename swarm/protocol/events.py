@@ -1,7 +1,4 @@
-"""What every core on the bus hears and what it wants done; shells translate both.
-
-Leaves out: what only one kind of process knows (agent.core.interface, coordinator.core.events).
-"""
+"""What every core on the bus hears and what it wants done; shells translate both."""
 
 from __future__ import annotations
 

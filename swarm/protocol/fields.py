@@ -1,21 +1,18 @@
-"""Types of message fields, with the bounds that keep every computation finite.
-
-Leaves out: the messages that are made of such fields (swarm.protocol.messages).
-"""
+"""Types of message fields, with the bounds that keep every computation finite."""
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 from annotated_types import Ge, Gt, Le, Len, Predicate
-from pydantic import Strict
+from pydantic import ConfigDict, Strict
 
 from swarm.model import valid_id
 
 __all__ = [
-    "CHECKED",
     "LATEST_S",
     "MAX_COUNT",
+    "Checked",
     "Count",
     "Duration",
     "Flag",
@@ -32,9 +29,6 @@ __all__ = [
     "Words",
 ]
 
-
-CHECKED: Final = {"extra": "ignore", "allow_inf_nan": False}
-"""How pydantic checks each message; fields that only a newer release knows are passed over."""
 
 MAX_COUNT: Final = 2**53
 """Largest count; whoever counts on from what it heard stays within."""
@@ -56,3 +50,13 @@ Count = Annotated[int, Strict(), Ge(0), Le(MAX_COUNT)]
 Reason = Annotated[str, Strict(), Len(1, 40)]
 Words = Annotated[str, Strict(), Len(0, 200)]
 Score = Annotated[float, Strict(), Ge(-1e30), Le(1e30)]
+
+
+class Checked:
+    """Base of the dataclasses that messages are made of, which says how pydantic checks them.
+
+    Fields that only a newer release knows are passed over.
+    """
+
+    __slots__ = ()
+    __pydantic_config__: ClassVar[ConfigDict] = {"extra": "ignore", "allow_inf_nan": False}

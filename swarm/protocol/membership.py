@@ -4,7 +4,7 @@ A writer is present from the first sign of its token until either the token has 
 gone for a while, or it has said nothing for long although the token lives: a token
 proves the transport, speech proves the program. Both count only while the own link is
 up and this process itself has not been held up: without that, the silence of others
-proves nothing. Each process judges for itself. Leaves out: what follows from a loss.
+proves nothing. Each process judges for itself.
 """
 
 from __future__ import annotations

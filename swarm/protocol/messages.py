@@ -1,8 +1,7 @@
 """What is said on the bus: the messages, their bodies and their registers.
 
-Instants are mission time [s]; no machine's clock crosses the wire. Leaves out: what a UAV says
-(swarm.protocol.uav_messages), bytes and checking (swarm.protocol.codec), and what a reader
-makes of it (swarm.protocol.registers).
+Instants are mission time [s]; no machine's clock crosses the wire. What a UAV says is in
+swarm.protocol.uav_messages.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import lru_cache
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from annotated_types import Len
 from pydantic import Strict
@@ -19,8 +18,8 @@ from pydantic import Strict
 from swarm.model import Origin
 from swarm.model.ids import FLEET, RESERVED
 from swarm.protocol.fields import (
-    CHECKED,
     MAX_COUNT,
+    Checked,
     Count,
     Duration,
     Flag,
@@ -66,10 +65,8 @@ LONGEST_ROSTER = 1 << 20
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Stamp:
+class Stamp(Checked):
     """Order of one writer's statements in one register: later beats earlier."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     incarnation: Count
     """Grows whenever the writer's process starts anew."""
@@ -82,10 +79,8 @@ REVOKED_INCARNATION = 0
 
 
 @dataclass(frozen=True, slots=True)
-class UavSpec:
+class UavSpec(Checked):
     """One UAV as the brief describes it."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     id: Id
     position_enu_m: Point
@@ -99,10 +94,8 @@ class UavSpec:
 
 
 @dataclass(frozen=True, slots=True)
-class MissionConfig:
+class MissionConfig(Checked):
     """Register ``brief``: what stays the same for a whole mission."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     horizon_s: Horizon
     success_default: Probability
@@ -130,10 +123,8 @@ class MissionPhase(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class PlanEpoch:
+class PlanEpoch(Checked):
     """Register ``plan``: the pecking order in force."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     number: Count
     phase: MissionPhase
@@ -149,10 +140,8 @@ class PlanEpoch:
 
 
 @dataclass(frozen=True, slots=True)
-class TaskEntry:
-    """Register ``board/<task>``: one task of the task board."""
-
-    __pydantic_config__: ClassVar = CHECKED
+class PostedTask(Checked):
+    """What is said of one task, by whomever."""
 
     task: Id
     number: Count
@@ -162,6 +151,11 @@ class TaskEntry:
     service_s: Duration
     kind: Id | None
     withdrawn: Flag
+
+
+@dataclass(frozen=True, slots=True)
+class TaskEntry(PostedTask):
+    """Register ``board/<task>``: one task of the task board."""
 
 
 class CommandKind(StrEnum):
@@ -178,10 +172,8 @@ class CommandKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class OperatorCommand:
+class OperatorCommand(Checked):
     """Register ``operator/<target>``: the operator's newest word to one UAV, or to the fleet."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     target: Id
     """Id of a UAV, or the name that stands for the fleet."""
@@ -197,22 +189,12 @@ class OperatorCommand:
 
 
 @dataclass(frozen=True, slots=True)
-class TaskEdit:
+class TaskEdit(PostedTask):
     """Register ``operator/task/<task>``: a task that the operator adds, or takes off the board.
 
     For a task that the coordinator has posted, too, the operator's word counts.
     """
 
-    __pydantic_config__: ClassVar = CHECKED
-
-    task: Id
-    number: Count
-    """Position on the board, as in `TaskEntry`."""
-    position_enu_m: Point
-    value: Value
-    service_s: Duration
-    kind: Id | None
-    withdrawn: Flag
     run: Count
     """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
     reason: Words
@@ -220,14 +202,12 @@ class TaskEdit:
 
 
 @dataclass(frozen=True, slots=True)
-class StartWithout:
+class StartWithout(Checked):
     """Register ``operator/start/<uav>``: the operator lets the mission start without a UAV.
 
     Apart from the commands to that UAV, which hold as they are: it is told nothing by this, and
     takes part as soon as it is ready.
     """
-
-    __pydantic_config__: ClassVar = CHECKED
 
     uav: Id
     run: Count
@@ -237,13 +217,11 @@ class StartWithout:
 
 
 @dataclass(frozen=True, slots=True)
-class SignedRoster:
+class SignedRoster(Checked):
     """Register ``roster``: who belongs to the mission, in the words of its authority.
 
     It bears the authority's signature inside, so anyone may repeat it.
     """
-
-    __pydantic_config__: ClassVar = CHECKED
 
     signed: Annotated[str, Strict(), Len(1, LONGEST_ROSTER)]
     """As `swarm.identity.roster.decode_roster` reads it; ASCII."""

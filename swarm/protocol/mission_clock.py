@@ -2,7 +2,7 @@
 
 A word under way only makes mission time seem earlier than it is, so of the last few words the
 one that makes it latest is nearest the truth: the clock filter of NTP (RFC 5905, section 10),
-with one way to go instead of two. Leaves out: whose word is heard, and who says what time it is.
+with one way to go instead of two.
 """
 
 from __future__ import annotations
@@ -66,12 +66,8 @@ class MissionClock:
         """Forget what was heard when ``news`` briefs for another flight.
 
         But for the last word, if a mission runs: who is in charge of the new flight has said so
-        before (`Replica.is_premature`), and with it what time it is.
-
-        Args:
-            news: what has just been said.
-            brief: the one before.
-            epoch: in force.
+        before (`Replica.is_premature`), and with it what time it is. ``brief`` is the one before,
+        ``epoch`` the one in force.
         """
         if not isinstance(news, MissionConfig) or brief is None or news.run == brief.run:
             return

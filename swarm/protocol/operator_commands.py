@@ -2,8 +2,7 @@
 
 A command names the run it was given for, so a new flight of the same mission inherits none.
 Of those to one UAV and those to the fleet the newest decides what the UAV does; that the
-mission is aborted holds whatever is said to a single UAV afterwards. Leaves out: obeying
-(agent.core.agent_core, coordinator.core.stages).
+mission is aborted holds whatever is said to a single UAV afterwards.
 """
 
 from __future__ import annotations

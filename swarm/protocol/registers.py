@@ -3,9 +3,8 @@
 A `Replica` keeps of every register the statement with the highest stamp. Joining is
 commutative, associative and idempotent, so loss, duplication and reordering delay agreement
 and never break it. Claims and outcomes count of UAVs that the mission's configuration names.
-On the board the operator's word about a task comes before the coordinator's. Leaves out: who
-is alive (swarm.protocol.membership), and what follows from the registers
-(swarm.protocol.board).
+On the board the operator's word about a task comes before the coordinator's. Who is alive is for
+swarm.protocol.membership to say.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from dataclasses import replace
 from typing import Final
 
 from swarm.model.ids import FLEET
-from swarm.protocol.encoding import encode
+from swarm.protocol.encoding import FIELDS, encode
 from swarm.protocol.messages import (
     Message,
     MissionConfig,
@@ -315,9 +314,8 @@ class Replica:
         steady, and of everyone what an earlier life has said, which the present one may
         not have found yet.
 
-        Args:
-            own: who answers.
-            steady: writers that are there and remember all they ever said.
+        not have found yet. ``steady`` are the writers that are there and remember all they ever
+        said.
         """
         heads = self.heads
         answered = [
@@ -347,7 +345,7 @@ class Replica:
 
     def known(self, message: Message) -> Message | None:
         """What is known of the register that ``message`` is about."""
-        return self.register(message.key)
+        return self._registers.get(message.key)
 
     def register(self, key: str) -> Message | None:
         """What is known of the register of that key."""
@@ -373,15 +371,7 @@ def _without(signers: Collection[str], message: Message) -> Message:
 
 def _entry_of(order: TaskEdit) -> TaskEntry:
     """What ``order`` puts on the board."""
-    return TaskEntry(
-        task=order.task,
-        number=order.number,
-        position_enu_m=order.position_enu_m,
-        value=order.value,
-        service_s=order.service_s,
-        kind=order.kind,
-        withdrawn=order.withdrawn,
-    )
+    return TaskEntry(**{name: getattr(order, name) for name in FIELDS[TaskEntry]})
 
 
 def _says_more(new: Message, known: Message) -> bool:

@@ -8,9 +8,8 @@ parsed. So neither a broken router nor an answer that repeats others' registers 
 somebody else, and an answer counts for the one question it was given to.
 
 What is signed once is signed for good (the same bytes give the same signature), and what was
-found genuine once is known by its hash, since registers are repeated all the time. Leaves
-out: keys and rosters themselves (swarm.identity), bytes of statements (swarm.protocol.codec),
-and what is replayed whole, against which stamps help (swarm.protocol.registers).
+found genuine once is known by its hash, since registers are repeated all the time. Against what is
+replayed whole stamps help (swarm.protocol.registers).
 """
 
 from __future__ import annotations
@@ -49,40 +48,23 @@ __all__ = [
 
 
 SEALED_MARK: Final = "sealed 1"
-
 ENVELOPE_BYTES: Final = 160
 """By how much an envelope is longer than what is in it, at most."""
-
 ANSWER: Final = b"answer "
 """What answers are bound to, before the `bond` of the question; see swarm.protocol.sync."""
-
 QUESTION: Final = b"question"
 """What questions are bound to."""
-
 SIGNATURE_BYTES: Final = 64
-
-
 NOT_SIGNED: Final = "not signed"
-
 WRONGLY_SIGNED: Final = "wrongly signed"
-
 SIGNER_UNKNOWN: Final = "signer unknown"
-
 NOT_THE_SIGNERS: Final = "not the signer's to say"
-
-
 _CONTEXT: Final = b"peckorder sealed 1\n"
-
 _HEAD: Final = b"\x94" + msgpack.packb(SEALED_MARK)
-
 _SIGNATURE_HEAD: Final = bytes([0xC4, SIGNATURE_BYTES])
-
 _LONGEST_NAME: Final = 64
-
 _KEPT_ROSTERS: Final = 4
-
 _KEPT_VERDICTS: Final = 16384
-
 _HASH_BYTES: Final = 16
 
 
@@ -240,11 +222,9 @@ class Seal:
     # -- being believed ---------------------------------------------------------------
 
     def wrap(self, said: bytes, bound: bytes = b"") -> bytes:
-        """``said`` in an envelope of this process.
+        """``said``, a statement's bytes, in an envelope of this process.
 
-        Args:
-            said: a statement's bytes.
-            bound: what it is bound to, at most 255 bytes; empty for what holds by itself.
+        ``bound`` is what it is bound to, at most 255 bytes; empty for what holds by itself.
         """
         signature = self._sign(_signed_bytes(self._roster.series, bound, said))
         envelope: bytes = msgpack.packb([SEALED_MARK, self.name, signature, said])
@@ -255,11 +235,7 @@ class Seal:
     # -- believing ----------------------------------------------------------------------
 
     def unwrap(self, data: bytes, bound: bytes = b"") -> Envelope:
-        """What is in the envelope ``data``, which its signer has signed.
-
-        Args:
-            data: as it was heard.
-            bound: what it must be bound to.
+        """What is in the envelope ``data``, which its signer has signed and which is ``bound`` so.
 
         Raises:
             UnacceptableError: it is no envelope, or not to be believed.

@@ -2,8 +2,7 @@
 
 A question carries a digest, one number per writer, so that answers need not repeat what the
 asker knows: else, after a loss, each of N answers would hold all registers. Where the bus has
-keys a question bears a nonce too, and its answers are bound to it and to who asks. Leaves
-out: why to ask (the cores), and the asking itself (swarm.runtime.state_exchange).
+keys a question bears a nonce too, and its answers are bound to it and to who asks.
 """
 
 from __future__ import annotations
@@ -32,7 +31,6 @@ __all__ = [
     "combined",
     "decode_digest",
     "decode_question",
-    "encode_digest",
     "encode_question",
     "fingerprint",
     "unknown",
@@ -40,11 +38,7 @@ __all__ = [
 
 
 class QuestionTimer:
-    """Gathers wishes to ask into questions at least ``gap_s`` apart.
-
-    Args:
-        gap_s: shortest interval between two questions [s].
-    """
+    """Gathers wishes to ask into questions at least ``gap_s`` apart [s]."""
 
     def __init__(self, gap_s: float) -> None:
         self._gap_s = gap_s
@@ -86,12 +80,9 @@ def combined(numbers: Iterable[int]) -> int:
 def unknown(
     messages: Iterable[Message], mine: Mapping[str, int], theirs: Mapping[str, int]
 ) -> tuple[Message, ...]:
-    """Those of ``messages`` that may be news to somebody.
+    """Those of ``messages``, all registers of some writers, that may be news to somebody.
 
-    Args:
-        messages: all registers of some writers.
-        mine: digest of the replica they are from.
-        theirs: digest of what the other one knows.
+    ``mine`` is the digest of the replica they are from, ``theirs`` of what the other one knows.
     """
     known = {writer for writer, number in theirs.items() if mine.get(writer) == number}
     return tuple(message for message in messages if message.writer not in known)
@@ -156,11 +147,8 @@ def decode_question(data: bytes, seal: Seal | None) -> Question:
     asker, nonce = None, b""
     if seal is not None:
         envelope = seal.unwrap(data, QUESTION)
-        asker, nonce, data = (
-            envelope.signer,
-            envelope.said[:NONCE_BYTES],
-            envelope.said[NONCE_BYTES:],
-        )
+        asker, said = envelope.signer, envelope.said
+        nonce, data = said[:NONCE_BYTES], said[NONCE_BYTES:]
     known = decode_digest(data)
     if known is None or (seal is not None and len(nonce) < NONCE_BYTES):
         raise UnacceptableError("malformed")

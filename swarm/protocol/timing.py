@@ -170,8 +170,7 @@ def earliest(*times_s: float | None) -> float | None:
 class StallDetector:
     """Compares when a step comes with when it was to come at the latest.
 
-    Args:
-        limit_s: a deadline missed by more than this is no mere delay [s].
+    A deadline missed by more than ``limit_s`` is no mere delay [s].
     """
 
     def __init__(self, limit_s: float) -> None:

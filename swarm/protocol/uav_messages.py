@@ -2,7 +2,7 @@
 
 A choice is said for those who look on and record; no agent listens, nothing is decided by it,
 and it may be lost. With its basis anyone who has the statements themselves can decide again
-and compare. Leaves out: deciding (agent.core).
+and compare.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from annotated_types import Ge, Le, Len
 from pydantic import Strict
 
 from swarm.protocol.fields import (
-    CHECKED,
     MAX_COUNT,
+    Checked,
     Count,
     Duration,
     Flag,
@@ -51,10 +51,8 @@ MAX_CANDIDATES = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class Candidate(Checked):
     """A task that could have been taken."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     task: Id
     score: Score
@@ -62,10 +60,8 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True)
-class ChoiceBasis:
+class ChoiceBasis(Checked):
     """What a choice rested on, beside the statements of others."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     decided_s: Instant
     """Mission time at which the UAV became free [s]."""
@@ -86,10 +82,8 @@ class ChoiceBasis:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class Choice(Checked):
     """Key ``uav/<id>/choice``: why that UAV took a task."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     number: Count
     """Of the choices of this life of the agent, from 1; with UAV and incarnation its id in logs."""
@@ -139,10 +133,8 @@ class ClaimPhase(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class Claim(Checked):
     """Register ``uav/<id>/claim``: the task a UAV has taken."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     phase: ClaimPhase
     task: Id | None
@@ -170,10 +162,8 @@ class AttemptResult(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(Checked):
     """Register ``uav/<id>/outcome/<task>``: how this UAV's last attempt ended."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     task: Id
     result: AttemptResult
@@ -198,10 +188,8 @@ class StatusPhase(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Status:
+class Status(Checked):
     """Key ``uav/<id>/status``: news that may be dropped."""
-
-    __pydantic_config__: ClassVar = CHECKED
 
     phase: StatusPhase
     task: Id | None

@@ -1,7 +1,7 @@
 """Where time comes from: the sole reader of the system clock.
 
 Instants and durations are float seconds. Cores never read a clock: shells pass
-``now_s`` in. Leaves out: virtual time (sim.world.engine).
+``now_s`` in.
 """
 
 from __future__ import annotations
@@ -17,11 +17,9 @@ class Clock(Protocol):
 
     def now_s(self) -> float:
         """Seconds since an arbitrary instant; never decreases."""
-        ...
 
     def wall_delay_s(self, delay_s: float) -> float:
         """Wall seconds that pass while this clock advances by ``delay_s``."""
-        ...
 
 
 class SystemClock:

@@ -1,8 +1,7 @@
 """What a command shows a person beside its result: its help, and lines on standard error.
 
 A docstring becomes help: summary and description as they are, an ``Examples:`` section line by
-line, every other section (``Args:``, ``Raises:`` …) left to readers of code. Leaves out:
-finding and running commands (swarm.cli), and logs (swarm.runtime.log).
+line, every other section (``Args:``, ``Raises:`` …) left to readers of code.
 """
 
 from __future__ import annotations
@@ -45,7 +44,6 @@ PANELS: Mapping[str, tuple[str, ...]] = {
 """Commands by what one wants to do; those of no panel come with the last one."""
 
 _LAST = "Helpers"
-
 _SECTION = re.compile(r"(Args|Arguments|Examples?|Notes?|Raises|Returns|Yields):")
 
 

@@ -1,7 +1,6 @@
 """Errors that callers catch, and remedies that name what was probably meant.
 
-Every message is one clear line. Leaves out: expected outcomes (infeasible, refused), which are
-return values, and names in scenario files (swarm.scenario.findings), which may be many.
+Every message is one clear line. Expected outcomes (infeasible, refused) are return values.
 """
 
 from __future__ import annotations
@@ -50,13 +49,7 @@ class BusError(SwarmError):
 
 
 def remedy_for_name(name: str, names: Iterable[str], what: str = "choose one of") -> str:
-    """The remedy for a ``name`` that is none of ``names``: the nearest one, then all.
-
-    Args:
-        name: as it was typed.
-        names: that there are.
-        what: introduces them.
-    """
+    """The remedy for a ``name`` that is none of ``names``: the nearest; then ``what`` and all."""
     known = [str(each) for each in names]
     close = get_close_matches(name, known, n=1)
     choices = f"{what} {', '.join(known)}"

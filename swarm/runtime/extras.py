@@ -1,8 +1,7 @@
 """Which packages are optional, and which extra of the project brings them.
 
 What an agent and a coordinator need is always installed. A command that meets a package that is
-not there ends with one line, and no module has to look whether what it imports is there. Leaves
-out: what is installed in what versions (`swarm doctor`).
+not there ends with one line, and no module has to look whether what it imports is there.
 """
 
 from __future__ import annotations
@@ -50,11 +49,8 @@ class MissingExtraError(InputError):
 
 
 def missing_extra(error: ImportError, what: str) -> MissingExtraError | None:
-    """How to get what could not be imported; None where no extra brings it.
-
-    Args:
-        error: raised by an import.
-        what: needs it, such as ``swarm dashboard``.
+    """How ``what``, such as ``swarm dashboard``, gets what could not be imported; None where no
+    extra brings it.
     """
     module = (error.name or "").partition(".")[0]
     extra = next((extra for extra, modules in EXTRAS.items() if module in modules), None)

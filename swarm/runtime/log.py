@@ -4,7 +4,6 @@ A module that logs calls `get_logger` and binds what its lines are about; a comm
 logs calls `configure_logging` once, with what its options `swarm.runtime.options.LogLevelOption`
 and `LogFormatOption` say, and with the ids that every line of its process carries: mission,
 UAV, incarnation. Importing this module is cheap: structlog is loaded by the first logger.
-Leaves out: progress shown to people (rich, in the commands) and recordings.
 """
 
 from __future__ import annotations
@@ -105,14 +104,10 @@ class _Stderr:
     """Whatever ``sys.stderr`` is at the time of writing: a test or a live table may swap it."""
 
     def write(self, text: str) -> int:
-        return _stream().write(text)
+        return sys.stderr.write(text)
 
     def flush(self) -> None:
-        _stream().flush()
-
-
-def _stream() -> TextIO:
-    return sys.stderr
+        sys.stderr.flush()
 
 
 def _processors(form: LogFormat, on_terminal: bool) -> list[Processor]:
@@ -134,7 +129,7 @@ def _processors(form: LogFormat, on_terminal: bool) -> list[Processor]:
         return [*shared, structlog.dev.ConsoleRenderer(colors=on_terminal)]
     traced: list[Processor] = [*shared, structlog.processors.format_exc_info]
     if form is LogFormat.JSON:
-        return [*traced, structlog.processors.JSONRenderer(default=_plain)]
+        return [*traced, structlog.processors.JSONRenderer(default=str)]
     order = ["timestamp", "level", "module", "event"]
     return [*traced, structlog.processors.LogfmtRenderer(key_order=order, drop_missing=True)]
 
@@ -162,7 +157,7 @@ class _JsonFormatter(logging.Formatter):
         }
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
-        return json.dumps(line, default=_plain)
+        return json.dumps(line, default=str)
 
     @staticmethod
     def converter(timestamp: float | None) -> time.struct_time:
@@ -177,11 +172,6 @@ def _log_crash(
         sys.__excepthook__(kind, fault, traceback)
         return
     get_logger("swarm").critical("crashed", exc_info=(kind, fault, traceback))
-
-
-def _plain(value: Any) -> str:
-    """Text of a value JSON has no form for."""
-    return str(value)
 
 
 def _number(level: LogLevel) -> int:

@@ -6,7 +6,7 @@ parameter::
     def plan(scenario: ScenarioArgument, json: JsonOption = False, seed: SeedOption = 0) -> int: ...
 
 Those by which a command finds the bus come together, by one parameter of the kind
-`swarm.bus.connection.ConnectionOptions`. Leaves out: what a single command alone has.
+`swarm.bus.connection.ConnectionOptions`.
 """
 
 from __future__ import annotations
@@ -93,22 +93,18 @@ def _scenario_argument(metavar: str) -> Any:
 ScenarioArgument = Annotated[Path, _scenario_argument("SCENARIO")]
 """Path of an existing scenario file; shipped names are resolved already."""
 
-
 OptionalScenarioArgument = Annotated[Path | None, _scenario_argument("[SCENARIO]")]
 """The same for commands that can do without; None without one."""
-
 
 JsonOption = Annotated[
     bool,
     typer.Option("--json", help="Print one JSON object on standard output, nothing else there."),
 ]
 
-
 SeedOption = Annotated[
     int,
     typer.Option("--seed", min=0, metavar="N", help="Seed of everything random."),
 ]
-
 
 TimeLimitOption = Annotated[
     float | None,
@@ -121,18 +117,15 @@ TimeLimitOption = Annotated[
     ),
 ]
 
-
 LogLevelOption = Annotated[
     LogLevel,
     typer.Option("--log-level", envvar="SWARM_LOG_LEVEL", help="How much to log."),
 ]
 
-
 LogFormatOption = Annotated[
     LogFormat,
     typer.Option("--log-format", envvar="SWARM_LOG_FORMAT", help="What a log line looks like."),
 ]
-
 
 CheckOption = Annotated[
     bool,
@@ -140,10 +133,8 @@ CheckOption = Annotated[
 ]
 """Leave with status 0 where the process would begin to touch anything."""
 
-
 LifelineOption = Annotated[bool, typer.Option("--lifeline", hidden=True)]
 """End when standard input does: the parent process holds its other end."""
-
 
 SpeedupOption = Annotated[
     float,
@@ -156,12 +147,10 @@ SpeedupOption = Annotated[
     ),
 ]
 
-
 MissionOption = Annotated[
     str,
     typer.Option("--mission", metavar="NAME", help="Name of the mission: its scenario's name."),
 ]
-
 
 SomeMissionOption = Annotated[
     str | None,
@@ -172,7 +161,6 @@ SomeMissionOption = Annotated[
         show_default=False,
     ),
 ]
-
 
 BusOption = Annotated[
     str,
@@ -186,7 +174,6 @@ BusOption = Annotated[
     ),
 ]
 
-
 ListenOption = Annotated[
     str,
     typer.Option(
@@ -196,7 +183,6 @@ ListenOption = Annotated[
         show_default=False,
     ),
 ]
-
 
 ConnectOption = Annotated[
     list[str] | None,
@@ -208,7 +194,6 @@ ConnectOption = Annotated[
         show_default=False,
     ),
 ]
-
 
 KeysOption = Annotated[
     Path | None,
@@ -223,7 +208,6 @@ KeysOption = Annotated[
     ),
 ]
 
-
 UnencryptedOption = Annotated[
     bool,
     typer.Option(
@@ -232,7 +216,6 @@ UnencryptedOption = Annotated[
         "listen to everything, and steer.",
     ),
 ]
-
 
 LinkOption = Annotated[
     LinkKind,
@@ -243,7 +226,6 @@ LinkOption = Annotated[
         "to 20 % and 100 ms.",
     ),
 ]
-
 
 LeaseOption = Annotated[
     float | None,
@@ -256,7 +238,6 @@ LeaseOption = Annotated[
         show_default=False,
     ),
 ]
-
 
 StateOption = Annotated[
     Path | None,

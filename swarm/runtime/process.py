@@ -2,7 +2,7 @@
 
 It is told by a signal, or by the end of standard input when its parent is gone (``--lifeline``).
 Where a service manager listens, it is told that the process is ready, alive and leaving, as
-sd_notify(3) has it. Leaves out: starting and watching other processes (sim.fleet).
+sd_notify(3) has it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ __all__ = [
 
 
 STDIN_FD = 0
-
 CHUNK_BYTES = 4096
 
 
@@ -73,7 +72,6 @@ async def parent_gone(fd: int = STDIN_FD) -> None:
 
 SEND_LIMIT_S: Final = 0.05
 """How long a manager that does not read may hold the event loop up."""
-
 UNWATCHED_S: Final = 20.0
 """Stands in for the watchdog's interval where the unit has none."""
 
@@ -172,13 +170,10 @@ SERVICE_NOTIFIER: Final = ServiceNotifier(os.environ)
 
 T = TypeVar("T")
 
-
 EXIT_STOPPED = 0
 """Status after SIGTERM or the end of the lifeline: the daemon did what it was told."""
-
 EXIT_INTERRUPTED = 130
 """Status after SIGINT, as shells have it: 128 + 2."""
-
 
 INSIST_AFTER_S = 1.0
 """A second SIGINT kills from this long after the first: sooner it is likely the same Ctrl-C,
@@ -256,8 +251,7 @@ async def run_until_stopped(work: Coroutine[Any, Any, int], *, lifeline: bool = 
         lifeline: also stop when standard input ends.
 
     Returns:
-        What ``work`` returned if it ended by itself, else `EXIT_STOPPED` or
-        `EXIT_INTERRUPTED`. Use it as ``raise typer.Exit(asyncio.run(run_until_stopped(...)))``.
+        What ``work`` returned if it ended by itself, else `EXIT_STOPPED` or `EXIT_INTERRUPTED`.
 
     Raises:
         Exception: whatever ``work`` raised, also while cleaning up.
