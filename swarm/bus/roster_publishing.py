@@ -12,10 +12,11 @@ from typing import Final
 
 from swarm.bus.config import BusConfig
 from swarm.bus.zenoh_bus import open_zenoh_bus
-from swarm.identity.announcer import RosterAnnouncer, roster_message
+from swarm.identity.announcer import RosterAnnouncer
 from swarm.identity.roster import Role, Roster
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import CommonAction, CommonEvent
+from swarm.protocol.messages import roster_message
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.console import say
 from swarm.runtime.errors import SwarmError
@@ -69,10 +70,10 @@ async def _tell(config: BusConfig, change: Callable[[], bytes]) -> RosterAnnounc
         if identity is None or seal is None:
             raise ValueError("a roster is told on a bus with keys alone")
         before = seal.roster
-        signed = change()
+        signed = change().decode("ascii")
         with suppress(OSError):  # its folder may have been taken away
-            seal.put_in_force(signed.decode("ascii"))
-        roster = seal.read_roster(signed.decode("ascii"))
+            seal.put_in_force(signed)
+        roster = seal.read_roster(signed)
         message = roster_message(identity.mission, roster.version, signed)
         announcer = RosterAnnouncer(message, _writers(roster, before), CONFIRM_S)
         shell: Shell[CommonEvent, CommonAction] = Shell(

@@ -20,10 +20,9 @@ from swarm.bus.zenoh_session import close_session, open_session, session_config,
 from swarm.identity import Identity, Role, Roster
 from swarm.identity.folder import ROSTER_FILE
 from swarm.identity.roster import RosterEntry
-from swarm.model.ids import AUTHORITY
 from swarm.protocol.codec import Codec
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import Message, SignedRoster, Stamp
+from swarm.protocol.messages import SignedRoster, roster_message
 from swarm.protocol.seal import UnacceptableError, seal_of
 from swarm.runtime.errors import BusError
 from swarm.runtime.log import get_logger
@@ -143,9 +142,8 @@ class RosterKeeper:
 
     def _said(self) -> bytes:
         seal = self._seal
-        stamp, body = Stamp(seal.roster.version, 0), SignedRoster(seal.signed_roster)
-        packed = self._codec.pack(Message(self.identity.mission, AUTHORITY, stamp, body))
-        return packed or b""
+        said = roster_message(self.identity.mission, seal.roster.version, seal.signed_roster)
+        return self._codec.pack(said) or b""
 
     def _take(self, signed: str) -> None:
         before = self.roster.version

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 
-from swarm.model.ids import AUTHORITY
 from swarm.protocol.events import (
     Ask,
     CommonAction,
@@ -22,10 +21,10 @@ from swarm.protocol.events import (
     Publish,
     SnapshotsReceived,
 )
-from swarm.protocol.messages import Message, SignedRoster, Snapshot, Stamp
+from swarm.protocol.messages import Message, SignedRoster, Snapshot
 from swarm.protocol.registers import Replica
 
-__all__ = ["RosterAnnouncer", "roster_message"]
+__all__ = ["RosterAnnouncer"]
 
 
 FIRST_S = 0.2
@@ -34,12 +33,6 @@ SETTLE_S = 1.2
 """Routers begin anew with a new roster, and clients come back to them, within this time."""
 AGAIN_S = 0.4
 """From one question to the next."""
-
-
-def roster_message(mission: str, version: int, signed: bytes) -> Message:
-    """The register ``roster``, as everyone stamps it: by its version."""
-    body = SignedRoster(signed.decode("ascii"))
-    return Message(mission, AUTHORITY, Stamp(version, 0), body)
 
 
 class RosterAnnouncer:

@@ -16,7 +16,7 @@ from annotated_types import Len
 from pydantic import Strict
 
 from swarm.model import Origin
-from swarm.model.ids import FLEET, RESERVED
+from swarm.model.ids import AUTHORITY, FLEET, RESERVED
 from swarm.protocol.fields import (
     MAX_COUNT,
     Checked,
@@ -55,6 +55,7 @@ __all__ = [
     "UavSpec",
     "as_heard",
     "demoted",
+    "roster_message",
 ]
 
 
@@ -265,6 +266,11 @@ class Message:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "key", _key_of(self.mission, self.writer, self.body))
+
+
+def roster_message(mission: str, version: int, signed: str) -> Message:
+    """The register ``roster``, as everyone stamps it: by its version."""
+    return Message(mission, AUTHORITY, Stamp(version, 0), SignedRoster(signed))
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,9 +2,8 @@
 
 It decodes what the bus brings, steps the core, publishes what the core says, answers queries with
 the core's snapshot and ticks at the core's deadlines. On a bus with keys it says and believes only
-what is signed, and puts newer rosters in force. Leaves out: asking and answering
-(swarm.runtime.state_exchange), and actions that only one kind of process knows, which it carries
-out itself (``execute``; agent.runner, coordinator.daemon).
+what is signed, and puts newer rosters in force. Actions that only one kind of process knows
+it leaves to ``execute``.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from typing import Generic, Protocol, TypeVar
 from swarm import __version__
 from swarm.bus.admission import TOO_MANY, AdmissionControl
 from swarm.bus.port import Bus, BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
-from swarm.model.ids import AUTHORITY
 from swarm.protocol.codec import Codec
 from swarm.protocol.events import (
     Ask,
@@ -38,7 +36,14 @@ from swarm.protocol.events import (
     Tick,
 )
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import Message, MissionConfig, SignedRoster, Snapshot, Stamp
+from swarm.protocol.messages import (
+    Message,
+    MissionConfig,
+    SignedRoster,
+    Snapshot,
+    Stamp,
+    roster_message,
+)
 from swarm.protocol.registers import NO_ROOM
 from swarm.protocol.seal import Seal
 from swarm.protocol.timing import PRESETS, LinkKind
@@ -64,15 +69,12 @@ class Core(Protocol[E_contra, A_co]):
 
     def start(self, now_s: float) -> Sequence[A_co]:
         """What to do first."""
-        ...
 
     def step(self, event: E_contra, now_s: float) -> Sequence[A_co]:
         """React to one event."""
-        ...
 
     def next_deadline_s(self) -> float | None:
         """When the core wants a tick at the latest."""
-        ...
 
 
 class Shell(Generic[E, A]):
@@ -201,8 +203,7 @@ class Shell(Generic[E, A]):
         self._step_all()
 
     def _roster(self, seal: Seal) -> Message:
-        body = SignedRoster(seal.signed_roster)
-        return Message(self._mission, AUTHORITY, Stamp(seal.roster.version, 0), body)
+        return roster_message(self._mission, seal.roster.version, seal.signed_roster)
 
     def _heed(self, messages: Iterable[Message], *, answers: bool = False) -> None:
         """Put a newer roster in force; who told an older one is told the newer."""

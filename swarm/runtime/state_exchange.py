@@ -1,8 +1,7 @@
 """How one process asks the others what they know, and answers when they ask.
 
 A question goes out with a digest of what is known here, and the answer leaves that out. Where
-the bus has keys both are signed, and an answer counts for its question alone. Leaves out: when
-to ask, and what follows from the answers (the cores, by swarm.runtime.shell).
+the bus has keys both are signed, and an answer counts for its question alone.
 """
 
 from __future__ import annotations
@@ -105,8 +104,7 @@ class StateExchange:
     async def ask(self, heed: Callable[[Iterable[Message]], None]) -> tuple[Snapshot, ...]:
         """What the others know besides; their mission times brought to now.
 
-        Args:
-            heed: told each answer's rosters first: by the newest of them all else is believed.
+        ``heed`` is told each answer's rosters first: by the newest of them all else is believed.
         """
         asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
         # What is said in the own name is always told: by who remembers an earlier life, or a twin.

@@ -4,8 +4,7 @@ The file holds the encoded snapshot, others' statements in their envelopes so th
 be repeated, and the wall time it was taken at. It is replaced
 whole: written beside the old one, forced to the disk and renamed, so a crash at any
 moment leaves one or the other. Writing waits for the disk, so a thread of its own does
-it; of what waits only the newest is written. Leaves out: what a process remembers (the
-cores) and what it makes of that.
+it; of what waits only the newest is written.
 """
 
 from __future__ import annotations
@@ -94,8 +93,7 @@ class Store:
     def load(self, seal: Seal | None = None) -> Memory | None:
         """What the file holds; None without one, or when it is no use and was set aside.
 
-        Args:
-            seal: tells whose word of all that is remembered still counts.
+        ``seal`` tells whose word of all that is remembered still counts.
         """
         try:
             saved_unix_s, snapshot = self._decode(self.path.read_bytes(), seal)

@@ -1,7 +1,7 @@
 """A table of results: the same values for a terminal, for a document and for programs.
 
 Rows hold values in SI units; columns say in which unit and with which digits people read them,
-and what programs call them. Leaves out: what stands around a table.
+and what programs call them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """One thread that makes all calls into a transport, in order.
 
-A call may wait for a congested network; the asyncio loop must not. Leaves out: what
-the calls do (swarm.bus.zenoh_bus).
+A call may wait for a congested network; the asyncio loop must not.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """A new scenario that flies as it is, with every field explained, for a person to make their own.
 
 The fields and their defaults are those of swarm.scenario.shapes; here is what they mean.
-Leaves out: scenarios made of files of tasks (swarm.scenario.draft).
 """
 
 from __future__ import annotations
@@ -9,8 +8,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
 
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
@@ -18,7 +16,7 @@ from pydantic_core import PydanticUndefined
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.scenario.draft import PAD_SPACING_M, horizon_for
 from swarm.scenario.shapes import SCHEMA, MissionTable, OriginTable, Scenario, TaskTable, UavTable
-from swarm.scenario.write import toml_float, toml_point, toml_string
+from swarm.scenario.write import toml_lines, toml_place, toml_value
 
 __all__ = ["Blank", "blank_scenario"]
 
@@ -161,56 +159,46 @@ def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
         "examples. Every fault of this file is told by:  swarm plan FILE"
     )
     yield ""
-    top = {"schema": str(SCHEMA), "name": toml_string(mission.name)}
-    if not mission.tasks:
-        top["task"] = "[]"
+    top = {"schema": SCHEMA, "name": mission.name}
     yield from _explained("", top)
     if not mission.tasks:
         yield "task = []  # none yet: an operator adds them (swarm task add), or tables follow"
         yield ""
     yield "[mission]"
-    yield from _explained("mission", {"horizon_s": toml_float(mission.horizon_s)})
-    place = {
-        "lat_deg": blank.origin.lat_deg,
-        "lon_deg": blank.origin.lon_deg,
-        "alt_m": blank.origin.alt_m,
-    }
+    yield from _explained("mission", {"horizon_s": mission.horizon_s})
     yield "[origin]"
-    yield from _explained("origin", {key: toml_float(value) for key, value in place.items()})
+    yield from _explained("origin", asdict(blank.origin))
     for number, uav in enumerate(mission.uavs):
         given = {
-            "id": toml_string(uav.id),
-            "position_m": toml_point(uav.position_enu_m),
-            "speed_m_s": toml_float(uav.speed_m_s),
+            "id": uav.id,
+            "position_m": toml_place(uav.position_enu_m),
+            "speed_m_s": uav.speed_m_s,
         }
         yield from _entry("uav", given, explained=number == 0)
     for number, task in enumerate(mission.tasks):
         given = {
-            "id": toml_string(task.id),
-            "position_m": toml_point(task.position_enu_m),
-            "value": toml_float(task.value),
+            "id": task.id,
+            "position_m": toml_place(task.position_enu_m),
+            "value": task.value,
         }
         yield from _entry("task", given, explained=number == 0)
     if not mission.tasks:
         yield "# [[task]]"
-        yield from (
-            f"# {line}".rstrip() if not line.startswith("#") else line
-            for line in _explained(
-                "task", {"id": '"t1"', "position_m": "[60.0, 0.0]", "value": "1.0"}
-            )
-        )
+        example = {"id": "t1", "position_m": [60.0, 0.0], "value": 1.0}
+        for line in _explained("task", example):
+            yield line if line.startswith("#") else f"# {line}".rstrip()
 
 
-def _entry(table: str, given: Mapping[str, str], *, explained: bool) -> Iterator[str]:
+def _entry(table: str, given: Mapping[str, object], *, explained: bool) -> Iterator[str]:
     yield f"[[{table}]]"
     if explained:
         yield from _explained(table, given)
         return
-    yield from (f"{key} = {value}" for key, value in given.items())
+    yield from toml_lines(given)
     yield ""
 
 
-def _explained(table: str, given: Mapping[str, str]) -> Iterator[str]:
+def _explained(table: str, given: Mapping[str, object]) -> Iterator[str]:
     """Every field of a table with what it means; those not ``given`` as comments."""
     fields = _TABLES[table].model_fields
     keys = {field.alias or name: field for name, field in fields.items()}
@@ -221,20 +209,16 @@ def _explained(table: str, given: Mapping[str, str]) -> Iterator[str]:
         about = _ABOUT[table][key]
         default = keys[key].get_default(call_default_factory=True)
         if default not in (PydanticUndefined, None, {}):
-            about += f" Default: {_toml(default)}."
+            about += f" Default: {toml_value(default)}."
         yield from _wrapped(about)
         if key in given:
-            yield f"{key} = {given[key]}"
+            yield f"{key} = {SCHEMA if key == 'schema' else toml_value(given[key])}"
         elif (table, key) in _EXAMPLES:
             yield f"# {key} = {_EXAMPLES[table, key]}"
         else:
-            yield f"{key} = {_toml(default)}"
+            yield f"{key} = {toml_value(default)}"
     yield ""
 
 
 def _wrapped(text: str) -> Iterator[str]:
     yield from (f"# {line}" for line in textwrap.wrap(text, _WIDTH))
-
-
-def _toml(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else toml_float(value)

@@ -1,8 +1,7 @@
 """Rules between several places of a scenario file: ids, references, places, abilities.
 
 The checks read the parsed document itself and pass over whatever has the wrong
-shape, so that one run names every fault of a file. Leaves out: shapes and
-ranges of single values (swarm.scenario.shapes).
+shape, so that one run names every fault of a file.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""The commands ``swarm import`` and ``swarm new``.
-
-Leaves out: reading files of tasks (swarm.scenario.task_files), and the text of
-the scenario (swarm.scenario.draft, swarm.scenario.blank).
-"""
+"""The commands ``swarm import`` and ``swarm new``."""
 
 from __future__ import annotations
 
@@ -19,6 +15,19 @@ if TYPE_CHECKING:
 
 __all__ = ["import_tasks", "new"]
 
+NameOption = Annotated[
+    str | None,
+    typer.Option(
+        "--name",
+        metavar="NAME",
+        help="Name of the mission. Default: that of the file.",
+        show_default=False,
+    ),
+]
+UavsOption = Annotated[
+    int, typer.Option("--uavs", min=1, max=1000, metavar="N", help="Size of the fleet.")
+]
+
 
 def import_tasks(
     file: Annotated[
@@ -29,9 +38,7 @@ def import_tasks(
             show_default=False,
         ),
     ],
-    uavs: Annotated[
-        int, typer.Option("--uavs", min=1, max=1000, metavar="N", help="Size of the fleet.")
-    ] = 3,
+    uavs: UavsOption = 3,
     speed_m_s: Annotated[
         float | None,
         typer.Option(
@@ -92,15 +99,7 @@ def import_tasks(
             help="Time on the spot, for tasks the file gives none.",
         ),
     ] = 0.0,
-    name: Annotated[
-        str | None,
-        typer.Option(
-            "--name",
-            metavar="NAME",
-            help="Name of the mission. Default: that of the file.",
-            show_default=False,
-        ),
-    ] = None,
+    name: NameOption = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -128,15 +127,12 @@ def import_tasks(
         swarm import trees.geojson --home 47.3977,8.5456,488 -o trees.toml
         swarm import grid.csv --uavs 10 -o grid.toml
     """
-    from swarm.model.ids import ID_RULE, valid_id
-    from swarm.runtime.errors import Fault, InputError
     from swarm.scenario.draft import DraftOptions, draft_scenario
     from swarm.scenario.task_files import read_task_file
 
-    if name is not None and not valid_id(name):
-        raise InputError(Fault("--name", "", f"{name!r} is not an id", f"give {ID_RULE}"))
     tasks = read_task_file(file, home=None if home is None else _origin(home), below_m=below_m)
-    fleet = DraftOptions(name or _id_of(file.stem), uavs, speed_m_s, horizon_s, value, service_s)
+    named = _named(name, file)
+    fleet = DraftOptions(named, uavs, speed_m_s, horizon_s, value, service_s)
     text = draft_scenario(tasks, fleet)
     if output is None:
         print(text, end="")
@@ -155,9 +151,7 @@ def new(
             show_default=False,
         ),
     ],
-    uavs: Annotated[
-        int, typer.Option("--uavs", min=1, max=1000, metavar="N", help="Size of the fleet.")
-    ] = 3,
+    uavs: UavsOption = 3,
     tasks: Annotated[
         int, typer.Option("--tasks", min=0, max=10_000, metavar="M", help="Number of tasks.")
     ] = 6,
@@ -171,15 +165,7 @@ def new(
             show_default=False,
         ),
     ] = None,
-    name: Annotated[
-        str | None,
-        typer.Option(
-            "--name",
-            metavar="NAME",
-            help="Name of the mission. Default: that of the file.",
-            show_default=False,
-        ),
-    ] = None,
+    name: NameOption = None,
 ) -> int:
     """Write a new scenario in which every field is explained.
 
@@ -192,17 +178,15 @@ def new(
         swarm new field.toml && swarm plan field.toml && swarm run field.toml --speedup 5
     """
     from swarm.model.frames import DEFAULT_ORIGIN
-    from swarm.model.ids import ID_RULE, valid_id
     from swarm.runtime.errors import Fault, InputError
     from swarm.scenario.blank import Blank, blank_scenario
 
-    if name is not None and not valid_id(name):
-        raise InputError(Fault("--name", "", f"{name!r} is not an id", f"give {ID_RULE}"))
+    named = _named(name, file)
     if file.suffix != ".toml":
         remedy = f"end it in .toml, such as {file.stem or 'field'}.toml"
         raise InputError(Fault(str(file), "", "is no name of a scenario file", remedy))
     place = DEFAULT_ORIGIN if origin is None else _origin(origin, "--origin", alt_m=0.0)
-    _write(file, blank_scenario(Blank(name or _id_of(file.stem), uavs, tasks, place)), "")
+    _write(file, blank_scenario(Blank(named, uavs, tasks, place)), "")
     print(f"fly it with: swarm run {file}", file=sys.stderr)
     return 0
 
@@ -223,10 +207,15 @@ def _origin(text: str, option: str = "--home", *, alt_m: float | None = None) ->
         raise InputError(Fault(option, "", f"{text!r} is no place", remedy)) from error
 
 
-def _id_of(stem: str) -> str:
-    """A mission name close to the name of a file."""
-    words = re.sub(r"[^A-Za-z0-9_.-]+", "-", stem).strip("-_.")
-    return words[:64] or "mission"
+def _named(name: str | None, file: Path) -> str:
+    """The name of the mission; without one, one close to that of the file."""
+    from swarm.model.ids import ID_RULE, valid_id
+    from swarm.runtime.errors import Fault, InputError
+
+    if name is not None and not valid_id(name):
+        raise InputError(Fault("--name", "", f"{name!r} is not an id", f"give {ID_RULE}"))
+    words = re.sub(r"[^A-Za-z0-9_.-]+", "-", file.stem).strip("-_.")
+    return name or words[:64] or "mission"
 
 
 def _write(path: Path, text: str, option: str = "--output") -> None:

@@ -1,7 +1,4 @@
-"""A commented scenario made of a file of tasks and a few options, for a person to go on from.
-
-Leaves out: reading the file (swarm.scenario.task_files), and the command (swarm.scenario.cli).
-"""
+"""A commented scenario made of a file of tasks and a few options, for a person to go on from."""
 
 from __future__ import annotations
 
@@ -14,7 +11,8 @@ import numpy as np
 from swarm.model import Mission
 from swarm.scenario.read import build_mission
 from swarm.scenario.task_files import TaskFile
-from swarm.scenario.write import toml_float, toml_string
+from swarm.scenario.task_files.task_file import TASK_KEYS
+from swarm.scenario.write import toml_float, toml_lines, toml_string
 
 __all__ = ["PAD_SPACING_M", "SPEED_M_S", "DraftOptions", "draft_scenario", "horizon_for"]
 
@@ -25,17 +23,7 @@ PAD_SPACING_M = 5.0
 """Distance between the pads of neighbouring UAVs [m]."""
 _SHORTEST_HORIZON_S = 60.0
 _LONGEST_HORIZON_S = 1e9
-_KEYS = (
-    "id",
-    "position_m",
-    "lat_deg",
-    "lon_deg",
-    "alt_m",
-    "value",
-    "service_s",
-    "kind",
-    "appears_s",
-)
+_KEYS = ("id", "position_m", "lat_deg", "lon_deg", "alt_m", *TASK_KEYS[1:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,19 +114,19 @@ def _lines(
         yield ""
         yield "# Home, the zero of position_m; alt_m is its height above mean sea level."
         yield "[origin]"
-        yield from _entries(asdict(tasks.home))
+        yield from toml_lines(asdict(tasks.home))
     yield ""
     yield "# Where each UAV takes off [m east, m north of home], and its cruise speed."
     for uav in uavs:
         yield "[[uav]]"
-        yield from _entries(uav)
+        yield from toml_lines(uav)
         yield ""
     yield from _about_heights(tasks)
     for number, entry in enumerate(tasks.entries):
         if number:
             yield ""
         yield "[[task]]"
-        yield from _entries({key: entry.table[key] for key in _KEYS if key in entry.table})
+        yield from toml_lines({key: entry.table[key] for key in _KEYS if key in entry.table})
 
 
 def _about_heights(tasks: TaskFile) -> Iterator[str]:
@@ -146,20 +134,3 @@ def _about_heights(tasks: TaskFile) -> Iterator[str]:
     yield "# every other 3 m higher than the one before."
     if tasks.below_m:
         yield f"# Each place is {tasks.below_m:g} m below its waypoint for that reason."
-
-
-def _entries(table: Mapping[str, object]) -> Iterator[str]:
-    for key, value in table.items():
-        yield f"{key} = {_toml(value)}"
-
-
-def _toml(value: object) -> str:
-    match value:
-        case str():
-            return toml_string(value)
-        case int() | float():
-            return toml_float(value)
-        case list():
-            return f"[{', '.join(_toml(item) for item in value)}]"
-        case _:
-            raise TypeError(f"no value of a scenario: {value!r}")

@@ -2,7 +2,7 @@
 
 Shipped scenarios are the TOML files of the package ``sim.scenarios``. They are looked up by
 that name among the installed packages, not imported, so that commands of the lower packages
-can offer them. Leaves out: what the text of a file means.
+can offer them.
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 A finding names its place as a path of keys and indices into the parsed
 document; here paths become text a person recognises, in the order of the file.
-Leaves out: what counts as wrong (swarm.scenario.shapes, swarm.scenario.checks).
 """
 
 from __future__ import annotations

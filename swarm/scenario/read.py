@@ -2,8 +2,7 @@
 
 Only what is no TOML at all stops early. A mission without any task is wrong
 unless it says so itself with ``task = []``: forgetting the tasks is likelier
-than waiting for an operator to add them. Leaves out: finding the file by a
-shipped name (swarm.scenario.files).
+than waiting for an operator to add them.
 """
 
 from __future__ import annotations
@@ -203,6 +202,5 @@ def _point_enu_m(table: UavTable | TaskTable, origin: Origin | None) -> tuple[fl
         return east_m, north_m, up_m[0] if up_m else 0.0
     if origin is None or table.lat_deg is None or table.lon_deg is None:
         raise ValueError("a table without a position has passed the checks")
-    if table.alt_m is None:
-        return enu_from_wgs84(origin, table.lat_deg, table.lon_deg, origin.alt_m)
-    return enu_from_wgs84(origin, table.lat_deg, table.lon_deg, table.alt_m)
+    alt_m = origin.alt_m if table.alt_m is None else table.alt_m
+    return enu_from_wgs84(origin, table.lat_deg, table.lon_deg, alt_m)

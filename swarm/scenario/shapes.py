@@ -2,7 +2,6 @@
 
 The upper limits are far beyond any aircraft; they keep every product of eq. 1
 finite, so that a misplaced exponent is named here and not met as an infinite J.
-Leaves out: rules between several places of the file (swarm.scenario.checks).
 """
 
 from __future__ import annotations

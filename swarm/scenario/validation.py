@@ -1,7 +1,6 @@
 """Tables of a TOML file against pydantic models: every fault at once, in words people use.
 
-Scenario and study files share it. Leaves out: which tables and keys there are, and rules between
-several places of a file.
+Scenario and study files share it.
 """
 
 from __future__ import annotations

@@ -1,18 +1,18 @@
 """Write a mission as a scenario file that reads back as the same mission.
 
-Positions are written in local metres, numbers with all their digits. Leaves
-out: comments, and places in degrees (the origin is kept).
+Positions are written in local metres, numbers with all their digits.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 
 from swarm.model import Mission, Task, Uav
 
-__all__ = ["format_scenario", "toml_float", "toml_point", "toml_string"]
+__all__ = ["format_scenario", "toml_float", "toml_lines", "toml_place", "toml_string", "toml_value"]
 
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -24,62 +24,76 @@ def format_scenario(mission: Mission) -> str:
     A mission whose numbers pass the limits of the format (see
     swarm.scenario.shapes) is written all the same and refused when read.
     """
-    head = ["schema = 1", f"name = {toml_string(mission.name)}"]
+    head: dict[str, object] = {"name": mission.name}
     if not mission.tasks:
-        head.append("task = []")
+        head["task"] = []
+    rules = ("horizon_s", "success_default", "survival_default", "reattempt_failed")
     blocks = [
-        head,
-        [
-            "[mission]",
-            f"horizon_s = {toml_float(mission.horizon_s)}",
-            f"success_default = {toml_float(mission.success_default)}",
-            f"survival_default = {toml_float(mission.survival_default)}",
-            f"reattempt_failed = {'true' if mission.reattempt_failed else 'false'}",
-        ],
+        ["schema = 1", *toml_lines(head)],
+        ["[mission]", *toml_lines({key: getattr(mission, key) for key in rules})],
     ]
-    if (origin := mission.origin) is not None:
-        place = (("lat_deg", origin.lat_deg), ("lon_deg", origin.lon_deg), ("alt_m", origin.alt_m))
-        blocks.append(["[origin]", *(f"{key} = {toml_float(number)}" for key, number in place)])
-    blocks += [list(_uav_lines(uav)) for uav in mission.uavs]
-    blocks += [list(_task_lines(task)) for task in mission.tasks]
+    if mission.origin is not None:
+        blocks.append(["[origin]", *toml_lines(asdict(mission.origin))])
+    blocks += [["[[uav]]", *toml_lines(_uav(uav))] for uav in mission.uavs]
+    blocks += [["[[task]]", *toml_lines(_task(task))] for task in mission.tasks]
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
-def _uav_lines(uav: Uav) -> Iterable[str]:
-    yield "[[uav]]"
-    yield f"id = {toml_string(uav.id)}"
-    yield f"position_m = {toml_point(uav.position_enu_m)}"
-    yield f"speed_m_s = {toml_float(uav.speed_m_s)}"
-    if uav.success:
-        yield f"success = {_table(uav.success)}"
-    if uav.survival:
-        yield f"survival = {_table(uav.survival)}"
-    if uav.kind is not None:
-        yield f"kind = {toml_string(uav.kind)}"
+def _uav(uav: Uav) -> dict[str, object]:
+    more = {"success": uav.success or None, "survival": uav.survival or None, "kind": uav.kind}
+    return {
+        "id": uav.id,
+        "position_m": toml_place(uav.position_enu_m),
+        "speed_m_s": uav.speed_m_s,
+        **{key: value for key, value in more.items() if value is not None},
+    }
 
 
-def _task_lines(task: Task) -> Iterable[str]:
-    yield "[[task]]"
-    yield f"id = {toml_string(task.id)}"
-    yield f"position_m = {toml_point(task.position_enu_m)}"
-    yield f"value = {toml_float(task.value)}"
-    if task.service_s:
-        yield f"service_s = {toml_float(task.service_s)}"
-    if task.kind is not None:
-        yield f"kind = {toml_string(task.kind)}"
-    if task.appears_s:
-        yield f"appears_s = {toml_float(task.appears_s)}"
+def _task(task: Task) -> dict[str, object]:
+    more = {
+        "service_s": task.service_s or None,
+        "kind": task.kind,
+        "appears_s": task.appears_s or None,
+    }
+    return {
+        "id": task.id,
+        "position_m": toml_place(task.position_enu_m),
+        "value": task.value,
+        **{key: value for key, value in more.items() if value is not None},
+    }
 
 
-def toml_point(point_enu_m: tuple[float, float, float]) -> str:
+def toml_place(point_enu_m: tuple[float, float, float]) -> list[float]:
     """A place as ``position_m`` has it: without the height where that is 0."""
-    numbers = point_enu_m if point_enu_m[2] else point_enu_m[:2]
-    return f"[{', '.join(toml_float(number) for number in numbers)}]"
+    return list(point_enu_m if point_enu_m[2] else point_enu_m[:2])
 
 
-def _table(entries: Mapping[str, float]) -> str:
-    inner = ", ".join(f"{_key(name)} = {toml_float(number)}" for name, number in entries.items())
-    return f"{{ {inner} }}"
+def toml_lines(table: Mapping[str, object]) -> Iterator[str]:
+    """What is in ``table``, a key a line."""
+    for key, value in table.items():
+        yield f"{key} = {toml_value(value)}"
+
+
+def toml_value(value: object) -> str:
+    """A string, truth value or number, or an array or table of such, on one line.
+
+    Raises:
+        TypeError: it is nothing that a scenario holds.
+    """
+    match value:
+        case str():
+            return toml_string(value)
+        case bool():
+            return str(value).lower()
+        case int() | float():
+            return toml_float(value)
+        case list():
+            return f"[{', '.join(map(toml_value, value))}]"
+        case Mapping():
+            inner = ", ".join(f"{_key(name)} = {toml_value(each)}" for name, each in value.items())
+            return f"{{ {inner} }}"
+        case _:
+            raise TypeError(f"no value of a scenario: {value!r}")
 
 
 def _key(name: str) -> str:

@@ -13,7 +13,7 @@ import io
 from collections.abc import Sequence
 
 from swarm.runtime.errors import Fault, InputError
-from swarm.scenario.findings import number_of, printable, shown
+from swarm.scenario.findings import printable, shown
 from swarm.scenario.task_files.task_file import (
     TASK_KEYS,
     FileTask,
@@ -21,6 +21,7 @@ from swarm.scenario.task_files.task_file import (
     TaskFile,
     gather,
     slip_of,
+    spelt_number,
 )
 
 __all__ = ["read_csv"]
@@ -100,7 +101,7 @@ def _entry(
     for name in _COLUMNS:
         if name not in given:
             continue
-        number = _number(given[name])
+        number = spelt_number(given[name])
         if name not in _WORDS and number is None:
             problem = f"{shown(given[name])} is not a number"
             return Fault(source, f"{place}, {name}", problem, "give a number such as 12.5")
@@ -112,10 +113,3 @@ def _entry(
     if in_metres:
         table["position_m"] = [table.pop(name) for name in _METRES if name in table]
     return FileTask(table, place)
-
-
-def _number(text: str) -> float | None:
-    try:
-        return number_of(float(text))
-    except ValueError:
-        return None

@@ -2,8 +2,7 @@
 
 A waypoint is where a vehicle flies; a task is what it flies over. So a task lies
 as far below its waypoint as the lowest height layer lies above tasks: the first
-UAV then flies at the height planned, and every other one a layer higher. Leaves
-out: how a file writes an item (plan_file, waypoints_file).
+UAV then flies at the height planned, and every other one a layer higher.
 """
 
 from __future__ import annotations

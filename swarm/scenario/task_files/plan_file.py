@@ -2,8 +2,8 @@
 
 Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html.
 Of a complex item the mission items that QGroundControl has stored with it are
-taken; without them, the corners of its transects. Leaves out: geofence, rally
-points, and what a vehicle does on the way (cameras, regions of interest).
+taken; without them, the corners of its transects. Geofence, rally points, and what a vehicle
+does on the way (cameras, regions of interest) are left out.
 """
 
 from __future__ import annotations

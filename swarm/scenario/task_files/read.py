@@ -1,7 +1,4 @@
-"""Read a file of tasks by the reader its suffix asks for.
-
-Leaves out: the formats (one module each), and what a scenario makes of the tasks.
-"""
+"""Read a file of tasks by the reader its suffix asks for."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 An entry has the keys of a table ``[[task]]`` and is checked like one, but under its place in
 the file it came from. Unknown columns and properties are passed over and reported; one that is
-nearly right is a slip and a fault. Leaves out: the formats, one module each.
+nearly right is a slip and a fault.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from difflib import get_close_matches
 
 from swarm.model import Origin
 from swarm.runtime.errors import Fault, InputError
-from swarm.scenario.findings import printable, shown
+from swarm.scenario.findings import number_of, printable, shown
 
 __all__ = [
     "TASK_KEYS",
@@ -26,6 +26,7 @@ __all__ = [
     "member",
     "parse_object",
     "slip_of",
+    "spelt_number",
 ]
 
 
@@ -62,6 +63,14 @@ def member(value: object, *keys: str) -> object:
     for key in keys:
         value = value.get(key) if isinstance(value, Mapping) else None
     return value
+
+
+def spelt_number(text: str) -> float | None:
+    """The finite number that ``text`` spells; None if it is none."""
+    try:
+        return number_of(float(text))
+    except ValueError:
+        return None
 
 
 TASK_KEYS = ("id", "value", "service_s", "kind", "appears_s")

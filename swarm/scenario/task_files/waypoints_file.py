@@ -16,7 +16,7 @@ from swarm.scenario.task_files.mission_items import (
     stops_of,
     whole_of,
 )
-from swarm.scenario.task_files.task_file import ReadOptions, TaskFile, gather
+from swarm.scenario.task_files.task_file import ReadOptions, TaskFile, gather, spelt_number
 
 __all__ = ["read_waypoints"]
 
@@ -68,7 +68,7 @@ def _item(place: str, fields: list[str], source: str) -> WaypointItem | Fault:
         problem = f"has {len(fields)} fields instead of {_FIELDS}"
         remedy = "give index, current, frame, command, four params, latitude, longitude, height, 1"
         return Fault(source, place, problem, remedy)
-    numbers = [_number(field) for field in fields]
+    numbers = [spelt_number(field) for field in fields]
     for number, field in zip(numbers, fields, strict=True):
         if number is None:
             return Fault(source, place, f"{shown(field)} is not a number", "give a number")
@@ -77,13 +77,6 @@ def _item(place: str, fields: list[str], source: str) -> WaypointItem | Fault:
         wrong = fields[2] if frame is None else fields[3]
         return Fault(source, place, f"{wrong} is not a whole number", "give a frame and a command")
     return WaypointItem(command, frame, numbers[4:11], place)
-
-
-def _number(text: str) -> float | None:
-    try:
-        return number_of(float(text))
-    except ValueError:
-        return None
 
 
 def _home(item: WaypointItem) -> Origin | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swarm.identity.announcer import AGAIN_S, FIRST_S, SETTLE_S, RosterAnnouncer, roster_message
+from swarm.identity.announcer import AGAIN_S, FIRST_S, SETTLE_S, RosterAnnouncer
 from swarm.protocol.events import (
     Ask,
     Finish,
@@ -14,13 +14,13 @@ from swarm.protocol.events import (
     SnapshotsReceived,
     Tick,
 )
-from swarm.protocol.messages import Message, Snapshot
+from swarm.protocol.messages import Message, Snapshot, roster_message
 
 MISSION = "table-1"
-OLD = roster_message(MISSION, 3, b"old")
-NEW = roster_message(MISSION, 4, b"new")
-NEWER = roster_message(MISSION, 5, b"newer")
-FORK = roster_message(MISSION, 4, b"another")
+OLD = roster_message(MISSION, 3, "old")
+NEW = roster_message(MISSION, 4, "new")
+NEWER = roster_message(MISSION, 5, "newer")
+FORK = roster_message(MISSION, 4, "another")
 PATIENCE_S = 10.0
 
 

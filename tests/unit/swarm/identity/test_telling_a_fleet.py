@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import replace
 
-from swarm.identity.announcer import RosterAnnouncer, roster_message
+from swarm.identity.announcer import RosterAnnouncer
 from swarm.identity.roster import Roster, RosterEntry
 from swarm.protocol.events import (
     CommonAction,
@@ -16,7 +16,7 @@ from swarm.protocol.events import (
     SnapshotsReceived,
     Stop,
 )
-from swarm.protocol.messages import Snapshot
+from swarm.protocol.messages import Snapshot, roster_message
 from swarm.protocol.registers import Replica
 from swarm.protocol.seal import Seal
 from swarm.runtime.clock import ScaledClock
@@ -98,7 +98,9 @@ def told(
         signed = KEYS.signed(roster).encode()
         seal = KEYS.seal("operator")
         seal.put_in_force(signed.decode())
-        announcer = RosterAnnouncer(roster_message(MISSION, roster.version, signed), writers, 100.0)
+        announcer = RosterAnnouncer(
+            roster_message(MISSION, roster.version, signed.decode()), writers, 100.0
+        )
         bus = network.join("operator", seal=seal)
         telling: Shell[CommonEvent, CommonAction] = Shell(
             announcer,
