@@ -54,9 +54,8 @@ def main(
 ) -> int:
     """Run one command line and say how it ended, by its exit status.
 
-    Args:
-        argv: arguments after ``swarm``; those of this process if None.
-        commands: subcommands by name; the installed ones if None.
+    ``argv`` is what follows ``swarm``, on this process's command line if None; ``commands`` are the
+    installed ones if None.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     found = _installed_commands() if commands is None else commands

@@ -20,12 +20,9 @@ __all__ = ["evaluate", "executed_objective"]
 def evaluate(
     problem: Problem, routes: Sequence[Sequence[int]], state: TeamState | None = None
 ) -> tuple[float, FloatArray]:
-    """Objective and completion times of lists.
+    """J of eq. 1 and completion times of lists of task indices; tasks on no list count 0.
 
-    Args:
-        problem: the mission.
-        routes: task indices per UAV in order of execution; tasks on no list count 0.
-        state: from which the lists are flown; the starts at mission time 0 when None.
+    They are flown from ``state``; from the starts at mission time 0 when it is None.
 
     Returns:
         J [value·s] and (n_task,) completion times [s], NaN for tasks on no list.

@@ -132,10 +132,8 @@ class Problem:
     def with_tasks(self, mission: Mission, tasks: Sequence[Task], known: Sequence[int]) -> Problem:
         """The same UAVs and other tasks, exactly as `from_mission` has them.
 
-        Args:
-            mission: this problem's, whose own tasks play no part.
-            tasks: columns in this order.
-            known: (n_task,) of each the index of its column here; -1 of a new one.
+        ``known`` has of each the index of its column here, -1 of a new one; the tasks of
+        ``mission``, which is this problem's, play no part.
         """
         fresh = [task for task, index in zip(tasks, known, strict=True) if index < 0]
         new = _of_tasks(mission, mission.uavs, fresh)
@@ -183,12 +181,7 @@ class Problem:
     def travel_by_lists_s(
         self, routes: Sequence[Sequence[int]], first_enu_m: FloatArray
     ) -> FloatArray:
-        """(k,) the same of all UAVs, list after list [s].
-
-        Args:
-            routes: task indices per UAV in order of execution; k in all.
-            first_enu_m: (n_uav, 3) where each UAV begins [m; ENU].
-        """
+        """(k,) the same of all UAVs, list after list, each from its row of (n_uav, 3) [s]."""
         lengths = np.array([len(route) for route in routes], dtype=np.int64)
         tasks = np.array([task for route in routes for task in route], dtype=np.int64)
         uavs = np.repeat(np.arange(len(lengths)), lengths)

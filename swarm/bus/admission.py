@@ -66,9 +66,7 @@ _KEPT_QUESTIONS: Final = 4096
 class RateLimiter:
     """One token bucket for each of many sources; how many there may be is for who calls to say.
 
-    Args:
-        rate_hz: how many each may send for good.
-        burst: how many at once.
+    Each may send ``burst`` at once, and ``rate_hz`` for good.
     """
 
     def __init__(self, rate_hz: float, burst: int) -> None:

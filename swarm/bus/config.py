@@ -39,9 +39,6 @@ def is_loopback(endpoint: str) -> bool:
 
     A name counts as another machine's, but for ``localhost``: what it means may change. So
     does the address that stands for all of this machine's.
-
-    Args:
-        endpoint: ``PROTOCOL/HOST:PORT`` or ``unixsock-stream/PATH``.
     """
     protocol, _, place = endpoint.partition("/")
     if protocol == "unixsock-stream":
@@ -200,14 +197,8 @@ def bus_config(
 ) -> BusConfig:
     """Settings from what was given on a command line.
 
-    Args:
-        kind: ``mesh``, ``router`` or the path of a Zenoh configuration file.
-        listen: own endpoint in a mesh; empty when not given.
-        connect: routers, or peers to dial; when kind is router and none is given,
-            `DEFAULT_ROUTER`, with keys `DEFAULT_SECURE_ROUTER`.
-        lease_s: silence after which others take this process for lost [s].
-        identity: what the process proves to be; None without keys.
-        unencrypted: whether it may talk in the clear with other machines.
+    ``kind`` is ``mesh``, ``router`` or the path of a Zenoh configuration file. The default router
+    is `DEFAULT_ROUTER`, with keys `DEFAULT_SECURE_ROUTER`.
 
     Raises:
         InputError: the options contradict each other, an endpoint is wrong, or others could

@@ -140,10 +140,7 @@ class ConnectionOptions:
     ) -> BusConfig:
         """Settings of the seat; reads the keys, if there are any.
 
-        Args:
-            mission: that the keys have to be for; None for whichever they are for.
-            roles: of which the keys have to be of one; any if there is none.
-            name: that the keys have to be of; None for whichever.
+        Those have to be for ``mission``, of one of ``roles``, and of ``name``, where that is given.
 
         Raises:
             InputError: options contradict each other, or do not fit the keys.

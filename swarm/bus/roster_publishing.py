@@ -33,11 +33,9 @@ CONFIRM_S: Final = 10.0
 
 
 def publish(config: BusConfig, change: Callable[[], bytes]) -> list[str]:
-    """Make a change and tell the fleet.
+    """Make a change and tell the fleet from an operator's or a coordinator's seat.
 
-    Args:
-        config: of an operator's or a coordinator's seat, with its identity.
-        change: makes it once the bus is reached; gives the signed roster that follows.
+    ``change`` makes it once the bus is reached, and gives the signed roster that follows.
 
     Returns:
         Who has confirmed it; empty if nobody was there who could.

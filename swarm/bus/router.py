@@ -42,9 +42,7 @@ one says some 10 a second, and up to 1000 at once when a partition heals."""
 class RosterKeeper:
     """Keeps the newest roster of one mission, on disk too; a bad one changes nothing.
 
-    Args:
-        identity: whose folder it is, and whose authority counts.
-        look_s: how often the folder is looked into [wall s].
+    The folder of ``identity`` is looked into every ``look_s`` [wall s].
 
     Raises:
         OSError: its roster cannot be read any more.

@@ -47,12 +47,8 @@ def secure(
 ) -> None:
     """Lay what keys entail over the configuration of a session, a user's file included.
 
-    Args:
-        config: of the session.
-        identity: of the session.
-        mode: ``client``, ``peer`` or ``router``.
-        roster: in force.
-        door: for a router, the file that `door_of` made.
+    ``mode`` is ``client``, ``peer`` or ``router``; ``door`` is for the last, the file that
+    `door_of` made.
 
     Raises:
         InputError: an endpoint is not encrypted, or others would dial it in that mode, which

@@ -68,11 +68,8 @@ async def open_zenoh_bus(
     A peer does not wait for the others: `LinkUp` tells. A client waits for one of its
     routers, which may start later than itself.
 
-    Args:
-        config: how to reach the others.
-        timeout_s: how long to try.
-        inbox_capacity: events kept for a slow reader.
-        on_wait: told once what is waited for, when it takes longer than a person expects.
+    ``on_wait`` is told once what is waited for, when it takes longer than a person expects.
+    ``inbox_capacity`` events are kept for a slow reader.
 
     Raises:
         BusError: the bus cannot be reached in time, or the own endpoint is taken.

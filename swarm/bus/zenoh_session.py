@@ -48,11 +48,7 @@ def session_config(
 ) -> zenoh.Config:
     """A configuration that finds nobody but those named.
 
-    Args:
-        mode: ``peer``, ``client`` or ``router``.
-        listen: own endpoints.
-        connect: endpoints of others; a client uses the first that answers.
-        lease_s: silence after which others take this session for lost [s].
+    ``mode`` is ``peer``, ``client`` or ``router``; a client uses the first endpoint that answers.
     """
     retry = {
         "period_init_ms": _ms(RECONNECT_FIRST_S),

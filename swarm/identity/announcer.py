@@ -38,10 +38,8 @@ AGAIN_S = 0.4
 class RosterAnnouncer:
     """A core that spreads one roster.
 
-    Args:
-        message: the register ``roster``.
-        writers: everyone who, by that roster, may show a token.
-        patience_s: how long to wait for everyone who is there.
+    It waits no longer than ``patience_s`` for everyone who is there, of ``writers``, who may show a
+    token by that roster.
     """
 
     def __init__(self, message: Message, writers: Collection[str], patience_s: float) -> None:

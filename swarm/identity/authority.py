@@ -157,10 +157,8 @@ class Authority:
         Those in force get a new one in place of the old. A UAV keeps its MAVLink key, unless it was
         revoked since it got that. Gives the roster now in force.
 
-        Args:
-            names: role by name.
-            now_s: wall time [unix s].
-            days: how long they are valid; the authority's own custom if None.
+        ``names`` have a role each, ``now_s`` is wall time [unix s]; certificates are valid for
+        ``days``, by the authority's own custom if None.
 
         Raises:
             InputError: a name is no use, or had another role before.
@@ -349,11 +347,7 @@ def require_fit(
 ) -> None:
     """See that something can be issued for each of ``names``, in a folder of its own.
 
-    Args:
-        names: role by name.
-        ledger: what was issued before.
-        source: where the names come from, for the fault.
-        remedy: what to do about a name that is unfit.
+    ``ledger`` knows what was issued before; ``source`` of the names and ``remedy`` go into faults.
 
     Raises:
         InputError: for one of them nothing can be.

@@ -36,11 +36,9 @@ class FleetAddress:
         return bool(self.connect or self.listen or self.bus != "router")
 
     def config(self, signed: bytes, changing: Collection[str] = ()) -> BusConfig:
-        """Settings of a seat to tell it from.
+        """Settings of a seat to tell it from, whose keys are not among those ``changing``.
 
-        Args:
-            signed: roster of the authority whose word is to be told.
-            changing: names whose keys are about to change.
+        ``signed`` is a roster of the authority whose word is to be told.
 
         Raises:
             InputError: the keys or the options do not serve for that.

@@ -133,12 +133,8 @@ def load_identity(
 ) -> Identity:
     """The identity in the folder ``path``.
 
-    Args:
-        path: a folder that `swarm keys` made.
-        name: whose it must be; None for anyone's.
-        roles: of which one it must have; empty for any.
-        mission: of which it must be; None for any.
-        now_s: wall time [unix s]; the system's if None.
+    It must be that of ``name``, have one of ``roles`` and be of ``mission``, where that is given.
+    ``now_s`` is wall time [unix s]; the system's if None.
 
     Raises:
         InputError: something is missing, open to others, damaged, expired, not valid yet,

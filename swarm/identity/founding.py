@@ -48,17 +48,8 @@ def found_authority(
     The names are the UAVs' ids, ``coordinator``, ``router``, ``dashboard`` and ``operator``,
     the second of a kind ``coordinator-2`` and so on.
 
-    Args:
-        directory: must not be there yet, or be empty.
-        mission: name of the mission.
-        uavs: ids.
-        now_s: wall time [unix s].
-        coordinators: how many, each for a machine of its own, as of the others.
-        routers: how many.
-        dashboards: how many viewers.
-        operators: how many.
-        days: how long certificates are valid.
-        mesh: whether all shall be dialled, not only routers.
+    ``directory`` must not be there yet, or be empty; ``now_s`` is wall time [unix s]. Certificates
+    are valid for ``days``; in a ``mesh`` all shall be dialled, not only routers.
 
     Raises:
         InputError: the directory is in use, or two would have one name.

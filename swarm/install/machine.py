@@ -36,9 +36,8 @@ class FileOutcome(Enum):
 class TargetMachine:
     """The machine that services are installed on.
 
-    Args:
-        root: its file system, if that is not this one's.
-        is_root: whether this process may make users and give files away.
+    ``root`` is its file system, if that is not this one's; ``is_root`` whether this process may
+    make users and give files away.
     """
 
     def __init__(self, root: Path | None, *, is_root: bool) -> None:

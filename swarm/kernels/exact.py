@@ -29,11 +29,8 @@ def optimum(
     Best tours over every subset for each UAV, n²·2ⁿ, by labels where survival is below 1; then the
     division among the UAVs, 3ⁿ for each. The same with any number of threads.
 
-    Args:
-        problem: the prepared mission.
-        worst: minimise J instead.
-        threads: how many work at it; as many as there are processors when None.
-        should_stop: asked every few milliseconds whether to give up.
+    With ``worst`` J is minimised. ``should_stop`` is asked every few milliseconds whether to give
+    up.
 
     Returns:
         J [value·s], as the dynamic programme's sums have it, and a list of task indices per UAV;

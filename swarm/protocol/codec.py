@@ -95,10 +95,7 @@ def _stamps() -> TypeAdapter[Stamp]:
 class Codec:
     """Reads and writes what one mission's processes say, and counts what it drops.
 
-    Args:
-        mission: mission name.
-        seal: believes only what is signed, and signs what is written; None on a bus
-            without keys.
+    With a seal it believes only what is signed, and signs what is written.
     """
 
     def __init__(self, mission: str, seal: Seal | None = None) -> None:

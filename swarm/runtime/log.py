@@ -58,10 +58,7 @@ def configure_logging(
     what a dependency complains about is seen but its chatter is not. As JSON the traceback
     of a process that dies of an exception is a line, too.
 
-    Args:
-        level: how much is logged.
-        form: what a line looks like.
-        identity: ids that every line carries, such as ``mission``; see `identify`.
+    Each carries the ids of ``identity``, such as ``mission``; see `identify`.
     """
     import structlog
 

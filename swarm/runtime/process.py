@@ -77,11 +77,9 @@ UNWATCHED_S: Final = 20.0
 
 
 class ServiceNotifier:
-    """What this process tells whoever supervises it.
+    """What this process tells whoever supervises it, by its environment.
 
-    Args:
-        environment: of the process; read when something is told.
-        pid: of the process: what was meant for its parent is none of its business.
+    What that says of another ``pid``, as when it was meant for the parent, is none of its business.
     """
 
     def __init__(self, environment: Mapping[str, str], pid: int | None = None) -> None:
@@ -246,9 +244,7 @@ async def stop_requests(*, lifeline: bool) -> AsyncIterator[StopRequest]:
 async def run_until_stopped(work: Coroutine[Any, Any, int], *, lifeline: bool = False) -> int:
     """Run ``work`` to its end, or cancel it on SIGINT, SIGTERM or the parent's end.
 
-    Args:
-        work: the daemon; returns its exit status and cleans up in ``finally``.
-        lifeline: also stop when standard input ends.
+    It cleans up in ``finally``. With ``lifeline`` the end of standard input is the parent's.
 
     Returns:
         What ``work`` returned if it ended by itself, else `EXIT_STOPPED` or `EXIT_INTERRUPTED`.

@@ -40,18 +40,9 @@ def draw_nonce() -> bytes:
 
 
 class StateExchange:
-    """Asks and answers for one process.
+    """Asks and answers for one process; arguments are those of `swarm.runtime.shell.Shell`.
 
-    Args:
-        bus: open.
-        clock: gives ``now_s``.
-        codec: of the process; counts what is worth nothing.
-        mission: mission name.
-        name: writer id of this process.
-        snapshot: answers; None for a process that gives no answers.
-        known: digest of the registers that are known here.
-        answer_s: how long a question waits for the slowest answer [wall s].
-        draw_nonce: makes the nonce of a question, see swarm.protocol.sync.
+    ``codec`` counts what is worth nothing.
     """
 
     def __init__(

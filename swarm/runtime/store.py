@@ -54,12 +54,8 @@ class Memory:
 class Store:
     """The file of one process; no two processes may have the same.
 
-    Args:
-        directory: where the file is; made if it is not there.
-        mission: mission name.
-        writer: writer id of the process.
-        speedup: clock seconds per wall second, which scales the age of what is found.
-        unix_s: wall time.
+    It is in ``directory``, which is made if need be. ``speedup``, clock seconds per wall second,
+    scales the age of what is found.
 
     Raises:
         InputError: no file can be written there.

@@ -26,11 +26,6 @@ class WriterThread:
     When it is full, the oldest job that need not run goes and `dropped` counts it.
     The thread is a daemon: `close` normally ends it, but a call that hangs does not
     keep the process from leaving.
-
-    Args:
-        name: of the thread.
-        max_jobs: jobs waiting.
-        max_bytes: sum of their sizes.
     """
 
     def __init__(self, name: str, *, max_jobs: int = 4096, max_bytes: int = 64 << 20) -> None:
@@ -53,13 +48,10 @@ class WriterThread:
         must_run: bool = False,
         spare: bool = False,
     ) -> None:
-        """Let the thread make ``call``; returns at once.
+        """Let the thread make ``call``, which must not raise; returns at once.
 
-        Args:
-            call: must not raise.
-            size_bytes: what it keeps in memory.
-            must_run: never throw it away to make room.
-            spare: rather throw this one away than an older one.
+        It keeps ``size_bytes`` in memory. What ``must_run`` is never thrown away to make room, what
+        is ``spare`` rather than an older one.
         """
         with self._changed:
             full = (

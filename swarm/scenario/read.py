@@ -59,10 +59,7 @@ def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
     Places in degrees are converted to the local frame; without ``alt_m`` they
     lie at the height of the origin.
 
-    Args:
-        data: the bytes of a scenario file.
-        source: name of the file, for messages.
-        folder: where a file of tasks named by ``tasks_from`` is looked for.
+    ``source`` names it in messages; a file of ``tasks_from`` is looked for in ``folder``.
 
     Raises:
         InputError: with every fault of the file, in the order of the file.

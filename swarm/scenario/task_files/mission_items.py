@@ -103,11 +103,8 @@ def stops_of(
 ) -> list[FileTask | Fault]:
     """The tasks that ``items`` become; items that are not flown to become none.
 
-    Args:
-        items: the items of a mission.
-        home: where heights above home are counted from.
-        below_m: how far a task lies below its waypoint [m].
-        homeless: the fault when such a height is there and ``home`` is not.
+    They lie ``below_m`` below their waypoints. ``homeless`` is the fault where a height is counted
+    from ``home`` and that is None.
     """
     stops = [item for item in items if item.command in _STOPS]
     if home is None and any(item.frame in _ABOVE_HOME for item in stops):

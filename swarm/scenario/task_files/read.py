@@ -35,10 +35,8 @@ def read_task_file(
 ) -> TaskFile:
     """The tasks in the file ``path``.
 
-    Args:
-        path: a file whose name ends in one of `SUFFIXES`.
-        home: where the vehicles start, instead of the home that the file names.
-        below_m: how far tasks lie below the waypoints of a flight plan [m].
+    ``home`` takes the place of the one that it names; ``below_m`` is how far tasks lie below the
+    waypoints of a flight plan [m].
 
     Raises:
         InputError: with every fault of the file.
