@@ -31,9 +31,6 @@ from swarm.runtime.console import Panels, explain_family, help_text, say
 from swarm.runtime.errors import Fault, InputError, SwarmError
 from swarm.runtime.extras import missing_extra
 
-__all__ = ["COMMAND_GROUP", "check", "console_main", "main"]
-
-
 COMMAND_GROUP = "peckorder.commands"
 _CHECK = "--check"
 _COMPLETE = "_SWARM_COMPLETE"

@@ -16,8 +16,6 @@ import numpy as np
 from swarm.allocation.lower_level import Decision, TeamState
 from swarm.allocation.problem import FloatArray, IntArray, Problem
 
-__all__ = ["INDEX_RULES", "NEAREST", "VALUE_PER_TIME", "Index", "IndexRule"]
-
 Index = Callable[[Problem, int, FloatArray], FloatArray]
 """Of (problem, UAV index, (n_task,) travel times from where it is [s]): (n_task,) the index; not
 NaN. A pure function: every agent works it out for itself, and all must come to the same."""

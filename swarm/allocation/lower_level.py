@@ -20,18 +20,6 @@ from swarm.allocation.problem import BoolArray, FloatArray, IntArray, Problem
 from swarm.kernels import lower_level as kernel
 from swarm.kernels.lower_level import RuleCode
 
-__all__ = [
-    "CompiledRule",
-    "Decision",
-    "Rule",
-    "ScoringRule",
-    "TeamState",
-    "decisions",
-    "next_decision",
-    "rank_of",
-    "run",
-]
-
 
 @dataclass(slots=True, eq=False)
 class TeamState:

@@ -14,8 +14,6 @@ import numpy.typing as npt
 from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import FloatArray, Problem
 
-__all__ = ["evaluate", "executed_objective"]
-
 
 def evaluate(
     problem: Problem, routes: Sequence[Sequence[int]], state: TeamState | None = None

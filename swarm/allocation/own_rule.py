@@ -14,8 +14,6 @@ from swarm.allocation.lower_level import Decision, TeamState
 from swarm.allocation.problem import FloatArray, IntArray, Problem
 from swarm.model import Mission, Task, TaskId, UavId
 
-__all__ = ["DecisionRule", "FunctionRule", "Turn"]
-
 
 @dataclass(frozen=True, eq=False)
 class Turn:

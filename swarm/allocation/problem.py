@@ -17,9 +17,6 @@ from swarm.kernels.arrays import converted
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.mission import chances
 
-__all__ = ["BoolArray", "FloatArray", "IntArray", "Problem", "straight_m"]
-
-
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]

@@ -19,17 +19,6 @@ from swarm.kernels.lower_level import GREEDY, LOOKAHEAD, RuleCode, decide, value
 from swarm.kernels.rollout import GuidedChoice, guided_choice
 from swarm.kernels.routes import Routes, TeamArrays
 
-__all__ = [
-    "RULE_NAMES",
-    "GuidedRule",
-    "KernelRule",
-    "kernel_rule",
-    "rule_by_name",
-    "team_arrays",
-    "team_at_start",
-]
-
-
 _CODES: dict[str, RuleCode] = {"greedy": GREEDY, "lookahead": LOOKAHEAD}
 
 RULE_NAMES = (*_CODES, *INDEX_RULES)

@@ -17,9 +17,6 @@ from swarm.protocol.encoding import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.seal import ENVELOPE_BYTES
 
-__all__ = ["access_settings"]
-
-
 _LISTEN: Final = (
     "declare_subscriber",
     "declare_liveliness_subscriber",

@@ -25,16 +25,6 @@ from swarm.protocol.seal import (
 )
 from swarm.protocol.sync import Question
 
-__all__ = [
-    "MOST_STRANGERS",
-    "TOO_MANY",
-    "TOO_MANY_NAMES",
-    "AdmissionControl",
-    "QuestionFilter",
-    "RateLimiter",
-]
-
-
 TOO_MANY: Final = "too many"
 """Reason under which is counted what came too fast."""
 TOO_MANY_NAMES: Final = "too many names"

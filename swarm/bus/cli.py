@@ -27,8 +27,6 @@ from swarm.runtime.options import (
 if TYPE_CHECKING:
     from swarm.bus.config import RouterConfig
 
-__all__ = ["router"]
-
 
 def router(
     listen: Annotated[

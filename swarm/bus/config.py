@@ -18,21 +18,6 @@ from swarm.runtime.errors import Fault, InputError, remedy_for_name
 if TYPE_CHECKING:
     from swarm.identity import Identity
 
-__all__ = [
-    "DEFAULT_LEASE_S",
-    "DEFAULT_ROUTER",
-    "DEFAULT_SECURE_ROUTER",
-    "BusConfig",
-    "ClientTopology",
-    "FileTopology",
-    "MeshTopology",
-    "RouterConfig",
-    "Topology",
-    "bus_config",
-    "is_encrypted",
-    "is_loopback",
-]
-
 
 def is_loopback(endpoint: str) -> bool:
     """Whether only this machine's own processes are at ``endpoint``, or can reach it.

@@ -35,9 +35,6 @@ if TYPE_CHECKING:
     from swarm.bus.local_runs import LocalRun
     from swarm.identity import Role
 
-__all__ = ["DEFAULT_CONNECTION", "ConnectionOptions", "accepts", "with_connection_options"]
-
-
 RUN = "run"
 """What `--bus` is told for a run of this machine; ``run:PID`` for one of several."""
 _DIAL_S = 0.1

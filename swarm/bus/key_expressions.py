@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-__all__ = ["check_key", "check_key_expr", "intersects"]
-
 ANY_CHUNK = "*"
 ANY_CHUNKS = "**"
 CACHE_SIZE = 1 << 16

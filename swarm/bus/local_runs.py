@@ -20,8 +20,6 @@ from pathlib import Path
 
 from swarm.protocol.timing import LinkKind
 
-__all__ = ["LocalRun", "announced", "begun", "local_runs"]
-
 _LONGEST = 1 << 16
 """Bytes of a file: 1000 endpoints have room."""
 

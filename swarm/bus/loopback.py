@@ -8,9 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["free_loopback_endpoints"]
-
-
 LOOPBACK = "127.0.0.1"
 FIRST_PORT = 10_000
 """Below are many well-known services."""

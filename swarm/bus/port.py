@@ -19,22 +19,6 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     from swarm.protocol.seal import Seal
 
-__all__ = [
-    "MAX_PAYLOAD_BYTES",
-    "Answer",
-    "Bus",
-    "BusEvent",
-    "Inbox",
-    "LinkDown",
-    "LinkUp",
-    "Query",
-    "Sample",
-    "TokenGone",
-    "TokenSeen",
-    "check_payload",
-]
-
-
 MAX_PAYLOAD_BYTES = 4 << 20
 """Longest payload of a sample or an answer [bytes]."""
 

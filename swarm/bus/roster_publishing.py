@@ -23,9 +23,6 @@ from swarm.runtime.errors import SwarmError
 from swarm.runtime.log import LogLevel, configure_logging
 from swarm.runtime.shell import Shell, join_mission
 
-__all__ = ["CONFIRM_S", "CONNECT_S", "publish"]
-
-
 CONNECT_S: Final = 10.0
 """How long to wait for the bus [s]."""
 CONFIRM_S: Final = 10.0

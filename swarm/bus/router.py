@@ -27,9 +27,6 @@ from swarm.protocol.seal import UnacceptableError, seal_of
 from swarm.runtime.errors import BusError
 from swarm.runtime.log import get_logger
 
-__all__ = ["RosterKeeper", "Router", "open_router"]
-
-
 LOOK_S = 1.0
 """How often the folder is looked into [wall s]."""
 TELL_S = 30.0

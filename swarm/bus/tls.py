@@ -29,9 +29,6 @@ from swarm.runtime.clock import unix_s
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.log import get_logger
 
-__all__ = ["accepts", "door_of", "secure", "secure_settings", "why_refused", "with_keys_only"]
-
-
 _TLS: Final = "transport/link/tls"
 _DOOR: Final = "transport/auth/usrpwd"
 SEATS_PER_IDENTITY: Final = 8

@@ -40,9 +40,6 @@ from swarm.runtime.errors import BusError
 from swarm.runtime.log import get_logger
 from swarm.runtime.writer_thread import WriterThread
 
-__all__ = ["ZenohBus", "open_zenoh_bus"]
-
-
 REPLY_WITHIN_S = 10.0
 """A query nobody has answered for this long is given up: who asked waits no longer."""
 MOST_ANSWERS = 8

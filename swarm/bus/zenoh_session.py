@@ -18,18 +18,6 @@ from swarm.runtime.errors import BusError
 from swarm.runtime.log import get_logger
 from swarm.runtime.process import call_in_background
 
-__all__ = [
-    "close_session",
-    "endpoints_of",
-    "lay_over",
-    "mode_of",
-    "open_session",
-    "plain_error",
-    "session_config",
-    "session_config_file",
-]
-
-
 OPEN_TIMEOUT_S = 2.0
 """How long an endpoint that does not answer delays the next one; a bad link needs about 1 s."""
 KEEP_ALIVES_PER_LEASE = 4

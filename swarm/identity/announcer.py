@@ -24,9 +24,6 @@ from swarm.protocol.events import (
 from swarm.protocol.messages import Message, SignedRoster, Snapshot
 from swarm.protocol.registers import Replica
 
-__all__ = ["RosterAnnouncer"]
-
-
 FIRST_S = 0.2
 """Time for the tokens of those who are there to come, before a router begins anew."""
 SETTLE_S = 1.2

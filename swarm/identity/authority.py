@@ -69,17 +69,6 @@ from swarm.runtime.errors import Fault, InputError
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-__all__ = [
-    "DAY_S",
-    "EARLY_S",
-    "MAVLINK_TABLE_FILE",
-    "Authority",
-    "new_door_key",
-    "open_authority",
-    "require_fit",
-]
-
-
 MAVLINK_TABLE_FILE: Final = "mavlink-keys.csv"
 DAY_S: Final = 86_400
 EARLY_S: Final = DAY_S

@@ -15,19 +15,6 @@ from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-__all__ = [
-    "authority_certificate",
-    "certificate_pem",
-    "common_name_of",
-    "issue_certificate",
-    "issued_by",
-    "key_pem",
-    "public_bytes",
-    "read_certificate",
-    "read_key",
-]
-
-
 _AUTHORITY_NAME = "mission authority"
 
 

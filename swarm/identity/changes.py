@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from swarm.bus.config import BusConfig
     from swarm.identity.authority import Authority
 
-__all__ = ["FleetAddress", "enact", "told", "written"]
-
-
 Publish = Callable[["BusConfig", Callable[[], bytes]], Collection[str]]
 
 

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from swarm.identity.authority import Authority
     from swarm.identity.roster import RosterEntry
 
-__all__ = ["keys"]
-
-
 keys = typer.Typer(
     help="Make the keys of a mission: who may say what, encrypted and signed.",
     rich_markup_mode=None,

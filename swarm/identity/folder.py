@@ -29,22 +29,6 @@ from swarm.runtime.errors import Fault, InputError
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-__all__ = [
-    "AUTHORITY_FILE",
-    "AUTHORITY_KEY_FILE",
-    "CERTIFICATE_FILE",
-    "DOOR_KEY_FILE",
-    "DOOR_PASSWORD_FILE",
-    "IDENTITY_FILE",
-    "MAVLINK_KEY_FILE",
-    "PRIVATE_KEY_FILE",
-    "ROSTER_FILE",
-    "Identity",
-    "load_identity",
-    "shown_time",
-]
-
-
 IDENTITY_FILE: Final = "identity.json"
 AUTHORITY_FILE: Final = "authority.pem"
 CERTIFICATE_FILE: Final = "certificate.pem"

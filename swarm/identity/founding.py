@@ -23,9 +23,6 @@ from swarm.identity.roster import SERIES_BYTES, Role, Roster, encode_roster, fle
 from swarm.identity.shared_secrets import encode_table
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["DEFAULT_DAYS", "found_authority"]
-
-
 DEFAULT_DAYS: Final = 90
 _AUTHORITY_DAYS: Final = 3650
 

@@ -12,9 +12,6 @@ from typing import Any, Final
 
 from swarm.identity.roster import Role, RosterEntry
 
-__all__ = ["ISSUED_FILE", "Issued", "Ledger", "decode_ledger", "encode_ledger"]
-
-
 ISSUED_FILE: Final = "issued.json"
 _FORMAT: Final = "peckorder authority 1"
 

@@ -19,17 +19,6 @@ from swarm.identity.roster import Role, Roster, decode_roster
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.table import Column, ResultTable
 
-__all__ = [
-    "SOON_DAYS",
-    "IdentityRow",
-    "attention",
-    "listing_as_json",
-    "listing_rows",
-    "listing_table",
-    "read_lists",
-]
-
-
 SOON_DAYS: Final = 14
 """Certificates that end within this time are warned of."""
 _DAY_S: Final = 86_400.0

@@ -17,18 +17,6 @@ from typing import Final, TypeVar
 
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = [
-    "checked",
-    "decoded",
-    "make_private_folder",
-    "read_private",
-    "replace_private",
-    "swap_in_folder",
-    "sync",
-    "write_private",
-]
-
-
 _FILE_MODE = 0o600
 _FOLDER_MODE = 0o700
 

@@ -23,19 +23,6 @@ from swarm.model.ids import RESERVED, require_id
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-__all__ = [
-    "LONGEST_COMMON_NAME",
-    "LONGEST_ROSTER_BYTES",
-    "SERIES_BYTES",
-    "Role",
-    "Roster",
-    "RosterEntry",
-    "decode_roster",
-    "encode_roster",
-    "fleet_names",
-    "numbered",
-]
-
 
 class Role(StrEnum):
     """What one may do; everyone may read everything of the mission."""

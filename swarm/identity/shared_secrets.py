@@ -16,17 +16,6 @@ from collections.abc import Mapping
 
 from swarm.identity.roster import Roster
 
-__all__ = [
-    "DOOR_SECRET_BYTES",
-    "decode_table",
-    "door_dictionary",
-    "door_password",
-    "encode_table",
-    "mavlink_key",
-    "new_phrase",
-]
-
-
 DOOR_SECRET_BYTES = 32
 
 

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from swarm.install.machine import TargetMachine
     from swarm.install.services import ServiceInstance
 
-__all__ = ["install"]
-
-
 install = typer.Typer(
     help="Run a process of a fleet as a service of this machine.",
     rich_markup_mode=None,

@@ -38,18 +38,6 @@ from swarm.install.services import (
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.files import resolve_scenario, shipped_scenarios
 
-__all__ = [
-    "VARIABLE",
-    "File",
-    "Installation",
-    "kept_words",
-    "option_value",
-    "plan_installation",
-    "replaced",
-    "with_words",
-]
-
-
 VARIABLE: Final = "SWARM_OPTIONS"
 _LINE = re.compile(rf"^{VARIABLE}=((?:.*\\\n)*.*)$", re.MULTILINE)
 _ESCAPED = re.compile(r'([\\"`$])')

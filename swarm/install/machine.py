@@ -19,9 +19,6 @@ from swarm.install.installation import File, Installation
 from swarm.install.services import STATE, SYSUSERS_FILE
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["FileOutcome", "TargetMachine"]
-
-
 _FOLDER_MODE, _STATE_MODE = 0o755, 0o700
 
 

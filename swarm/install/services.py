@@ -10,18 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Final
 
-__all__ = [
-    "DEFAULT_PROGRAM",
-    "FOLDER",
-    "KINDS",
-    "STATE",
-    "SYSUSERS_FILE",
-    "UNITS",
-    "ServiceInstance",
-    "ServiceKind",
-]
-
-
 UNITS: Final = Path(__file__).parent / "units"
 """The units as they are shipped; deploy/systemd shows the same."""
 DEFAULT_PROGRAM: Final = PurePosixPath("/opt/peckorder/bin/swarm")

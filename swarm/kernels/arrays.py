@@ -7,9 +7,6 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["converted"]
-
-
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 

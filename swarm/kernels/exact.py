@@ -8,9 +8,6 @@ from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelProblem
 from swarm.kernels.lower_level import default_threads
 
-__all__ = ["MOST_TASKS", "MOST_UNCERTAIN_TASKS", "optimum"]
-
-
 MOST_TASKS: int = _kernels.MOST_TASKS
 """Tasks the solver takes where every survival probability is 1."""
 MOST_UNCERTAIN_TASKS: int = _kernels.MOST_UNCERTAIN_TASKS

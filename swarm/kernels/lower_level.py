@@ -19,25 +19,6 @@ from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelProblem
 from swarm.kernels.arrays import converted
 
-__all__ = [
-    "EXACT_TASKS",
-    "GREEDY",
-    "LOOKAHEAD",
-    "UNDONE",
-    "Fields",
-    "RuleCode",
-    "Runs",
-    "Team",
-    "decide",
-    "default_threads",
-    "evaluate_sequences",
-    "first_rounds",
-    "run",
-    "run_sequences",
-    "valued",
-]
-
-
 _Floats = npt.NDArray[np.float64]
 _Ints = npt.NDArray[np.int64]
 _Bools = npt.NDArray[np.bool_]

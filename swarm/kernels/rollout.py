@@ -17,8 +17,6 @@ import numpy as np
 from swarm.kernels import _kernels
 from swarm.kernels.routes import TeamArrays, open_lists
 
-__all__ = ["GuidedChoice", "guided_choice"]
-
 
 @dataclass(frozen=True, slots=True)
 class GuidedChoice:

@@ -21,17 +21,6 @@ import numpy.typing as npt
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelProblem
 
-__all__ = [
-    "FloatArray",
-    "Routes",
-    "TeamArrays",
-    "flat_lists",
-    "improve_routes",
-    "open_lists",
-    "optimise_routes",
-]
-
-
 FloatArray = npt.NDArray[np.float64]
 Routes = list[list[int]]
 """Task indices per UAV in order of execution."""

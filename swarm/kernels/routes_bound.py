@@ -20,9 +20,6 @@ import numpy.typing as npt
 from swarm.kernels import _kernels
 from swarm.kernels.routes import FloatArray, TeamArrays
 
-__all__ = ["MOST_BUCKETS", "Timetable", "priced_lists", "shortest_legs_s"]
-
-
 MOST_BUCKETS = 100_000
 
 

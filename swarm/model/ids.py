@@ -7,20 +7,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, NewType
 
-__all__ = [
-    "AUTHORITY",
-    "COORDINATOR",
-    "FLEET",
-    "ID_RULE",
-    "OPERATOR",
-    "RESERVED",
-    "TaskId",
-    "UavId",
-    "require_id",
-    "valid_id",
-]
-
-
 UavId = NewType("UavId", str)
 TaskId = NewType("TaskId", str)
 

@@ -9,8 +9,6 @@ from dataclasses import dataclass, field, replace
 from swarm.model.frames import Origin
 from swarm.model.ids import RESERVED, TaskId, UavId, require_id
 
-__all__ = ["Mission", "Task", "Uav", "chances", "require_point", "require_probabilities"]
-
 
 @dataclass(frozen=True, slots=True)
 class Uav:

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 
 from swarm.model.ids import TaskId, UavId
 
-__all__ = ["Evaluation", "Plan", "Routes"]
-
-
 Routes = Mapping[UavId, tuple[TaskId, ...]]
 """Ordered, disjoint task lists u_j of eq. 1; every UAV of the mission has one, maybe empty."""
 

@@ -22,21 +22,6 @@ from swarm.protocol.messages import MissionConfig, TaskEntry, UavSpec
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
 
-__all__ = [
-    "RuleMaker",
-    "TaskBoard",
-    "TaskState",
-    "after_outcomes",
-    "claim_strength",
-    "doable",
-    "finish_claim",
-    "holders",
-    "mission_of",
-    "ranks",
-    "rule_of",
-    "winner",
-]
-
 
 def claim_strength(uav: str, claim: Claim) -> tuple[bool, float, int, str]:
     """Sort key of claims on one task: the smallest wins."""

@@ -70,9 +70,6 @@ from swarm.protocol.seal import (
 )
 from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 
-__all__ = ["Codec"]
-
-
 IN_SEALED_ANSWER: Final = 64
 """Arrays and maps of an answer in which all registers but the roster are envelopes."""
 SIGNED_HERE: Final = "signed, but no keys here"

@@ -30,24 +30,6 @@ from swarm.protocol.messages import (
 from swarm.protocol.seal import UnacceptableError
 from swarm.protocol.uav_messages import Candidate, Choice, ChoiceBasis, Claim, Outcome, Status
 
-__all__ = [
-    "FIELDS",
-    "KINDS",
-    "LARGE",
-    "LARGE_LIMIT_BYTES",
-    "NAMES",
-    "SMALL_LIMIT_BYTES",
-    "SNAPSHOT_LIMIT_BYTES",
-    "encode",
-    "encode_memory",
-    "fit",
-    "fit_memory",
-    "repacked",
-    "snapshot_bytes",
-    "unpacked",
-]
-
-
 SMALL_LIMIT_BYTES: Final = 4 * 1024
 LARGE_LIMIT_BYTES: Final = 1024 * 1024
 SNAPSHOT_LIMIT_BYTES: Final = 4 * 1024 * 1024

@@ -7,25 +7,6 @@ from dataclasses import dataclass, field
 
 from swarm.protocol.messages import Message, Snapshot
 
-__all__ = [
-    "Ask",
-    "CommonAction",
-    "CommonEvent",
-    "Finish",
-    "KeysReplaced",
-    "LinkChanged",
-    "LogLine",
-    "MessageReceived",
-    "PeerGone",
-    "PeerSeen",
-    "Publish",
-    "PublishLast",
-    "Save",
-    "SnapshotsReceived",
-    "Stop",
-    "Tick",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class MessageReceived:

@@ -9,27 +9,6 @@ from pydantic import ConfigDict, Strict
 
 from swarm.model import valid_id
 
-__all__ = [
-    "LATEST_S",
-    "MAX_COUNT",
-    "Checked",
-    "Count",
-    "Duration",
-    "Flag",
-    "Horizon",
-    "Id",
-    "Instant",
-    "Metres",
-    "Point",
-    "Probability",
-    "Reason",
-    "Score",
-    "Speed",
-    "Value",
-    "Words",
-]
-
-
 MAX_COUNT: Final = 2**53
 """Largest count; whoever counts on from what it heard stays within."""
 LATEST_S: Final = 1e15

@@ -14,9 +14,6 @@ from dataclasses import dataclass
 
 from swarm.model.ids import AUTHORITY, COORDINATOR, OPERATOR, require_id, valid_id
 
-__all__ = ["ANY_TOKEN", "KeySpace", "mission_of_token"]
-
-
 ANY_TOKEN = "swarm/*/alive/*"  # noqa: S105 - a key expression, nothing secret
 """Liveliness tokens of all missions on the bus."""
 

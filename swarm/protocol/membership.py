@@ -14,8 +14,6 @@ from collections.abc import Iterable
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.timing import Timing, earliest
 
-__all__ = ["Membership"]
-
 
 class Membership:
     """One process's judgement of who is present."""

@@ -36,29 +36,6 @@ from swarm.protocol.fields import (
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 
-__all__ = [
-    "REVOKED_INCARNATION",
-    "SCHEMA_VERSION",
-    "Body",
-    "CommandKind",
-    "Message",
-    "MissionConfig",
-    "MissionPhase",
-    "OperatorCommand",
-    "PlanEpoch",
-    "SignedRoster",
-    "Snapshot",
-    "Stamp",
-    "StartWithout",
-    "TaskEdit",
-    "TaskEntry",
-    "UavSpec",
-    "as_heard",
-    "demoted",
-    "roster_message",
-]
-
-
 SCHEMA_VERSION = 1
 """Grows only with what releases before cannot be mixed with; see swarm.protocol.codec."""
 LONGEST_ROSTER = 1 << 20

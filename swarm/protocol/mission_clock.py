@@ -12,9 +12,6 @@ from typing import Final
 
 from swarm.protocol.messages import Body, MissionConfig, MissionPhase, PlanEpoch
 
-__all__ = ["MissionClock"]
-
-
 WORDS_KEPT: Final = 8
 """As many as NTP keeps. A word from the future is forgotten after that many others."""
 NOISE_S: Final = 1e-3

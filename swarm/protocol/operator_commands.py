@@ -11,17 +11,6 @@ from swarm.model.ids import FLEET
 from swarm.protocol.messages import CommandKind, OperatorCommand, Stamp, StartWithout
 from swarm.protocol.registers import Replica
 
-__all__ = [
-    "BEING_STOPPED",
-    "CANNOT_HOLD",
-    "abort_command",
-    "describe_command",
-    "dispensable",
-    "in_force",
-    "newest_command",
-]
-
-
 BEING_STOPPED = "being stopped, "
 """Begins the note of a held UAV whose vehicle has not been seen to stand yet."""
 CANNOT_HOLD = "cannot hold: "

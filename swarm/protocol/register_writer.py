@@ -7,8 +7,6 @@ from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import Body, Message, Stamp, as_heard
 from swarm.protocol.uav_messages import Choice, Status
 
-__all__ = ["RegisterWriter"]
-
 
 class RegisterWriter:
     """Stamps what one writer says, so that replicas can tell news from old."""

@@ -33,18 +33,6 @@ from swarm.protocol.seal import open_envelope
 from swarm.protocol.sync import fingerprint
 from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 
-__all__ = [
-    "MOST_STRANGE",
-    "MOST_TASKS",
-    "MOST_UNBRIEFED",
-    "MOST_UNPOSTED",
-    "NO_ROOM",
-    "Replica",
-    "snapshot_without",
-    "without_signers",
-]
-
-
 # A bus without keys lets anybody make names up: they must not cost memory without end.
 MOST_UNPOSTED: Final = 1000
 """Tasks that nobody has posted of which one writer may tell the outcome."""

@@ -30,23 +30,6 @@ from swarm.model.ids import COORDINATOR, OPERATOR, valid_id
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
-__all__ = [
-    "ANSWER",
-    "ENVELOPE_BYTES",
-    "NOT_SIGNED",
-    "NOT_THE_SIGNERS",
-    "QUESTION",
-    "SIGNER_UNKNOWN",
-    "WRONGLY_SIGNED",
-    "Envelope",
-    "Seal",
-    "UnacceptableError",
-    "is_envelope",
-    "open_envelope",
-    "seal_of",
-]
-
-
 SEALED_MARK: Final = "sealed 1"
 ENVELOPE_BYTES: Final = 160
 """By how much an envelope is longer than what is in it, at most."""

@@ -23,19 +23,6 @@ from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import Message
 from swarm.protocol.seal import QUESTION, Seal, UnacceptableError
 
-__all__ = [
-    "NONCE_BYTES",
-    "Question",
-    "QuestionTimer",
-    "bond",
-    "combined",
-    "decode_digest",
-    "decode_question",
-    "encode_question",
-    "fingerprint",
-    "unknown",
-]
-
 
 class QuestionTimer:
     """Gathers wishes to ask into questions at least ``gap_s`` apart [s]."""

@@ -15,8 +15,6 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
-__all__ = ["PRESETS", "LinkKind", "LinkPreset", "StallDetector", "Timing", "earliest", "preset"]
-
 
 @dataclass(frozen=True, slots=True)
 class Timing:

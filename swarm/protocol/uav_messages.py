@@ -30,22 +30,6 @@ from swarm.protocol.fields import (
     Words,
 )
 
-__all__ = [
-    "MAX_CANDIDATES",
-    "MOST_REASONS",
-    "AttemptResult",
-    "Candidate",
-    "Choice",
-    "ChoiceBasis",
-    "Claim",
-    "ClaimPhase",
-    "Outcome",
-    "Status",
-    "StatusPhase",
-    "choice_id",
-]
-
-
 MAX_CANDIDATES = 5
 """How many tasks a choice tells of, the one taken among them."""
 

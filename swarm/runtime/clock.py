@@ -9,8 +9,6 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-__all__ = ["Clock", "ScaledClock", "SystemClock", "incarnation", "unix_s"]
-
 
 class Clock(Protocol):
     """A monotonic source of seconds with an arbitrary zero."""

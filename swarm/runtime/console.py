@@ -15,8 +15,6 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-__all__ = ["PANELS", "Panels", "explain_family", "help_text", "say"]
-
 
 def say(text: str) -> None:
     """One line on standard error."""

@@ -9,8 +9,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-__all__ = ["BusError", "Fault", "InputError", "SwarmError", "remedy_for_name"]
-
 
 class SwarmError(Exception):
     """Base of all errors raised on purpose by this project."""

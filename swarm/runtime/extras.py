@@ -13,9 +13,6 @@ from typing import Final
 
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["EXTRAS", "MissingExtraError", "missing_extra", "require_extra"]
-
-
 EXTRAS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
         "ground": (

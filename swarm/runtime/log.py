@@ -20,9 +20,6 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger, Processor
 
-__all__ = ["LogFormat", "LogLevel", "configure_logging", "get_logger", "identify"]
-
-
 _identity: dict[str, object] = {}
 """What every line of this process carries, whichever thread and logger it comes from."""
 

@@ -21,31 +21,6 @@ from swarm.protocol.timing import LinkKind
 from swarm.runtime.log import LogFormat, LogLevel
 from swarm.scenario.files import resolve_scenario, shipped_scenarios
 
-__all__ = [
-    "BusOption",
-    "CheckOption",
-    "ConnectOption",
-    "JsonOption",
-    "KeysOption",
-    "LeaseOption",
-    "LifelineOption",
-    "LinkOption",
-    "ListenOption",
-    "LogFormatOption",
-    "LogLevelOption",
-    "MissionOption",
-    "OptionalScenarioArgument",
-    "ScenarioArgument",
-    "SeedOption",
-    "SomeMissionOption",
-    "SpeedupOption",
-    "StateOption",
-    "TimeLimitOption",
-    "UnencryptedOption",
-    "complete_among",
-    "complete_from",
-]
-
 
 def complete_among(*words: str) -> Callable[[str], list[str]]:
     """Completes with those of ``words`` that continue what has been typed."""

@@ -18,20 +18,6 @@ from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from concurrent.futures import Future
 from typing import Any, Final, NoReturn, TypeVar
 
-__all__ = [
-    "EXIT_INTERRUPTED",
-    "EXIT_STOPPED",
-    "SERVICE_NOTIFIER",
-    "ServiceNotifier",
-    "StopRequest",
-    "call_in_background",
-    "leave",
-    "parent_gone",
-    "run_until_stopped",
-    "stop_requests",
-]
-
-
 STDIN_FD = 0
 CHUNK_BYTES = 4096
 

@@ -52,9 +52,6 @@ from swarm.runtime.clock import Clock
 from swarm.runtime.log import get_logger
 from swarm.runtime.state_exchange import StateExchange, draw_nonce
 
-__all__ = ["Core", "Shell", "join_mission"]
-
-
 TURN = 20
 """Events from the bus between two looks at everything else."""
 

@@ -22,9 +22,6 @@ from swarm.protocol.sync import NONCE_BYTES, bond, decode_question, encode_quest
 from swarm.runtime.clock import Clock
 from swarm.runtime.log import get_logger
 
-__all__ = ["MOST_REFUSED", "UNREAD", "StateExchange", "draw_nonce"]
-
-
 TURN: Final = 20
 """Registers of an answer between two looks at everything else."""
 MOST_REFUSED: Final = 500

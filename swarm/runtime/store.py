@@ -31,9 +31,6 @@ from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.log import get_logger
 from swarm.runtime.writer_thread import WriterThread
 
-__all__ = ["Memory", "Store"]
-
-
 FORMAT: Final = "peckorder state 1"
 CLOSE_LIMIT_S = 2.0
 """How long closing waits for the disk."""

@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.text import Text
 
-__all__ = ["NONE", "Column", "ResultTable"]
-
-
 NONE = "–"
 """What stands where there is no value."""
 

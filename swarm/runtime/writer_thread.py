@@ -10,8 +10,6 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["WriterThread"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Job:

@@ -18,9 +18,6 @@ from swarm.scenario.draft import PAD_SPACING_M, horizon_for
 from swarm.scenario.shapes import SCHEMA, MissionTable, OriginTable, Scenario, TaskTable, UavTable
 from swarm.scenario.write import toml_lines, toml_place, toml_value
 
-__all__ = ["Blank", "blank_scenario"]
-
-
 _SPEED_M_S = 8.0
 _SPACING_M = 60.0
 """About how far tasks lie from their neighbours."""

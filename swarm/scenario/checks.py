@@ -12,9 +12,6 @@ from swarm.model.frames import Origin, enu_from_wgs84
 from swarm.model.ids import RESERVED
 from swarm.scenario.findings import Document, Finding, Path, absent, close_match, number_of, shown
 
-__all__ = ["check", "origin_of"]
-
-
 _FARTHEST_M = 1e7
 _HINTS = 20
 """References that get a suggestion; comparing names is slow, and a file with more is generated."""

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from swarm.model import Origin
     from swarm.scenario.task_files import TaskFile
 
-__all__ = ["import_tasks", "new"]
-
 NameOption = Annotated[
     str | None,
     typer.Option(

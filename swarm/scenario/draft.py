@@ -14,9 +14,6 @@ from swarm.scenario.task_files import TaskFile
 from swarm.scenario.task_files.task_file import TASK_KEYS
 from swarm.scenario.write import toml_float, toml_lines, toml_string
 
-__all__ = ["PAD_SPACING_M", "SPEED_M_S", "DraftOptions", "draft_scenario", "horizon_for"]
-
-
 SPEED_M_S = 5.0
 """Cruise speed where neither the file nor its reader names one [m/s]."""
 PAD_SPACING_M = 5.0

@@ -14,9 +14,6 @@ from pathlib import Path
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import printable
 
-__all__ = ["LARGEST_FILE_BYTES", "decode", "read_bytes", "resolve_scenario", "shipped_scenarios"]
-
-
 LARGEST_FILE_BYTES = 16 * 2**20
 """Larger files are refused unread: no mission needs them, and they take minutes."""
 

@@ -15,19 +15,6 @@ from difflib import get_close_matches
 
 from swarm.runtime.errors import Fault
 
-__all__ = [
-    "Document",
-    "Finding",
-    "Path",
-    "absent",
-    "close_match",
-    "faults_of",
-    "number_of",
-    "printable",
-    "shown",
-]
-
-
 Document = Mapping[str, object]
 """A parsed TOML file."""
 Path = tuple[str | int, ...]

@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from swarm.scenario.shapes import Scenario, TaskTable, UavTable
     from swarm.scenario.task_files import TaskFile
 
-__all__ = ["build_mission", "load_scenario", "parse_scenario", "parse_toml"]
-
-
 _WHAT = "scenario file"
 _WHERE = re.compile(r"(?P<problem>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end.*)\)")
 

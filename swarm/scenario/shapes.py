@@ -24,9 +24,6 @@ from swarm.scenario.validation import (
     wrong,
 )
 
-__all__ = ["SCHEMA", "MissionTable", "OriginTable", "Scenario", "TaskTable", "UavTable", "validate"]
-
-
 SCHEMA = 1
 """The version of the format that is read and written."""
 _SLOWEST_M_S = 1e-6

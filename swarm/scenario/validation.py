@@ -15,18 +15,6 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from swarm.model.ids import valid_id
 from swarm.scenario.findings import Document, Finding, Path, absent, close_match, shown
 
-__all__ = [
-    "PROBABILITY",
-    "Id",
-    "Probability",
-    "StrictTable",
-    "TableShape",
-    "known_schema",
-    "validate_tables",
-    "wrong",
-]
-
-
 T = TypeVar("T", bound=BaseModel)
 
 PROBABILITY = "a probability within 0..1"

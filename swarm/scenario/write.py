@@ -12,9 +12,6 @@ from dataclasses import asdict
 
 from swarm.model import Mission, Task, Uav
 
-__all__ = ["format_scenario", "toml_float", "toml_lines", "toml_place", "toml_string", "toml_value"]
-
-
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 

@@ -24,9 +24,6 @@ from swarm.scenario.task_files.task_file import (
     spelt_number,
 )
 
-__all__ = ["read_csv"]
-
-
 _DEGREES = ("lat_deg", "lon_deg", "alt_m")
 _METRES = ("east_m", "north_m", "up_m")
 _COLUMNS = (*TASK_KEYS, *_DEGREES, *_METRES)

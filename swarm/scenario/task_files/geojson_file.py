@@ -23,9 +23,6 @@ from swarm.scenario.task_files.task_file import (
     slip_of,
 )
 
-__all__ = ["read_geojson"]
-
-
 _WHAT = "a FeatureCollection of Points in GeoJSON"
 
 

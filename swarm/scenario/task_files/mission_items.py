@@ -17,17 +17,6 @@ from swarm.runtime.errors import Fault
 from swarm.scenario.findings import number_of, shown
 from swarm.scenario.task_files.task_file import FileTask
 
-__all__ = [
-    "BELOW_M",
-    "MavCommand",
-    "MavFrame",
-    "WaypointItem",
-    "left_out_of",
-    "stops_of",
-    "whole_of",
-]
-
-
 BELOW_M = 10.0
 """How far a task lies below its waypoint [m]: the coordinator's lowest layer unless told."""
 

@@ -25,9 +25,6 @@ from swarm.scenario.task_files.mission_items import (
 )
 from swarm.scenario.task_files.task_file import ReadOptions, TaskFile, gather, member, parse_object
 
-__all__ = ["LAYER_KEY", "read_plan"]
-
-
 LAYER_KEY = "peckorder"
 """Top-level key under which an exported plan keeps its height layer, for the way back."""
 

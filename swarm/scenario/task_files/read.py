@@ -15,9 +15,6 @@ from swarm.scenario.task_files.plan_file import read_plan
 from swarm.scenario.task_files.task_file import Reader, ReadOptions, TaskFile
 from swarm.scenario.task_files.waypoints_file import read_waypoints
 
-__all__ = ["SUFFIXES", "read_task_file"]
-
-
 _READERS: Mapping[str, Reader] = {
     ".plan": read_plan,
     ".waypoints": read_waypoints,

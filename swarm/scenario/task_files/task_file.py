@@ -16,19 +16,6 @@ from swarm.model import Origin
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import number_of, printable, shown
 
-__all__ = [
-    "TASK_KEYS",
-    "FileTask",
-    "ReadOptions",
-    "Reader",
-    "TaskFile",
-    "gather",
-    "member",
-    "parse_object",
-    "slip_of",
-    "spelt_number",
-]
-
 
 def slip_of(name: str, known: Collection[str]) -> str | None:
     """The one of ``known`` that ``name`` misspells; None if it is one itself, or none at all."""

@@ -18,9 +18,6 @@ from swarm.scenario.task_files.mission_items import (
 )
 from swarm.scenario.task_files.task_file import ReadOptions, TaskFile, gather, spelt_number
 
-__all__ = ["read_waypoints"]
-
-
 _HEADER = "QGC WPL 110"
 _FIELDS = 12
 
