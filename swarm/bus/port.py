@@ -1,7 +1,12 @@
 """What the runtime asks of a bus, whatever carries it.
 
 Every implementation passes tests/contract/ (swarm.bus.zenoh_bus, sim.world.network,
-tests.support.memory_bus). Keys and key expressions are those of swarm.bus.key_expressions.
+tests.support.memory_bus).
+
+A key is chunks joined by ``/``. In an expression the chunk ``*`` stands for any one chunk and
+``**`` for any number of them, none included; neither for one that starts with ``@``. This is Zenoh
+without ``$*``, wildcards inside a chunk, which no key of ours needs:
+https://zenoh.io/docs/manual/abstractions/#key-expression
 
 A bus hands everything that happens to one bounded `Inbox`, in order of arrival,
 from whichever thread; nothing of the runtime is ever called on a bus thread.
@@ -196,6 +201,52 @@ def check_payload(payload: bytes) -> bytes:
             f"{len(payload)} bytes are more than the {MAX_PAYLOAD_BYTES} a bus carries"
         )
     return payload
+
+
+def check_key(key: str) -> str:
+    """Return ``key``.
+
+    Raises:
+        ValueError: it is not a key: empty, or with an empty chunk or one of ``*$#?``.
+    """
+    fault = _key_fault(key)
+    if fault is None and "*" in key:
+        fault = "a key names one thing, without *"
+    if fault is not None:
+        raise ValueError(f"not a key: {key!r}: {fault}")
+    return key
+
+
+def check_key_expr(key_expr: str) -> str:
+    """Return ``key_expr``.
+
+    Raises:
+        ValueError: it is not a key expression in its one canonical form: ``**``
+            follows neither itself nor precedes ``*``.
+    """
+    fault = _key_fault(key_expr)
+    if fault is not None:
+        raise ValueError(f"not a key expression: {key_expr!r}: {fault}")
+    return key_expr
+
+
+def _key_fault(key_expr: str) -> str | None:
+    if not key_expr:
+        return "it is empty"
+    if not key_expr.isascii() and any("\ud800" <= sign <= "\udfff" for sign in key_expr):
+        return "half a surrogate pair is no text"
+    before = None
+    for chunk in key_expr.split("/"):
+        if not chunk:
+            return "an empty chunk (a / at either end, or two together)"
+        if any(sign in chunk for sign in "$#?"):
+            return "$, # and ? are reserved"
+        if "*" in chunk and chunk not in ("*", "**"):
+            return "* and ** stand alone between slashes"
+        if before == "**" and chunk in ("*", "**"):
+            return "write */** for **/* and ** for **/**"
+        before = chunk
+    return None
 
 
 class Bus(Protocol):

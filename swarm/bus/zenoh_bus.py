@@ -23,8 +23,17 @@ import zenoh
 from zenoh.handlers import Callback
 
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology
-from swarm.bus.key_expressions import check_key, check_key_expr
-from swarm.bus.port import Answer, Inbox, Query, Sample, TokenGone, TokenSeen, check_payload
+from swarm.bus.port import (
+    Answer,
+    Inbox,
+    Query,
+    Sample,
+    TokenGone,
+    TokenSeen,
+    check_key,
+    check_key_expr,
+    check_payload,
+)
 from swarm.bus.zenoh_session import (
     LinkWatch,
     close_session,

@@ -34,6 +34,7 @@ from swarm.install.services import (
     SYSUSERS_FILE,
     UNITS,
     ServiceInstance,
+    placed,
 )
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.files import resolve_scenario, shipped_scenarios
@@ -165,7 +166,7 @@ def plan_installation(
     Raises:
         InputError: something is wrong with an option, or with a file that one names.
     """
-    options = _at(root, service.options_path)
+    options = placed(root, service.options_path)
     before = options.read_text("utf-8") if options.is_file() else None
     files: list[File] = []
     notes: list[str] = []
@@ -202,7 +203,7 @@ def _checked(
     """What the process's own command makes of ``words``."""
     parameters = check([service.kind.command, *words])
     state, wanted = parameters.get("state"), service.state_folder
-    if state is not None and Path(state) != _at(root, wanted):
+    if state is not None and Path(state) != placed(root, wanted):
         raise _fault(service, f"--state {state} is not a place it can write to", "leave it out")
     port = parameters.get("port")
     if port is not None and 0 < port < _LOWEST_PORT:
@@ -275,7 +276,7 @@ def _place_token(
     target = service.state_folder / "token"
     if option_value(words, "--token-file") is not None or is_loopback(f"tcp/{host}:1"):
         return words
-    there = _at(root, target)
+    there = placed(root, target)
     kept = there.is_file() and not there.is_symlink()  # which would be another's secret
     token = there.read_bytes() if kept else f"{secrets.token_urlsafe(24)}\n".encode()
     files.append(File(target, token, _PRIVATE, service.kind.user))
@@ -311,7 +312,7 @@ def _key_files(service: ServiceInstance, folder: Path, root: Path | None) -> lis
     identity = load_identity(folder)
     user = service.kind.user
     data = {name: _read(folder / name, "--keys") for name in _KEY_FILES if (folder / name).exists()}
-    there = _at(root, service.keys_folder / ROSTER_FILE)
+    there = placed(root, service.keys_folder / ROSTER_FILE)
     try:
         kept = there.read_bytes()
         roster = decode_roster(kept, identity.authority_public_key)
@@ -380,12 +381,9 @@ def _within(root: Path | None, words: Sequence[str]) -> list[str]:
     if root is None:
         return list(words)
     own = (f"{FOLDER}/", f"{STATE}/")
-    return [str(_at(root, PurePosixPath(each))) if each.startswith(own) else each for each in words]
-
-
-def _at(root: Path | None, path: PurePosixPath) -> Path:
-    """Where ``path`` of the machine is for this process."""
-    return Path(path) if root is None else root / path.relative_to("/")
+    return [
+        str(placed(root, PurePosixPath(each))) if each.startswith(own) else each for each in words
+    ]
 
 
 def _read(path: Path, option: str) -> bytes:

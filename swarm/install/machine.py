@@ -16,7 +16,7 @@ from enum import Enum
 from pathlib import Path, PurePosixPath
 
 from swarm.install.installation import File, Installation
-from swarm.install.services import STATE, SYSUSERS_FILE
+from swarm.install.services import STATE, SYSUSERS_FILE, placed
 from swarm.runtime.errors import Fault, InputError
 
 _FOLDER_MODE, _STATE_MODE = 0o755, 0o700
@@ -70,12 +70,8 @@ class TargetMachine:
             raise InputError(Fault(str(place), "", problem, "see to it and try again")) from error
         return done
 
-    def at(self, path: PurePosixPath) -> Path:
-        """Where ``path`` of the machine is for this process."""
-        return Path(path) if self._root is None else self._root / path.relative_to("/")
-
     def _put(self, file: File) -> FileOutcome:
-        path = self.at(file.path)
+        path = placed(self._root, file.path)
         self._make_folder(file.path.parent, file.owner)
         there = path.read_bytes() if path.is_file() and not path.is_symlink() else None
         if there == file.content:
@@ -101,9 +97,9 @@ class TargetMachine:
         """Make a folder with those above it; what is below the state's is its owner's alone."""
         private = STATE in folder.parents
         for above in reversed(folder.parents):
-            if not self.at(above).exists():
+            if not placed(self._root, above).exists():
                 self._make_folder(above, owner if STATE in above.parents else None)
-        path = self.at(folder)
+        path = placed(self._root, folder)
         if not path.exists():
             path.mkdir(mode=_STATE_MODE if private else _FOLDER_MODE)
             path.chmod(_STATE_MODE if private else _FOLDER_MODE)
@@ -133,7 +129,7 @@ class TargetMachine:
     def _ids(self, name: str) -> tuple[int, int] | None:
         """User and group of that name; None if there is no such user."""
         try:
-            lines = self.at(PurePosixPath("/etc/passwd")).read_text("utf-8").splitlines()
+            lines = placed(self._root, PurePosixPath("/etc/passwd")).read_text("utf-8").splitlines()
         except FileNotFoundError:
             return None
         for line in lines:

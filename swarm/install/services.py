@@ -110,3 +110,8 @@ class ServiceInstance:
     def keys_folder(self) -> PurePosixPath:
         """Its keys."""
         return self.state_folder / "keys"
+
+
+def placed(root: Path | None, path: PurePosixPath) -> Path:
+    """Where ``path`` of the machine is for this process, which may see it below ``root``."""
+    return Path(path) if root is None else root / path.relative_to("/")

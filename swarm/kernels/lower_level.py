@@ -40,18 +40,13 @@ Fields = tuple[int, int, float, float, float, float | None, bool, bool]
 
 
 class Team(Protocol):
-    """Where the team stands; `swarm.allocation.TeamState` is one."""
+    """Where the team stands, as `swarm.allocation.TeamState` explains it, which is one."""
 
     free_s: _Floats
-    """(n_uav,) mission time at which each UAV is next free [s]; not NaN."""
     place_enu_m: _Floats
-    """(n_uav, 3) where each UAV is then [m; east, north, up]."""
     survived: _Floats
-    """(n_uav,) S of eq. 1 so far, within 0..1."""
     open: _Bools
-    """(n_task,) tasks nobody has taken."""
     active: _Bools
-    """(n_uav,) UAVs that take part."""
 
 
 def default_threads() -> int:

@@ -26,6 +26,12 @@ _GOLDEN_ANGLE_RAD = math.pi * (3.0 - math.sqrt(5.0))
 https://doi.org/10.1016/0025-5564(79)90080-4)."""
 _WIDTH = 92
 
+_IN_DEGREES: Mapping[str, str] = {
+    "lat_deg": "Instead of position_m: latitude and longitude [deg], and the height above mean "
+    "sea level [m]; without alt_m it is the origin's.",
+    "lon_deg": "",
+    "alt_m": "",
+}
 _ABOUT: Mapping[str, Mapping[str, str]] = {
     "": {
         "schema": "Version of this format.",
@@ -60,10 +66,7 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "id": "Name of the UAV: what --uav, hold and return call it.",
         "position_m": "Where it takes off [m east, m north] of the origin; a third number is the "
         "height above it. UAVs at one place are told apart in the air by height layers.",
-        "lat_deg": "Instead of position_m: latitude and longitude [deg], and the height above mean "
-        "sea level [m]; without alt_m it is the origin's.",
-        "lon_deg": "",
-        "alt_m": "",
+        **_IN_DEGREES,
         "speed_m_s": "Cruise speed over ground [m/s]; plans count on it, and the vehicle is told "
         "to fly at it.",
         "success": "p by task id or by kind of task; an id goes before a kind.",
@@ -75,10 +78,7 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "position_m": "Where it is [m east, m north] of the origin; a third number is the height "
         "above it. A UAV flies its height layer above that place: the first 10 m, every other "
         "one 3 m more.",
-        "lat_deg": "Instead of position_m: latitude and longitude [deg], and the height above mean "
-        "sea level [m]; without alt_m it is the origin's.",
-        "lon_deg": "",
-        "alt_m": "",
+        **_IN_DEGREES,
         "value": "m, what it is worth; only the ratios to other tasks count.",
         "service_s": "Time on the spot [s]: the UAV waits there for so long.",
         "kind": "What kind of task it is; success and survival of UAVs may name it.",

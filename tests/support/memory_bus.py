@@ -10,8 +10,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
-from swarm.bus.key_expressions import check_key, check_key_expr, intersects
+import zenoh
+
 from swarm.bus.port import (
     Answer,
     Inbox,
@@ -21,12 +23,20 @@ from swarm.bus.port import (
     Sample,
     TokenGone,
     TokenSeen,
+    check_key,
+    check_key_expr,
     check_payload,
 )
 from swarm.protocol.seal import Seal
 from swarm.runtime.errors import BusError
 
 __all__ = ["MemoryBus", "MemoryNetwork"]
+
+
+@lru_cache(maxsize=1 << 16)
+def intersects(one: str, other: str) -> bool:
+    """Whether some key matches both expressions; a key is an expression too."""
+    return zenoh.KeyExpr(one).intersects(zenoh.KeyExpr(other))
 
 
 @dataclass(slots=True, eq=False)

@@ -7,11 +7,10 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm.bus.key_expressions import check_key, check_key_expr, intersects
+from swarm.bus.port import check_key, check_key_expr
 
 CHUNKS = st.sampled_from(["a", "b", "ab", "@a", "@b", "*", "**"])
 EXPRESSIONS = st.lists(CHUNKS, min_size=1, max_size=7).map("/".join)
-KEYS = st.lists(st.sampled_from(["a", "b", "@a"]), min_size=1, max_size=6).map("/".join)
 TEXTS = st.text(alphabet="ab/*@#?é -", max_size=8)
 
 
@@ -41,16 +40,6 @@ def test_accepts_the_expressions_zenoh_accepts(text: str) -> None:
 @given(TEXTS | EXPRESSIONS)
 def test_keys_are_the_expressions_without_wildcards(text: str) -> None:
     assert accepts(check_key, text) == (is_canonical(text) and "*" not in text)
-
-
-@given(EXPRESSIONS.filter(is_canonical), EXPRESSIONS.filter(is_canonical))
-def test_intersects_as_in_zenoh(one: str, other: str) -> None:
-    assert intersects(one, other) == zenoh.KeyExpr(one).intersects(other)
-
-
-@given(EXPRESSIONS.filter(is_canonical), KEYS)
-def test_expression_meets_the_keys_it_includes(expression: str, key: str) -> None:
-    assert intersects(expression, key) == zenoh.KeyExpr(expression).includes(key)
 
 
 @pytest.mark.parametrize(
