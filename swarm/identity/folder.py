@@ -37,6 +37,17 @@ ROSTER_FILE: Final = "roster.json"
 DOOR_PASSWORD_FILE: Final = "door.password"  # noqa: S105 - the name of a file
 DOOR_KEY_FILE: Final = "door.key"
 MAVLINK_KEY_FILE: Final = "mavlink.key"
+KEY_FILES: Final = (
+    IDENTITY_FILE,
+    AUTHORITY_FILE,
+    CERTIFICATE_FILE,
+    PRIVATE_KEY_FILE,
+    ROSTER_FILE,
+    DOOR_PASSWORD_FILE,
+    DOOR_KEY_FILE,
+    MAVLINK_KEY_FILE,
+)
+"""All that may be in the folder of one identity."""
 AUTHORITY_KEY_FILE: Final = "authority.key"
 """In the authority's folder alone."""
 

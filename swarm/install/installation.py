@@ -16,16 +16,7 @@ from typing import Any, Final
 from swarm.bus.config import is_loopback
 from swarm.cli import check
 from swarm.identity import load_identity
-from swarm.identity.folder import (
-    AUTHORITY_FILE,
-    CERTIFICATE_FILE,
-    DOOR_KEY_FILE,
-    DOOR_PASSWORD_FILE,
-    IDENTITY_FILE,
-    MAVLINK_KEY_FILE,
-    PRIVATE_KEY_FILE,
-    ROSTER_FILE,
-)
+from swarm.identity.folder import KEY_FILES, ROSTER_FILE
 from swarm.identity.roster import decode_roster
 from swarm.install.services import (
     DEFAULT_PROGRAM,
@@ -99,17 +90,6 @@ def kept_words(text: str) -> list[str]:
         value = _UNESCAPED.sub(r"\1", value[1:-1])
     return shlex.split(value)
 
-
-_KEY_FILES: Final = (
-    IDENTITY_FILE,
-    AUTHORITY_FILE,
-    CERTIFICATE_FILE,
-    PRIVATE_KEY_FILE,
-    ROSTER_FILE,
-    DOOR_PASSWORD_FILE,
-    DOOR_KEY_FILE,
-    MAVLINK_KEY_FILE,
-)
 
 _OPEN, _PRIVATE = 0o644, 0o600
 _LOWEST_PORT = 1024
@@ -311,7 +291,7 @@ def _key_files(service: ServiceInstance, folder: Path, root: Path | None) -> lis
     """Copies of the keys in ``folder``; a newer roster on the machine stays."""
     identity = load_identity(folder)
     user = service.kind.user
-    data = {name: _read(folder / name, "--keys") for name in _KEY_FILES if (folder / name).exists()}
+    data = {name: _read(folder / name, "--keys") for name in KEY_FILES if (folder / name).exists()}
     there = placed(root, service.keys_folder / ROSTER_FILE)
     try:
         kept = there.read_bytes()
