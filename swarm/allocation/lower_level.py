@@ -213,8 +213,8 @@ def run(
 ) -> tuple[list[list[int]], FloatArray]:
     """All decisions as lists, as `decisions` takes them.
 
-    Once ``should_stop``, asked every few milliseconds, or between the decisions of a rule that is
-    not compiled, says so, the decisions left are greedy, or are not taken.
+    ``should_stop`` is asked every few milliseconds, or between the decisions of a rule that is not
+    compiled. Once it says so the decisions left are greedy, or are not taken.
 
     Returns:
         Task indices per UAV in order of execution, and (n_task,) completion times [s], NaN for

@@ -65,7 +65,7 @@ UNWATCHED_S: Final = 20.0
 class ServiceNotifier:
     """What this process tells whoever supervises it, by its environment.
 
-    What that says of another ``pid``, as when it was meant for the parent, is none of its business.
+    What that says of a process with another ``pid``, such as the parent, is passed over.
     """
 
     def __init__(self, environment: Mapping[str, str], pid: int | None = None) -> None:
@@ -230,7 +230,8 @@ async def stop_requests(*, lifeline: bool) -> AsyncIterator[StopRequest]:
 async def run_until_stopped(work: Coroutine[Any, Any, int], *, lifeline: bool = False) -> int:
     """Run ``work`` to its end, or cancel it on SIGINT, SIGTERM or the parent's end.
 
-    It cleans up in ``finally``. With ``lifeline`` the end of standard input is the parent's.
+    ``work`` cleans up in ``finally``. With ``lifeline`` the end of standard input counts as the
+    parent's end.
 
     Returns:
         What ``work`` returned if it ended by itself, else `EXIT_STOPPED` or `EXIT_INTERRUPTED`.
