@@ -1,7 +1,4 @@
-"""Commands of the coordinator.
-
-Leaves out: what they do (coordinator.planner, coordinator.planner.plan_report, coordinator.plot).
-"""
+"""Commands of the coordinator."""
 
 from __future__ import annotations
 

@@ -2,10 +2,9 @@
 
 Publishes ``brief``, ``plan`` and ``board/<task>``, holds ``alive/coordinator`` and answers on
 ``state/coordinator``; while it stands by, none of that. Subscribes to ``brief``, ``plan``,
-``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and ``operator/*`` and watches ``alive/*``.
-One that stands by takes a seat as an observer; when it takes over it keeps that seat. When it has
-to stand down, it leaves it and watches from a new one: a token cannot be taken back. Leaves out:
-every decision (coordinator.core).
+``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and ``operator/*`` and watches ``alive/*``. One
+that stands by takes a seat as an observer; when it takes over it keeps that seat. When it has to
+stand down, it leaves it and watches from a new one: a token cannot be taken back.
 """
 
 from __future__ import annotations

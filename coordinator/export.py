@@ -1,8 +1,8 @@
 """A plan as QGroundControl plans (``.plan``), one for every UAV that has tasks.
 
-Take-off into the UAV's height layer, cruise speed, one waypoint per task with its
-service as hold time, return to launch. Heights are above the UAV's start, which
-is the home of its plan. Leaves out: geofence and rally points.
+Take-off into the UAV's height layer, cruise speed, one waypoint per task with its service as hold
+time, return to launch. Heights are above the UAV's start, which is the home of its plan.
+There are no geofences and no rally points.
 
 Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html.
 """
@@ -83,15 +83,7 @@ def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: ExportFirm
 def uav_plan(
     uav: Uav, route: Sequence[Task], origin: Origin, layer_m: float, firmware: ExportFirmware
 ) -> dict[str, object]:
-    """The plan of one UAV, ready for `json.dumps`.
-
-    Args:
-        uav: who flies it.
-        route: its tasks in order.
-        origin: place of the local frame's zero.
-        layer_m: height at which it flies above the places it visits [m].
-        firmware: what flies it.
-    """
+    """The plan of one UAV, ready for `json.dumps`; ``layer_m`` above the places it visits [m]."""
     home_alt_m = origin.alt_m + uav.position_enu_m[2]
     return {
         "fileType": "Plan",

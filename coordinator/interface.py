@@ -1,6 +1,6 @@
 """What ``import swarm`` offers of this package: planning, and reading recordings.
 
-Found by entry points (swarm.interface, which documents it). Leaves out: flying (sim.interface).
+Found by entry points (swarm.interface, which documents it).
 """
 
 from __future__ import annotations

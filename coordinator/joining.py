@@ -1,8 +1,4 @@
-"""Join a mission on its bus to observe or to command it, without taking part in it.
-
-Leaves out: what is heard there (coordinator.mission_view.observation) and how it is shown
-(coordinator.terminal).
-"""
+"""Join a mission on its bus to observe or to command it, without taking part in it."""
 
 from __future__ import annotations
 
@@ -44,9 +40,7 @@ SETTLE_S = 0.4
 async def find_missions(bus: Bus, patience_s: float | None) -> list[str]:
     """Names of all missions that somebody on ``bus`` flies, once there is one.
 
-    Args:
-        bus: open; its inbox is read.
-        patience_s: how long to wait for the first [wall s]; None for as long as it takes.
+    Waits for the first for ``patience_s`` [wall s], for as long as it takes if that is None.
     """
     bus.watch_tokens(ANY_TOKEN)
     found: set[str] = set()
@@ -64,11 +58,7 @@ async def find_missions(bus: Bus, patience_s: float | None) -> list[str]:
 
 
 async def only_mission(bus: Bus, patience_s: float | None) -> str:
-    """The mission that is meant when none is named.
-
-    Args:
-        bus: open; its inbox is read.
-        patience_s: how long to wait for it [wall s]; None for as long as it takes.
+    """The mission that is meant when none is named; waits as `find_missions` does.
 
     Raises:
         SwarmError: there is none.
@@ -129,15 +119,8 @@ def observer_shell(
 ) -> Shell[CommonEvent, CommonAction]:
     """A shell that tells ``core`` all that is said on the bus; it shows no token.
 
-    Args:
-        core: looks on, and may speak.
-        bus: open.
-        clock: gives ``now_s``.
-        mission: name of the mission.
-        name: of this process, in logs and, where it speaks, as a writer.
-        answer_s: how long a question waits for the slowest answer [wall s].
-        every_status: see `join_mission`.
-        left_out: see `Shell`.
+    ``name`` is that of this process, in logs and, where it speaks, as a writer. A question waits
+    ``answer_s`` for the slowest answer [wall s].
     """
     shell: Shell[CommonEvent, CommonAction] = Shell(
         core,

@@ -1,7 +1,7 @@
 """A plan drawn over the map: starts, tasks, and every UAV's list as a path of arrows.
 
-Colours are Okabe and Ito's, told apart by most colour-blind people, and line styles tell
-UAVs apart without any colour. Leaves out: terrain, and live missions.
+Colours are Okabe and Ito's, told apart by most colour-blind people, and line styles tell UAVs apart
+without any colour.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Names beside points on a map, placed so that they hide neither each other nor the map.
 
-Each label tries a ring of places around its point, nearest first, and takes the one that
-covers least. Leaves out: moving labels that are already placed.
+Each label tries a ring of places around its point, nearest first, and takes the one that covers
+least.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """The coordinator at work: hears, asks, takes charge of its mission; events in, actions out.
 
-It learns before it says anything. Where a mission runs it takes charge of that; else it
-publishes the mission and leads it through its stages (coordinator.core.stages). The fleet needs it
-for none of its own decisions. Whenever others may know more, it asks them before it decides
-anything further. Leaves out: who leads where there are two (coordinator.core.leadership), how
-plans are made (coordinator.planner), and transport (coordinator.daemon).
+It learns before it says anything. Where a mission runs it takes charge of that; else it publishes
+the mission and leads it through its stages (coordinator.core.stages). The fleet needs it for none
+of its own decisions. Whenever others may know more, it asks them before it decides anything
+further.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Two coordinators meet when one was started beside the other, or after a partitio
 standing by took over. Both apply one rule to what they know of each other, `LeadershipBid`, so one
 gives way. Who leads asks before it decides (`StateQuery`), goes on from what those who fly the
 mission answer or from its own memory (`Predecessors`), and later takes in what the other side of a
-partition has done (`reunion`). Leaves out: saying so (coordinator.core.active).
+partition has done (`reunion`).
 """
 
 from __future__ import annotations

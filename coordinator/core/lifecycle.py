@@ -1,10 +1,9 @@
 """When a mission starts, and when it is over.
 
-Waiting costs nothing on the ground, and energy in the air. As soon as somebody is airborne,
-whoever was lost is waited for only as long as a restart of its agent takes, whoever else is not
-ready (preparing, or never seen) only as long as the first in the air may hover, and whom the
-operator does not want waited for not at all. Who gets ready later joins the mission that runs.
-Leaves out: saying so (coordinator.core.stages).
+Waiting costs nothing on the ground, and energy in the air. As soon as somebody is airborne, whoever
+was lost is waited for only as long as a restart of its agent takes, whoever else is not ready
+(preparing, or never seen) only as long as the first in the air may hover, and whom the operator
+does not want waited for not at all. Who gets ready later joins the mission that runs.
 """
 
 from __future__ import annotations

@@ -3,8 +3,7 @@
 What a scenario looks like in these registers and how they differ from its file, when each task is
 released to the fleet, and what is said, said again, and said in the place of another coordinator.
 What the operator has ordered counts first: a task withdrawn before it appeared is not released any
-more. Leaves out: when to start and to end (coordinator.core.stages), and keys and bytes
-(swarm.protocol).
+more.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """When to plan a running mission anew, and when a new plan becomes the next epoch.
 
-Reasons are differences between the situation that the epoch in force answers to and the
-situation of now, so a reason that comes at a bad moment is not forgotten. Leaves out: planning
-(`coordinator.planner.online`) and publishing (`coordinator.core.stages`).
+Reasons are differences between the situation that the epoch in force answers to and the situation
+of now, so a reason that comes at a bad moment is not forgotten.
 """
 
 from __future__ import annotations

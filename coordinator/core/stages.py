@@ -3,9 +3,7 @@
 `TRANSITIONS` says where it may go from each stage, and `StagedMission` takes it there: it starts
 the mission when the fleet is airborne or given up, releases pop-ups when their time comes, has the
 rest planned anew where that is worth an epoch, ends the mission when nothing is left that anybody
-could do or the operator aborts it, and leaves when everybody has left. Leaves out: who leads it
-(coordinator.core.leadership), when to start and to end (coordinator.core.lifecycle), when to plan
-(coordinator.core.replanning), and what the registers hold (coordinator.core.publication).
+could do or the operator aborts it, and leaves when everybody has left.
 """
 
 from __future__ import annotations

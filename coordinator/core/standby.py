@@ -1,9 +1,8 @@
 """The coordinator that stands by: watches the one at work, and takes its place when it is lost.
 
-It watches without a token and says nothing. When the coordinator has been missed for a
-while and does not answer either, it becomes the coordinator itself: a `CoordinatorCore`
-that remembers all that was heard meanwhile. Leaves out: standing by anew when another one
-proves to be there (coordinator.daemon starts a new watch then).
+It watches without a token and says nothing. When the coordinator has been missed for a while and
+does not answer either, it becomes the coordinator itself: a `CoordinatorCore` that remembers all
+that was heard meanwhile.
 """
 
 from __future__ import annotations

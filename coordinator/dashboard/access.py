@@ -3,7 +3,6 @@
 Address and port, names of this server, other pages, token, and how often a client may ask. A page
 of another origin that a person has open may send requests here; a browser tells its `Origin`. A
 name that an attacker's DNS turns to this machine makes that page one of ours; the `Host` tells.
-Leaves out: reading requests (coordinator.dashboard.app).
 """
 
 from __future__ import annotations
@@ -81,8 +80,6 @@ class RateLimit:
     """How often each client may ask for something: a burst, and so many a second on average.
 
     Args:
-        burst: at once.
-        per_s: later on.
         clients: at most so many are remembered; the longest unheard of is forgotten.
     """
 
@@ -106,10 +103,8 @@ class RateLimit:
 def access_for(host: str, allowed: Sequence[str], token: str | None) -> tuple[AccessRules, bool]:
     """What requests to a server at ``host`` have to show, and whether the token is a new one.
 
-    Args:
-        host: where it listens.
-        allowed: other names under which it may be asked for.
-        token: None for one of its own where it can be reached from elsewhere.
+    ``allowed`` are other names under which it may be asked for. Without a ``token`` it gets one of
+    its own where it can be reached from elsewhere.
     """
     names = {_bracketed(name).lower() for name in (*allowed, host)} | _LOOPBACK_NAMES
     if is_loopback(host):

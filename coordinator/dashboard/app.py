@@ -1,7 +1,6 @@
 """HTTP and websocket of the dashboard: who asks is checked, then answered.
 
-README.md has the words. Leaves out: what is told (coordinator.dashboard.feed), who may ask
-(coordinator.dashboard.access) and what comes of an order (coordinator.dashboard.operator_session).
+README.md has the words.
 """
 
 from __future__ import annotations
@@ -66,15 +65,7 @@ class _HttpError(Exception):
 
 
 class Dashboard:
-    """The endpoints of one dashboard; ``hub`` is to be told when it ends.
-
-    Args:
-        source: what is shown and commanded.
-        access: who may look and command.
-        display: what the page is told of itself.
-        clock: by which the pace of requests is judged.
-        static: folder with the page.
-    """
+    """The endpoints of one dashboard; ``hub`` is to be told when it ends."""
 
     def __init__(
         self,

@@ -1,7 +1,6 @@
 """What a mission is measured by: J of the lists it began with, and a bound on J of any lists.
 
-Both concern the tasks of those lists: what was known at the start. Leaves out: when and on
-which thread a bound is worked out (coordinator.dashboard.hub).
+Both concern the tasks of those lists: what was known at the start.
 """
 
 from __future__ import annotations
@@ -41,10 +40,6 @@ class Baseline:
 
 def baseline_of(replica: Replica, name: str) -> Baseline | None:
     """What the mission of that name is measured by.
-
-    Args:
-        replica: knows its board, and the epoch in force.
-        name: of the mission.
 
     Returns:
         None where that is not to be known: in a later epoch than the first, without lists, or

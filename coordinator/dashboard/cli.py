@@ -1,7 +1,4 @@
-"""The command `swarm dashboard`.
-
-Leaves out: everything it serves (coordinator.dashboard.app).
-"""
+"""The command `swarm dashboard`."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """What is told to a page: whole at first, then what has changed; README.md has the words.
 
-`Feed.look` takes in what its source knows, `Feed.frame` tells it to a client that has seen all
-up to some look, however long ago; clients that are in step share one text. Leaves out: when
-to look and how a text gets to a client (coordinator.dashboard.hub).
+`Feed.look` takes in what its source knows, `Feed.frame` tells it to a client that has seen all up
+to some look, however long ago; clients that are in step share one text.
 """
 
 from __future__ import annotations
@@ -51,12 +50,7 @@ class PageSettings:
 
 
 class Feed:
-    """Tells clients what a source knows.
-
-    Args:
-        source: knows it.
-        display: what the page is told of itself.
-    """
+    """Tells clients what a source knows."""
 
     def __init__(self, source: DashboardSource, display: PageSettings) -> None:
         self._source = source

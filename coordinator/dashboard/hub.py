@@ -1,7 +1,4 @@
-"""Looks twice a second, and lets everyone who is connected know.
-
-Leaves out: what is told (coordinator.dashboard.feed) and connections (coordinator.dashboard.app).
-"""
+"""Looks twice a second, and lets everyone who is connected know."""
 
 from __future__ import annotations
 
@@ -31,11 +28,7 @@ BOUND_S = 3.0
 
 @dataclass(slots=True)
 class Hub:
-    """One feed and all who follow it; `run` keeps it going.
-
-    Args:
-        feed: looks.
-    """
+    """One feed and all who follow it; `run` keeps it going."""
 
     feed: Feed
     clients: int = 0

@@ -1,9 +1,7 @@
 """The session behind a dashboard: it finds a mission and observes it, again and again.
 
 Publishes ``operator/<target>`` and ``operator/task/<task>`` when the operator wants something;
-subscribes to all that is said, watches ``alive/*`` and shows no token. Leaves out: every
-decision (coordinator.dashboard.operator_session), and telling a page
-(coordinator.dashboard.feed).
+subscribes to all that is said, watches ``alive/*`` and shows no token.
 """
 
 from __future__ import annotations
@@ -37,10 +35,6 @@ class LiveMission:
     Args:
         mission: its name; None for the only one there is, and after it for the next.
         open_bus: takes a seat on the bus, however long that takes.
-        network: timers.
-        clock: gives ``now_s``.
-        speedup: of that clock.
-        may_order: whether what is ordered here would be believed.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """What Prometheus is told, read from what is known whenever it asks.
 
 Names begin with ``peckorder_`` and end in their unit; of the process itself there are the usual
-``process_…``. Leaves out: who may ask (coordinator.dashboard.app).
+``process_…``.
 """
 
 from __future__ import annotations
@@ -27,12 +27,7 @@ __all__ = ["Metrics"]
 
 
 class Metrics:
-    """The metrics of one dashboard.
-
-    Args:
-        source: what is known.
-        hub: who looks on, and what is made of it.
-    """
+    """The metrics of one dashboard."""
 
     def __init__(self, source: DashboardSource, hub: Hub) -> None:
         self._registry = CollectorRegistry(auto_describe=False)

@@ -1,8 +1,7 @@
 """The core behind a dashboard: it observes a mission, and says what the operator requests.
 
 It outlives the coordinator, all agents, and the flight: when a mission of the same name is flown
-anew, it begins anew with it. Leaves out: following a request (coordinator.operator.requests), the
-process (coordinator.dashboard.live_mission), and who may request (coordinator.dashboard.access).
+anew, it begins anew with it.
 """
 
 from __future__ import annotations
@@ -49,12 +48,9 @@ class OperatorSession:
     """A core that looks on and gives orders.
 
     Args:
-        mission: name of the mission.
-        timing: timers, in the seconds of ``now_s``.
         incarnation: wall time in milliseconds.
         patience_s: how long to wait for the effect of an order [s of ``now_s``].
         stays: look on for ever; else until the mission is over and everyone has left.
-        first: number of the first order.
     """
 
     def __init__(
@@ -122,12 +118,7 @@ class OperatorSession:
         )
 
     def give(self, wish: OperatorRequest, who: str, now_s: float) -> int:
-        """Give an order, which goes out with the next step; its number.
-
-        Args:
-            wish: what the operator wants.
-            who: asks for it, for the log.
-            now_s: now.
+        """Give an order, which goes out with the next step; its number. ``who`` is for the log.
 
         Raises:
             RefusedError: it could not be said.

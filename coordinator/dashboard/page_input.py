@@ -1,7 +1,4 @@
-"""What a page may say, field by field; what does not fit is told in one sentence.
-
-Leaves out: how it arrives (coordinator.dashboard.app).
-"""
+"""What a page may say, field by field; what does not fit is told in one sentence."""
 
 from __future__ import annotations
 

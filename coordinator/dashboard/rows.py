@@ -1,7 +1,4 @@
-"""Rows of a feed: what has changed since when, each made into text once.
-
-Leaves out: what the rows say (coordinator.dashboard.feed).
-"""
+"""Rows of a feed: what has changed since when, each made into text once."""
 
 from __future__ import annotations
 
@@ -19,11 +16,7 @@ def as_text(row: Mapping[str, object]) -> str:
 
 
 class RowTable:
-    """Rows that change; none vanishes but the oldest where there are too many.
-
-    Args:
-        keep: how many; None for all.
-    """
+    """Rows that change; none vanishes but the oldest of more than ``keep``, if that is given."""
 
     def __init__(self, keep: int | None = None) -> None:
         self._keep = keep
@@ -33,14 +26,7 @@ class RowTable:
     def put(
         self, key: Hashable, row: Mapping[str, object], seq: int, but: str | None = None
     ) -> None:
-        """Take ``row`` in, as of ``seq``.
-
-        Args:
-            key: the row's own.
-            row: all of it.
-            seq: grows from call to call.
-            but: a field whose change alone is none.
-        """
+        """Take ``row`` in, as of ``seq``; a change of the field ``but`` alone is none."""
         heart = row if but is None else {name: row[name] for name in row if name != but}
         known = self._rows.get(key)
         if known is None or known[0] != heart:
@@ -64,11 +50,7 @@ class RowTable:
 
 
 class AppendOnlyTable:
-    """Rows that are added and never change; the newest are kept.
-
-    Args:
-        keep: how many.
-    """
+    """Rows that are added and never change; the newest ``keep`` are kept."""
 
     def __init__(self, keep: int) -> None:
         self._rows: deque[tuple[int, str]] = deque(maxlen=keep)

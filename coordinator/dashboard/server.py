@@ -1,7 +1,4 @@
-"""Serve an application inside a running loop, on a port that was taken beforehand.
-
-Leaves out: what is served (coordinator.dashboard.app) and who ends it (swarm.runtime.process).
-"""
+"""Serve an application inside a running loop, on a port that was taken beforehand."""
 
 from __future__ import annotations
 

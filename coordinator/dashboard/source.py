@@ -1,8 +1,4 @@
-"""What a page is fed from: a living mission, or a recording that is played.
-
-Leaves out: the living mission (coordinator.dashboard.live_mission), and how any of it is told to a
-page (coordinator.dashboard.feed).
-"""
+"""What a page is fed from: a living mission, or a recording that is played."""
 
 from __future__ import annotations
 
@@ -69,11 +65,7 @@ class RequestSink(Protocol):
     """Takes what an operator wants said."""
 
     def give(self, wish: OperatorRequest, who: str) -> int:
-        """Say it on the bus; the number of its `CommandRow`.
-
-        Args:
-            wish: what the operator wants.
-            who: asks for it, for the log.
+        """Say it on the bus; the number of its `CommandRow`. ``who`` asks for it, for the log.
 
         Raises:
             RefusedError: it was not said.

@@ -1,8 +1,7 @@
 """Keeps a `swarm dashboard` running as a child, for a process that has more important things to do.
 
 Whatever becomes of the child, nothing of it reaches its parent: it is started again, ever later,
-and however the parent ends, the child sees the end of its standard input and leaves. Leaves
-out: what the child does (coordinator.dashboard.cli).
+and however the parent ends, the child sees the end of its standard input and leaves.
 """
 
 from __future__ import annotations
@@ -42,11 +41,8 @@ def supervised_dashboard(
 ) -> AbstractAsyncContextManager[None]:
     """A dashboard of ``mission`` while the context lasts, on the bus of its parent.
 
-    Args:
-        place: where; None for no dashboard.
-        mission: its name.
-        seat: the parent's; of a coordinator's keys the page can only look on.
-        speedup: of the mission.
+    ``seat`` is the parent's: of a coordinator's keys the page can only look on. There is none
+    where ``place`` is None.
 
     Raises:
         InputError: the bus is a mesh, in which it would need an endpoint of its own.

@@ -1,7 +1,7 @@
 """What the agents of a fleet have reported: newest statuses, what was dropped, and choices.
 
 Whatever is claimed without keys, no more is kept of writers that are not in the fleet than
-`MOST_STRANGE`. Leaves out: what is told of it (coordinator.mission_view.narrator).
+`MOST_STRANGE`.
 """
 
 from __future__ import annotations
@@ -22,11 +22,7 @@ CHOICES_KEPT = 2000
 
 
 class FleetReports:
-    """The reports of one fleet.
-
-    Args:
-        replica: knows who is in the fleet.
-    """
+    """The reports of one fleet."""
 
     def __init__(self, replica: Replica) -> None:
         self.statuses: dict[str, Status] = {}

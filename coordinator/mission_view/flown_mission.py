@@ -1,7 +1,4 @@
-"""The mission that is flown: as it was given, with the operator's tasks, and what came of it.
-
-Leaves out: hearing of tasks and attempts (coordinator.mission_view.mission_state).
-"""
+"""The mission that is flown: as it was given, with the operator's tasks, and what came of it."""
 
 from __future__ import annotations
 
@@ -19,12 +16,7 @@ __all__ = ["FlownMission"]
 
 
 class FlownMission:
-    """One mission as it is flown.
-
-    Args:
-        given: the scenario, pop-ups included.
-        board: what is known of its tasks.
-    """
+    """One mission as it is flown."""
 
     def __init__(self, given: Mission, board: TaskBoard) -> None:
         self._given = given
@@ -80,10 +72,7 @@ class FlownMission:
     def result(self, *, repeated_visits: int, lost: Sequence[UavId], epochs: int) -> MissionResult:
         """What has been executed so far.
 
-        Args:
-            repeated_visits: by UAVs to tasks that they had done themselves.
-            lost: UAVs that are.
-            epochs: in which the mission ran.
+        ``repeated_visits`` are by UAVs to tasks that they had done themselves.
         """
         mission = self.mission
         if self._problem is None:

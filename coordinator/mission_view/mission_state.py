@@ -57,7 +57,6 @@ class MissionState:
     """The state of one mission, as one observer knows it.
 
     Args:
-        mission: the scenario being flown, pop-ups included.
         timing: timers, in the seconds of ``now_s``.
         explains: tell of everything why, for an explanation of a recording.
     """
@@ -209,13 +208,7 @@ class MissionState:
         return self._clock.mission_s(now_s)
 
     def keep_time(self, now_s: float, mission_s: float, pace: float) -> None:
-        """Follow a mission whose time runs otherwise than the own clock.
-
-        Args:
-            now_s: time of the own clock [s].
-            mission_s: mission time then [s].
-            pace: mission seconds per second of the own clock; > 0.
-        """
+        """Follow a mission whose time runs at ``pace`` (> 0) seconds per second of the own clock."""
         self._clock.set(mission_s, now_s, pace)
 
     def silent_s(self, uav: str, now_s: float) -> float | None:

@@ -1,8 +1,7 @@
 """What happens in a mission, put into words: the one place that does.
 
-A mission state says what it has heard and what that changes; here it becomes a line of the
-story, with the detail that an explanation adds if one is wanted. Leaves out: what follows from
-a fact (coordinator.mission_view.mission_state), and reasons (coordinator.mission_view.reasons).
+A mission state says what it has heard and what that changes; here it becomes a line of the story,
+with the detail that an explanation adds if one is wanted.
 """
 
 from __future__ import annotations
@@ -61,10 +60,6 @@ class MissionNarrator:
     """Tells the story of one mission.
 
     Args:
-        mission: as the scenario has it, pop-ups included.
-        board: what is known of its tasks.
-        membership: who is there.
-        clock: mission time.
         explains: say of everything why, and tell what needs an explanation alone: every claim,
             choice and list. Such a story is kept whole.
     """
@@ -117,11 +112,7 @@ class MissionNarrator:
     ) -> None:
         """Tell what a register newly says.
 
-        Args:
-            message: says it.
-            earlier: what the register said before.
-            claim: the writer's claim before.
-            now_s: now.
+        ``earlier`` is what it said before, ``claim`` what the writer claimed.
         """
         body = message.body
         if earlier is not None and earlier.body == body and not isinstance(body, PlanEpoch):
@@ -217,12 +208,7 @@ class MissionNarrator:
     ) -> None:
         """Tell why a UAV leaves, and what it says about its vehicle.
 
-        Args:
-            uav: its id.
-            status: what it says.
-            before: what it said before.
-            now_s: now.
-            reborn: whether another life of its agent says so.
+        ``before`` is what it said before; ``reborn`` if another life of its agent says so.
         """
         phase, note = status.phase, status.note
         changed = self._reasons is not None and (before is None or before.phase is not phase)

@@ -1,8 +1,7 @@
 """Observe a mission of which only the name is known, until it is over and nobody is there any more.
 
 It may be flown at a speed-up that whoever joins it has not been told: see
-coordinator.mission_view.pace. Leaves out: joining the bus (coordinator.joining), and what is made
-of what is heard (coordinator.mission_view.mission_state).
+coordinator.mission_view.pace.
 """
 
 from __future__ import annotations
@@ -36,13 +35,10 @@ class MissionObserver:
     """A core that feeds a `MissionState` until that knows how the mission stands.
 
     Args:
-        mission: name of the mission.
-        timing: timers, in the seconds of ``now_s``.
         patience_s: how long to wait for what is missing [s of ``now_s``]; None to look on
             for ever.
         complete: keep the state's mission like the board, which takes 0.1 s a change for
             100 UAVs and 1000 tasks; else its board alone tells the tasks.
-        explains: tell of everything why.
     """
 
     def __init__(

@@ -1,7 +1,4 @@
-"""Mission time for an observer whose clock need not run as the mission's does.
-
-Leaves out: which words tell what time it is (coordinator.mission_view.mission_state).
-"""
+"""Mission time for an observer whose clock need not run as the mission's does."""
 
 from __future__ import annotations
 
@@ -28,13 +25,7 @@ class SpeedupEstimator:
         """Of each UAV: when it first told the mission time, and which it told."""
 
     def told(self, uav: str, now_s: float, mission_s: float) -> float:
-        """The pace, now that ``uav`` says that it is ``mission_s``.
-
-        Args:
-            uav: who says so.
-            now_s: time of the observer's clock [s].
-            mission_s: mission time [s].
-        """
+        """The pace, now that ``uav`` says that it is ``mission_s``."""
         first_s, first_mission_s = self._first.setdefault(uav, (now_s, mission_s))
         if mission_s < first_mission_s:  # another flight
             self._first[uav] = now_s, mission_s

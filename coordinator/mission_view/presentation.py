@@ -1,8 +1,6 @@
 """How a mission looks wherever it is shown: characters, colours, styles of lines.
 
 States differ in shape, never in colour alone; UAV colours are Okabe and Ito's, as in plots.
-Leaves out: what is told (coordinator.mission_view.narrator), and where things are put
-(coordinator.terminal).
 """
 
 from __future__ import annotations

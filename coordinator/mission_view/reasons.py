@@ -2,8 +2,6 @@
 
 Of each claim who else wanted the task and why it was kept or given up, of each attempt how it
 compares with what was predicted, of each choice what it passed over, of each epoch its lists.
-Leaves out: what a story tells anyway (coordinator.mission_view.narrator), and picking what
-concerns one task or UAV (coordinator.recording.explanation).
 """
 
 from __future__ import annotations
@@ -50,14 +48,7 @@ class TellEvent(Protocol):
 
 
 class Reasons:
-    """Knows why, from claims, choices, outcomes and lists.
-
-    Args:
-        board: what is known of the tasks.
-        membership: who is there.
-        tell: adds to the story.
-        story: what has been told.
-    """
+    """Knows why, from claims, choices, outcomes and lists."""
 
     def __init__(
         self, board: TaskBoard, membership: Membership, tell: TellEvent, story: Story

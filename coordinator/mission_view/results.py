@@ -1,7 +1,6 @@
 """What a mission has come to: after each task, at its end, and beside what was planned.
 
-With what a run's protection refused, which the report tells too. Leaves out: how it is shown
-(coordinator.terminal.report).
+With what a run's protection refused, which the report tells too.
 """
 
 from __future__ import annotations
@@ -320,11 +319,7 @@ _HARMLESS = frozenset({"stale", "not forwarded"})
 
 
 def refusals(dropped: Iterable[Mapping[str, int]]) -> Counter[str]:
-    """What was refused, by reason: all that was dropped but what honest ones drop, too.
-
-    Args:
-        dropped: messages and frames dropped, by reason, of each process that tells.
-    """
+    """What was refused, by reason: all that was dropped but what honest ones drop, too."""
     total: Counter[str] = Counter()
     for counts in dropped:
         total.update({reason: n for reason, n in counts.items() if reason not in _HARMLESS})

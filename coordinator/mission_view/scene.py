@@ -1,7 +1,4 @@
-"""One moment of a mission, in the words and numbers that a picture needs.
-
-Leaves out: where and how they are shown (coordinator.terminal.live_view).
-"""
+"""One moment of a mission, in the words and numbers that a picture needs."""
 
 from __future__ import annotations
 

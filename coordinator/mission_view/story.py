@@ -1,8 +1,6 @@
 """The story of a mission: what happened, each thing once, with whom and what it concerns.
 
-A line of the story says it in short; an explanation adds the detail. Leaves out: finding out
-what happened (coordinator.mission_view.mission_state), the words for it
-(coordinator.mission_view.narrator) and where it is shown.
+A line of the story says it in short; an explanation adds the detail.
 """
 
 from __future__ import annotations
@@ -117,8 +115,7 @@ def notable(story: Sequence[MissionEvent]) -> list[MissionEvent]:
 class Story:
     """What has been told, oldest first.
 
-    Args:
-        kept: lines that are remembered, give or take half of them; None for all.
+    ``kept`` lines are remembered, give or take half of them; all if it is None.
     """
 
     def __init__(self, kept: int | None = STORY_KEPT) -> None:

@@ -1,7 +1,6 @@
 """How each UAV of a mission stands: what it does, for how long, where, and how well it is heard.
 
-Whoever shows, measures or records a UAV reads it from here. Leaves out: the rest of a moment
-(coordinator.mission_view.scene).
+Whoever shows, measures or records a UAV reads it from here.
 """
 
 from __future__ import annotations
@@ -127,12 +126,7 @@ class UavView(UavState):
 
 
 class FleetStates:
-    """Of all UAVs of a mission at one moment; what concerns all is looked up once.
-
-    Args:
-        mission_state: of the mission.
-        now_s: the moment, in its own clock's seconds.
-    """
+    """Of all UAVs of a mission at one moment; what concerns all is looked up once."""
 
     def __init__(self, mission_state: MissionState, now_s: float) -> None:
         brief = mission_state.replica.brief

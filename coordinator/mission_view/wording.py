@@ -1,8 +1,6 @@
 """The words of a mission: numbers, names, places, the operator's commands, choices and claims.
 
-One way to say each thing, for the story, the terminal, the dashboard and explanations. Leaves
-out: what is told when (coordinator.mission_view.narrator), characters and colours
-(coordinator.mission_view.presentation).
+One way to say each thing, for the story, the terminal, the dashboard and explanations.
 """
 
 from __future__ import annotations

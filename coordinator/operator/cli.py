@@ -1,7 +1,4 @@
-"""The commands `swarm start`, `hold`, `resume`, `return`, `abort` and `task add|withdraw`.
-
-Leaves out: saying so on the bus and seeing what comes of it (coordinator.operator.submission).
-"""
+"""The commands `swarm start`, `hold`, `resume`, `return`, `abort` and `task add|withdraw`."""
 
 from __future__ import annotations
 

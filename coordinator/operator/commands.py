@@ -1,7 +1,6 @@
 """An operator's word to UAVs: hold, resume, return, abort, or start without one.
 
-What is to be said, and what has come of it. Leaves out: saying it
-(coordinator.operator.requests), and obeying (agent.core, coordinator.core).
+What is to be said, and what has come of it.
 """
 
 from __future__ import annotations
@@ -83,13 +82,7 @@ class CommandRequest:
 
 
 class CommandHandler:
-    """One command, and what comes of it.
-
-    Args:
-        wish: what the operator wants.
-        mission_state: of the mission.
-        patience_s: how long to wait for the effect [s of ``now_s``].
-    """
+    """One command, and what comes of it."""
 
     asks = False
     """What a UAV says by itself tells whether it obeys."""
@@ -237,13 +230,7 @@ class StartRequest:
 
 
 class StartHandler:
-    """One such word, and what comes of it.
-
-    Args:
-        wish: what the operator wants.
-        mission_state: of the mission.
-        patience_s: how long to wait for the effect [s of ``now_s``].
-    """
+    """One such word, and what comes of it."""
 
     asks = True
     """The coordinator's own answer tells whether it knows."""

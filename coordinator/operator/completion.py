@@ -1,8 +1,7 @@
 """Names on the bus that complete what an operator types: quickly, or not at all.
 
 A shell waits for it, so it looks for a moment only where a run is on or a router accepts
-connections, and is silent about everything that is wrong. Leaves out: every other completion
-(swarm.runtime.options).
+connections, and is silent about everything that is wrong.
 """
 
 from __future__ import annotations

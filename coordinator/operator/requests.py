@@ -11,11 +11,10 @@ dashboard many.
     request.verdict                       # None while it is open
 
 `step` gives what is to be published and asked, so step once (with a `Tick`) after `give`, and
-whenever `next_deadline_s` comes. The process behind it joins without a token, and its shell has
-the name `OPERATOR`: then answers to its questions always tell what is known of the operator's own
+whenever `next_deadline_s` comes. The process behind it joins without a token, and its shell has the
+name `OPERATOR`: then answers to its questions always tell what is known of the operator's own
 registers, which is how a task edit is confirmed. It should have asked once before it gives
-anything, lest it speaks below what other operators have said. Leaves out: the requests themselves
-(coordinator.operator.commands, coordinator.operator.task_edits), and who may have them.
+anything, lest it speaks below what other operators have said.
 """
 
 from __future__ import annotations
@@ -73,12 +72,7 @@ class RequestHandler(Protocol):
 
 
 class TrackedRequest:
-    """One wish under way.
-
-    Args:
-        wish: what the operator wants.
-        handler: does it.
-    """
+    """One wish under way."""
 
     def __init__(
         self, wish: OperatorRequest, handler: CommandHandler | StartHandler | TaskEditHandler
@@ -111,7 +105,6 @@ class RequestTracker:
 
     Args:
         mission_state: of the mission; somebody else feeds it.
-        incarnation: wall time in milliseconds.
         timing: timers, in the seconds of ``now_s``.
         patience_s: how long to wait for the effect of each [s of ``now_s``].
     """
@@ -127,12 +120,7 @@ class RequestTracker:
         self._patience_s = patience_s
 
     def give(self, wish: OperatorRequest, now_s: float) -> TrackedRequest:
-        """Say what the operator wants, from the next step on; at once with a verdict if it cannot.
-
-        Args:
-            wish: what they want.
-            now_s: now.
-        """
+        """Say what the operator wants, from the next step on; at once with a verdict if it cannot."""
         mission_state, brief = self._mission_state, self._mission_state.replica.brief
         handler: CommandHandler | StartHandler | TaskEditHandler
         if isinstance(wish, CommandRequest):
@@ -224,10 +212,6 @@ class OperatorClient:
     """A core that has one request, and ends when it knows what came of it.
 
     Args:
-        mission: mission name.
-        wish: what the operator wants.
-        incarnation: wall time in milliseconds.
-        timing: timers, in the seconds of ``now_s``.
         patience_s: how long to wait for the mission, and then for the effect [s of ``now_s``].
     """
 

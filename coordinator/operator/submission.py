@@ -1,7 +1,4 @@
-"""Submit one request from a terminal: reach the mission, say it, and wait for what comes of it.
-
-Leaves out: what a person types and reads (coordinator.operator.cli).
-"""
+"""Submit one request from a terminal: reach the mission, say it, and wait for what comes of it."""
 
 from __future__ import annotations
 
@@ -45,11 +42,7 @@ class MissionConnection:
 
 
 def check_reason_and_ids(reason: str, *ids: tuple[str, str | None]) -> None:
-    """Refuse what no message can carry.
-
-    Args:
-        reason: the operator's words.
-        ids: what was given, and where; None where nothing was.
+    """Refuse what no message can carry; ``ids`` are what was given, and where.
 
     Raises:
         InputError: one line for each fault.

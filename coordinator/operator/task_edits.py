@@ -2,8 +2,7 @@
 
 An edit is a register like any other, so it has arrived where somebody's answer shows it: everyone
 who is there is asked until all have confirmed it. Whoever is out of reach learns of it later from
-those who know. Leaves out: saying it and asking (coordinator.operator.requests), and what agents
-and coordinator make of it.
+those who know.
 """
 
 from __future__ import annotations
@@ -112,14 +111,7 @@ class TaskWithdrawal:
 
 
 class TaskEditHandler:
-    """One task order, and what comes of it.
-
-    Args:
-        wish: what the operator wants.
-        mission_state: of the mission.
-        timing: timers, in the seconds of ``now_s``.
-        patience_s: how long to wait for the effect [s of ``now_s``].
-    """
+    """One task order, and what comes of it."""
 
     asks = True
     """Whether everyone is to be asked for what has come of it."""

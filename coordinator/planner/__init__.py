@@ -1,4 +1,4 @@
 """The upper level: which priority sequence, and how good is the plan it gives.
 
-Pure: takes problems, limits and seeds, returns plans. Leaves out: files, the bus, printing.
+Pure: takes problems, limits and seeds, returns plans.
 """

@@ -18,8 +18,6 @@ begin as what each task adds to known lists and follow subgradients, a group of 
 (incremental subgradients: Nedić and Bertsekas 2001, doi:10.1137/S1052623499362111) with Polyak's
 step at first, which then shrinks. Any prices yield a bound, and the least one seen is kept. Who
 bounds those maxima otherwise passes that in.
-
-Leaves out: proofs of optimality (`coordinator.planner.exact`).
 """
 
 from __future__ import annotations

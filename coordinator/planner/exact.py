@@ -1,8 +1,7 @@
 """The exact optimum of eq. 1 for small problems: the yardstick of every other method.
 
-Dynamic programming over task subsets per UAV, then over the division of the tasks among the
-UAVs (`swarm.kernels.exact`). All tasks that some UAV is capable of are on the lists, also late
-ones. Leaves out: anything approximate.
+Dynamic programming over task subsets per UAV, then over the division of the tasks among the UAVs
+(`swarm.kernels.exact`). All tasks that some UAV is capable of are on the lists, also late ones.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """Planning in a mission that runs: where it stands, where it is heading, and what would be better.
 
-A claimed task is finished first by the UAV that claims it; only what nobody has claimed is
-planned. Old and new plan are predicted alike: by letting the fleet decide by them until nothing
-is left. Leaves out: when to plan anew and whether a new plan is worth an epoch
-(`coordinator.core.replanning`).
+A claimed task is finished first by the UAV that claims it; only what nobody has claimed is planned.
+Old and new plan are predicted alike: by letting the fleet decide by them until nothing is left.
 """
 
 from __future__ import annotations
@@ -80,10 +78,7 @@ class Situation:
     def of(cls, board: TaskBoard, credible: Collection[str], mission_s: float) -> Situation | None:
         """The situation as the registers of one replica show it; None before the brief.
 
-        Args:
-            board: of the mission.
-            credible: writers believed alive whose claims count.
-            mission_s: mission time of now [s].
+        ``credible`` are the writers believed alive whose claims count.
         """
         problem = board.problem
         if problem is None:

@@ -1,7 +1,6 @@
 """A priority sequence for any rule: by the kernels, else the best of some orders.
 
 An order for a rule that is not compiled is flown decision by decision, so only few are tried.
-Leaves out: the search by the kernels (coordinator.planner.sequence_search).
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """From a mission to a plan: choose the method, bound the work, prove what can be proven.
 
 Plans of the method `guided` are made here: optimised lists and the sequence published with them.
-Pop-ups (tasks with ``appears_s > 0``) are unknown to a plan. Leaves out: searching for sequences
-(coordinator.planner.sequence_search) and for lists (swarm.kernels.routes), scenario files,
-printing and drawing.
+Pop-ups (tasks with ``appears_s > 0``) are unknown to a plan.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""What a plan looks like to people and to programs: a table, or one JSON object.
-
-Leaves out: making the plan (coordinator.planner) and drawing it (coordinator.plot).
-"""
+"""What a plan looks like to people and to programs: a table, or one JSON object."""
 
 from __future__ import annotations
 

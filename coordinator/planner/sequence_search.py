@@ -1,13 +1,11 @@
 """The upper level: search the priority sequences for the best J of the lower level.
 
-Sequences that lead to the same first round lead to the same lists, unless UAVs become free
-at the very same time later; each distinct first round is therefore evaluated once, by its
-lexicographically first sequence, and again only after such a tie. All of them are tried
-where that is cheap, else a seeded local search runs until it is stopped. Equal UAVs keep their
-order, since exchanging them changes only names. Evaluations go to a kernel many at a time, on
-every processor; results do not depend on how many there are. Leaves out: limits
-(`coordinator.planner.options`), listing first rounds (`coordinator.planner.sequence_space`) and
-lists that no sequence gives.
+Sequences that lead to the same first round lead to the same lists, unless UAVs become free at the
+very same time later; each distinct first round is therefore evaluated once, by its
+lexicographically first sequence, and again only after such a tie. All of them are tried where that
+is cheap, else a seeded local search runs until it is stopped. Equal UAVs keep their order, since
+exchanging them changes only names. Evaluations go to a kernel many at a time, on every processor;
+results do not depend on how many there are.
 """
 
 from __future__ import annotations

@@ -3,8 +3,7 @@
 Where all UAVs are free at once, many sequences share a first round, in which every UAV takes one
 task. The sequence that reproduces the optimal single-stage assignment (Theorem 3, Corollary 4) is
 constructed instead of searched: solve the assignment, then peel off a UAV that holds its own best
-remaining task, as Lemma 2 promises one, until none is left. Leaves out: what sequences are worth
-(coordinator.planner.sequence_search).
+remaining task, as Lemma 2 promises one, until none is left.
 """
 
 from __future__ import annotations
@@ -109,9 +108,6 @@ class FirstRounds:
     """The first rounds of some UAVs that priority alone orders.
 
     Args:
-        problem: the mission.
-        rule: how UAVs decide.
-        state: where the team stands.
         uavs: indices of those that take part, ascending; free all at once.
         twins: each of them with its equals, ascending, of which it is one.
     """
@@ -146,13 +142,9 @@ class FirstRounds:
         """Every distinct one with its lexicographically first sequence; None if too many.
 
         Grown UAV by UAV. Which order led to a partial round does not matter to the rest of it,
-        so only the first order of each is carried on.
-
-        Args:
-            most: of them.
-            most_partial: of those of only some UAVs, at once.
-            most_decisions: that may be needed.
-            should_stop: asked after each decision; to stop is to find too many.
+        so only the first order of each is carried on. Too many are more than ``most``, more than
+        ``most_partial`` of only some UAVs at once, more than ``most_decisions`` needed for them, or
+        being told to stop, which is asked after each decision.
         """
         rounds: dict[FirstRound, tuple[Sequence, TaskSet]]
         rounds = {(_UNDECIDED,) * len(self._uavs): ((), 0)}
@@ -242,12 +234,8 @@ def single_stage(problem: Problem, state: TeamState | None = None) -> SingleStag
     """The optimal first round, and the priority sequence that makes greedy UAVs fly it.
 
     As many tasks as possible are assigned, and of all such assignments one with the largest
-    objective is.
-
-    Args:
-        problem: the mission.
-        state: where the team stands; at its start when None. UAVs that are not active and tasks
-            that are not open take no part.
+    objective is. UAVs that are not active in ``state`` (the start when None) and tasks that are not
+    open take no part.
     """
     state = TeamState.at_start(problem) if state is None else state
     scores = np.array([_scores(problem, state, uav) for uav in range(problem.n_uav)]).reshape(

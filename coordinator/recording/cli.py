@@ -1,7 +1,4 @@
-"""The commands `swarm record`, `swarm replay` and `swarm explain`.
-
-Leaves out: everything they do (the other modules here, and coordinator.dashboard).
-"""
+"""The commands `swarm record`, `swarm replay` and `swarm explain`."""
 
 from __future__ import annotations
 

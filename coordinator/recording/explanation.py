@@ -1,7 +1,4 @@
-"""The story of one task or one UAV of a recorded mission: what happened, why, and what came of it.
-
-Leaves out: finding what happened, and the words for it (coordinator.mission_view).
-"""
+"""The story of one task or UAV of a recorded mission: what happened, why, and what came of it."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 Whoever flies never waits for the disk: facts are handed over, and all that costs time (deriving,
 encoding, compressing, writing) happens on the thread. After each write the file is complete, and
-asked to be on the disk. A disk that is full or fails ends the recording and nothing else: the
-file keeps what it held, in order. Leaves out: what is recorded (coordinator.recording.recorder).
+asked to be on the disk. A disk that is full or fails ends the recording and nothing else: the file
+keeps what it held, in order.
 """
 
 from __future__ import annotations
@@ -121,11 +121,9 @@ class RecordingThread:
 
     Args:
         mcap: the file in the making; touched by jobs and by this thread alone.
-        sink: takes its bytes.
         on_fault: called once, from the thread, with the reason why nothing more is recorded.
         last: done after all other jobs.
         patient: whether jobs that there is no room for wait for it, as nobody flies meanwhile.
-        period_s: wall time between two writes.
     """
 
     def __init__(
@@ -262,11 +260,8 @@ class FlightRecorder:
     """Takes facts and logs down, on a thread of its own; close it in ``finally``.
 
     Args:
-        about: what is recorded.
-        sink: takes the file's bytes, such as a `FileSink`.
         time_ns: wall time for people and their tools, given the core's time [s -> ns].
         on_fault: called once, from the thread, with the reason why nothing more is recorded.
-        patient: see `RecordingThread`.
     """
 
     def __init__(

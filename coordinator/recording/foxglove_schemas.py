@@ -1,8 +1,7 @@
 """Well-known schemas by which Foxglove shows maps, scenes and logs, and the messages that fit them.
 
 Names, fields and meanings are Foxglove's: https://docs.foxglove.dev/docs/sdk/schemas. Fields that
-are not needed here (lineage, message ids) are left out, as they may be. Leaves out: what is shown
-(coordinator.recording.foxglove_topics).
+are not needed here (lineage, message ids) are left out, as they may be.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """What is drawn from the facts for people and their tools: map, scene, curves and story.
 
 Everything here follows from what is known of the mission; nothing of it is read back. Each scene
-message shows one kind of thing whole, so that a viewer may begin anywhere. Leaves out: the
-schemas (coordinator.recording.foxglove_schemas) and when to draw (coordinator.recording.recorder).
+message shows one kind of thing whole, so that a viewer may begin anywhere.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """An MCAP file that grows and is complete after every step.
 
-Each step puts one chunk where the file's tail was, and a new tail behind it, in a single
-write. Records are those of the `mcap` package; ours is only how the tail moves.
-Leaves out: writing to a disk (coordinator.recording.flight_recorder) and what the messages
-say (coordinator.recording.recorder).
+Each step puts one chunk where the file's tail was, and a new tail behind it, in a single write.
+Records are those of the `mcap` package; ours is only how the tail moves.
 
 Format: https://mcap.dev/spec.
 """
@@ -61,10 +59,8 @@ class GrowingMcap:
     """Messages in, patches out: with each of them applied the file is complete.
 
     Args:
-        library: who writes, for people.
         metadata: told at the beginning of the file, under ``name``.
         name: of the metadata.
-        max_summary_bytes: see `MAX_SUMMARY_BYTES`.
     """
 
     def __init__(
@@ -109,14 +105,7 @@ class GrowingMcap:
         return sum(self._counts.values())
 
     def add(self, topic: str, schema: str, data: bytes, log_ns: int) -> None:
-        """One JSON message, for the next patch.
-
-        Args:
-            topic: its channel, made if need be.
-            schema: name of one that has been defined.
-            data: UTF-8.
-            log_ns: when it was recorded, and said [ns].
-        """
+        """One message of UTF-8 JSON for the next patch; its topic's channel is made if need be."""
         channel = self._channels.get(topic)
         if channel is None:
             known = self._schemas[schema]
@@ -137,8 +126,7 @@ class GrowingMcap:
     def grow(self, *, last: bool = False) -> Patch | None:
         """What to write so that the file holds everything so far; None when it does already.
 
-        Args:
-            last: the recording ends: the summary is whole, however long it is.
+        With ``last`` the summary is whole, however long it is.
         """
         if not (self._pending or self._begun is not None or last):
             return None

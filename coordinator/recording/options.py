@@ -1,7 +1,4 @@
-"""The option `--record`, for every command that flies or watches a mission.
-
-Leaves out: what it does (coordinator.recording.flight_recorder).
-"""
+"""The option `--record`, for every command that flies or watches a mission."""
 
 from __future__ import annotations
 

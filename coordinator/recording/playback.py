@@ -1,8 +1,7 @@
 """A recording that is played: the same facts at the same times into a fresh observer.
 
-Pure: time passes by `advance`. Going back starts from the nearest of a few pictures that were
-kept on the way. Leaves out: reading files (coordinator.recording.reader), and showing
-(coordinator.dashboard).
+Pure: time passes by `advance`. Going back starts from the nearest of a few pictures that were kept
+on the way.
 """
 
 from __future__ import annotations
@@ -38,12 +37,7 @@ class _Played:
 
 
 class Playback:
-    """Plays one recording.
-
-    Args:
-        recording: what is played.
-        speed: recorded seconds per wall second, of the recording core's clock.
-    """
+    """Plays one recording, at ``speed`` recorded seconds per wall second."""
 
     def __init__(self, recording: Recording, speed: float = 1.0) -> None:
         self.recording = recording

@@ -1,7 +1,4 @@
-"""A recording as a source of the dashboard: it plays by itself, and obeys the page.
-
-Leaves out: playing (coordinator.recording.playback) and serving (coordinator.dashboard.app).
-"""
+"""A recording as a source of the dashboard: it plays by itself, and obeys the page."""
 
 from __future__ import annotations
 
@@ -21,12 +18,7 @@ FRAME_S = 0.1
 
 
 class RecordingPlayer:
-    """A source that plays a recording, and the recording's controls.
-
-    Args:
-        playback: plays.
-        clock: of the wall.
-    """
+    """A source that plays a recording, and the recording's controls."""
 
     def __init__(self, playback: Playback, clock: Clock) -> None:
         self._playback = playback

@@ -1,10 +1,8 @@
 """Recordings, read back: the facts that the recording core got, and when.
 
-The same facts at the same times into a fresh `MissionObserver` give the same picture. A file may
-be cut off or torn anywhere: it is read from its beginning, chunk by chunk, each checked by its
-checksum, so that whatever is whole is found. Leaves out: playing them
-(coordinator.recording.playback), and what the file holds for other tools
-(coordinator.recording.foxglove_topics).
+The same facts at the same times into a fresh `MissionObserver` give the same picture. A file may be
+cut off or torn anywhere: it is read from its beginning, chunk by chunk, each checked by its
+checksum, so that whatever is whole is found.
 
 Format: https://mcap.dev/spec.
 """

@@ -1,8 +1,8 @@
 """What goes into a recording, and in which order: facts as they come, pictures in between.
 
-A recorder follows the mission by an observer of its own, fed with the very facts it writes down,
-so that what it draws is what a replay will show. Pure: bytes go to a `GrowingMcap`, times are
-passed in. Leaves out: threads and disks (coordinator.recording.flight_recorder).
+A recorder follows the mission by an observer of its own, fed with the very facts it writes down, so
+that what it draws is what a replay will show. Pure: bytes go to a `GrowingMcap`, times are passed
+in.
 """
 
 from __future__ import annotations
@@ -58,7 +58,6 @@ class RecordedCore(Generic[A]):
     """A core that hears the bus, and a recorder beside it.
 
     Args:
-        core: an observer, or whoever else hears what observers hear.
         fact_sink: told every fact before the core is.
         mission_state: may be given a plan by somebody else, which is written down, too.
     """
@@ -132,11 +131,7 @@ class RecordingInfo:
 
 
 class Recorder:
-    """Turns facts into lines of a file.
-
-    Args:
-        about: what is recorded.
-    """
+    """Turns facts into lines of a file."""
 
     def __init__(self, about: RecordingInfo) -> None:
         self.mcap = GrowingMcap(f"peckorder {__version__}", about.metadata(), METADATA)
@@ -196,8 +191,6 @@ class RecordingObserver:
     """A core that looks on until everybody who took part has left.
 
     Args:
-        mission: name of the mission.
-        timing: timers, in the seconds of ``now_s``.
         linger_s: how long to wait for somebody to come back [s of ``now_s``].
         until_s: when to stop at the latest, from the start [s of ``now_s``]; None: never.
     """

@@ -1,8 +1,7 @@
 """What a recording holds besides pictures: every fact its core got, as JSON of a published schema.
 
-Facts are written so that reading gives back the very same: numbers digit by digit, messages
-field by field. A recording is made of *lines*; a line knows its topic, schema and JSON.
-Leaves out: what is drawn from the facts for other tools (coordinator.recording.foxglove_topics).
+Facts are written so that reading gives back the very same: numbers digit by digit, messages field
+by field. A recording is made of *lines*; a line knows its topic, schema and JSON.
 """
 
 from __future__ import annotations
@@ -279,14 +278,7 @@ def topics_of(mission: str) -> Mapping[str, str]:
 def encode(
     what: RecordableFact, mission: str, now_s: float, mission_s: float | None
 ) -> FileMessage | None:
-    """The line that says ``what``; None for what only the recorder's own process was told.
-
-    Args:
-        what: a fact, or a plan.
-        mission: its name.
-        now_s: of the recording core's clock [s].
-        mission_s: mission time, for people [s].
-    """
+    """The line that says ``what``; None for what only the recorder's own process was told."""
     match what:
         case MessageReceived(message):
             name = body_name(message.body)

@@ -1,8 +1,4 @@
-"""The command `swarm status`.
-
-Leaves out: looking (coordinator.mission_view.observation, coordinator.joining) and showing
-(coordinator.terminal.status_table, coordinator.terminal.live_view).
-"""
+"""The command `swarm status`."""
 
 from __future__ import annotations
 
@@ -150,12 +146,7 @@ async def _watch(
 
 
 class JsonLines:
-    """Tells how a mission stands as one JSON object on a line, about once a second.
-
-    Args:
-        tell: prints a line.
-        every_s: between two lines [s of the observer's clock].
-    """
+    """Tells how a mission stands as one JSON object on a line, every so many seconds of its clock."""
 
     def __init__(self, tell: Callable[[str], object], every_s: float) -> None:
         self._tell = tell

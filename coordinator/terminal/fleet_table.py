@@ -1,7 +1,6 @@
 """The UAVs of a running mission at a glance: what each does, and what is wrong.
 
-Lines about trouble are there only when there is something to tell. Leaves out: the map and
-everything else beside it (coordinator.terminal.live_view).
+Lines about trouble are there only when there is something to tell.
 """
 
 from __future__ import annotations

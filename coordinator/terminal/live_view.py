@@ -1,7 +1,6 @@
 """The live picture of a running mission in a terminal: map, fleet, worth and story.
 
-Off a terminal, only new lines of the story are printed. Leaves out: what is known
-(coordinator.mission_view.mission_state) and the report at the end (coordinator.terminal.report).
+Off a terminal, only new lines of the story are printed.
 """
 
 from __future__ import annotations
@@ -93,8 +92,6 @@ class LiveView:
 
     Args:
         console: where to; standard error, so that results have standard output alone.
-        speedup: mission seconds per wall second.
-        secure: see `live_picture`.
     """
 
     def __init__(self, console: Console, *, speedup: float = 1.0, secure: bool = False) -> None:

@@ -1,8 +1,7 @@
 """The map of a running mission in character cells, north up, true to scale.
 
-Cells are taken to be twice as high as wide. Lines are made of braille dots, two by four to a
-cell, or of full stops where only ASCII can be shown. Leaves out: everything beside the map
-(coordinator.terminal.live_view).
+Cells are taken to be twice as high as wide. Lines are made of braille dots, two by four to a cell,
+or of full stops where only ASCII can be shown.
 """
 
 from __future__ import annotations
@@ -33,13 +32,7 @@ _BITS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 
 
 class Canvas:
-    """Cells to draw on; what lies outside is left out.
-
-    Args:
-        width: columns.
-        height: rows.
-        braille: whether lines may use braille characters.
-    """
+    """Cells to draw on; what lies outside is left out."""
 
     def __init__(self, width: int, height: int, *, braille: bool) -> None:
         self.width = width

@@ -1,8 +1,4 @@
-"""The report of a mission that is over: for people, for programs, and as a file.
-
-Leaves out: comparing (coordinator.mission_view.results) and laying out for the terminal
-(coordinator.terminal.report_text).
-"""
+"""The report of a mission that is over: for people, for programs, and as a file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The report of a mission for a terminal, from 80 columns on.
-
-Leaves out: the report as a document or for programs (coordinator.terminal.report).
-"""
+"""The report of a mission for a terminal, from 80 columns on."""
 
 from __future__ import annotations
 
@@ -49,17 +46,7 @@ def report_text(
     hint: str,
     signs: Signs,
 ) -> RenderableType:
-    """The report: verdict, lists, worth, what went otherwise, and the notable story.
-
-    Args:
-        mission: as flown.
-        plan: the offline plan, if there was one.
-        result: what came of it.
-        story: of the mission, whole.
-        notes: what else is worth a line each.
-        hint: last line; empty for none.
-        signs: characters to use.
-    """
+    """The report: verdict, lists, worth, what went otherwise, and the notable story."""
     ascii_only = not signs.braille
     headline = Text.assemble(
         (f"{mission.name}: ", "bold"),

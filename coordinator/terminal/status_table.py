@@ -1,8 +1,7 @@
 """How a mission stands, as an observer knows it: for people and for programs.
 
-`mission_status` is the one place that reads a `MissionState`; whoever shows it again and
-again calls it again and again. Leaves out: how the observer came to know
-(coordinator.mission_view.observation).
+`mission_status` is the one place that reads a `MissionState`; whoever shows it again and again
+calls it again and again.
 """
 
 from __future__ import annotations
