@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.events import (
+from coordinator.core.lifecycle import (
     CoordinatorAction,
     CoordinatorEvent,
     MakePlan,

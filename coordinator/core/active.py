@@ -10,14 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coordinator.core.events import (
-    CoordinatorAction,
-    CoordinatorEvent,
-    PlanFailed,
-    PlanMade,
-    Replanned,
-    Withdraw,
-)
 from coordinator.core.leadership import (
     InheritedState,
     LeadershipBid,
@@ -26,6 +18,14 @@ from coordinator.core.leadership import (
     StateQuery,
     coordinator_messages,
     reunion,
+)
+from coordinator.core.lifecycle import (
+    CoordinatorAction,
+    CoordinatorEvent,
+    PlanFailed,
+    PlanMade,
+    Replanned,
+    Withdraw,
 )
 from coordinator.core.publication import FlightLayers, RegisterAnnouncer
 from coordinator.core.stages import MissionStage, StagedMission
@@ -56,13 +56,8 @@ class CoordinatorCore:
     """The coordinator of one mission.
 
     Args:
-        mission: the scenario, pop-ups included.
-        method: planning method, whose rule the agents then use.
-        seed: of the planner.
         incarnation: greater than in any earlier life of this coordinator.
-        timing: timers, in the seconds of ``now_s``.
         start_timeout_s: UAVs that are not airborne by then are given up [s].
-        layers: heights of flight.
         memory: of an earlier life, its mission time brought to now; None if there is none.
         memory_age_s: how old that is [s].
     """
@@ -112,12 +107,7 @@ class CoordinatorCore:
         return self._conclude(now_s)
 
     def step(self, event: CoordinatorEvent, now_s: float) -> list[CoordinatorAction]:
-        """React to one event.
-
-        Args:
-            event: what happened.
-            now_s: now, on this process's own clock [s]; never decreases.
-        """
+        """React to one event; ``now_s``, on this process's own clock, never decreases."""
         if self._mission.is_over:
             return []
         if self._stall_detector.late(now_s):

@@ -102,12 +102,7 @@ class StateQuery:
         """Those of them that were asked before the last doubt."""
 
     def want(self, now_s: float, *, before_deciding: bool = False) -> None:
-        """There is a reason to ask.
-
-        Args:
-            now_s: now.
-            before_deciding: what is known may be old.
-        """
+        """There is a reason to ask; ``before_deciding`` if what is known may be old."""
         if before_deciding:
             self.unsure, self._outdated = True, self._open
         self._asking.want(now_s)
@@ -159,18 +154,12 @@ def inherited_state(
     *,
     memory_is_young: bool = False,
 ) -> InheritedState:
-    """All that is known of the mission which is being flown.
+    """All that is known of the mission which is being flown: ``heard``, answered and remembered.
 
-    The living go first. The own memory adds to what they know of the same flight; where
-    they know of none it counts only while it is young, and if it is of a mission that
-    had ended of itself only while somebody still takes part. One that was aborted is not
-    begun anew by a process that merely starts again.
-
-    Args:
-        snapshots: what the others answered.
-        heard: what was heard besides.
-        memory: of the coordinator's earlier life, its mission time brought to now.
-        memory_is_young: whether the mission it tells of may still be on.
+    The living go first. The own memory, its mission time brought to now, adds to what they know of
+    the same flight; where they know of none it counts only while it is young, and if it is of a
+    mission that had ended of itself only while somebody still takes part. One that was aborted is
+    not begun anew by a process that merely starts again.
     """
     replica = Replica()
     replica.join_all(heard)
@@ -196,7 +185,6 @@ class Predecessors:
     Args:
         memory: of an earlier life, its mission time brought to ``now_s`` of `begin`; None if there
             is none.
-        memory_is_young: whether the mission it tells of may still be on.
     """
 
     def __init__(self, memory: Snapshot | None, *, memory_is_young: bool) -> None:

@@ -1,4 +1,4 @@
-"""When a mission starts, and when it is over.
+"""What the coordinator hears and wants done, when a mission starts, and when it is over.
 
 Waiting costs nothing on the ground, and energy in the air. As soon as somebody is airborne, whoever
 was lost is waited for only as long as a restart of its agent takes, whoever else is not ready
@@ -9,13 +9,13 @@ does not want waited for not at all. Who gets ready later joins the mission that
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 
-from coordinator.core.events import CoordinatorAction, MakePlan
+from coordinator.planner.online import EpochPolicy, ReplanResult, Situation
 from swarm.model import Mission, Plan, UavId
 from swarm.protocol.board import TaskBoard, TaskState, doable, mission_of
-from swarm.protocol.events import LogLine
+from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import MissionPhase, PlanEpoch
 from swarm.protocol.operator_commands import dispensable
@@ -23,7 +23,90 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import ClaimPhase
 
-__all__ = ["MissionEndCondition", "StartDecision", "StartGate"]
+__all__ = [
+    "CoordinatorAction",
+    "CoordinatorEvent",
+    "MakePlan",
+    "MissionEndCondition",
+    "PlanFailed",
+    "PlanMade",
+    "Replan",
+    "Replanned",
+    "StartDecision",
+    "StartGate",
+    "StopPlanning",
+    "TakeSeat",
+    "Withdraw",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanMade:
+    """The answer to a `MakePlan`."""
+
+    request: int
+    plan: Plan
+
+
+@dataclass(frozen=True, slots=True)
+class PlanFailed:
+    """The answer to a `MakePlan` that could not be planned."""
+
+    request: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class MakePlan:
+    """Plan this mission in the background; ends in `PlanMade` or `PlanFailed`."""
+
+    request: int
+    mission: Mission
+    method: str
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Replan:
+    """Plan the rest of a running mission in the background; ends in `Replanned`."""
+
+    request: int
+    situation: Situation
+    course: EpochPolicy
+    """Of the epoch in force."""
+    method: str
+    seed: int
+    reason: str
+    """What has changed since the epoch in force was made."""
+
+
+@dataclass(frozen=True, slots=True)
+class Replanned:
+    """The answer to a `Replan`."""
+
+    request: int
+    plan: ReplanResult
+
+
+@dataclass(frozen=True, slots=True)
+class StopPlanning:
+    """Nobody waits for what is being planned any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Withdraw:
+    """Take a task off the board: nobody need visit it any more."""
+
+    task: str
+
+
+@dataclass(frozen=True, slots=True)
+class TakeSeat:
+    """Show that the coordinator is there, and answer for it."""
+
+
+CoordinatorEvent = CommonEvent | PlanMade | PlanFailed | Replanned | Withdraw
+CoordinatorAction = CommonAction | MakePlan | Replan | StopPlanning | TakeSeat
 
 
 EVERYBODY = "every UAV is airborne"
@@ -41,14 +124,8 @@ class StartGate:
     """The beginning of one mission.
 
     Args:
-        mission: the scenario.
-        method: planning method.
-        seed: of the planner.
-        replica: brief, board and claims.
-        membership: who is there.
         start_timeout_s: UAVs that are not airborne by then are given up, whatever the others
             do [s].
-        timing: how long to wait for whom while others hover.
     """
 
     def __init__(
@@ -229,13 +306,7 @@ NOBODY_WILL = "nobody takes what is left"
 
 
 class MissionEndCondition:
-    """The end of one mission.
-
-    Args:
-        board: its tasks.
-        membership: who is there.
-        timing: how long to wait for those who may come back, or change their minds.
-    """
+    """The end of one mission."""
 
     def __init__(self, board: TaskBoard, membership: Membership, timing: Timing) -> None:
         self._board = board
@@ -249,10 +320,7 @@ class MissionEndCondition:
     def wait_until(self, grace_until_s: float, *, was_away: bool = False) -> None:
         """Nobody is missed before then: they need the time to show themselves.
 
-        Args:
-            grace_until_s: when.
-            was_away: whether the operator may have added tasks of which is not known here, and
-                will not be before then.
+        Who ``was_away`` may not know of tasks that the operator has added, nor will before then.
         """
         if was_away:
             self._ignorant_until_s = max(self._ignorant_until_s, grace_until_s)
@@ -261,12 +329,7 @@ class MissionEndCondition:
             self._over_at_s = max(self._over_at_s, grace_until_s)
 
     def reason(self, now_s: float, *, more_to_come: bool) -> str | None:
-        """Why the mission is over; None while it is not.
-
-        Args:
-            now_s: now.
-            more_to_come: whether tasks will yet be posted.
-        """
+        """Why the mission is over; None while it is not, or there are tasks ``more_to_come``."""
         prospect, patience_s = self._outlook(more_to_come=more_to_come)
         if prospect is None:
             self._prospect = self._over_at_s = None

@@ -147,12 +147,7 @@ def scenario_differences(mission: Mission, layers: FlightLayers, replica: Replic
 
 
 class TaskReleaser:
-    """The tasks of one scenario on the board of one mission.
-
-    Args:
-        mission: the scenario, pop-ups included.
-        replica: holds the board.
-    """
+    """The tasks of one scenario on the board of one mission."""
 
     def __init__(self, mission: Mission, replica: Replica) -> None:
         self._mission = mission
@@ -165,12 +160,7 @@ class TaskReleaser:
         return bool(unreleased_tasks(self._replica, self._mission))
 
     def due(self, zero_s: float | None, now_s: float) -> list[TaskEntry]:
-        """Entries to post by now; before the start, what has been there all along.
-
-        Args:
-            zero_s: when the mission began; None while it has not.
-            now_s: now.
-        """
+        """Entries to post by now; before the start, what has been there all along."""
         return [
             task_entry_of(task, self._numbers[task.id])
             for task in unreleased_tasks(self._replica, self._mission)
@@ -215,11 +205,7 @@ class RegisterAnnouncer:
     """The statements of one coordinator, and the mission time that they tell.
 
     Args:
-        mission: the scenario, pop-ups included.
-        layers: heights of flight.
         incarnation: greater than in any earlier life of this coordinator.
-        replica: holds the own registers among all others.
-        timing: how often they are repeated.
     """
 
     def __init__(

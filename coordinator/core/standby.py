@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.events import CoordinatorAction, CoordinatorEvent, TakeSeat
 from coordinator.core.leadership import StateQuery
+from coordinator.core.lifecycle import CoordinatorAction, CoordinatorEvent, TakeSeat
 from coordinator.core.publication import exit_status
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
@@ -45,9 +45,6 @@ class StandbyCore:
     """One process that stands by for the coordinator of one mission.
 
     Args:
-        mission: the scenario, pop-ups included.
-        make_coordinator: makes the one that takes over.
-        timing: timers, in the seconds of ``now_s``.
         memory: of an earlier life as coordinator, for when nothing newer is heard.
         memory_age_s: how old that is [s].
     """
@@ -91,12 +88,7 @@ class StandbyCore:
         return self._conclude(now_s)
 
     def step(self, event: CoordinatorEvent, now_s: float) -> Sequence[CoordinatorAction]:
-        """React to one event; once it has taken over, as the coordinator.
-
-        Args:
-            event: what happened.
-            now_s: now, on this process's own clock [s]; never decreases.
-        """
+        """React to one event; once it has taken over, as the coordinator."""
         if self.coordinator is not None:
             return self.coordinator.step(event, now_s)
         if self._finished:

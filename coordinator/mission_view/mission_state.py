@@ -208,7 +208,7 @@ class MissionState:
         return self._clock.mission_s(now_s)
 
     def keep_time(self, now_s: float, mission_s: float, pace: float) -> None:
-        """Follow a mission whose time runs at ``pace`` (> 0) seconds per second of the own clock."""
+        """Follow a mission whose time runs at ``pace`` (> 0) seconds per own second."""
         self._clock.set(mission_s, now_s, pace)
 
     def silent_s(self, uav: str, now_s: float) -> float | None:

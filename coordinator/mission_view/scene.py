@@ -55,6 +55,9 @@ class Scene:
     mission: Mission
     phase: MissionPhase
     mission_s: float | None
+    epoch: int | None
+    reason: str
+    """Why that epoch."""
     rule: str | None
     sequence: tuple[str, ...]
     uavs: tuple[UavView, ...]
@@ -70,6 +73,8 @@ class Scene:
     bus ends when everybody has left is no loss."""
     coordinator: bool
     """Whether it is there."""
+    others: tuple[str, ...]
+    """Who else is there under a name that is no UAV's."""
     commands: tuple[OperatorCommand, ...]
     """The operator's newest word to each whom there was any, in this flight."""
     dropped: int
@@ -79,6 +84,12 @@ class Scene:
     def aborted(self) -> bool:
         """Whether the operator has ended the mission."""
         return any(command.kind is CommandKind.ABORT for command in self.commands)
+
+    @property
+    def dropped_by_reason(self) -> dict[str, int]:
+        """Messages that the fleet's agents together have dropped, most first."""
+        total = sum((Counter(uav.dropped) for uav in self.uavs), Counter[str]())
+        return dict(total.most_common())
 
     @property
     def counts(self) -> Counter[str]:
@@ -115,6 +126,8 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
         mission=mission,
         phase=mission_state.phase,
         mission_s=mission_s,
+        epoch=None if epoch is None else epoch.number,
+        reason="" if epoch is None else epoch.reason,
         rule=epoch.rule if epoch is not None else None if plan is None else plan.method,
         sequence=tuple(sequence),
         uavs=tuple(
@@ -134,6 +147,7 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
         optimum=None if plan is None else plan.optimum,
         cut_s=None if cut_since_s is None or deserted(mission_state) else now_s - cut_since_s,
         coordinator=COORDINATOR in mission_state.present,
+        others=tuple(sorted(mission_state.present - {COORDINATOR, *numbers})),
         commands=tuple(in_force(mission_state.replica).values()),
         dropped=sum(count.total() for count in mission_state.dropped.values()),
     )

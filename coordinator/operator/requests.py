@@ -120,7 +120,7 @@ class RequestTracker:
         self._patience_s = patience_s
 
     def give(self, wish: OperatorRequest, now_s: float) -> TrackedRequest:
-        """Say what the operator wants, from the next step on; at once with a verdict if it cannot."""
+        """Say what the operator wants, from the next step on; with a verdict if it cannot."""
         mission_state, brief = self._mission_state, self._mission_state.replica.brief
         handler: CommandHandler | StartHandler | TaskEditHandler
         if isinstance(wish, CommandRequest):

@@ -168,11 +168,17 @@ def replay(
         swarm replay flight.mcap --final
         swarm replay flight.mcap --final --json
     """
+    from rich.console import Console
+
+    from coordinator.mission_view.scene import scene_of
     from coordinator.recording.playback import Playback
+    from coordinator.terminal.cli import print_status
 
     playback = Playback(_read(file), speed)
     if final:
-        _print_final(playback, json=json)
+        playback.seek(playback.duration_s)
+        found = scene_of(playback.mission_state, playback.now_s)
+        print_status(found, Console(highlight=False), json=json)
         return 0
     playback.seek(at_s)
     return _play(playback, port, json=json, browser=not no_browser)
@@ -233,23 +239,6 @@ def _read(file: Path) -> Recording:
 
 def _warn(line: str) -> None:
     print(f"swarm: {line}", file=sys.stderr)
-
-
-def _print_final(playback: Playback, *, json: bool) -> None:
-    from json import dumps
-
-    from rich.console import Console
-
-    from coordinator.mission_view.presentation import signs_for
-    from coordinator.terminal.status_table import mission_status, status_as_json, status_table
-
-    playback.seek(playback.duration_s)
-    found = mission_status(playback.mission_state, playback.now_s)
-    if json:
-        print(dumps(status_as_json(found), allow_nan=False))
-        return
-    console = Console(highlight=False)
-    console.print(status_table(found, console.width, signs_for(console.options.ascii_only)))
 
 
 def _play(playback: Playback, port: int, *, json: bool, browser: bool) -> int:

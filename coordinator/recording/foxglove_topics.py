@@ -175,12 +175,12 @@ def log_line(name: str, message: str, level: str, time_ns: int) -> FileMessage:
 
 
 def _progress(mission_state: MissionState, scene: Scene, now_s: float) -> FileMessage:
-    plan, epoch, counts = mission_state.plan, mission_state.replica.epoch, scene.counts
+    plan, counts = mission_state.plan, scene.counts
     progress = _Progress(
         now_s=now_s,
         mission_s=scene.mission_s,
         phase=scene.phase,
-        epoch=None if epoch is None else epoch.number,
+        epoch=scene.epoch,
         rule=scene.rule,
         objective=scene.objective,
         plan_objective=scene.planned_objective,

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from coordinator.mission_view.mission_state import MissionState
-    from coordinator.terminal.status_table import MissionStatus
+    from coordinator.mission_view.scene import Scene
     from swarm.bus.config import BusConfig
     from swarm.protocol.timing import Timing
     from swarm.runtime.clock import ScaledClock
 
-__all__ = ["JsonLines", "status"]
+__all__ = ["JsonLines", "print_status", "status"]
 
 
 PATIENCE_S = 4.0
@@ -73,13 +73,10 @@ def status(
         swarm status --watch --json --mission table-1
     """
     import asyncio
-    from json import dumps
 
     from rich.console import Console
 
     from coordinator.joining import check_mission
-    from coordinator.mission_view.presentation import signs_for
-    from coordinator.terminal.status_table import status_as_json, status_table
     from swarm.runtime.clock import ScaledClock
     from swarm.runtime.log import LogLevel, configure_logging
     from swarm.runtime.process import run_until_stopped
@@ -96,29 +93,39 @@ def status(
             await _watch(mission, config, timing, clock, timeout_s, console, json=json)
             return 0
         found = await _look(mission, config, timing, clock, timeout_s or PATIENCE_S)
-        if json:
-            print(dumps(status_as_json(found), allow_nan=False))
-        else:
-            signs = signs_for(console.options.ascii_only)
-            console.print(status_table(found, console.width, signs))
+        print_status(found, console, json=json)
         return 0
 
     return asyncio.run(run_until_stopped(work()))
 
 
+def print_status(scene: Scene, console: Console, *, json: bool) -> None:
+    """Print how a mission stands, as `swarm status` does."""
+    from json import dumps
+
+    from coordinator.mission_view.presentation import signs_for
+    from coordinator.terminal.status_table import status_as_json, status_table
+
+    if json:
+        print(dumps(status_as_json(scene), allow_nan=False))
+    else:
+        signs = signs_for(console.options.ascii_only)
+        console.print(status_table(scene, console.width, signs))
+
+
 async def _look(
     name: str | None, config: BusConfig, timing: Timing, clock: ScaledClock, patience_s: float
-) -> MissionStatus:
+) -> Scene:
     """Learn how a mission stands."""
     from coordinator.joining import joined, observer_shell
     from coordinator.mission_view.observation import MissionObserver
-    from coordinator.terminal.status_table import mission_status
+    from coordinator.mission_view.scene import scene_of
 
     async with joined(name, config, patience_s) as (mission, place):
         observer = MissionObserver(mission, timing, patience_s * clock.speedup)
         if await observer_shell(observer, place, clock, mission, "status").run() != 0:
             raise SwarmError(observer.lack)
-        return mission_status(observer.mission_state, clock.now_s())
+        return scene_of(observer.mission_state, clock.now_s())
 
 
 async def _watch(
@@ -146,7 +153,7 @@ async def _watch(
 
 
 class JsonLines:
-    """Tells how a mission stands as one JSON object on a line, every so many seconds of its clock."""
+    """Tells how a mission stands as a JSON object on a line, every so many seconds."""
 
     def __init__(self, tell: Callable[[str], object], every_s: float) -> None:
         self._tell = tell
@@ -159,9 +166,10 @@ class JsonLines:
 
     def update(self, mission_state: MissionState, now_s: float) -> None:
         """Print how the mission stands, if it is time."""
-        from coordinator.terminal.status_table import mission_status, status_as_json
+        from coordinator.mission_view.scene import scene_of
+        from coordinator.terminal.status_table import status_as_json
 
-        self._untold = status_as_json(mission_status(mission_state, now_s))
+        self._untold = status_as_json(scene_of(mission_state, now_s))
         if now_s >= self._due_s:
             self._due_s = now_s + self._every_s
             self.close()

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from agent.core.agent_core import AgentCore
 from agent.core.interface import GoTo, VehicleReport
-from coordinator.core.events import Replan
+from coordinator.core.lifecycle import Replan
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.planner.online import ReplanResult, replan
 from sim.world.engine import EventQueue, LocalClock, Process

@@ -26,7 +26,7 @@ from agent.core.interface import (
     VehicleReport,
 )
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.events import (
+from coordinator.core.lifecycle import (
     CoordinatorAction,
     MakePlan,
     PlanMade,

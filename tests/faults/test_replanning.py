@@ -16,7 +16,7 @@ import pytest
 from agent.core.interface import Action as AgentAction
 from agent.core.interface import GoTo, OrderVehicle
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.events import CoordinatorAction, Replan
+from coordinator.core.lifecycle import CoordinatorAction, Replan
 from coordinator.planner.online import ReplanResult, predicted, replan
 from sim.world.engine import Process
 from sim.world.network import IdealNetwork

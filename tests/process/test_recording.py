@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from coordinator.mission_view.scene import scene_of
 from coordinator.recording.playback import Playback
 from coordinator.recording.reader import read_recording
-from coordinator.terminal.status_table import mission_status
 from swarm.runtime.errors import InputError
 from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
@@ -92,9 +92,9 @@ def test_killed_recorders_leave_whole_files_and_the_flight_goes_on(tmp_path: Pat
     assert recording.torn is None
     playback = Playback(recording)
     playback.seek(playback.duration_s)
-    found = mission_status(playback.mission_state, playback.now_s)
-    assert found.scene.counts["done"] == 8
-    assert found.scene.objective == pytest.approx(told["executed_objective"], abs=1e-9)
+    found = scene_of(playback.mission_state, playback.now_s)
+    assert found.counts["done"] == 8
+    assert found.objective == pytest.approx(told["executed_objective"], abs=1e-9)
     flown = {
         uav: list(tasks) for uav, tasks in playback.mission_state.result().executed_routes.items()
     }

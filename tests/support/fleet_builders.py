@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 
 from agent.core.interface import Action as AgentAction
-from coordinator.core.events import CoordinatorAction
+from coordinator.core.lifecycle import CoordinatorAction
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import make_plan
 from sim.world.engine import Process

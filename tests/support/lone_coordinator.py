@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.events import CoordinatorAction, CoordinatorEvent, MakePlan, PlanMade
+from coordinator.core.lifecycle import CoordinatorAction, CoordinatorEvent, MakePlan, PlanMade
 from coordinator.core.publication import FlightLayers
 from swarm.model import Mission, Plan, UavId
 from swarm.protocol.events import (

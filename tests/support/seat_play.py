@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.events import (
+from coordinator.core.lifecycle import (
     CoordinatorAction,
     CoordinatorEvent,
     MakePlan,

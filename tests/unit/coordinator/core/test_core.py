@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coordinator.core.events import PlanFailed, PlanMade, Withdraw
+from coordinator.core.lifecycle import PlanFailed, PlanMade, Withdraw
 from coordinator.core.publication import FlightLayers
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.codec import Codec

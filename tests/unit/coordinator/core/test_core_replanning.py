@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.core.events import CoordinatorAction, Replan, Replanned, StopPlanning
+from coordinator.core.lifecycle import CoordinatorAction, Replan, Replanned, StopPlanning
 from coordinator.planner.online import EpochPolicy, Prediction, ReplanResult
 from swarm.model import Mission
 from swarm.protocol.events import LinkChanged, SnapshotsReceived, Stop

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.core.events import Replan, Replanned
-from coordinator.core.replanning import ReplanPolicy
+from coordinator.core.lifecycle import Replan, Replanned
+from coordinator.core.stages import ReplanPolicy
 from coordinator.planner.online import (
     EpochPolicy,
     Lists,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.events import CoordinatorAction, TakeSeat
+from coordinator.core.lifecycle import CoordinatorAction, TakeSeat
 from coordinator.core.standby import StandbyCore
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coordinator.core.events import Withdraw
+from coordinator.core.lifecycle import Withdraw
 from coordinator.core.publication import TaskReleaser, mission_config_of, scenario_differences
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.events import LinkChanged, PeerSeen, Publish

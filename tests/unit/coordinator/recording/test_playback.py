@@ -6,10 +6,11 @@ import json
 
 import pytest
 
+from coordinator.mission_view.scene import scene_of
 from coordinator.recording.playback import Playback
 from coordinator.recording.player import RecordingPlayer
 from coordinator.recording.reader import Recording, read_recording
-from coordinator.terminal.status_table import mission_status, status_as_json
+from coordinator.terminal.status_table import status_as_json
 from tests.support.observed_mission import shipped
 from tests.support.recordings import fly_recorded
 
@@ -22,7 +23,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 def picture(playback: Playback) -> str:
-    return json.dumps(status_as_json(mission_status(playback.mission_state, playback.now_s)))
+    return json.dumps(status_as_json(scene_of(playback.mission_state, playback.now_s)))
 
 
 def straight(recording: Recording, t_s: float) -> str:

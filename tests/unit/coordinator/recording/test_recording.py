@@ -16,10 +16,11 @@ from mcap.reader import make_reader
 from mcap.records import Chunk, DataEnd, Footer, Header
 from mcap.writer import MCAP0_MAGIC
 
+from coordinator.mission_view.scene import scene_of
 from coordinator.recording.playback import Playback
 from coordinator.recording.reader import FileRecords, Recording, read_recording
 from coordinator.recording.records import RecordingStarted
-from coordinator.terminal.status_table import mission_status, status_as_json
+from coordinator.terminal.status_table import status_as_json
 from swarm.model import Plan
 from swarm.runtime.errors import InputError
 from tests.support.observed_mission import shipped
@@ -41,7 +42,7 @@ def recording(flown: Flown, tmp_path: Path) -> Recording:
 
 
 def final(playback: Playback) -> dict[str, Any]:
-    return status_as_json(mission_status(playback.mission_state, playback.now_s))
+    return status_as_json(scene_of(playback.mission_state, playback.now_s))
 
 
 def read_or_refuse(path: Path) -> Recording | str:
@@ -76,7 +77,7 @@ def test_replay_ends_with_the_very_picture_of_the_flight(
 
     playback.seek(playback.duration_s)
 
-    live = status_as_json(mission_status(flown.mission_state, playback.now_s))
+    live = status_as_json(scene_of(flown.mission_state, playback.now_s))
     assert json.dumps(final(playback)) == json.dumps(live)
     assert [line.text for line in playback.mission_state.story] == [
         line.text for line in flown.mission_state.story

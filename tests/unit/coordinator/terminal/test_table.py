@@ -9,7 +9,8 @@ from rich.console import Console
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.presentation import signs_for
-from coordinator.terminal.status_table import mission_status, status_as_json, status_table
+from coordinator.mission_view.scene import scene_of
+from coordinator.terminal.status_table import status_as_json, status_table
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.events import PeerGone, PeerSeen, Tick
 from swarm.protocol.messages import CommandKind, OperatorCommand
@@ -23,7 +24,7 @@ MALFORMED = {"malformed": 48, "stale": 2}
 def rendered(mission_state: MissionState, now_s: float, width: int = 80) -> str:
     console = Console(width=width, color_system=None, highlight=False)
     with console.capture() as capture:
-        console.print(status_table(mission_status(mission_state, now_s), width, signs_for(True)))
+        console.print(status_table(scene_of(mission_state, now_s), width, signs_for(True)))
     return capture.get()
 
 
@@ -48,41 +49,41 @@ def go(teller: Teller, writer: str, now_s: float) -> None:
 
 
 def test_each_uav_is_told_with_task_place_age_and_what_it_dropped() -> None:
-    first, second, third = mission_status(flying().mission_state, 3.0).uavs
+    first, second, third = scene_of(flying().mission_state, 3.0).uavs
 
-    assert (first.does, first.task, first.eta_s) == ("flying", "t2", 1.5)
-    assert (first.position_enu_m, first.battery_frac) == ((5.0, -0.001, 0.0), 0.17)
+    assert (first.now_does, first.now_task, first.now_eta_s) == ("flying", "t2", 1.5)
+    assert (first.in_layer_enu_m, first.battery_frac) == ((5.0, -0.001, 0.0), 0.17)
     assert first.link_age_s == 0.5
     assert first.dropped == MALFORMED
-    assert (second.does, second.task, second.done) == ("lost", None, 1)
-    assert (third.position_enu_m, third.link_age_s, third.dropped) == (None, None, {})
+    assert (second.now_does, second.now_task, len(second.flown)) == ("lost", None, 1)
+    assert (third.in_layer_enu_m, third.link_age_s, third.dropped) == (None, None, {})
 
 
 def test_dropped_messages_are_added_up_by_reason() -> None:
-    assert mission_status(flying().mission_state, 3.0).dropped == {"malformed": 48, "stale": 5}
+    assert scene_of(flying().mission_state, 3.0).dropped_by_reason == {"malformed": 48, "stale": 5}
 
 
 def test_coordinator_and_others_are_told() -> None:
     teller = flying()
-    assert mission_status(teller.mission_state, 3.0).coordinator
-    assert mission_status(teller.mission_state, 3.0).others == ("standby",)
+    assert scene_of(teller.mission_state, 3.0).coordinator
+    assert scene_of(teller.mission_state, 3.0).others == ("standby",)
 
     go(teller, "coordinator", 2.7)
 
-    assert not mission_status(teller.mission_state, 3.0).coordinator
+    assert not scene_of(teller.mission_state, 3.0).coordinator
 
 
 def test_a_uav_that_was_never_seen_is_absent_whatever_others_remember_of_it() -> None:
     teller = Teller(shipped("table-1"))
     teller.claim("uav3", "t1", 4.5)
 
-    third = mission_status(teller.mission_state, 3.0).uavs[2]
+    third = scene_of(teller.mission_state, 3.0).uavs[2]
 
-    assert (third.does, third.task) == ("absent", None)
+    assert (third.now_does, third.now_task) == ("absent", None)
 
 
 def test_json_holds_everything_and_can_be_printed() -> None:
-    told = json.loads(json.dumps(status_as_json(mission_status(flying().mission_state, 3.0))))
+    told = json.loads(json.dumps(status_as_json(scene_of(flying().mission_state, 3.0))))
 
     assert (told["mission"], told["phase"], told["epoch"]) == ("table-1", "running", 1)
     assert told["tasks"] == {"open": 7, "done": 1, "failed": 0, "withdrawn": 0, "taken": 1}
@@ -133,7 +134,7 @@ def test_the_operators_words_are_told() -> None:
     teller = commanded()
     teller.say(OPERATOR, OperatorCommand("fleet", CommandKind.ABORT, 1, ""), 2.7)
 
-    told = json.loads(json.dumps(status_as_json(mission_status(teller.mission_state, 3.0))))
+    told = json.loads(json.dumps(status_as_json(scene_of(teller.mission_state, 3.0))))
     assert told["aborted"] is True
     assert told["commands"] == {
         "uav1": {"command": "hold", "reason": "helicopter"},
@@ -149,7 +150,7 @@ def test_the_operators_words_are_told() -> None:
 
 
 def test_without_a_word_of_the_operator_nothing_is_told_of_any() -> None:
-    told = status_as_json(mission_status(flying().mission_state, 3.0))
+    told = status_as_json(scene_of(flying().mission_state, 3.0))
 
     assert (told["aborted"], told["commands"]) == (False, {})
 
@@ -163,6 +164,6 @@ def test_who_went_home_and_left_is_home_and_its_height_is_that_of_its_layer() ->
     teller.status("uav1", StatusPhase.HOME, 2.6, position_enu_m=(5.0, 0.0, -10.0))
     go(teller, "uav1", 2.7)
 
-    first = mission_status(teller.mission_state, 3.0).uavs[0]
+    first = scene_of(teller.mission_state, 3.0).uavs[0]
 
-    assert (first.does, first.position_enu_m) == ("home", (5.0, 0.0, 0.0))
+    assert (first.now_does, first.in_layer_enu_m) == ("home", (5.0, 0.0, 0.0))
