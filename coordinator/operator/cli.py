@@ -15,9 +15,9 @@ from swarm.runtime.options import JsonOption, SomeMissionOption, SpeedupOption
 
 if TYPE_CHECKING:
     from coordinator.operator.commands import RequestVerdict
-    from coordinator.operator.requests import OperatorClient
+    from coordinator.operator.requests import OperatorClient, OperatorRequest
     from coordinator.operator.submission import MissionConnection
-    from coordinator.operator.task_edits import NewTask, TaskWithdrawal, Wgs84
+    from coordinator.operator.task_edits import Wgs84
     from swarm.protocol.fields import Point
 
 __all__ = ["abort", "hold", "resume", "return_home", "start", "task"]
@@ -136,26 +136,12 @@ def start(
         swarm start --without uav2
         swarm start --without uav2 --reason "no GPS" --keys keys/operator
     """
-    from json import dumps
-
     from coordinator.operator.commands import StartRequest
-    from coordinator.operator.submission import (
-        MissionConnection,
-        check_reason_and_ids,
-        submit_request,
-    )
+    from coordinator.operator.submission import MissionConnection, check_reason_and_ids
 
     check_reason_and_ids(reason, ("--mission", mission), ("--without", without))
-
-    def tell(name: str, core: OperatorClient, verdict: RequestVerdict) -> None:
-        if json:
-            told = {"mission": name, "command": "start", "without": without, "reason": reason}
-            print(dumps(told | {"obeyed": core.obeyed, "text": verdict.text}))
-        elif core.obeyed:
-            print(verdict.text)
-
     reach = MissionConnection(mission, timeout_s, seat, speedup)
-    return submit_request(StartRequest(without, reason), reach, source="--without", tell=tell)
+    return _submit(StartRequest(without, reason), reach, "--without", json=json)
 
 
 @with_connection_options
@@ -297,7 +283,7 @@ def add(
     place = _place(position, lat_deg, lon_deg, alt_m)
     wish = NewTask(place, name, value, service_s, kind, reason)
     reach = MissionConnection(mission, timeout_s, seat, speedup)
-    return _order("add", wish, reach, json=json)
+    return _submit(wish, reach, "ID", json=json)
 
 
 @task.command("withdraw", help=_WITHDRAW_HELP, short_help="Take a task off the board.")
@@ -317,7 +303,7 @@ def withdraw(
 
     check_reason_and_ids(reason, ("--mission", mission), ("ID", name))
     reach = MissionConnection(mission, timeout_s, seat, speedup)
-    return _order("withdraw", TaskWithdrawal(name, reason), reach, json=json)
+    return _submit(TaskWithdrawal(name, reason), reach, "ID", json=json)
 
 
 def _place(
@@ -352,53 +338,24 @@ def _place(
 
 def _give(name: str, target: str, reason: str, reach: MissionConnection, *, json: bool) -> int:
     """Give the command of that name, and say what came of it."""
-    from json import dumps
-
     from coordinator.operator.commands import CommandRequest
-    from coordinator.operator.submission import check_reason_and_ids, submit_request
+    from coordinator.operator.submission import check_reason_and_ids
     from swarm.protocol.messages import CommandKind
 
     check_reason_and_ids(reason, ("--mission", reach.mission), ("UAV", target))
-
-    def tell(mission: str, seat: OperatorClient, verdict: RequestVerdict) -> None:
-        if json:
-            told = {
-                "mission": mission,
-                "command": name,
-                "target": target,
-                "reason": reason,
-                "obeyed": seat.obeyed,
-                "text": verdict.text,
-                "uavs": seat.does,
-            }
-            print(dumps(told))
-        elif seat.obeyed:
-            print(verdict.text)
-
-    wish = CommandRequest(CommandKind(name), target, reason)
-    return submit_request(wish, reach, source="UAV", tell=tell)
+    return _submit(CommandRequest(CommandKind(name), target, reason), reach, "UAV", json=json)
 
 
-def _order(
-    name: str, wish: NewTask | TaskWithdrawal, reach: MissionConnection, *, json: bool
-) -> int:
-    """Give the order about a task, and say what came of it."""
+def _submit(wish: OperatorRequest, reach: MissionConnection, source: str, *, json: bool) -> int:
+    """Say what is wanted, and tell what came of it; ``source`` is the argument that it is about."""
     from json import dumps
 
     from coordinator.operator.submission import submit_request
 
-    def tell(mission: str, seat: OperatorClient, verdict: RequestVerdict) -> None:
+    def tell(mission: str, client: OperatorClient, verdict: RequestVerdict) -> None:
         if json:
-            told = {
-                "mission": mission,
-                "command": f"task {name}",
-                **seat.ordered,
-                "reason": wish.reason,
-                "obeyed": seat.obeyed,
-                "text": verdict.text,
-            }
-            print(dumps(told))
-        elif seat.obeyed:
+            print(dumps({"mission": mission} | client.as_json))
+        elif client.obeyed:
             print(verdict.text)
 
-    return submit_request(wish, reach, source="ID", tell=tell)
+    return submit_request(wish, reach, source=source, tell=tell)

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from types import MappingProxyType
+from typing import Generic, TypeVar
 
 from coordinator.mission_view.mission_state import MissionState
 from swarm.model.ids import COORDINATOR, FLEET
@@ -18,6 +20,7 @@ from swarm.protocol.messages import (
     MissionConfig,
     MissionPhase,
     OperatorCommand,
+    Stamp,
     StartWithout,
 )
 from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD, dispensable
@@ -26,6 +29,7 @@ from swarm.protocol.uav_messages import ClaimPhase, Status, StatusPhase
 __all__ = [
     "CommandHandler",
     "CommandRequest",
+    "RequestHandler",
     "RequestResult",
     "RequestVerdict",
     "StartHandler",
@@ -61,6 +65,87 @@ class RequestVerdict:
     text: str
     """One line; of wrong input what would be right."""
 
+    @classmethod
+    def good(cls, text: str) -> RequestVerdict:
+        """It has taken effect."""
+        return cls(RequestResult.OBEYED, text)
+
+    @classmethod
+    def bad(cls, text: str) -> RequestVerdict:
+        """It was not seen to take effect, or cannot."""
+        return cls(RequestResult.NOT_OBEYED, text)
+
+
+Wish = TypeVar("Wish")
+Statement = TypeVar("Statement")
+
+
+class RequestHandler(Generic[Wish, Statement]):
+    """One request: what to say for it, and what comes of it.
+
+    Args:
+        wish: what the operator wants.
+        mission_state: of the mission.
+        patience_s: how long to wait for the effect [s of ``now_s``].
+    """
+
+    asks = True
+    """Whether everyone is to be asked for what has come of it."""
+
+    def __init__(self, wish: Wish, mission_state: MissionState, patience_s: float) -> None:
+        self.known_to: set[str] = set()
+        """Who has confirmed that it knows what was said."""
+        self._wish = wish
+        self._mission_state = mission_state
+        self._patience_s = patience_s
+        self._stamp: Stamp | None = None
+        """Of the statement that `known_to` is about."""
+
+    def body(self, brief: MissionConfig) -> Statement | RequestVerdict:
+        """What to say; or why it cannot be said."""
+        raise NotImplementedError
+
+    def apart(self, said: Message) -> Statement | None:
+        """What to say instead, as somebody has said something else in the same place."""
+        del said
+        return None
+
+    def heed(self, fact: CommonEvent, said: Message) -> None:
+        """See who knows what was said, from a fact that the observer has taken note of."""
+        if said.stamp != self._stamp:
+            self._stamp = said.stamp
+            self.known_to.clear()
+        if isinstance(fact, SnapshotsReceived):
+            for snapshot in fact.snapshots:
+                if any(m.key == said.key and m.stamp >= said.stamp for m in snapshot.messages):
+                    self.known_to.add(snapshot.writer)
+
+    def judge(self, said: Message, now_s: float, *, late: bool) -> RequestVerdict | None:
+        """What has come of it by now; None as long as that is open, and it is not ``late``."""
+        raise NotImplementedError
+
+    def next_deadline_s(self) -> float | None:
+        """When `judge` may find something though nothing happens."""
+        return None
+
+    @property
+    def task(self) -> str | None:
+        """Id of the task that it is about, once there is one."""
+        return None
+
+    @property
+    def told(self) -> dict[str, object]:
+        """What a program is told of it."""
+        return {}
+
+    @property
+    def _fleet(self) -> list[str]:
+        brief = self._mission_state.replica.brief
+        return [] if brief is None else [str(uav.id) for uav in brief.uavs]
+
+    def _no_such_uav(self) -> RequestVerdict:
+        return RequestVerdict(RequestResult.UNKNOWN_UAV, f"the fleet is {', '.join(self._fleet)}")
+
 
 _ON_THE_WAY_HOME = (StatusPhase.RETURNING, StatusPhase.HOME)
 
@@ -81,61 +166,46 @@ class CommandRequest:
         return self.kind.value if self.target == FLEET else f"{self.kind} {self.target}"
 
 
-class CommandHandler:
+class CommandHandler(RequestHandler[CommandRequest, OperatorCommand]):
     """One command, and what comes of it."""
 
     asks = False
     """What a UAV says by itself tells whether it obeys."""
-
-    def __init__(
-        self, wish: CommandRequest, mission_state: MissionState, patience_s: float
-    ) -> None:
-        self._target, self._kind, self._reason = wish.target, wish.kind, wish.reason
-        self._mission_state = mission_state
-        self._patience_s = patience_s
-        self._before: dict[str, Status] = {}
-        """Newest status of each UAV when the command was given."""
+    _before: Mapping[str, Status] = MappingProxyType({})
+    """Newest status of each UAV when the command was given."""
 
     def body(self, brief: MissionConfig) -> OperatorCommand | RequestVerdict:
         """What to say; or why it cannot be said."""
-        if self._target != FLEET and not self.concerned:
-            fleet = ", ".join(uav.id for uav in brief.uavs)
-            return RequestVerdict(RequestResult.UNKNOWN_UAV, f"the fleet is {fleet}")
+        wish = self._wish
+        if wish.target != FLEET and not self.concerned:
+            return self._no_such_uav()
         self._before = dict(self._mission_state.statuses)
-        return OperatorCommand(self._target, self._kind, brief.run, self._reason)
-
-    def heed(self, fact: CommonEvent, said: Message) -> None:
-        """Nothing but what the observer makes of it counts."""
-
-    def next_deadline_s(self) -> float | None:
-        """Only news can change the judgement."""
-        return None
+        return OperatorCommand(wish.target, wish.kind, brief.run, wish.reason)
 
     def judge(self, said: Message, now_s: float, *, late: bool) -> RequestVerdict | None:
         """What has come of it by now; None as long as that is open, and it is not ``late``."""
         del now_s  # it is as good later
-        stamp, command = self._mission_state.replica.commands[self._target]
+        stamp, command = self._mission_state.replica.commands[self._wish.target]
         if stamp != said.stamp:
             text = f"another operator has said {command.kind} meanwhile"
-            return RequestVerdict(RequestResult.NOT_OBEYED, text)
+            return RequestVerdict.bad(text)
         found = [self._effect(uav) for uav in self.concerned]
         if any(effect is None for effect in found):
             if not late:
                 return None
             open_still = zip(self.concerned, found, strict=True)
             texts = [self._unseen(uav) for uav, effect in open_still if effect is None]
-            return RequestVerdict(RequestResult.NOT_OBEYED, "; ".join(texts))
+            return RequestVerdict.bad("; ".join(texts))
         effects = [effect for effect in found if effect is not None]
         obeyed = all(effect.result is RequestResult.OBEYED for effect in effects)
         text = _in_short({u: e.text for u, e in zip(self.concerned, effects, strict=True)})
-        return RequestVerdict(RequestResult.OBEYED if obeyed else RequestResult.NOT_OBEYED, text)
+        return RequestVerdict.good(text) if obeyed else RequestVerdict.bad(text)
 
     @property
     def concerned(self) -> list[str]:
         """UAVs of the fleet that the command is to."""
-        brief = self._mission_state.replica.brief
-        fleet = [] if brief is None else [str(uav.id) for uav in brief.uavs]
-        return fleet if self._target == FLEET else [uav for uav in fleet if uav == self._target]
+        target = self._wish.target
+        return self._fleet if target == FLEET else [uav for uav in self._fleet if uav == target]
 
     def _effect(self, uav: str) -> RequestVerdict | None:
         """What has come of it for ``uav``; None as long as that is open."""
@@ -143,30 +213,28 @@ class CommandHandler:
         status, claim = mission_state.statuses.get(uav), mission_state.replica.claims.get(uav)
         if uav not in mission_state.present:
             gone = claim is not None and claim.phase is ClaimPhase.OUT
-            if self._kind in (CommandKind.RETURN, CommandKind.ABORT) and gone:
-                return RequestVerdict(RequestResult.OBEYED, f"{uav} has left the mission")
-            if self._kind is CommandKind.ABORT and claim is None:
-                return RequestVerdict(RequestResult.OBEYED, f"nobody flies {uav}")
+            if self._wish.kind in (CommandKind.RETURN, CommandKind.ABORT) and gone:
+                return RequestVerdict.good(f"{uav} has left the mission")
+            if self._wish.kind is CommandKind.ABORT and claim is None:
+                return RequestVerdict.good(f"nobody flies {uav}")
             return None
         if status is None or status is self._before.get(uav):
             return None
         if status.phase is StatusPhase.OUT:
             # The mission is over for it at any rate.
-            result = (
-                RequestResult.OBEYED
-                if self._kind is CommandKind.ABORT
-                else RequestResult.NOT_OBEYED
+            verdict = (
+                RequestVerdict.good if self._wish.kind is CommandKind.ABORT else RequestVerdict.bad
             )
-            return RequestVerdict(result, f"{uav} {_NOT_COMMANDED}: {status.note}")
+            return verdict(f"{uav} {_NOT_COMMANDED}: {status.note}")
         return self._seen(uav, status)
 
     def _seen(self, uav: str, status: Status) -> RequestVerdict | None:
         """What a status tells that ``uav`` has said since."""
-        phase, obeyed = status.phase, RequestVerdict(RequestResult.OBEYED, _told(uav, status))
-        match self._kind:
+        phase, obeyed = status.phase, RequestVerdict.good(_told(uav, status))
+        match self._wish.kind:
             case CommandKind.HOLD if phase is StatusPhase.HOLDING:
                 if status.note.startswith(CANNOT_HOLD):
-                    return RequestVerdict(RequestResult.NOT_OBEYED, _told(uav, status))
+                    return RequestVerdict.bad(_told(uav, status))
                 return None if status.note.startswith(BEING_STOPPED) else obeyed
             case CommandKind.HOLD:
                 return None
@@ -178,9 +246,7 @@ class CommandHandler:
                 before = self._before.get(uav)
                 if before is not None and before.phase is StatusPhase.HOLDING:
                     return obeyed  # it had been stopped on its way
-                return RequestVerdict(
-                    RequestResult.NOT_OBEYED, f"{_told(uav, status)}; it takes no further part"
-                )
+                return RequestVerdict.bad(f"{_told(uav, status)}; it takes no further part")
             case CommandKind.RESUME:
                 return obeyed
 
@@ -194,7 +260,7 @@ class CommandHandler:
             )
         if status is None or status is self._before.get(uav):
             return f"{uav} has not been heard of {waited}"
-        return f"{_told(uav, status)} still, {self._kind} was not obeyed {waited}"
+        return f"{_told(uav, status)} still, {self._wish.kind} was not obeyed {waited}"
 
 
 def _in_short(texts: Mapping[str, str]) -> str:
@@ -229,78 +295,49 @@ class StartRequest:
         return f"start without {self.target}"
 
 
-class StartHandler:
-    """One such word, and what comes of it."""
-
-    asks = True
-    """The coordinator's own answer tells whether it knows."""
-
-    def __init__(self, wish: StartRequest, mission_state: MissionState, patience_s: float) -> None:
-        self._wish = wish
-        self._mission_state = mission_state
-        self._patience_s = patience_s
-        self._confirmed = False
+class StartHandler(RequestHandler[StartRequest, StartWithout]):
+    """One such word, and what comes of it: the coordinator's own answer tells whether it knows."""
 
     def body(self, brief: MissionConfig) -> StartWithout | RequestVerdict:
         """What to say; or why it cannot be said."""
-        uav, fleet = self._wish.target, [str(uav.id) for uav in brief.uavs]
-        if uav not in fleet:
-            return RequestVerdict(RequestResult.UNKNOWN_UAV, f"the fleet is {', '.join(fleet)}")
-        phase = self._mission_state.phase
+        uav, phase = self._wish.target, self._mission_state.phase
+        if uav not in self._fleet:
+            return self._no_such_uav()
         if phase is not MissionPhase.PREPARING:
             past = "has started already" if phase is MissionPhase.RUNNING else "has ended"
-            return RequestVerdict(
-                RequestResult.NOT_OBEYED, f"the mission {past}: nobody waits for {uav}"
-            )
+            return RequestVerdict.bad(f"the mission {past}: nobody waits for {uav}")
         return StartWithout(uav, brief.run, self._wish.reason)
-
-    def heed(self, fact: CommonEvent, said: Message) -> None:
-        """See whether the coordinator knows of it."""
-        if isinstance(fact, SnapshotsReceived):
-            answers = (each for each in fact.snapshots if each.writer == COORDINATOR)
-            messages = (message for each in answers for message in each.messages)
-            self._confirmed |= any(m.key == said.key and m.stamp >= said.stamp for m in messages)
-
-    def next_deadline_s(self) -> float | None:
-        """Only news can change the judgement."""
-        return None
 
     def judge(self, said: Message, now_s: float, *, late: bool) -> RequestVerdict | None:
         """What has come of it by now; None as long as that is open, and it is not ``late``."""
         del said, now_s  # whoever has said it since means the same
-        mission_state, uav, epoch = (
-            self._mission_state,
-            self._wish.target,
-            self._mission_state.replica.epoch,
-        )
+        mission_state, uav = self._mission_state, self._wish.target
+        epoch = mission_state.replica.epoch
         if epoch is not None and epoch.phase is MissionPhase.RUNNING:
             how = "with" if uav in epoch.sequence else "without"
-            return RequestVerdict(RequestResult.OBEYED, f"the mission has started {how} {uav}")
+            return RequestVerdict.good(f"the mission has started {how} {uav}")
         if epoch is not None and epoch.phase is MissionPhase.ENDED:
-            return RequestVerdict(
-                RequestResult.NOT_OBEYED, f"the mission has ended: {epoch.reason}"
-            )
+            return RequestVerdict.bad(f"the mission has ended: {epoch.reason}")
         waits_for = self._waits_for
-        if self._confirmed and (late or waits_for):
+        if COORDINATOR in self.known_to and (late or waits_for):
             what = f"waits for {waits_for}" if waits_for else "starts as soon as it is planned"
-            return RequestVerdict(RequestResult.OBEYED, f"without {uav}; the mission {what}")
+            return RequestVerdict.good(f"without {uav}; the mission {what}")
         if not late:
             return None
         if COORDINATOR not in mission_state.present:
             text = "there is no coordinator that could start the mission"
         else:
             text = f"the coordinator has not confirmed it within {self._patience_s:g} s"
-        return RequestVerdict(RequestResult.NOT_OBEYED, text)
+        return RequestVerdict.bad(text)
 
     @property
     def _waits_for(self) -> str:
         """What else the start waits for; empty if for nothing but its plan."""
         replica, present = self._mission_state.replica, self._mission_state.present
-        fleet = [] if replica.brief is None else [str(uav.id) for uav in replica.brief.uavs]
         phases = {u: c.phase for u, c in replica.claims.items() if u in present}
         settled = (ClaimPhase.IDLE, ClaimPhase.OUT, ClaimPhase.PAUSED)
         without = dispensable(replica)
-        missing = [u for u in fleet if phases.get(u) not in settled and u not in without]
+        missing = [u for u in self._fleet if phases.get(u) not in settled and u not in without]
         if missing:
             return ", ".join(missing)
         nobody = ClaimPhase.IDLE not in phases.values()

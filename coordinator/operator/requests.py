@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Protocol
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import MissionObserver
@@ -37,7 +36,7 @@ from coordinator.operator.commands import (
 from coordinator.operator.task_edits import NewTask, TaskEditHandler, TaskWithdrawal
 from swarm.model.ids import OPERATOR
 from swarm.protocol.events import Ask, CommonAction, CommonEvent, Finish, Publish, SnapshotsReceived
-from swarm.protocol.messages import Message, MissionConfig, OperatorCommand, StartWithout, TaskEdit
+from swarm.protocol.messages import Message, OperatorCommand, StartWithout, TaskEdit
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.timing import Timing, earliest
 
@@ -49,34 +48,13 @@ OperatorRequest = CommandRequest | StartRequest | NewTask | TaskWithdrawal
 OperatorStatement = OperatorCommand | StartWithout | TaskEdit
 
 
-class RequestHandler(Protocol):
-    """One kind of wish: what to say for it, and how its effect shows."""
-
-    asks: bool
-
-    def body(self, brief: MissionConfig) -> OperatorStatement | RequestVerdict:
-        """What to say; or why it cannot be said."""
-        ...
-
-    def heed(self, fact: CommonEvent, said: Message) -> None:
-        """Take note of a fact, which the observer has taken note of already."""
-        ...
-
-    def judge(self, said: Message, now_s: float, *, late: bool) -> RequestVerdict | None:
-        """What has come of it by now; None as long as that is open, and it is not ``late``."""
-        ...
-
-    def next_deadline_s(self) -> float | None:
-        """When `judge` may find something though nothing happens."""
-        ...
+AnyHandler = CommandHandler | StartHandler | TaskEditHandler
 
 
 class TrackedRequest:
     """One wish under way."""
 
-    def __init__(
-        self, wish: OperatorRequest, handler: CommandHandler | StartHandler | TaskEditHandler
-    ) -> None:
+    def __init__(self, wish: OperatorRequest, handler: AnyHandler) -> None:
         self.wish = wish
         self.handler = handler
         """Tells more than the verdict: whom a command concerns, who knows of a task order."""
@@ -97,7 +75,7 @@ class TrackedRequest:
     @property
     def task(self) -> str | None:
         """Id of the task that it is about, once there is one."""
-        return self.handler.task if isinstance(self.handler, TaskEditHandler) else None
+        return self.handler.task
 
 
 class RequestTracker:
@@ -122,89 +100,72 @@ class RequestTracker:
     def give(self, wish: OperatorRequest, now_s: float) -> TrackedRequest:
         """Say what the operator wants, from the next step on; with a verdict if it cannot."""
         mission_state, brief = self._mission_state, self._mission_state.replica.brief
-        handler: CommandHandler | StartHandler | TaskEditHandler
+        handler: AnyHandler
         if isinstance(wish, CommandRequest):
             handler = CommandHandler(wish, mission_state, self._patience_s)
         elif isinstance(wish, StartRequest):
             handler = StartHandler(wish, mission_state, self._patience_s)
         else:
             handler = TaskEditHandler(wish, mission_state, self._timing, self._patience_s)
-        tracked_request = TrackedRequest(wish, handler)
-        if brief is None:
-            tracked_request.verdict = RequestVerdict(
-                RequestResult.UNKNOWN_MISSION, "nothing is known of the mission"
-            )
-            return tracked_request
-        body = handler.body(brief)
+        request = TrackedRequest(wish, handler)
+        unknown = RequestVerdict(RequestResult.UNKNOWN_MISSION, "nothing is known of the mission")
+        body = unknown if brief is None else handler.body(brief)
         if isinstance(body, RequestVerdict):
-            tracked_request.verdict = body
-            return tracked_request
-        self._say(tracked_request, body, now_s)
-        tracked_request.leave_at_s = now_s + self._patience_s
+            request.verdict = body
+            return request
+        self._say(request, body, now_s)
+        request.leave_at_s = now_s + self._patience_s
         if handler.asks:
-            tracked_request.ask_at_s = now_s + self._timing.ask_gap_s
-        self.open.append(tracked_request)
-        return tracked_request
+            request.ask_at_s = now_s + self._timing.ask_gap_s
+        self.open.append(request)
+        return request
 
     def step(self, fact: CommonEvent, now_s: float) -> list[CommonAction]:
         """Follow what has been given; call it after the observer has taken note of ``fact``."""
         wishes: list[CommonAction] = []
         asks = False
-        for tracked_request in self.open:
-            said = self._said_for_this_run(tracked_request, now_s)
+        for request in self.open:
+            said = self._said_for_this_run(request, now_s)
             if said is None:
                 continue
-            said = self._said_apart(tracked_request, said, now_s)
-            tracked_request.handler.heed(fact, said)
-            if tracked_request.again_at_s <= now_s:
-                tracked_request.again_at_s = now_s + self._timing.announce_s
+            if (body := request.handler.apart(said)) is not None:
+                said = self._say(request, body, now_s)
+            request.handler.heed(fact, said)
+            if request.again_at_s <= now_s:
+                request.again_at_s = now_s + self._timing.announce_s
                 wishes.append(Publish(said))
-            if tracked_request.ask_at_s <= now_s:
-                tracked_request.ask_at_s = now_s + self._timing.ask_s
+            if request.ask_at_s <= now_s:
+                request.ask_at_s = now_s + self._timing.ask_s
                 asks = True
-            late = tracked_request.leave_at_s <= now_s
-            tracked_request.verdict = tracked_request.handler.judge(said, now_s, late=late)
-        self.open = [
-            tracked_request for tracked_request in self.open if tracked_request.verdict is None
-        ]
+            late = request.leave_at_s <= now_s
+            request.verdict = request.handler.judge(said, now_s, late=late)
+        self.open = [request for request in self.open if request.verdict is None]
         return [*wishes, Ask()] if asks else wishes
 
-    def _say(
-        self, tracked_request: TrackedRequest, body: OperatorStatement, now_s: float
-    ) -> Message:
+    def _say(self, request: TrackedRequest, body: OperatorStatement, now_s: float) -> Message:
         """State ``body`` above all that is known of any operator."""
         for message in self._mission_state.replica.messages({OPERATOR}):
             self._register_writer.observe(message.stamp)
         said = self._register_writer.say(body)
         self._mission_state.take_note(said, now_s)
-        tracked_request.said, tracked_request.again_at_s = said, now_s
+        request.said, request.again_at_s = said, now_s
         return said
 
-    def _said_for_this_run(self, tracked_request: TrackedRequest, now_s: float) -> Message | None:
+    def _said_for_this_run(self, request: TrackedRequest, now_s: float) -> Message | None:
         """What was said; anew, if the brief turns out to be of another run than it was told of."""
-        said, brief = tracked_request.said, self._mission_state.replica.brief
+        said, brief = request.said, self._mission_state.replica.brief
         if said is None or brief is None or not isinstance(said.body, OperatorStatement):
             return said
         if said.body.run == brief.run:
             return said
-        return self._say(tracked_request, replace(said.body, run=brief.run), now_s)
-
-    def _said_apart(self, tracked_request: TrackedRequest, said: Message, now_s: float) -> Message:
-        """What was said; under another id, if another operator's task has come under the same."""
-        body = (
-            tracked_request.handler.apart(said)
-            if isinstance(tracked_request.handler, TaskEditHandler)
-            else None
-        )
-        return said if body is None else self._say(tracked_request, body, now_s)
+        return self._say(request, replace(said.body, run=brief.run), now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick; None while nothing is open."""
         deadlines = [
-            min(tracked_request.leave_at_s, tracked_request.again_at_s, tracked_request.ask_at_s)
-            for tracked_request in self.open
+            min(request.leave_at_s, request.again_at_s, request.ask_at_s) for request in self.open
         ]
-        looks = (tracked_request.handler.next_deadline_s() for tracked_request in self.open)
+        looks = (request.handler.next_deadline_s() for request in self.open)
         return min([*deadlines, *(at_s for at_s in looks if at_s is not None)], default=None)
 
 
@@ -281,28 +242,23 @@ class OperatorClient:
         return self.verdict is not None and self.verdict.result is RequestResult.OBEYED
 
     @property
-    def ordered(self) -> dict[str, object]:
-        """What a task order says of its task, who has confirmed it, and who has taken it."""
+    def as_json(self) -> dict[str, object]:
+        """What a program is told of the request and what came of it, but for the mission."""
         handler = None if self.tracked_request is None else self.tracked_request.handler
-        if not isinstance(handler, TaskEditHandler):
-            return {}
-        entry = handler.entry
-        told: dict[str, object] = {
-            "task": handler.task,
-            "uav": handler.uav,
-            "known_to": sorted(handler.known_to),
-        }
-        if entry is None:
-            return told
-        return told | {
-            "position": list(entry.position_enu_m),
-            "value": entry.value,
-            "service_s": entry.service_s,
-            "kind": entry.kind,
-        }
+        match wish := self._wish:
+            case CommandRequest():
+                about: dict[str, object] = {"command": wish.kind.value, "target": wish.target}
+            case StartRequest():
+                about = {"command": "start", "without": wish.target}
+            case _:
+                about = {"command": f"task {'add' if isinstance(wish, NewTask) else 'withdraw'}"}
+                about |= {} if handler is None else handler.told
+        text = "" if self.verdict is None else self.verdict.text
+        about |= {"reason": wish.reason, "obeyed": self.obeyed, "text": text}
+        return about | {"uavs": self._does} if isinstance(wish, CommandRequest) else about
 
     @property
-    def does(self) -> dict[str, str]:
+    def _does(self) -> dict[str, str]:
         """What each UAV does that a command concerns: `StatusPhase`, or absent."""
         handler = None if self.tracked_request is None else self.tracked_request.handler
         mission_state = self._observer.mission_state

@@ -9,20 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from statistics import median
 from typing import Final
 
 from coordinator.core.publication import task_entry_of
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.operator.commands import RequestResult, RequestVerdict
+from coordinator.operator.commands import RequestHandler, RequestResult, RequestVerdict
 from swarm.model import Origin
 from swarm.model.frames import enu_from_wgs84
 from swarm.model.ids import COORDINATOR, ID_RULE, valid_id
 from swarm.protocol.board import TaskState
-from swarm.protocol.events import CommonEvent, SnapshotsReceived
 from swarm.protocol.fields import MAX_COUNT, Point
-from swarm.protocol.messages import Message, MissionConfig, MissionPhase, Stamp, TaskEdit, TaskEntry
+from swarm.protocol.messages import Message, MissionConfig, MissionPhase, TaskEdit, TaskEntry
 from swarm.protocol.operator_commands import abort_command
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import ClaimPhase
@@ -110,11 +109,8 @@ class TaskWithdrawal:
         return f"withdraw task {self.task}"
 
 
-class TaskEditHandler:
+class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
     """One task order, and what comes of it."""
-
-    asks = True
-    """Whether everyone is to be asked for what has come of it."""
 
     def __init__(
         self,
@@ -123,27 +119,19 @@ class TaskEditHandler:
         timing: Timing,
         patience_s: float,
     ) -> None:
-        self.known_to: set[str] = set()
-        """Who has confirmed that it knows of the order."""
-        self._wish = wish
-        self._mission_state = mission_state
-        self._patience_s = patience_s
+        super().__init__(wish, mission_state, patience_s)
+        self.entry: TaskEdit | None = None
+        """What is said; None when nothing could be."""
         self._look_s = 2.0 * timing.patience_s
         """How long to look for who takes a new task, once all know of it."""
         self._look_until_s = math.inf
-        self.entry: TaskEdit | None = None
-        """What is said; None when nothing could be."""
-        self._stamp: Stamp | None = None
-        """Of the statement that `known_to` is about."""
 
     # -- what to say --------------------------------------------------------------------
 
     def body(self, brief: MissionConfig) -> TaskEdit | RequestVerdict:
         """What to say; or why it cannot be said."""
         if self._is_over:
-            return RequestVerdict(
-                RequestResult.NOT_OBEYED, "the mission has ended: nothing is taken up any more"
-            )
+            return RequestVerdict.bad("the mission has ended: nothing is taken up any more")
         if isinstance(self._wish, NewTask):
             found = self._addition(self._wish, brief)
         else:
@@ -186,7 +174,7 @@ class TaskEditHandler:
                 RequestResult.UNKNOWN_TASK, f"the board holds {_some(list(board))}"
             )
         if state in (TaskState.DONE, TaskState.WITHDRAWN):
-            return RequestVerdict(RequestResult.NOT_OBEYED, f"{wish.task} is {state} already")
+            return RequestVerdict.bad(f"{wish.task} is {state} already")
         return replace(entry, withdrawn=True)
 
     # -- what comes of it ---------------------------------------------------------------
@@ -211,17 +199,6 @@ class TaskEditHandler:
         self.entry = replace(ours, task=next_id(self._used_ids), number=self._next_number)
         return self.entry
 
-    def heed(self, fact: CommonEvent, said: Message) -> None:
-        """See who knows of the order."""
-        if said.stamp != self._stamp:
-            self._stamp = said.stamp
-            self.known_to.clear()
-        if isinstance(fact, SnapshotsReceived):
-            for snapshot in fact.snapshots:
-                for message in snapshot.messages:
-                    if message.key == said.key and message.stamp >= said.stamp:
-                        self.known_to.add(snapshot.writer)
-
     def next_deadline_s(self) -> float | None:
         """When `judge` may find that it has looked for long enough."""
         return None if math.isinf(self._look_until_s) else self._look_until_s
@@ -235,7 +212,7 @@ class TaskEditHandler:
             other = known.body
             gone = isinstance(other, TaskEdit) and other.withdrawn
             did = f"{'withdrawn' if gone else 'changed'} {order.task}"
-            return RequestVerdict(RequestResult.NOT_OBEYED, f"another operator has {did} meanwhile")
+            return RequestVerdict.bad(f"another operator has {did} meanwhile")
         if self._is_over and (verdict := self._in_the_end(order)) is not None:
             return verdict
         silent = sorted(self._expected - self.known_to)
@@ -245,11 +222,11 @@ class TaskEditHandler:
             return None
         if not self.known_to:
             text = f"nobody has confirmed it within {self._patience_s:g} s"
-            return RequestVerdict(RequestResult.NOT_OBEYED, f"{order.task}: {text}")
+            return RequestVerdict.bad(f"{order.task}: {text}")
         verdict = self._gone(order) if order.withdrawn else self._taken(order, now_s, late)
         if verdict is None and late:
             text = ", ".join(self._claimants)
-            return RequestVerdict(RequestResult.NOT_OBEYED, f"{text} still claims {order.task}")
+            return RequestVerdict.bad(f"{text} still claims {order.task}")
         if verdict is None or not silent:
             return verdict
         unsure = f"{', '.join(silent)} {'have' if len(silent) > 1 else 'has'} not confirmed it yet"
@@ -260,9 +237,9 @@ class TaskEditHandler:
         if order.withdrawn:
             return self._gone(order)
         if self._mission_state.board.states.get(order.task) is TaskState.DONE:
-            return RequestVerdict(RequestResult.OBEYED, f"{order.task} was added and is done")
+            return RequestVerdict.good(f"{order.task} was added and is done")
         text = f"the mission has ended meanwhile: nothing more comes of {order.task}"
-        return RequestVerdict(RequestResult.NOT_OBEYED, text)
+        return RequestVerdict.bad(text)
 
     def _taken(self, order: TaskEdit, now_s: float, late: bool) -> RequestVerdict | None:
         """What is told of a task that is on the board; None to look a little longer."""
@@ -273,7 +250,7 @@ class TaskEditHandler:
                 self._look_until_s = now_s + self._look_s
             if now_s < self._look_until_s:
                 return None
-        result, what = RequestResult.OBEYED, "nobody has taken it yet"
+        verdict, what = RequestVerdict.good, "nobody has taken it yet"
         if uav is not None:
             what = f"{uav} flies there"
         elif state is not TaskState.OPEN:
@@ -281,23 +258,17 @@ class TaskEditHandler:
         elif not self._able(self._fleet):
             what = "but no UAV is capable of it: the success of each there is 0"
         elif not somebody_can:
-            result, what = (
-                RequestResult.NOT_OBEYED,
-                "but nobody who could do it takes part any more",
-            )
-        return RequestVerdict(
-            result, f"{order.task} is on the board, worth {order.value:g}; {what}"
-        )
+            verdict = RequestVerdict.bad
+            what = "but nobody who could do it takes part any more"
+        return verdict(f"{order.task} is on the board, worth {order.value:g}; {what}")
 
     def _gone(self, order: TaskEdit) -> RequestVerdict | None:
         """What is told of a task that is off the board; None while somebody claims it."""
         if self._mission_state.board.states.get(order.task) is TaskState.DONE:
-            return RequestVerdict(
-                RequestResult.NOT_OBEYED, f"{order.task} was done before it could be withdrawn"
-            )
+            return RequestVerdict.bad(f"{order.task} was done before it could be withdrawn")
         if self._claimants:
             return None
-        return RequestVerdict(RequestResult.OBEYED, f"{order.task} is withdrawn")
+        return RequestVerdict.good(f"{order.task} is withdrawn")
 
     @property
     def _in_scenario(self) -> set[str]:
@@ -321,6 +292,23 @@ class TaskEditHandler:
         return self._wish.task if self.entry is None else self.entry.task
 
     @property
+    def told(self) -> dict[str, object]:
+        """What it says of its task, who has confirmed it, and who has taken it."""
+        told: dict[str, object] = {
+            "task": self.task,
+            "uav": self.uav,
+            "known_to": sorted(self.known_to),
+        }
+        if (entry := self.entry) is None:
+            return told
+        return told | {
+            "position": list(entry.position_enu_m),
+            "value": entry.value,
+            "service_s": entry.service_s,
+            "kind": entry.kind,
+        }
+
+    @property
     def uav(self) -> str | None:
         """Who is on its way to the task or serves it."""
         return None if self.task is None else self._mission_state.holders.get(self.task)
@@ -338,12 +326,7 @@ class TaskEditHandler:
         """Who is there and takes part, and so ought to know of it."""
         claims = self._mission_state.replica.claims.items()
         out = {uav for uav, claim in claims if claim.phase is ClaimPhase.OUT}
-        return (self._fleet - out | {COORDINATOR}) & self._mission_state.present
-
-    @property
-    def _fleet(self) -> set[str]:
-        brief = self._mission_state.replica.brief
-        return set() if brief is None else {uav.id for uav in brief.uavs}
+        return ({*self._fleet} - out | {COORDINATOR}) & self._mission_state.present
 
     @property
     def _claimants(self) -> list[str]:
@@ -364,17 +347,8 @@ class TaskEditHandler:
 
 def task_edit_of(entry: TaskEntry, run: int, reason: str = "") -> TaskEdit:
     """The order that puts ``entry`` on the board, in the flight of that ``run``."""
-    return TaskEdit(
-        task=entry.task,
-        number=entry.number,
-        position_enu_m=entry.position_enu_m,
-        value=entry.value,
-        service_s=entry.service_s,
-        kind=entry.kind,
-        withdrawn=entry.withdrawn,
-        run=run,
-        reason=reason,
-    )
+    values = {each.name: getattr(entry, each.name) for each in fields(entry)}
+    return TaskEdit(**values, run=run, reason=reason)
 
 
 def next_id(taken: set[str]) -> str:
