@@ -47,12 +47,16 @@ class LiveMission:
         *,
         may_order: bool = True,
     ) -> None:
-        self._may_order = may_order
+        self.speedup = speedup
+        """Of the clock."""
+        self.orders = self if may_order else None
+        """Takes orders; None where the keys are no operator's."""
+        self.player: PlaybackControl | None = None
+        """There is none: this is no recording."""
         self._mission = mission
         self._open_bus = open_bus
         self._network = network
         self._clock = clock
-        self._speedup = speedup
         self._linked = False
         self._operator_session: OperatorSession | None = None
         self._shell: Shell[CommonEvent, CommonAction] | None = None
@@ -85,9 +89,9 @@ class LiveMission:
             first = self._before[-1].n + 1 if self._before else 1
         self._operator_session = OperatorSession(
             mission,
-            self._network.timing.scaled(self._speedup),
+            self._network.timing.scaled(self.speedup),
             incarnation=incarnation(),
-            patience_s=EFFECT_S * self._speedup,
+            patience_s=EFFECT_S * self.speedup,
             stays=self._mission is not None,
             first=first,
         )
@@ -118,11 +122,6 @@ class LiveMission:
             self.mission_state is None or self.mission_state.cut_since_s is None
         )
 
-    @property
-    def speedup(self) -> float:
-        """Of the clock."""
-        return self._speedup
-
     def now_s(self) -> float:
         """Now."""
         return self._clock.now_s()
@@ -139,16 +138,6 @@ class LiveMission:
             *self._before,
             *(() if self._operator_session is None else self._operator_session.rows),
         ]
-
-    @property
-    def orders(self) -> LiveMission | None:
-        """Takes orders; None where the keys are no operator's."""
-        return self if self._may_order else None
-
-    @property
-    def player(self) -> PlaybackControl | None:
-        """There is none: this is no recording."""
-        return None
 
     def give(self, wish: OperatorRequest, who: str) -> int:
         """Give an order; its number.

@@ -38,7 +38,6 @@ from swarm.protocol.messages import (
     MissionPhase,
     PlanEpoch,
     Snapshot,
-    Stamp,
     TaskEdit,
 )
 from swarm.protocol.registers import Replica
@@ -75,6 +74,12 @@ class MissionState:
         self._timing = timing
         self._flown = FlownMission(mission, self.board)
         self._reports = FleetReports(self.replica)
+        self.statuses = self._reports.statuses
+        """Newest status by UAV id."""
+        self.heard_s = self._reports.heard_s
+        """When each writer last said something itself [s of ``now_s``]."""
+        self.choices = self._reports.choices
+        """Why UAVs took tasks, as far as it is remembered."""
         self._membership = Membership(timing)
         self._clock = PacedClock()
         self._narrator = MissionNarrator(
@@ -165,21 +170,6 @@ class MissionState:
         It is called when somebody next wants to know, as boards are told entry by entry.
         """
         self._flown.revise(mission)
-
-    @property
-    def statuses(self) -> dict[str, Status]:
-        """Newest status by UAV id."""
-        return self._reports.statuses
-
-    @property
-    def heard_s(self) -> dict[str, float]:
-        """When each writer last said something itself [s of ``now_s``]."""
-        return self._reports.heard_s
-
-    @property
-    def choices(self) -> deque[tuple[str, Stamp, Choice]]:
-        """Why UAVs took tasks, as far as it is remembered."""
-        return self._reports.choices
 
     @property
     def dropped(self) -> dict[str, Counter[str]]:

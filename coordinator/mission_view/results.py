@@ -276,15 +276,15 @@ def summary_line(mission: Mission, plan: Plan | None, result: MissionResult) -> 
 
 def deviations(mission: Mission, result: MissionResult) -> list[ReportFact]:
     """What went otherwise than in a faultless mission; nothing if nothing did."""
-    found = []
-    if result.lost_uavs:
-        found.append(
-            ReportFact("lost", counted(len(result.lost_uavs), "UAV"), tuple(result.lost_uavs), True)
+    found = [
+        ReportFact(name, counted(len(ids), noun), tuple(ids), True)
+        for name, noun, ids in (
+            ("lost", "UAV", result.lost_uavs),
+            ("failed", "task", result.failed),
+            ("still open", "task", result.open),
         )
-    if result.failed:
-        found.append(ReportFact("failed", counted(len(result.failed), "task"), result.failed, True))
-    if result.open:
-        found.append(ReportFact("still open", counted(len(result.open), "task"), result.open, True))
+        if ids
+    ]
     times_s = result.executed_completion_s
     late = sorted((t for t in times_s if times_s[t] > mission.horizon_s), key=times_s.__getitem__)
     if late:

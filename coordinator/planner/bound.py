@@ -65,15 +65,8 @@ class UpperBound:
 
     objective: float
     """[value·s]."""
-    method: str
-    """``trivial`` or ``lagrangian``, whichever is lower."""
     steps: int
     """Cycles of price changes made."""
-
-    def gap(self, objective: float) -> float:
-        """How far ``objective`` may at most be below the optimum, as a share of the bound."""
-        scale = abs(self.objective)
-        return max(0.0, (self.objective - objective) / scale) if scale > 0.0 else 0.0
 
 
 def trivial_bound(problem: Problem) -> float:
@@ -113,13 +106,13 @@ def upper_bound(
     """
     trivial = trivial_bound(problem)
     if problem.n_task < 2 or problem.n_uav == 0 or should_stop(0.0):
-        return UpperBound(trivial, "trivial", 0)
+        return UpperBound(trivial, 0)
     if _affordable_cycles(problem, _COARSEST) < _FEWEST_CYCLES:
-        return UpperBound(trivial, "trivial", 0)
+        return UpperBound(trivial, 0)
     team = team_at_start(problem)
     bucket_s, cycles = _affordable(problem, team)
     if cycles < _FEWEST_CYCLES:
-        return UpperBound(trivial, "trivial", 0)
+        return UpperBound(trivial, 0)
     known = max(0.0, evaluate(problem, lists)[0])
     price = _marginal_worth(problem, lists)
     pricing = partial(
@@ -128,9 +121,7 @@ def upper_bound(
     lowest, made = lagrangian_bound(
         team, pricing, price, cycles, known=known, should_stop=should_stop
     )
-    if lowest < trivial:
-        return UpperBound(lowest, "lagrangian", made)
-    return UpperBound(trivial, "trivial", made)
+    return UpperBound(min(lowest, trivial), made)
 
 
 def lagrangian_bound(

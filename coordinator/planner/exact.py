@@ -45,10 +45,6 @@ class ProblemTooLargeError(SwarmError):
         else:
             why = f"it would take about {estimate_s:.0f} s and the limit is {limit_s:g} s"
         super().__init__(f"{n_uav} UAVs × {n_task} tasks are too many to prove the optimum: {why}")
-        self.n_uav = n_uav
-        self.n_task = n_task
-        self.estimate_s = estimate_s
-        self.limit_s = limit_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,57 +67,39 @@ def estimated_s(problem: Problem) -> float:
     return problem.n_uav * (table_s + 3.0**n * 2e-9 + 1e-5)
 
 
-def optimum(problem: Problem, limit_s: float = _LIMIT_S, *, threads: int | None = None) -> Optimum:
-    """The best lists.
-
-    Args:
-        problem: the mission.
-        limit_s: refuse when `estimated_s` is above this [s]; the run itself is not cut short.
-        threads: at most this many; does not change the result.
-
-    Raises:
-        ProblemTooLargeError: more than `MAX_TASKS` tasks, or the estimate is above ``limit_s``.
-    """
-    solved = _solved(problem, limit_s, threads=threads)
+def optimum(
+    problem: Problem,
+    limit_s: float = _LIMIT_S,
+    *,
+    worst: bool = False,
+    threads: int | None = None,
+) -> Optimum:
+    """The best lists; see `optimum_before`."""
+    solved = optimum_before(problem, None, limit_s, worst=worst, threads=threads)
     assert solved is not None  # noqa: S101 - nobody stops it
     return solved
 
 
 def optimum_before(
-    problem: Problem, should_stop: Callable[[], bool], *, threads: int | None = None
+    problem: Problem,
+    should_stop: Callable[[], bool] | None,
+    limit_s: float = _LIMIT_S,
+    *,
+    worst: bool = False,
+    threads: int | None = None,
 ) -> Optimum | None:
     """The best lists; None if told to stop before they are proven.
 
     Args:
         problem: the mission.
         should_stop: asked every few milliseconds.
+        limit_s: refuse when `estimated_s` is above this [s]; the run itself is not cut short.
+        worst: find the worst lists that hold all tasks instead.
         threads: at most this many; does not change the result.
 
     Raises:
-        ProblemTooLargeError: as `optimum`.
+        ProblemTooLargeError: more than `MAX_TASKS` tasks, or the estimate is above ``limit_s``.
     """
-    return _solved(problem, _LIMIT_S, threads=threads, should_stop=should_stop)
-
-
-def worst_value(problem: Problem, limit_s: float = _LIMIT_S) -> float:
-    """J of the worst lists that hold all tasks; normalises objectives as the paper does.
-
-    Raises:
-        ProblemTooLargeError: as `optimum`.
-    """
-    solved = _solved(problem, limit_s, worst=True)
-    assert solved is not None  # noqa: S101 - nobody stops it
-    return solved.objective
-
-
-def _solved(
-    problem: Problem,
-    limit_s: float,
-    *,
-    worst: bool = False,
-    threads: int | None = None,
-    should_stop: Callable[[], bool] | None = None,
-) -> Optimum | None:
     estimate_s = estimated_s(problem)
     if estimate_s > limit_s:
         raise ProblemTooLargeError(
@@ -133,6 +111,11 @@ def _solved(
     if np.isnan(objective):
         return None
     return Optimum(objective, tuple(tuple(route) for route in routes))
+
+
+def worst_value(problem: Problem) -> float:
+    """J of the worst lists that hold all tasks; normalises objectives as the paper does."""
+    return optimum(problem, worst=True).objective
 
 
 def _most_tasks(problem: Problem) -> int:

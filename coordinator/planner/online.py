@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordinator.planner.options import ShouldStop, after_evaluations, first_of, never, part_of
-from coordinator.planner.order_search import search_sequence
 from coordinator.planner.plan import guided_plan
+from coordinator.planner.sequence_search import search_sequence
 from swarm.allocation.lower_level import TeamState, run
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem

@@ -22,8 +22,7 @@ from coordinator.planner.options import (
     never,
     part_of,
 )
-from coordinator.planner.order_search import search_sequence
-from coordinator.planner.sequence_search import EXHAUSTIVE_UAVS, SearchLimits
+from coordinator.planner.sequence_search import EXHAUSTIVE_UAVS, SearchLimits, search_sequence
 from swarm.allocation import RULE_NAMES, Rule, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule, team_arrays
@@ -52,11 +51,7 @@ Progress = Callable[[int, float], None]
 """Told the iterations spent and the best J to go so far [value·s]."""
 
 
-_ITERATIONS_PER_TASK = 400
-
-_FEWEST_ITERATIONS = 4_000
-
-_MOST_ITERATIONS = 300_000
+_ITERATIONS_PER_TASK, _FEWEST_ITERATIONS, _MOST_ITERATIONS = 400, 4_000, 300_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,25 +147,18 @@ def _sequence(
 
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""
-
 _PROOF_FRAC = 0.5
 """Of what a limit leaves, the most that such a proof takes."""
-
 _INSTEAD_OF_PROOF = 4_000
 """Iterations of ``guided`` where the proof of ``exact`` was stopped: some 20 ms."""
-
 _EXHAUSTIVE_DECISIONS = 3_000_000
 """Decisions all first rounds together may take to be tried one by one: some seconds."""
-
 _LOCAL_DECISIONS = 600_000
 """The same for the local search: a second or two."""
-
 _MODEST_ROUNDS = 60
 """First rounds of some UAVs that modest planning holds at once: those of small fleets."""
-
 _MODEST_EVALUATIONS = 200
 """Evaluations of a modest local search."""
-
 _LONG_LOOKAHEAD_WORK = 60_000
 """Evaluations × tasks² of lookahead where its tours are long: a few seconds."""
 
@@ -219,21 +207,11 @@ def make_plan(
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop
-    proven = _proven(problem, method, ends, threads)
+    search = _Search(problem, method, seed, stop, progress, threads, modest)
+    proven = search.proven()
     keeps = proven is None and bound_s is not None and bound_frac > 0.0
     search_ends = part_of(ends, 1.0 - bound_frac) if keeps else ends
-    routes, sequence, evaluations = _searched(
-        problem,
-        method,
-        proven,
-        search_ends,
-        seed=seed,
-        limited=stop is not None,
-        by_share=isinstance(stop, Limit),
-        progress=progress,
-        threads=threads,
-        modest=modest,
-    )
+    routes, sequence, evaluations = search.lists(proven, search_ends)
     objective, completion_s = evaluate(problem, routes)
     bound: float | None = None
     if proven is None and bound_s is not None:
@@ -257,56 +235,58 @@ def make_plan(
     )
 
 
-def _searched(
-    problem: Problem,
-    method: str | Rule,
-    proven: Optimum | None,
-    ends: ShouldStop,
-    *,
-    seed: int,
-    limited: bool,
-    by_share: bool,
-    progress: Progress | None,
-    threads: int | None,
-    modest: bool,
-) -> tuple[Sequence[Sequence[int]], tuple[int, ...] | None, int]:
-    """Lists, the sequence that leads to them if there is one, and the work spent; see `make_plan`.
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """What `make_plan` is asked for, but for a bound."""
 
-    Args:
-        problem: the mission.
-        method: one of `METHODS`, or a rule of the user's own.
-        proven: the optimum, where it is known.
-        ends: the limit of the search.
-        seed: of all that is drawn.
-        limited: whether the caller has set a limit.
-        by_share: whether that limit tells which share of it is spent.
-        progress: told how far the search is.
-        threads: at most so many.
-        modest: spend little on the search for a sequence.
-    """
-    if not isinstance(method, str):
-        order = tuple(range(problem.n_uav))
-        start = TeamState.at_start(problem)
-        return run(problem, start, rank_of(order), method, lambda: ends(0.0))[0], order, 1
-    if method == "exact" and proven is not None:
-        return proven.routes, None, 0
-    if method in ("exact", GuidedRule.name):
-        stop: ShouldStop | None = ends if limited else None
-        if method == "exact":
-            stop = after_evaluations(_INSTEAD_OF_PROOF)
-        guided = guided_plan(problem, seed=seed, stop=stop, progress=progress, threads=threads)
-        sequence = guided.sequence if method == GuidedRule.name else None
-        return guided.routes, sequence, guided.iterations
-    search = search_sequence(
-        problem,
-        rule_by_name(method),
-        np.random.default_rng(seed),
-        ends,
-        limits=_limits(problem, method, stopped=by_share, modest=modest),
-        progress=progress,
-        threads=threads,
-    )
-    return search.routes, search.sequence, search.evaluations
+    problem: Problem
+    method: str | Rule
+    seed: int
+    stop: ShouldStop | None
+    progress: Progress | None
+    threads: int | None
+    modest: bool
+
+    def proven(self) -> Optimum | None:
+        """The optimum where it is asked for or quickly proven; None otherwise, or if stopped."""
+        ends = never if self.stop is None else self.stop
+        if self.method != "exact":
+            if estimated_s(self.problem) > _PROOF_S:
+                return None
+            ends = part_of(ends, _PROOF_FRAC)
+        return optimum_before(self.problem, lambda: ends(0.0), threads=self.threads)
+
+    def lists(
+        self, proven: Optimum | None, ends: ShouldStop
+    ) -> tuple[Sequence[Sequence[int]], tuple[int, ...] | None, int]:
+        """Lists, the sequence that leads to them if there is one, and the work spent."""
+        problem, method, seed, threads = self.problem, self.method, self.seed, self.threads
+        if not isinstance(method, str):
+            order = tuple(range(problem.n_uav))
+            start = TeamState.at_start(problem)
+            return run(problem, start, rank_of(order), method, lambda: ends(0.0))[0], order, 1
+        if method == "exact" and proven is not None:
+            return proven.routes, None, 0
+        if method in ("exact", GuidedRule.name):
+            stop = None if self.stop is None else ends
+            if method == "exact":
+                stop = after_evaluations(_INSTEAD_OF_PROOF)
+            guided = guided_plan(
+                problem, seed=seed, stop=stop, progress=self.progress, threads=threads
+            )
+            sequence = guided.sequence if method == GuidedRule.name else None
+            return guided.routes, sequence, guided.iterations
+        stopped = isinstance(self.stop, Limit)
+        search = search_sequence(
+            problem,
+            rule_by_name(method),
+            np.random.default_rng(seed),
+            ends,
+            limits=_limits(problem, method, stopped=stopped, modest=self.modest),
+            progress=self.progress,
+            threads=threads,
+        )
+        return search.routes, search.sequence, search.evaluations
 
 
 def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[UavId, tuple[TaskId, ...]]:
@@ -314,18 +294,6 @@ def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[UavId, tup
         uav: tuple(problem.task_ids[task] for task in route)
         for uav, route in zip(problem.uav_ids, routes, strict=True)
     }
-
-
-def _proven(
-    problem: Problem, method: str | Rule, ends: ShouldStop, threads: int | None
-) -> Optimum | None:
-    """The optimum where it is asked for or quickly proven; None otherwise, or if stopped."""
-    if method == "exact":
-        return optimum_before(problem, lambda: ends(0.0), threads=threads)
-    if estimated_s(problem) > _PROOF_S:
-        return None
-    proof_ends = part_of(ends, _PROOF_FRAC)
-    return optimum_before(problem, lambda: proof_ends(0.0), threads=threads)
 
 
 def check_online_method(method: str) -> None:

@@ -10,9 +10,10 @@ results do not depend on how many there are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice, permutations
+from math import factorial
 
 import numpy as np
 
@@ -27,12 +28,20 @@ from coordinator.planner.sequence_space import (
     single_stage,
     twins,
 )
+from swarm.allocation import Rule, evaluate, rank_of, run
 from swarm.allocation.lower_level import CompiledRule, TeamState
 from swarm.allocation.problem import IntArray, Problem
 from swarm.kernels import lower_level as kernel
 from swarm.kernels.lower_level import EXACT_TASKS
 
-__all__ = ["EXHAUSTIVE_UAVS", "Progress", "SearchLimits", "SequenceSearch", "best_sequence"]
+__all__ = [
+    "EXHAUSTIVE_UAVS",
+    "Progress",
+    "SearchLimits",
+    "SequenceSearch",
+    "best_sequence",
+    "search_sequence",
+]
 
 
 EXHAUSTIVE_UAVS = 8
@@ -50,6 +59,9 @@ _THREAD_LOOKS = 100_000
 """Tasks looked at in about the time that starting threads takes."""
 _LOOKAHEAD_LOOKS = 1_000_000
 """A decision by lookahead over more tasks than it can solve exactly, in the same currency."""
+_MOST_ORDERS = 120
+"""All orders of five UAVs; of more UAVs so many are drawn for a rule that is not compiled, as each
+is flown decision by decision."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +95,56 @@ class SequenceSearch:
     """Lower-level runs spent; 0 if the first was stopped, whose last decisions then are greedy."""
     exhaustive: bool
     """No sequence gives a better objective."""
-    interrupted: bool = False
-    """Ctrl-C ended the search before its limits did."""
+
+
+def search_sequence(
+    problem: Problem,
+    rule: Rule,
+    rng: np.random.Generator,
+    should_stop: ShouldStop,
+    state: TeamState | None = None,
+    limits: SearchLimits | None = None,
+    *,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> SequenceSearch:
+    """The best sequence found for UAVs that decide by ``rule``; see `best_sequence`.
+
+    For a rule that is not compiled the orders tried are all of up to five active UAVs, and else the
+    problem's own and some drawn ones; the first is flown to its end, whatever ``should_stop`` says.
+    """
+    if isinstance(rule, CompiledRule):
+        return best_sequence(
+            problem, rule, rng, should_stop, state, limits, progress=progress, threads=threads
+        )
+    state = TeamState.at_start(problem) if state is None else state
+    active = tuple(int(uav) for uav in np.flatnonzero(state.active))
+    out = tuple(int(uav) for uav in np.flatnonzero(~state.active))
+    flown: list[tuple[float, tuple[int, ...], list[list[int]]]] = []
+    for order in _orders(active, rng):
+        if flown and should_stop(float(len(flown) + 1)):
+            break
+        routes, _ = run(problem, state, rank_of(order + out), rule)
+        flown.append((evaluate(problem, routes, state)[0], order + out, routes))
+        if progress is not None:
+            progress(len(flown), max(objective for objective, _, _ in flown))
+    objective, sequence, routes = max(flown, key=lambda each: each[0])
+    return SequenceSearch(
+        sequence=sequence,
+        routes=tuple(tuple(route) for route in routes),
+        objective=objective,
+        evaluations=len(flown),
+        exhaustive=factorial(len(active)) <= len(flown),
+    )
+
+
+def _orders(uavs: tuple[int, ...], rng: np.random.Generator) -> Iterator[tuple[int, ...]]:
+    if factorial(len(uavs)) <= _MOST_ORDERS:
+        yield from permutations(uavs)
+        return
+    yield uavs
+    for _ in range(_MOST_ORDERS - 1):
+        yield tuple(int(uav) for uav in rng.permutation(uavs))
 
 
 def best_sequence(
@@ -124,8 +184,8 @@ def best_sequence(
     except KeyboardInterrupt:
         if not search.evaluations:
             raise
-        return search.result(exhaustive=False, interrupted=True)
-    return search.result(exhaustive=exhaustive, interrupted=False)
+        return search.result(exhaustive=False)
+    return search.result(exhaustive=exhaustive)
 
 
 def _searched_all(search: _Search, rng: np.random.Generator, limits: SearchLimits) -> bool:
@@ -174,7 +234,7 @@ class _Search:
         self._cut = False
         """An evaluation was stopped under way."""
 
-    def result(self, *, exhaustive: bool, interrupted: bool) -> SequenceSearch:
+    def result(self, *, exhaustive: bool) -> SequenceSearch:
         objective, sequence = self._best
         return SequenceSearch(
             sequence + self._inactive,
@@ -182,7 +242,6 @@ class _Search:
             objective,
             self.evaluations,
             exhaustive,
-            interrupted,
         )
 
     def try_each(self, sequences: Iterable[Sequence]) -> bool:
@@ -347,11 +406,11 @@ class _Search:
             # of those that were stopped only the very first one, for want of any other
             candidates = range(whole if self.evaluations else 1)
             best = None
-            for run in candidates:
+            for number in candidates:
                 best_value, best_sequence_ = self._best
-                value, sequence = values[run], batch[run]
+                value, sequence = values[number], batch[number]
                 if value > best_value or (value == best_value and sequence < best_sequence_):
-                    self._best, best = (value, sequence), run
+                    self._best, best = (value, sequence), number
             if best is not None:
                 self._lists = runs.lists(best, self._problem.n_uav)
             results += zip(values[:whole], runs.tied[:whole].tolist(), strict=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from coordinator.dashboard.source import CommandRow, PlaybackState, RequestSink
 from coordinator.mission_view.mission_state import MissionState
@@ -20,7 +21,18 @@ FRAME_S = 0.1
 class RecordingPlayer:
     """A source that plays a recording, and the recording's controls."""
 
+    dropped: Mapping[str, int] = MappingProxyType({})
+    """None: nothing is heard."""
+    commands: tuple[CommandRow, ...] = ()
+    """None: what was ordered is in the story."""
+    orders: RequestSink | None = None
+    """Nobody flies here."""
+
     def __init__(self, playback: Playback, clock: Clock) -> None:
+        self.speedup = playback.recording.speedup
+        """Of the recorder's clock."""
+        self.duration_s = playback.duration_s
+        """Of the recording, in its own time."""
         self._playback = playback
         self._clock = clock
         self._advanced_s = clock.now_s()
@@ -43,29 +55,9 @@ class RecordingPlayer:
         """Whether the recorder's link was up."""
         return self.mission_state.cut_since_s is None
 
-    @property
-    def speedup(self) -> float:
-        """Of the recorder's clock."""
-        return self._playback.recording.speedup
-
     def now_s(self) -> float:
         """The moment that is shown."""
         return self._playback.now_s
-
-    @property
-    def dropped(self) -> Mapping[str, int]:
-        """None: nothing is heard."""
-        return {}
-
-    @property
-    def commands(self) -> tuple[CommandRow, ...]:
-        """None: what was ordered is in the story."""
-        return ()
-
-    @property
-    def orders(self) -> RequestSink | None:
-        """Nobody flies here."""
-        return None
 
     @property
     def player(self) -> RecordingPlayer:
@@ -73,11 +65,6 @@ class RecordingPlayer:
         return self
 
     # -- the controls -------------------------------------------------------------------
-
-    @property
-    def duration_s(self) -> float:
-        """Of the recording, in its own time."""
-        return self._playback.duration_s
 
     @property
     def state(self) -> PlaybackState:

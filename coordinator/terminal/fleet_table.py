@@ -24,17 +24,11 @@ __all__ = ["alerts", "fit_cells", "fleet_table", "table_width", "task_lists"]
 
 
 _DOES_CELLS = len(StatusPhase.PREPARING)
-
 _ETA_CELLS = 7
-
 _DONE_CELLS = 5
-
 _BATTERY_CELLS = 5
-
 _LONGEST_ID = 12
-
 _SHORTEST_NOTE = 10
-
 _GAP = 2
 """Columns between two tables side by side."""
 
@@ -217,25 +211,25 @@ def _joined(cells: Sequence[Text], width: int) -> Text:
 
 _MANY = 4
 """More names than that are counted instead of told."""
-
 _LABEL_CELLS = 7
 
 
 def alerts(scene: Scene, width: int, signs: Signs) -> list[Text]:
     """At most two lines of at most ``width`` cells: what is wrong, and the operator's words."""
-    lines = []
-    if trouble := _trouble(scene):
-        line = Text().append(f"{'wrong':<{_LABEL_CELLS}}", BAD)
-        text = clean(f" {signs.dot} ".join(trouble), ascii_only=not signs.braille)
-        lines.append(line.append(fit_cells(text, width - _LABEL_CELLS, signs).rstrip(), BAD))
+    trouble, said = f" {signs.dot} ".join(_trouble(scene)), f" {signs.dot} ".join(_said(scene))
+    parts = []
+    if trouble:
+        parts.append(("wrong", trouble, BAD, BAD))
     elif scene.dropped:
         text = f"nothing but {scene.dropped} dropped messages; see swarm status"
-        line = Text().append(f"{'wrong':<{_LABEL_CELLS}}", "dim")
-        lines.append(line.append(fit_cells(text, width - _LABEL_CELLS, signs).rstrip(), "dim"))
-    if said := _said(scene):
-        text = clean(f" {signs.dot} ".join(said), ascii_only=not signs.braille)
-        line = Text().append(f"{'orders':<{_LABEL_CELLS}}", "bold yellow")
-        lines.append(line.append(fit_cells(text, width - _LABEL_CELLS, signs).rstrip(), "yellow"))
+        parts.append(("wrong", text, "dim", "dim"))
+    if said:
+        parts.append(("orders", said, "bold yellow", "yellow"))
+    lines = []
+    for label, text, label_style, style in parts:
+        line = Text().append(f"{label:<{_LABEL_CELLS}}", label_style)
+        shown = clean(text, ascii_only=not signs.braille)
+        lines.append(line.append(fit_cells(shown, width - _LABEL_CELLS, signs).rstrip(), style))
     return lines
 
 

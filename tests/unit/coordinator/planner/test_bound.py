@@ -52,8 +52,7 @@ def test_it_is_closer_than_the_trivial_bound() -> None:
 
     bound = upper_bound(problem, plan.routes)
 
-    assert bound.method == "lagrangian"
-    assert bound.gap(plan.objective) < 0.06
+    assert 1.0 - plan.objective / bound.objective < 0.06
     assert 1.0 - plan.objective / trivial_bound(problem) > 0.15
 
 
@@ -68,8 +67,8 @@ def test_two_tasks_in_one_place_do_not_spoil_it() -> None:
 
         bound = upper_bound(problem, plan.routes)
 
-        assert bound.method == "lagrangian"
-        gaps.append(bound.gap(plan.objective))
+        assert bound.steps > 0
+        gaps.append(1.0 - plan.objective / bound.objective)
     assert gaps[1] < gaps[0] + 0.01
 
 
@@ -78,7 +77,6 @@ def test_told_to_stop_before_there_is_any_it_is_the_trivial_one() -> None:
 
     bound = upper_bound(problem, guided_plan(problem).routes, lambda _: True)
 
-    assert bound.method == "trivial"
     assert bound.objective == trivial_bound(problem)
 
 
