@@ -140,7 +140,6 @@ def observer_shell(
 
 FRAME_S = 0.2
 """Wall time between two pictures."""
-
 FOREVER_S = 1e9
 """As long as it takes."""
 

@@ -26,7 +26,6 @@ __all__ = ["PLOT_SUFFIXES", "PathStyle", "draw_plan", "path_styles", "plan_figur
 
 PLOT_SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of picture, named by the file's suffix."""
-
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 _DASHES: tuple[tuple[int, tuple[float, ...]], ...] = (
     (0, ()),

@@ -299,9 +299,7 @@ class StartGate:
 
 
 ALL_ENDED = "every task has ended"
-
 NOBODY_LEFT = "nobody is left who could go on"
-
 NOBODY_WILL = "nobody takes what is left"
 
 

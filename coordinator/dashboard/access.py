@@ -36,10 +36,8 @@ __all__ = [
 
 
 TOKEN_VARIABLE = "SWARM_DASHBOARD_TOKEN"  # noqa: S105 - a variable's name
-
 LEAST_TOKEN = 16
 """Characters of a token; fewer could be guessed."""
-
 _LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 
@@ -212,9 +210,7 @@ def url_of(host: str, port: int) -> str:
 
 
 OPTION = "--dashboard"
-
 _PLACE = re.compile(r"(?:(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/\[\]]+):)?(?P<port>\d{1,5})")
-
 TOKEN_FILE = "dashboard-token"  # noqa: S105 - a file's name
 
 

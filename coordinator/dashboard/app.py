@@ -52,7 +52,6 @@ END_S = 0.5
 """Wall time that those who look on have to hear that it is over."""
 _WRONG_TOKEN, _FULL, _GOING_AWAY = 4401, 1013, 1001
 _STATUS = {Refusal.WRONG: 400, Refusal.TOO_EARLY: 409}
-
 Said = TypeVar("Said")
 
 

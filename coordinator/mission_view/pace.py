@@ -10,7 +10,6 @@ __all__ = ["PacedClock", "SpeedupEstimator"]
 
 BASELINE_S = 0.8
 """Two words of one UAV that far apart tell the pace [s of the observer's clock]."""
-
 TOLERANCE = 1.25
 """Within this factor of 1 the two clocks run alike: what differs is the network's delay."""
 

@@ -23,7 +23,6 @@ __all__ = [
 
 
 _UAV_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-
 BAD = "bold red"
 """Style of losses and failures."""
 

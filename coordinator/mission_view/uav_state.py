@@ -16,7 +16,6 @@ __all__ = ["ABSENT", "LOST", "FleetStates", "UavState", "UavView"]
 
 
 Point = tuple[float, float, float]
-
 LOST = "lost"
 STARTING = "starting"
 ABSENT = "absent"

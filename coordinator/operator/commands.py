@@ -148,7 +148,6 @@ class RequestHandler(Generic[Wish, Statement]):
 
 
 _ON_THE_WAY_HOME = (StatusPhase.RETURNING, StatusPhase.HOME)
-
 _NOT_COMMANDED = "takes no part, and its vehicle is not commanded"
 
 

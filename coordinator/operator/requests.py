@@ -44,7 +44,6 @@ __all__ = ["OperatorClient", "OperatorRequest", "RequestTracker", "TrackedReques
 
 
 OperatorRequest = CommandRequest | StartRequest | NewTask | TaskWithdrawal
-
 OperatorStatement = OperatorCommand | StartWithout | TaskEdit
 
 

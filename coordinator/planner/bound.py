@@ -40,7 +40,6 @@ __all__ = ["Pricing", "UpperBound", "lagrangian_bound", "trivial_bound", "upper_
 
 Pricing = Callable[[TeamArrays, FloatArray], tuple[float, IntArray]]
 """Of lists; see `swarm.kernels.routes_bound.priced_lists`."""
-
 _GROUPS = 10
 _FIRST_STRIDE = 2.0
 _LAST_STRIDE = 0.1

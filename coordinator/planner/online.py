@@ -46,7 +46,6 @@ __all__ = [
 
 Lists = Mapping[str, tuple[str, ...]]
 """Task ids by UAV id, in order of execution."""
-
 _ITERATIONS_PER_TASK = 400
 _SEQUENCES = 200
 """Tried at most: UAVs under way decide in the order in which they become free, and a sequence

@@ -44,9 +44,7 @@ __all__ = [
 
 ONLINE_METHODS = (*RULE_NAMES, GuidedRule.name)
 """Those whose rule agents can follow by themselves."""
-
 METHODS = (*ONLINE_METHODS, "exact")
-
 Progress = Callable[[int, float], None]
 """Told the iterations spent and the best J to go so far [value·s]."""
 

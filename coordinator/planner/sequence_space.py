@@ -95,12 +95,9 @@ def perturbed(sequence: Sequence, rng: np.random.Generator) -> Sequence:
 
 FirstRound = tuple[int, ...]
 """Per active UAV in scenario order, the task it takes first, `_NO_TASK` or `_UNDECIDED`."""
-
 TaskSet = int
 """Tasks, a bit for each."""
-
 _NO_TASK = -1
-
 _UNDECIDED = -2
 
 

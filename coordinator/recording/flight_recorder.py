@@ -39,10 +39,8 @@ __all__ = [
 
 PERIOD_S = 1.0
 """Wall time between two writes."""
-
 MAX_WAITING = 50_000
 """Jobs that wait for a thread that does not keep up, as when a disk hangs; more are lost."""
-
 HUNG_S = 30.0
 """Wall time in which at the end something is written, or nothing more will be."""
 

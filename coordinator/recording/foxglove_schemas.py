@@ -34,7 +34,6 @@ Json = dict[str, Any]
 Point = tuple[float, float, float]
 Colour = tuple[float, float, float, float]
 """Red, green, blue and opacity within 0..1."""
-
 LOCATION_FIX: Final = "foxglove.LocationFix"
 SCENE_UPDATE: Final = "foxglove.SceneUpdate"
 LOG: Final = "foxglove.Log"

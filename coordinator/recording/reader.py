@@ -41,9 +41,7 @@ __all__ = ["FileRecords", "RecordedFact", "RecordedPlan", "Recording", "is_mcap"
 
 
 _HEAD: Final = struct.Struct("<BQ")
-
 _FOOTER: Final = struct.Struct("<BQQQI")
-
 _LARGEST_CHUNK: Final = 256 << 20
 """Bytes of a chunk that is unpacked; ours hold what is heard in about a second."""
 

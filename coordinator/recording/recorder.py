@@ -97,7 +97,6 @@ class RecordedCore(Generic[A]):
 
 METADATA: Final = "peckorder"
 """Name of the file's metadata."""
-
 PICTURE_S: Final = 0.5
 """Wall time between two pictures."""
 

@@ -26,7 +26,6 @@ Spot = tuple[float, float]
 
 
 _BRAILLE = 0x2800
-
 _BITS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 """Braille bit of a dot, by row and column inside its cell."""
 
@@ -116,16 +115,12 @@ def _cell(spot: Spot) -> tuple[int, int]:
 
 _CELL_ASPECT = 2.0
 """Height of a character cell over its width."""
-
 _MARGIN = 3
 """Columns kept free left and right of the outermost places, for names."""
-
 _ROOM_FOR_PATHS = 12
 """Cells per task from which on flown paths are drawn without a muddle."""
-
 _ROOM_FOR_PLANS = 30
 """Cells per task from which on planned paths are drawn as well."""
-
 _ROOM_PER_LETTER = 6
 """Cells per task and letter of its name from which on tasks are named."""
 
