@@ -21,7 +21,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["PLOT_SUFFIXES", "PathStyle", "draw_plan", "path_styles", "plan_figure"]
+    from swarm.allocation.problem import BoolArray, FloatArray
+
+__all__ = [
+    "PLOT_SUFFIXES",
+    "Label",
+    "PathStyle",
+    "draw_plan",
+    "path_styles",
+    "place_labels",
+    "plan_figure",
+]
 
 
 PLOT_SUFFIXES = (".png", ".svg", ".pdf")
@@ -79,7 +89,7 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     axes = figure.add_subplot()
     looks = dict(zip(plan.routes, path_styles(len(plan.routes)), strict=True))
     diameters = _diameters_points(mission)
-    _draw_paths(axes, mission, plan, looks, diameters)
+    _draw_paths(axes, mission, plan, looks)
     _draw_tasks(axes, mission, plan, looks, diameters)
     _draw_starts(axes, mission, looks)
     axes.set_aspect("equal", adjustable="box")
@@ -91,7 +101,7 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     axes.set_title(f"{plan.scenario}: lists by {plan.method}", loc="left", fontweight="bold")
     _draw_legend(figure, mission, plan, looks)
     figure.draw_without_rendering()  # settles the scale in which labels must not overlap
-    _draw_labels(axes, mission, plan, diameters)
+    _draw_labels(axes, mission, diameters)
     return figure
 
 
@@ -134,9 +144,7 @@ def _draw_paths(
     mission: Mission,
     plan: Plan,
     looks: Mapping[UavId, PathStyle],
-    diameters: Mapping[TaskId, float],
 ) -> None:
-    del diameters
     for points, look in _paths(mission, plan, looks):
         axes.plot(
             *points.T,
@@ -309,13 +317,8 @@ def _wrapped(head: str, names: Sequence[str], width: int = 36) -> str:
     return "\n".join(lines)
 
 
-def _draw_labels(
-    axes: Axes, mission: Mission, plan: Plan, diameters: Mapping[TaskId, float]
-) -> None:
+def _draw_labels(axes: Axes, mission: Mission, diameters: Mapping[TaskId, float]) -> None:
     """Name every place where its name hides nothing, as far as there is room."""
-    from coordinator.plot_labels import Label, place_labels
-
-    del plan
     labels = [
         Label(task.id, task.position_enu_m[:2], 0.5 * diameters[task.id], bold=False)
         for task in mission.tasks
@@ -324,3 +327,108 @@ def _draw_labels(
         name = ", ".join(uav.id for uav in uavs) if len(uavs) <= 3 else f"{len(uavs)} UAVs"
         labels.insert(0, Label(name, _middle_m(uavs), 6.0, bold=True))
     place_labels(axes, labels, _LABEL_POINTS if len(labels) <= 40 else _LABEL_POINTS - 1.5)
+
+
+_DIRECTIONS = tuple(
+    (float(np.cos(angle)), float(np.sin(angle)))
+    for angle in np.radians([0, 90, 180, 270, 45, 315, 135, 225, 22, 158, 202, 338])
+)
+_GAPS_POINTS = (1.5, 5.0, 10.0, 17.0)
+_LABEL_COST, _MARKER_COST, _LINE_COST, _OUTSIDE_COST = 100.0, 40.0, 3.0, 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A name to write near a point."""
+
+    text: str
+    point_m: tuple[float, float]
+    """Where the point is, in the axes' data [m]."""
+    radius_points: float
+    """How far its marker reaches [points]."""
+    bold: bool
+
+
+def place_labels(axes: Axes, labels: Sequence[Label], size_points: float) -> list[FloatArray]:
+    """Write ``labels`` on ``axes``, whose layout must be settled and whose lines must be drawn.
+
+    Each tries a ring of places around its point, nearest first, and takes the one that hides least
+    of other names and of the map.
+
+    Returns:
+        Per label, the box it takes as (left, bottom, right, top) [pixels].
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.patheffects import withStroke
+
+    figure = axes.get_figure(root=True)
+    if figure is None or not labels:
+        return []
+    FigureCanvasAgg(figure)  # measures text in the pixels of a picture
+    pixels = figure.dpi / 72.0
+    points = axes.transData.transform([label.point_m for label in labels])
+    reach = np.array([label.radius_points for label in labels])[:, None] * pixels
+    markers = np.hstack([points - reach, points + reach])
+    trail = _trail(axes)
+    frame = np.array(axes.get_window_extent().extents)
+    placed: list[FloatArray] = []
+    for label, point, marker_reach in zip(labels, points, reach[:, 0], strict=True):
+        text = axes.annotate(
+            label.text,
+            label.point_m,
+            xytext=(0.0, 0.0),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=size_points,
+            fontweight="bold" if label.bold else "normal",
+            color="#1a1a1a",
+            zorder=6,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
+        )
+        extent = text.get_window_extent()
+        half = np.array([extent.width, extent.height]) / 2.0
+        best_cost, best_offset, best_box = np.inf, np.zeros(2), np.zeros(4)
+        for gap in _GAPS_POINTS:
+            for direction in _DIRECTIONS:
+                # the box touches a circle around the point from outside
+                offset = np.array(direction) * (marker_reach + gap * pixels + half)
+                box = np.concatenate([point + offset - half, point + offset + half])
+                cost = 0.4 * gap + _cost(box, placed, markers, trail, frame)
+                if cost < best_cost:
+                    best_cost, best_offset, best_box = cost, offset, box
+        text.set_position(tuple(best_offset / pixels))
+        placed.append(best_box)
+    return placed
+
+
+def _cost(
+    box: FloatArray,
+    placed: Sequence[FloatArray],
+    markers: FloatArray,
+    trail: FloatArray,
+    frame: FloatArray,
+) -> float:
+    cost = _MARKER_COST * float(_overlaps(box, markers).sum())
+    if placed:
+        cost += _LABEL_COST * float(_overlaps(box, np.array(placed)).sum())
+    if (box[:2] < frame[:2]).any() or (box[2:] > frame[2:]).any():
+        cost += _OUTSIDE_COST
+    inside = (trail >= box[:2]).all(axis=1) & (trail <= box[2:]).all(axis=1)
+    return cost + _LINE_COST * min(5.0, float(inside.sum()) / 4.0)
+
+
+def _overlaps(box: FloatArray, others: FloatArray) -> BoolArray:
+    reaches = (box[:2] < others[:, 2:]) & (box[2:] > others[:, :2])
+    return np.logical_and(reaches[:, 0], reaches[:, 1])
+
+
+def _trail(axes: Axes) -> FloatArray:
+    """Points every few pixels along all lines [pixels]."""
+    parts = [np.empty((0, 2))]
+    for line in axes.get_lines():
+        corners = axes.transData.transform(np.column_stack(line.get_data()))
+        for begin, end in pairwise(corners):
+            steps = max(2, int(np.hypot(*(end - begin)) / 3.0))
+            parts.append(begin + np.linspace(0.0, 1.0, steps)[:, None] * (end - begin))
+    return np.concatenate(parts)

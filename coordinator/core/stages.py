@@ -28,6 +28,7 @@ from coordinator.core.lifecycle import (
     StopPlanning,
 )
 from coordinator.core.publication import RegisterAnnouncer, exit_status, last_epoch
+from coordinator.mission_view.wording import listed
 from coordinator.planner.online import EpochPolicy, Situation, complete_lists, objective_to_go
 from swarm.model import Mission
 from swarm.protocol.board import TaskBoard
@@ -400,7 +401,7 @@ class ReplanPolicy:
             "appeared": tasks - tasks_before,
             "withdrawn": now.withdrawn - before.withdrawn,
         }
-        reasons = [f"{_some(sorted(ids))} {what}" for what, ids in changes.items() if ids]
+        reasons = [f"{listed(sorted(ids), 3)} {what}" for what, ids in changes.items() if ids]
         if now.failures > before.failures:
             reasons.append("an attempt failed")
         if self._lateness_frac(now) > DRIFT_FRAC:
@@ -419,7 +420,3 @@ class ReplanPolicy:
             if task in self._expected_s
         ]
         return float(np.mean(late_s)) / left_s if late_s else 0.0
-
-
-def _some(ids: list[str]) -> str:
-    return ", ".join(ids) if len(ids) <= 3 else f"{', '.join(ids[:3])} and {len(ids) - 3} more"

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Generic, TypeVar
 
 from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.wording import listed
 from swarm.model.ids import COORDINATOR, FLEET
 from swarm.protocol.events import CommonEvent, SnapshotsReceived
 from swarm.protocol.messages import (
@@ -269,8 +270,7 @@ def _in_short(texts: Mapping[str, str]) -> str:
         same.setdefault(text.removeprefix(uav), []).append(uav)
     parts = []
     for told, uavs in same.items():
-        more = f" and {len(uavs) - 3} more" if len(uavs) > 3 else ""
-        each = f"{', '.join(uavs[:3])}{more}: each{told}"
+        each = f"{listed(uavs, 3)}: each{told}"
         parts.append(texts[uavs[0]] if len(uavs) == 1 else each)
     return "; ".join(parts)
 

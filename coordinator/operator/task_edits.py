@@ -15,6 +15,7 @@ from typing import Final
 
 from coordinator.core.publication import task_entry_of
 from coordinator.mission_view.mission_state import MissionState
+from coordinator.mission_view.wording import listed
 from coordinator.operator.commands import RequestHandler, RequestResult, RequestVerdict
 from swarm.model import Origin
 from swarm.model.frames import enu_from_wgs84
@@ -171,7 +172,8 @@ class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
         entry, state = entries.get(wish.task), self._mission_state.board.states.get(wish.task)
         if entry is None:
             return RequestVerdict(
-                RequestResult.UNKNOWN_TASK, f"the board holds {_some(list(board))}"
+                RequestResult.UNKNOWN_TASK,
+                f"the board holds {listed(sorted(board), 12) or 'no task'}",
             )
         if state in (TaskState.DONE, TaskState.WITHDRAWN):
             return RequestVerdict.bad(f"{wish.task} is {state} already")
@@ -362,10 +364,3 @@ def next_id(taken: set[str]) -> str:
 def _require(what: str, number: float, least: float, most: float) -> None:
     if not least <= number <= most:
         raise ValueError(f"{what} must be within {least:g}..{most:g}, not {number:g}")
-
-
-def _some(ids: list[str]) -> str:
-    if not ids:
-        return "no task"
-    shown = sorted(ids)
-    return ", ".join(shown[:12]) + (f" and {len(shown) - 12} more" if len(shown) > 12 else "")

@@ -100,7 +100,7 @@ def search_sequence(
     problem: Problem,
     rule: Rule,
     rng: np.random.Generator,
-    should_stop: ShouldStop,
+    should_stop: ShouldStop = never,
     state: TeamState | None = None,
     limits: SearchLimits | None = None,
     *,

@@ -5,27 +5,30 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
 
-from coordinator.mission_view.presentation import signs_for
+from coordinator.mission_view.presentation import BAD, Signs, signs_for, story_style
 from coordinator.mission_view.results import (
     MissionResult,
     ProtectionSummary,
     ReportFact,
+    RouteComparison,
+    RouteStop,
     compare_quantities,
     compare_routes,
     deviations,
     summary_line,
 )
-from coordinator.mission_view.story import MissionEvent
+from coordinator.mission_view.story import MissionEvent, notable
 from coordinator.mission_view.wording import clean, shown_s, shown_value
 from coordinator.planner.plan_report import plan_as_json
-from coordinator.terminal.report_text import report_text
 from swarm.model import Mission, Plan, UavId
 from swarm.runtime.errors import Fault, InputError
 
@@ -38,6 +41,11 @@ _LISTS_KEY = (
     "Each task @ its completion in s of mission time; `+` flown though not planned for this "
     "UAV, `(…)` planned for it but not flown by it, `!` after the horizon."
 )
+_ROWS = 16
+"""UAVs whose lists are shown."""
+_STORY_LINES = 12
+_IDS = 10
+"""Ids shown of one fact."""
 _HINT = "More: --report FILE.md has the whole story; --json is for programs."
 
 
@@ -120,18 +128,26 @@ class MissionReport:
         return "\n\n".join(part for part in parts if part) + "\n"
 
     def render(self, console: Console) -> None:
-        """Print the report for people, in the width of ``console``."""
-        signs = signs_for(console.options.ascii_only)
-        text = report_text(
-            self.mission,
-            self.plan,
-            self.result,
-            self.story,
-            notes=self.notes(),
-            hint=self.hint,
-            signs=signs,
-        )
-        console.print(text, highlight=False, markup=False)
+        """Print the report for people, in the width of ``console``, from 80 columns on."""
+        mission, plan, result = self.mission, self.plan, self.result
+        ascii_only = console.options.ascii_only
+        signs = signs_for(ascii_only)
+        style = "bold green" if result.is_complete else BAD
+        parts: list[RenderableType] = [
+            Text.assemble((f"{mission.name}: ", "bold"), (self.verdict, style))
+        ]
+        if plan is not None:
+            order = "" if plan.sequence is None else f": {_order(plan.sequence, signs)}"
+            parts.append(Text(f"planned by {plan.method}{order}", "dim"))
+        parts += ["", _lists(compare_routes(mission, plan, result), plan is not None, signs)]
+        parts += ["", _worth_table(plan, result, signs)]
+        if notes := self.notes():
+            parts += ["", _notes_table(notes, ascii_only)]
+        if told := notable(self.story):
+            parts += ["", _story_table(told, ascii_only)]
+        if self.hint:
+            parts += ["", Text(self.hint, "dim")]
+        console.print(Group(*parts), highlight=False, markup=False)
 
     def notes(self) -> list[ReportFact]:
         """What went otherwise than planned, how long it took, and what became of processes."""
@@ -156,8 +172,11 @@ class MissionReport:
         return found
 
     def _lines(self) -> list[str]:
-        head = [] if self.plan is None else [_plan_line(self.plan)]
-        return [*head, *(f"{fact.name}: {fact.shown()}" for fact in self.notes())]
+        lines = [f"{fact.name}: {fact.shown()}" for fact in self.notes()]
+        if (plan := self.plan) is not None:
+            order = "" if plan.sequence is None else f", sequence {' > '.join(plan.sequence)}"
+            lines.insert(0, f"planned by {plan.method}{order}, seed {plan.seed}")
+        return lines
 
     def _worth_as_markdown(self) -> str:
         rows = ["| | flown | planned | flown / planned | optimum | flown / optimum |"]
@@ -246,11 +265,6 @@ def _no_plan(mission: Mission) -> dict[str, object]:
     }
 
 
-def _plan_line(plan: Plan) -> str:
-    order = "" if plan.sequence is None else f", sequence {' > '.join(plan.sequence)}"
-    return f"planned by {plan.method}{order}, seed {plan.seed}"
-
-
 def _finite(value: Any) -> Any:
     """``value`` with null for every number JSON has no form for."""
     if isinstance(value, dict):
@@ -267,3 +281,103 @@ def _code(text: str) -> str:
 def _escaped(text: str) -> str:
     """``text`` without anything that Markdown would obey."""
     return "".join(f"\\{sign}" if sign in "\\`*_[]<>|#" else sign for sign in text)
+
+
+def _order(sequence: Sequence[str], signs: Signs) -> str:
+    shown = " > ".join(sequence[:_IDS])
+    return shown if len(sequence) <= _IDS else f"{shown} > {signs.cut}"
+
+
+def _lists(compared: Sequence[RouteComparison], planned: bool, signs: Signs) -> RenderableType:
+    """One row per UAV that kept to its plan, two where the lists differ."""
+    shown = list(compared)
+    if len(shown) > _ROWS:
+        shown = [each for each in compared if not each.same][:_ROWS]
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("UAV", no_wrap=True)
+    table.add_column("list", no_wrap=True)
+    table.add_column(Text("each task @ its completion in s"))
+    for each in shown:
+        name = Text(each.uav, BAD if each.lost else "bold")
+        if each.lost:
+            name.append(" lost")
+        flown = _stops(each.flown, planned=False, compared=planned and not each.same, signs=signs)
+        if each.same or not planned:
+            said = Text("as planned", "green") if each.same else Text("flown")
+            table.add_row(name, said, flown)
+            continue
+        table.add_row(name, Text("planned"), _stops(each.planned, True, True, signs))
+        table.add_row(Text(), Text("flown", "yellow"), flown)
+    below = []
+    if any(stop.odd for each in shown for stop in (*each.planned, *each.flown)) and planned:
+        below.append("+ flown but planned for another   ( ) planned but flown by another or nobody")
+    if any(stop.late for each in shown for stop in (*each.planned, *each.flown)):
+        below.append("! after the horizon: counts against J")
+    hidden = [each for each in compared if each not in shown]
+    if hidden:
+        same = sum(each.same for each in hidden)
+        other = len(hidden) - same
+        counts = [f"{same} more as planned"] if same else []
+        counts += [f"{other} more that differ"] if other else []
+        below.append(f"{signs.cut} and {', '.join(counts)}")
+    return Group(table, *(Text(line, "dim") for line in below))
+
+
+def _stops(stops: Sequence[RouteStop], planned: bool, compared: bool, signs: Signs) -> Text:
+    if not stops:
+        return Text(signs.nothing, "dim")
+    text = Text()
+    for number, stop in enumerate(stops):
+        odd = stop.odd and compared
+        style = BAD if stop.late else "yellow" if odd else ""
+        shown = stop if odd == stop.odd else RouteStop(stop.task, stop.time_s, stop.late, odd=False)
+        text.append(" " if number else "")
+        text.append(shown.shown(planned=planned), style)
+    return text
+
+
+def _worth_table(plan: Plan | None, result: MissionResult, signs: Signs) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("", no_wrap=True, style="bold")
+    table.add_column("flown", justify="right", no_wrap=True)
+    if plan is not None:
+        for heading in ("planned", "of planned"):
+            table.add_column(heading, justify="right", no_wrap=True)
+        if plan.optimum is not None:
+            for heading in ("optimum", "of optimum"):
+                table.add_column(heading, justify="right", no_wrap=True)
+    for each in compare_quantities(plan, result):
+        show = shown_s if each.unit == "s" else shown_value
+        unit = each.unit.replace("·", signs.product)
+        cells = [Text(f"{each.name} [{unit}]"), Text(show(each.flown))]
+        for other in (each.planned, each.optimum):
+            cells.append(Text("" if other is None else show(other)))
+            cells.append(Text(_share(each.flown, other)))
+        table.add_row(*cells[: len(table.columns)])
+    return table
+
+
+def _share(flown: float, other: float | None) -> str:
+    return f"{100.0 * flown / other:.2f} %" if other is not None and other > 0.0 else ""
+
+
+def _notes_table(notes: Sequence[ReportFact], ascii_only: bool) -> Table:
+    table = Table.grid(padding=(0, 2, 0, 0))
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for note in notes:
+        text = clean(note.shown(_IDS), ascii_only=ascii_only)
+        style = BAD if note.bad else ""
+        table.add_row(Text(note.name, style or "bold"), Text(text, style))
+    return table
+
+
+def _story_table(told: Sequence[MissionEvent], ascii_only: bool) -> RenderableType:
+    table = Table.grid(padding=(0, 2, 0, 0))
+    table.add_column(justify="right", no_wrap=True)
+    table.add_column()
+    for line in told[-_STORY_LINES:]:
+        text = clean(line.text, ascii_only=ascii_only)
+        table.add_row(Text(line.told_at), Text(text, story_style(line)))
+    earlier = len(told) - _STORY_LINES
+    return Group(Text(f"{earlier} earlier lines", "dim"), table) if earlier > 0 else table

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import make_plan
-from coordinator.plot import draw_plan, path_styles, plan_figure
-from coordinator.plot_labels import Label, place_labels
+from coordinator.plot import Label, draw_plan, path_styles, place_labels, plan_figure
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
 from swarm.runtime.clock import SystemClock
 from tests.support.problems import table_1_mission

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coordinator.planner.order_search import search_sequence
 from coordinator.planner.plan import METHODS, ONLINE_METHODS, make_plan
+from coordinator.planner.sequence_search import search_sequence
 from swarm.allocation import TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.allocation.index_rules import INDEX_RULES, NEAREST, VALUE_PER_TIME
 from swarm.allocation.rules import kernel_rule
