@@ -205,7 +205,7 @@ def make_plan(
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop
-    search = _Search(problem, method, seed, stop, progress, threads, modest)
+    search = _PlanRequest(problem, method, seed, stop, progress, threads, modest)
     proven = search.proven()
     keeps = proven is None and bound_s is not None and bound_frac > 0.0
     search_ends = part_of(ends, 1.0 - bound_frac) if keeps else ends
@@ -234,7 +234,7 @@ def make_plan(
 
 
 @dataclass(frozen=True, slots=True)
-class _Search:
+class _PlanRequest:
     """What `make_plan` is asked for, but for a bound."""
 
     problem: Problem
