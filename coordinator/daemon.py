@@ -47,7 +47,6 @@ __all__ = ["CoordinatorProcess", "run_coordinator"]
 
 
 MissionPlanner = Callable[[Mission, str, int, ShouldStop], Plan]
-"""Plans a mission by method and seed, until told to stop."""
 T = TypeVar("T")
 
 
@@ -220,7 +219,6 @@ class CoordinatorProcess:
     answer_s: float
     """How long a question waits for the slowest answer [wall s]."""
     store: Store | None
-    """Where it keeps what its next life needs."""
     seal: Seal | None
     """Tells whose word of what it kept still counts; None without keys."""
 

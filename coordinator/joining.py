@@ -141,7 +141,6 @@ def observer_shell(
 FRAME_S = 0.2
 """Wall time between two pictures."""
 FOREVER_S = 1e9
-"""As long as it takes."""
 
 
 class MissionDisplay(Protocol):
@@ -187,48 +186,32 @@ async def watch(
     try:
         shows.wait(f"waiting for {'a mission' if mission is None else f'mission {mission}'}")
         name = mission or config.mission or await only_mission(bus, limit_s)
-        await _watch_until_deserted(name, bus, timing, clock, shows, limit_s)
+        observer = MissionObserver(name, timing, None)
+        mission_state = observer.mission_state
+        shell = observer_shell(observer, bus, clock, name, "status")
+        looking = asyncio.get_running_loop().create_task(shell.run())
+        give_up_at_s = clock.now_s() + limit_s * clock.speedup
+        deserted_at_s = math.inf
+        try:
+            while True:
+                now_s = clock.now_s()
+                if observer.known:
+                    shows.update(mission_state, now_s)
+                elif now_s >= give_up_at_s:
+                    raise SwarmError(observer.lack)
+                else:
+                    shows.wait(f"waiting for mission {name}: {observer.lack.partition(': ')[2]}")
+                # Tokens may come a little later than what others know.
+                left = deserted(mission_state)
+                deserted_at_s = min(deserted_at_s, now_s) if left else math.inf
+                if now_s - deserted_at_s >= timing.relink_grace_s:
+                    return
+                await asyncio.wait({looking}, timeout=FRAME_S)
+                if looking.done() and looking.result() is not None:  # it ends only by a fault
+                    return
+        finally:
+            looking.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await looking
     finally:
         bus.close()
-
-
-async def _watch_until_deserted(
-    mission: str,
-    bus: Bus,
-    timing: Timing,
-    clock: ScaledClock,
-    shows: MissionDisplay,
-    limit_s: float,
-) -> None:
-    observer = MissionObserver(mission, timing, None)
-    mission_state = observer.mission_state
-    shell = observer_shell(observer, bus, clock, mission, "status")
-    looking = asyncio.get_running_loop().create_task(shell.run())
-    give_up_at_s = clock.now_s() + limit_s * clock.speedup
-    deserted_at_s = math.inf
-    try:
-        while True:
-            now_s = clock.now_s()
-            if observer.known:
-                shows.update(mission_state, now_s)
-            elif now_s >= give_up_at_s:
-                raise SwarmError(observer.lack)
-            else:
-                shows.wait(f"waiting for mission {mission}: {observer.lack.partition(': ')[2]}")
-            # Tokens may come a little later than what others know.
-            left = deserted(mission_state)
-            deserted_at_s = min(deserted_at_s, now_s) if left else math.inf
-            if now_s - deserted_at_s >= timing.relink_grace_s:
-                return
-            if await _ends(looking, FRAME_S):
-                return
-    finally:
-        looking.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await looking
-
-
-async def _ends(looking: asyncio.Task[int], within_s: float) -> bool:
-    """Whether the shell ends in that time, which it does only by a fault; raises that."""
-    await asyncio.wait({looking}, timeout=within_s)
-    return looking.done() and looking.result() is not None

@@ -56,7 +56,6 @@ class LeadershipBid:
 
     stage: LeadershipStage
     term: int
-    """Its incarnation."""
 
     @classmethod
     def of(cls, answer: Snapshot) -> LeadershipBid:

@@ -201,17 +201,16 @@ class StandbyCore:
             if not self._saw_coordinator:
                 self._saw_coordinator = True
                 self._actions.append(LogLine("stands by for the coordinator"))
-        elif self._due_at_s is not None and self._due_at_s <= now_s and self._is_informed:
-            if self._last_question:
-                self._take_over(now_s)
-            else:
-                self._state_query.want(now_s, before_deciding=True)
-                self._last_question = True
-
-    @property
-    def _is_informed(self) -> bool:
-        """Whether what it misses is missing, rather than the own link."""
-        return self._linked and not self._state_query.unsure
+            return
+        if not self._linked or self._state_query.unsure:  # what it misses may be its own link
+            return
+        if self._due_at_s is None or self._due_at_s > now_s:
+            return
+        if self._last_question:
+            self._take_over(now_s)
+        else:
+            self._state_query.want(now_s, before_deciding=True)
+            self._last_question = True
 
     def _take_over(self, now_s: float) -> None:
         others = self._membership.present

@@ -55,7 +55,7 @@ class AccessRules:
     def knows_host(self, host: str | None) -> bool:
         """Whether the header ``Host`` names this server."""
         name = _name_of(host or "")
-        return name in self.names or (self.any_address and _is_address(name))
+        return name in self.names or (self.any_address and _address(name) is not None)
 
     def same_origin(self, origin: str | None, host: str | None) -> bool:
         """Whether a request comes from a page of this server, or from no page at all."""
@@ -114,12 +114,8 @@ def access_for(host: str, allowed: Sequence[str], token: str | None) -> tuple[Ac
 
 def is_loopback(host: str) -> bool:
     """Whether only this machine reaches a server at ``host``."""
-    if host.lower() == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return False
+    address = _address(host)
+    return host.lower() == "localhost" or (address is not None and address.is_loopback)
 
 
 def read_token(file: Path | None, environment: Mapping[str, str]) -> str | None:
@@ -161,12 +157,11 @@ def _name_of(host: str) -> str:
     return host.partition(":")[0].lower()
 
 
-def _is_address(name: str) -> bool:
+def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     try:
-        ipaddress.ip_address(name.strip("[]"))
+        return ipaddress.ip_address(host.strip("[]"))
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def _bracketed(host: str) -> str:

@@ -36,7 +36,7 @@ from coordinator.dashboard.page_input import (
 from coordinator.dashboard.source import DashboardSource, Refusal, RefusedError
 from swarm.runtime.clock import Clock, SystemClock
 
-__all__ = ["STATIC", "Dashboard", "create_app"]
+__all__ = ["STATIC", "Dashboard"]
 
 
 STATIC = Path(__file__).parent / "static"
@@ -64,20 +64,30 @@ class _HttpError(Exception):
 
 
 class Dashboard:
-    """The endpoints of one dashboard; ``hub`` is to be told when it ends."""
+    """The dashboard of ``source``; serve its ``app``, and tell its ``hub`` when it ends.
+
+    Args:
+        source: what is shown and commanded.
+        access: who may look and command.
+        display: what the page is told of itself; plain when None.
+        clock: by which the pace of requests is judged; the machine's when None.
+        static: folder with the page.
+    """
 
     def __init__(
         self,
         source: DashboardSource,
         access: AccessRules,
-        display: PageSettings,
-        clock: Clock,
-        static: Path,
+        display: PageSettings | None = None,
+        *,
+        clock: Clock | None = None,
+        static: Path = STATIC,
     ) -> None:
+        display = display or PageSettings(token=access.token is not None)
         self.hub = Hub(Feed(source, display))
         self._source = source
         self._access = access
-        self._clock = clock
+        self._clock = clock or SystemClock()
         self._static = static
         self._pace = RateLimit()
         self._strangers = 0
@@ -249,27 +259,6 @@ class Dashboard:
         return {}
 
 
-def create_app(
-    source: DashboardSource,
-    access: AccessRules,
-    display: PageSettings | None = None,
-    *,
-    clock: Clock | None = None,
-    static: Path = STATIC,
-) -> Dashboard:
-    """The dashboard of ``source``; serve its ``app``.
-
-    Args:
-        source: what is shown and commanded.
-        access: who may look and command.
-        display: what the page is told of itself; plain when None.
-        clock: by which the pace of requests is judged; the machine's when None.
-        static: folder with the page.
-    """
-    shown = display or PageSettings(token=access.token is not None)
-    return Dashboard(source, access, shown, clock or SystemClock(), static)
-
-
 class _Guard:
     """Turns away who asks for another host or from another page, and marks what is answered."""
 
@@ -290,7 +279,10 @@ class _Guard:
             await self._app(scope, receive, send)
             return
         headers = dict(scope["headers"])
-        host, origin = (_text(headers.get(name)) for name in (b"host", b"origin"))
+        host, origin = (
+            None if (header := headers.get(name)) is None else header.decode("latin-1")
+            for name in (b"host", b"origin")
+        )
         reads = scope["type"] == "http" and scope["method"] in ("GET", "HEAD")
         if not self._access.knows_host(host):
             refusal = _refuse(403, "this server has another name; see --allow-host")
@@ -349,10 +341,6 @@ def _bearer(request: Request) -> str | None:
 def _refuse(status: int, text: str) -> Response:
     headers = {"www-authenticate": "Bearer"} if status == 401 else None
     return JSONResponse({"error": text}, status_code=status, headers=headers)
-
-
-def _text(header: bytes | None) -> str | None:
-    return None if header is None else header.decode("latin-1")
 
 
 async def _send(socket: WebSocket, text: str) -> None:

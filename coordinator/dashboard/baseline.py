@@ -31,7 +31,6 @@ class Baseline:
     bound: float | None = None
     """No lists of those tasks have a larger J [value·s]; None as long as it is not known."""
     sought: bool = False
-    """Whether somebody is looking for the bound, or has."""
 
     def work_out(self, should_stop: ShouldStop) -> float:
         """The bound; takes a while, on one thread."""

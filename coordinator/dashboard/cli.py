@@ -110,7 +110,7 @@ def dashboard(
 
     from coordinator.dashboard.access import access_for, read_token, url_of
     from coordinator.dashboard.access import listen as take_port
-    from coordinator.dashboard.app import create_app
+    from coordinator.dashboard.app import Dashboard
     from coordinator.dashboard.live_mission import LiveMission
     from coordinator.dashboard.server import serving
     from coordinator.joining import check_mission
@@ -157,7 +157,7 @@ def dashboard(
     )
 
     async def work() -> int:
-        served = create_app(source, access, display)
+        served = Dashboard(source, access, display)
         async with serving(served.app, taken):
             SERVICE_NOTIFIER.ready(f"shows {mission or 'any mission'} at {url}")
             try:

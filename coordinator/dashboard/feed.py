@@ -14,7 +14,7 @@ from itertools import takewhile
 import swarm
 from coordinator.dashboard.baseline import Baseline, baseline_of
 from coordinator.dashboard.rows import AppendOnlyTable, RowTable, as_text
-from coordinator.dashboard.source import CommandRow, DashboardSource
+from coordinator.dashboard.source import DashboardSource
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import Progress, progress_of
 from coordinator.mission_view.scene import TAKEN, task_stands
@@ -43,9 +43,7 @@ class PageSettings:
     """What the page is told of itself."""
 
     token: bool = False
-    """Whether it needs a token."""
     tiles: str | None = None
-    """URL of map tiles."""
     tiles_credit: str = ""
 
 
@@ -60,7 +58,6 @@ class Feed:
         self.mission: str | None = None
         """The ``mission`` message; None while there is none."""
         self.mission_seq = 0
-        """As of which look."""
         self._whole_since = 1
         """Who has seen nothing since that look is told everything."""
         self._mission_state: MissionState | None = None
@@ -154,7 +151,9 @@ class Feed:
         self._frames.clear()
         now_s = self._source.now_s()
         for given in list(self._source.commands)[-_COMMANDS:]:
-            self._commands.put(given.n, _command_row(given), self.seq)
+            row: dict[str, object] = {"n": given.n, "text": clean(given.text)}
+            row |= {"state": given.state, "result": clean(given.result)}
+            self._commands.put(given.n, row, self.seq)
         mission_state = self._source.mission_state
         brief = None if mission_state is None else mission_state.replica.brief
         if mission_state is not self._mission_state or brief is not self._brief:
@@ -382,10 +381,6 @@ def _choice_row(n: int, uav: str, choice: Choice) -> dict[str, object]:
         "completion_s": _rounded(choice.completion_s, 3),
         "candidates": [{"task": each.task, "score": each.score} for each in choice.candidates],
     }
-
-
-def _command_row(row: CommandRow) -> dict[str, object]:
-    return {"n": row.n, "text": clean(row.text), "state": row.state, "result": clean(row.result)}
 
 
 def _point(place: tuple[float, float, float] | None) -> list[float] | None:

@@ -48,11 +48,9 @@ class LiveMission:
         may_order: bool = True,
     ) -> None:
         self.speedup = speedup
-        """Of the clock."""
         self.orders = self if may_order else None
         """Takes orders; None where the keys are no operator's."""
         self.player: PlaybackControl | None = None
-        """There is none: this is no recording."""
         self._mission = mission
         self._open_bus = open_bus
         self._network = network

@@ -26,20 +26,6 @@ from swarm.protocol.messages import MissionConfig, MissionPhase
 __all__ = ["Metrics"]
 
 
-class Metrics:
-    """The metrics of one dashboard."""
-
-    def __init__(self, source: DashboardSource, hub: Hub) -> None:
-        self._registry = CollectorRegistry(auto_describe=False)
-        self._registry.register(_Mission(source, hub))
-        ProcessCollector(registry=self._registry)
-
-    def page(self, accept: str) -> tuple[bytes, str]:
-        """What to answer, and its content type, to somebody who accepts that."""
-        encode, content_type = choose_encoder(accept)
-        return encode(self._registry), content_type
-
-
 Samples = Iterable[tuple[Sequence[str], float]]
 """Values of labels, and of the metric."""
 
@@ -58,12 +44,20 @@ def _filled(family: GaugeMetricFamily | CounterMetricFamily, samples: Samples) -
     return family
 
 
-class _Mission(Collector):
-    """Reads what is known of the mission when asked."""
+class Metrics(Collector):
+    """The metrics of one dashboard: read, when asked, from what is known and who looks on."""
 
     def __init__(self, source: DashboardSource, hub: Hub) -> None:
         self._source = source
         self._hub = hub
+        self._registry = CollectorRegistry(auto_describe=False)
+        self._registry.register(self)
+        ProcessCollector(registry=self._registry)
+
+    def page(self, accept: str) -> tuple[bytes, str]:
+        """What to answer, and its content type, to somebody who accepts that."""
+        encode, content_type = choose_encoder(accept)
+        return encode(self._registry), content_type
 
     def collect(self) -> Iterator[Metric]:
         """All metrics, as they are now."""

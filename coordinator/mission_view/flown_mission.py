@@ -30,7 +30,6 @@ class FlownMission:
         self._added_s: dict[str, float] = {}
         """By task that the operator has added: when that was heard [s mission time]."""
         self._problem: Problem | None = None
-        """Of the mission, as far as it has been wanted."""
 
     @property
     def mission(self) -> Mission:

@@ -60,7 +60,6 @@ class MissionResult:
     added: tuple[TaskId, ...] = ()
     """Tasks that the operator has added to the scenario's, whatever became of them."""
     done_by: Mapping[TaskId, UavId] = field(default_factory=dict)
-    """Who was the first to do each task."""
 
     @property
     def is_complete(self) -> bool:
@@ -331,9 +330,7 @@ class ProtectionSummary:
     """Of a run with keys."""
 
     measures: tuple[str, ...]
-    """What was on, in words."""
     lacking: tuple[str, ...] = ()
-    """What was not, and why."""
     refused: Mapping[str, int] = field(default_factory=dict)
     """Messages and MAVLink frames refused by the UAVs and the observer, by reason."""
 

@@ -72,7 +72,6 @@ class Scene:
     """For how long the own link to the bus has been down [s of the observer's clock]; that the
     bus ends when everybody has left is no loss."""
     coordinator: bool
-    """Whether it is there."""
     others: tuple[str, ...]
     """Who else is there under a name that is no UAV's."""
     commands: tuple[OperatorCommand, ...]

@@ -74,9 +74,7 @@ class MissionEvent:
     detail: str = ""
     """What an explanation adds to the end of the text."""
     uavs: frozenset[str] = frozenset()
-    """Whom it concerns."""
     tasks: frozenset[str] = frozenset()
-    """Which tasks it concerns."""
 
     @property
     def sentence(self) -> str:

@@ -158,9 +158,7 @@ class CommandRequest:
 
     kind: CommandKind
     target: str = FLEET
-    """Id of a UAV, or the name that stands for the fleet."""
     reason: str = ""
-    """Why, in the operator's words."""
 
     def __str__(self) -> str:
         return self.kind.value if self.target == FLEET else f"{self.kind} {self.target}"
@@ -286,9 +284,7 @@ class StartRequest:
     """Start the mission without one UAV."""
 
     target: str
-    """Its id."""
     reason: str = ""
-    """Why, in the operator's words."""
 
     def __str__(self) -> str:
         return f"start without {self.target}"

@@ -63,7 +63,6 @@ class TrackedRequest:
         """What has come of it; None as long as that is open."""
         self.leave_at_s = math.inf
         self.again_at_s = math.inf
-        """When to repeat it."""
         self.ask_at_s = math.inf
 
     @property

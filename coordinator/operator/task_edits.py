@@ -81,7 +81,6 @@ class NewTask:
     service_s: float = 0.0
     kind: str | None = None
     reason: str = ""
-    """Why, in the operator's words."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.place, Wgs84):
@@ -104,7 +103,6 @@ class TaskWithdrawal:
 
     task: str
     reason: str = ""
-    """Why, in the operator's words."""
 
     def __str__(self) -> str:
         return f"withdraw task {self.task}"

@@ -301,13 +301,8 @@ def _ended_by_lists(
             state.place_enu_m[uav] = problem.task_enu_m[task]
             state.survived[uav] *= problem.survival[uav, task]
             state.open[task] = False
-    rest = guided_plan(problem, stop=_at_once, state=state, lists=_by_index(problem, routes))
+    rest = guided_plan(problem, stop=lambda _: True, state=state, lists=_by_index(problem, routes))
     return [[*route, *more] for route, more in zip(begun, rest.routes, strict=True)]
-
-
-def _at_once(evaluations: float) -> bool:
-    del evaluations
-    return True
 
 
 def _visited(

@@ -218,6 +218,9 @@ class _Search:
         self._problem = problem
         self._rule = rule
         self._state = state
+        self._n_open = int(np.count_nonzero(state.open))
+        self._takes_long = rule.code == kernel.LOOKAHEAD and self._n_open > EXACT_TASKS
+        """Whether a single decision takes some milliseconds."""
         self._should_stop = should_stop
         self._progress = progress
         self._threads = kernel.default_threads() if threads is None else threads
@@ -361,7 +364,8 @@ class _Search:
         if not self.plain:
             return [row.tobytes() for row in ranks]
         self._looked_up += len(sequences) * min(len(self.uavs), self._problem.n_task)
-        looks = len(ranks) * len(self.uavs) * self._looks_per_decision()
+        each = _LOOKAHEAD_LOOKS if self._takes_long else self._n_open
+        looks = len(ranks) * len(self.uavs) * each
         threads = self._threads if looks > _THREAD_LOOKS else 1
         tasks = kernel.first_rounds(
             self._problem.kernel, self._state, ranks, self._rule.code, threads, self._is_over
@@ -421,21 +425,10 @@ class _Search:
 
     def _chunk(self) -> int:
         """Evaluations to do between two questions whether to stop."""
-        n_open = int(np.count_nonzero(self._state.open))
-        looks = n_open * (n_open / 2 + 100.0) + 1.0
+        looks = self._n_open * (self._n_open / 2 + 100.0) + 1.0
         if self._takes_long:
-            looks += n_open * _LOOKAHEAD_LOOKS
+            looks += self._n_open * _LOOKAHEAD_LOOKS
         return int(min(max(_CHUNK_LOOKS / looks, 1.0), 512.0)) * self._threads
-
-    def _looks_per_decision(self) -> int:
-        n_open = int(np.count_nonzero(self._state.open))
-        return _LOOKAHEAD_LOOKS if self._takes_long else n_open
-
-    @property
-    def _takes_long(self) -> bool:
-        """Whether a single decision takes some milliseconds."""
-        n_open = int(np.count_nonzero(self._state.open))
-        return self._rule.code == kernel.LOOKAHEAD and n_open > EXACT_TASKS
 
     def _allowed(self, count: int) -> int:
         """How many of the next ``count`` evaluations may be spent; the first one always."""

@@ -248,7 +248,7 @@ def _play(playback: Playback, port: int, *, json: bool, browser: bool) -> int:
     from json import dumps
 
     from coordinator.dashboard.access import access_for, listen, url_of
-    from coordinator.dashboard.app import create_app
+    from coordinator.dashboard.app import Dashboard
     from coordinator.dashboard.server import serving
     from coordinator.recording.player import RecordingPlayer
     from swarm.runtime.clock import SystemClock
@@ -266,7 +266,7 @@ def _play(playback: Playback, port: int, *, json: bool, browser: bool) -> int:
 
     async def work() -> int:
         player = RecordingPlayer(playback, SystemClock())
-        served = create_app(player, access)
+        served = Dashboard(player, access)
         async with serving(served.app, taken):
             try:
                 await served.beside(player.run())

@@ -40,13 +40,11 @@ class Explanation:
     id: str
     events: tuple[MissionEvent, ...]
     state: str
-    """How it stands in the end."""
     worth: float
     """What it adds to J [value·s]."""
     objective: float
     """J of all that was done [value·s]."""
     ending: str
-    """The same in a sentence."""
 
     def render(self, console: Console) -> None:
         """Print it for people, in the width of ``console``."""

@@ -198,7 +198,6 @@ FOXGLOVE_SCHEMAS: Final[Mapping[str, bytes]] = {
         LOG: _LOG,
     }.items()
 }
-"""JSON schemas by name."""
 
 # -- messages ----------------------------------------------------------------------------
 

@@ -89,7 +89,6 @@ class GrowingMcap:
         self._data_end = len(self._begun)
         """Where the next chunk goes."""
         self._size = 0
-        """Of the file."""
         self._index = bytearray()
         """The chunk indexes so far."""
         self._chunks = 0

@@ -99,10 +99,12 @@ class Playback:
         if t_s >= self.duration_s:
             now_s = max(now_s, self.recording.end_s)
         heard = bisect_right(self._times_s, now_s)
-        if heard < self._played.heard or now_s < self._now_s:
-            self._go_back(heard)
-        elif (kept := self._kept_before(heard)) and kept[0] > self._played.heard:
+        goes_back = heard < self._played.heard or now_s < self._now_s
+        kept = self._kept_before(heard)
+        if kept is not None and (goes_back or kept[0] > self._played.heard):
             self._restore(*kept)
+        elif goes_back:
+            self._played = self._fresh()
         self._hear(heard)
         self._now_s = now_s
 
@@ -135,13 +137,6 @@ class Playback:
         """The last picture after no more than that many entries."""
         place = bisect_right(self._kept, heard, key=lambda kept: kept[0])
         return self._kept[place - 1] if place else None
-
-    def _go_back(self, heard: int) -> None:
-        kept = self._kept_before(heard)
-        if kept is None:
-            self._played = self._fresh()
-        else:
-            self._restore(*kept)
 
     def _restore(self, heard: int, packed: bytes) -> None:
         self._played = pickle.loads(zlib.decompress(packed))  # noqa: S301 - made by `_keep`

@@ -30,9 +30,7 @@ class RecordingPlayer:
 
     def __init__(self, playback: Playback, clock: Clock) -> None:
         self.speedup = playback.recording.speedup
-        """Of the recorder's clock."""
         self.duration_s = playback.duration_s
-        """Of the recording, in its own time."""
         self._playback = playback
         self._clock = clock
         self._advanced_s = clock.now_s()

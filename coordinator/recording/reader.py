@@ -206,7 +206,6 @@ class Recording:
 
     path: Path
     mission: str
-    """Name of the mission."""
     scenario: str
     """What was flown, as the one who recorded called it; may be empty."""
     speedup: float
@@ -214,9 +213,7 @@ class Recording:
     timing: Timing
     """Of the recording core [s of its clock]."""
     virtual: bool
-    """Whether it was flown in virtual time."""
     version: str
-    """Of the program that recorded."""
     start_s: float
     """When the core began, by its clock [s]."""
     entries: Sequence[RecordedFact]

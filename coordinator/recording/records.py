@@ -239,7 +239,6 @@ _SHAPES: Final[Mapping[str, Any]] = {
     **{f"peckorder.{name}": shape for name, shape in _SAID.items()},
 }
 SCHEMAS: Final = tuple(_SHAPES)
-"""Names of all schemas of facts."""
 
 
 def body_name(body: Body) -> str:

@@ -56,11 +56,8 @@ class _ColumnWidths:
     def total(self) -> int:
         """All columns, without room for notes."""
         battery = _BATTERY_CELLS if self.battery else 0
-        return self._before_task + self.task + _ETA_CELLS + _DONE_CELLS + battery
-
-    @property
-    def _before_task(self) -> int:
-        return 2 + self.id + 1 + _DOES_CELLS + 1
+        before_task = 2 + self.id + 1 + _DOES_CELLS + 1
+        return before_task + self.task + _ETA_CELLS + _DONE_CELLS + battery
 
 
 def table_width(scene: Scene) -> int:
@@ -91,7 +88,10 @@ def fleet_table(scene: Scene, width: int, height: int, signs: Signs) -> list[Tex
         cells = [_row(uav, columns, block_width, signs) for uav in shown[row::rows]]
         lines.append(_joined(cells, block_width))
     if hidden:
-        lines.append(Text(fit_cells(_hidden(hidden, signs), width, signs), "dim"))
+        counts = Counter(uav.does for uav in hidden).most_common()
+        text = f"{signs.cut} and {len(hidden)} more: "
+        text += ", ".join(f"{number} {does}" for does, number in counts)
+        lines.append(Text(fit_cells(text, width, signs), "dim"))
     return lines[:height]
 
 
@@ -193,11 +193,6 @@ def _urgency(uav: UavView) -> int:
     return 2 if uav.busy else 3
 
 
-def _hidden(uavs: Sequence[UavView], signs: Signs) -> str:
-    counts = Counter(uav.does for uav in uavs).most_common()
-    return f"{signs.cut} and {len(uavs)} more: " + ", ".join(f"{n} {does}" for does, n in counts)
-
-
 def _joined(cells: Sequence[Text], width: int) -> Text:
     line = Text(no_wrap=True, end="")
     for number, cell in enumerate(cells):
@@ -244,7 +239,7 @@ def _trouble(scene: Scene) -> list[str]:
     out = [uav.id for uav in scene.uavs if uav.does == StatusPhase.OUT]
     silent = [f"{uav.id} {uav.silent_s:.0f} s" for uav in scene.uavs if uav.silent_s is not None]
     parts += [
-        f"{what} {_named(names)}"
+        f"{what} {', '.join(names) if len(names) <= _MANY else f'{len(names)} UAVs'}"
         for what, names in (("lost", lost), ("out", out), ("silent", silent))
         if names
     ]
@@ -258,7 +253,3 @@ def _said(scene: Scene) -> list[str]:
     lasting = [command for command in scene.commands if command.kind is not CommandKind.RESUME]
     ordered = sorted(lasting, key=lambda command: command.target != FLEET)
     return [command_in_words(command) for command in ordered]
-
-
-def _named(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= _MANY else f"{len(names)} UAVs"

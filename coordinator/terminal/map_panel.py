@@ -150,7 +150,7 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
     # Names of UAVs come first, and the UAVs themselves over everything.
     for uav in scene.uavs:
         canvas.put(view.spot(uav.place_enu_m), *_uav_look(uav, signs))
-    for uav in _by_urgency(scene):
+    for uav in sorted(scene.uavs, key=lambda uav: not uav.troubled):
         style = _uav_look(uav, signs)[1]
         canvas.name(view.spot(uav.place_enu_m), (uav.id, uav.short), style)
     longest = max((len(task.id) for task in tasks), default=0)
@@ -201,11 +201,12 @@ def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
     for uav in scene.uavs:
         if room < _ROOM_FOR_PLANS or uav.troubled:
             continue
+        faint = f"dim {uav_colour(uav.number)}"
         ahead = [task for task in uav.planned if task != uav.task and task in places]
         begin = places.get(uav.task, uav.place_enu_m) if uav.task else uav.place_enu_m
         stops = [begin, *(places[task] for task in ahead)]
         for first, last in pairwise(stops):
-            canvas.line(view.spot(first), view.spot(last), _faint(uav), every=4)
+            canvas.line(view.spot(first), view.spot(last), faint, every=4)
     for uav in scene.uavs:
         if room >= _ROOM_FOR_PATHS:
             stops = [uav.start_enu_m, *(places[task] for task in uav.flown if task in places)]
@@ -216,10 +217,6 @@ def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
         if uav.task is not None and uav.task in places:
             target = view.spot(places[uav.task])
             canvas.line(view.spot(uav.place_enu_m), target, uav_colour(uav.number), every=2)
-
-
-def _faint(uav: UavView) -> str:
-    return f"dim {uav_colour(uav.number)}"
 
 
 def _weight(task: TaskView) -> int:
@@ -240,10 +237,6 @@ def _uav_look(uav: UavView, signs: Signs) -> tuple[str, str]:
     if uav.troubled:
         return signs.uav_lost, BAD
     return signs.uav, f"bold {uav_colour(uav.number)}"
-
-
-def _by_urgency(scene: Scene) -> list[UavView]:
-    return sorted(scene.uavs, key=lambda uav: not uav.troubled)
 
 
 def _framed(lines: list[Text], columns: int, m_per_column: float, signs: Signs) -> list[Text]:

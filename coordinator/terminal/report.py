@@ -36,7 +36,6 @@ __all__ = ["REPORT_SUFFIXES", "MissionReport", "check_report_path", "write_repor
 
 
 REPORT_SUFFIXES = (".json", ".md")
-"""Kinds of report file."""
 _LISTS_KEY = (
     "Each task @ its completion in s of mission time; `+` flown though not planned for this "
     "UAV, `(…)` planned for it but not flown by it, `!` after the horizon."
@@ -137,7 +136,9 @@ class MissionReport:
             Text.assemble((f"{mission.name}: ", "bold"), (self.verdict, style))
         ]
         if plan is not None:
-            order = "" if plan.sequence is None else f": {_order(plan.sequence, signs)}"
+            sequence = list(plan.sequence or ())
+            shown = sequence[:_IDS] + [signs.cut] * (len(sequence) > _IDS)
+            order = "" if plan.sequence is None else f": {' > '.join(shown)}"
             parts.append(Text(f"planned by {plan.method}{order}", "dim"))
         parts += ["", _lists(compare_routes(mission, plan, result), plan is not None, signs)]
         parts += ["", _worth_table(plan, result, signs)]
@@ -283,11 +284,6 @@ def _escaped(text: str) -> str:
     return "".join(f"\\{sign}" if sign in "\\`*_[]<>|#" else sign for sign in text)
 
 
-def _order(sequence: Sequence[str], signs: Signs) -> str:
-    shown = " > ".join(sequence[:_IDS])
-    return shown if len(sequence) <= _IDS else f"{shown} > {signs.cut}"
-
-
 def _lists(compared: Sequence[RouteComparison], planned: bool, signs: Signs) -> RenderableType:
     """One row per UAV that kept to its plan, two where the lists differ."""
     shown = list(compared)
@@ -352,13 +348,10 @@ def _worth_table(plan: Plan | None, result: MissionResult, signs: Signs) -> Tabl
         cells = [Text(f"{each.name} [{unit}]"), Text(show(each.flown))]
         for other in (each.planned, each.optimum):
             cells.append(Text("" if other is None else show(other)))
-            cells.append(Text(_share(each.flown, other)))
+            share = "" if other is None or other <= 0.0 else f"{100.0 * each.flown / other:.2f} %"
+            cells.append(Text(share))
         table.add_row(*cells[: len(table.columns)])
     return table
-
-
-def _share(flown: float, other: float | None) -> str:
-    return f"{100.0 * flown / other:.2f} %" if other is not None and other > 0.0 else ""
 
 
 def _notes_table(notes: Sequence[ReportFact], ascii_only: bool) -> Table:

@@ -14,7 +14,7 @@ from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
 from coordinator.dashboard.access import AccessRules
-from coordinator.dashboard.app import create_app
+from coordinator.dashboard.app import Dashboard
 from coordinator.dashboard.feed import PageSettings
 from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit
 from swarm.protocol.uav_messages import StatusPhase
@@ -67,7 +67,7 @@ def client(play: DeskPlay, static: Path, token: str | None = None) -> TestClient
     (static / "app.js").write_text("// script")
     access = AccessRules(NAMES, any_address=False, token=token)
     display = PageSettings(token is not None, "https://{s}.tiles.example/{z}/{x}/{y}.png", "them")
-    made = create_app(play, access, display, clock=StillClock(), static=static)
+    made = Dashboard(play, access, display, clock=StillClock(), static=static)
     return TestClient(made.app)
 
 
@@ -113,7 +113,7 @@ def test_the_feed_begins_whole_and_goes_on_with_changes(page: TestClient, play: 
 
 def test_whoever_looks_on_is_told_of_the_end(play: DeskPlay, tmp_path: Path) -> None:
     (tmp_path / "index.html").touch()
-    made = create_app(play, AccessRules(NAMES, any_address=False, token=None), static=tmp_path)
+    made = Dashboard(play, AccessRules(NAMES, any_address=False, token=None), static=tmp_path)
     with (
         TestClient(made.app) as opened,
         opened.websocket_connect("/feed") as socket,
@@ -140,7 +140,7 @@ def test_a_fault_of_the_feed_ends_what_is_done_beside_it(tmp_path: Path) -> None
     async def nothing() -> None:
         await asyncio.Event().wait()
 
-    made = create_app(
+    made = Dashboard(
         BrokenPlay(), AccessRules(NAMES, any_address=False, token=None), static=tmp_path
     )
     with TestClient(made.app) as opened:
