@@ -298,7 +298,7 @@ class CoordinatorCore:
         if self._announcer.observe([*found.theirs, *overheard]):
             self._actions += self._announcer.restate()
         self._predecessors.succeeded()
-        for entry in self._announcer.tasks.merged(found.posts):
+        for entry in self._announcer.merged(found.posts):
             self._actions.append(self._announcer.say(entry))
         if any(snapshot.writer == COORDINATOR for snapshot in snapshots):
             self._announcer.hurry(now_s)

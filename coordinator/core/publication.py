@@ -33,7 +33,6 @@ from swarm.protocol.timing import Timing
 __all__ = [
     "FlightLayers",
     "RegisterAnnouncer",
-    "TaskReleaser",
     "exit_status",
     "height_warning",
     "last_epoch",
@@ -146,46 +145,6 @@ def scenario_differences(mission: Mission, layers: FlightLayers, replica: Replic
     return found
 
 
-class TaskReleaser:
-    """The tasks of one scenario on the board of one mission."""
-
-    def __init__(self, mission: Mission, replica: Replica) -> None:
-        self._mission = mission
-        self._replica = replica
-        self._numbers = {task.id: number for number, task in enumerate(mission.tasks)}
-
-    @property
-    def more_to_come(self) -> bool:
-        """Whether tasks have yet to appear."""
-        return bool(unreleased_tasks(self._replica, self._mission))
-
-    def due(self, zero_s: float | None, now_s: float) -> list[TaskEntry]:
-        """Entries to post by now; before the start, what has been there all along."""
-        return [
-            task_entry_of(task, self._numbers[task.id])
-            for task in unreleased_tasks(self._replica, self._mission)
-            # The same sum as the deadline's: another may round to just before it.
-            if task.appears_s == 0.0 or (zero_s is not None and zero_s + task.appears_s <= now_s)
-        ]
-
-    def merged(self, theirs: Iterable[Message]) -> list[TaskEntry]:
-        """What another coordinator of the mission has posted or withdrawn, and this one has not."""
-        entries = []
-        for message in theirs:
-            if isinstance(entry := message.body, TaskEntry):
-                known = self._replica.posted.get(entry.task)
-                if known is None or (entry.withdrawn and not known.withdrawn):
-                    entries.append(entry)
-        return entries
-
-    def next_deadline_s(self, zero_s: float) -> float | None:
-        """When the next task is due in a mission that began at ``zero_s``."""
-        times_s = (
-            zero_s + task.appears_s for task in unreleased_tasks(self._replica, self._mission)
-        )
-        return min(times_s, default=None)
-
-
 def exit_status(board: TaskBoard, mission: Mission) -> int:
     """0 if every task of ``mission`` has appeared and was done or withdrawn, else 1."""
     done = all(s in (TaskState.DONE, TaskState.WITHDRAWN) for s in board.states.values())
@@ -218,7 +177,6 @@ class RegisterAnnouncer:
     ) -> None:
         self.zero_s: float | None = None
         """When mission time was 0; None while it has not begun, and if it ends without."""
-        self.tasks = TaskReleaser(mission, replica)
         self._mission = mission
         self._layers = layers
         self._register_writer = RegisterWriter(mission.name, COORDINATOR, incarnation)
@@ -253,13 +211,33 @@ class RegisterAnnouncer:
         return [self.say(mission_config_of(self._mission, self._layers, self.incarnation))]
 
     def post(self, now_s: float) -> list[Publish | LogLine]:
-        """Put on the board what is due by now."""
+        """Put on the board what is due by now; before the start, what has been there all along."""
         actions: list[Publish | LogLine] = []
-        for entry in self.tasks.due(self.zero_s, now_s):
-            actions.append(self.say(entry))
+        unreleased = {task.id for task in unreleased_tasks(self._replica, self._mission)}
+        for number, task in enumerate(self._mission.tasks):
+            # The same sum as the deadline's: another may round to just before it.
+            due = self.zero_s is not None and self.zero_s + task.appears_s <= now_s
+            if task.id not in unreleased or not (due or task.appears_s == 0.0):
+                continue
+            actions.append(self.say(task_entry_of(task, number)))
             if self.zero_s is not None:
-                actions.append(LogLine("pop-up posted", {"task": entry.task}))
+                actions.append(LogLine("pop-up posted", {"task": task.id}))
         return actions
+
+    @property
+    def more_to_come(self) -> bool:
+        """Whether tasks have yet to appear."""
+        return bool(unreleased_tasks(self._replica, self._mission))
+
+    def merged(self, theirs: Iterable[Message]) -> list[TaskEntry]:
+        """What another coordinator of the mission has posted or withdrawn, and this one has not."""
+        entries = []
+        for message in theirs:
+            if isinstance(entry := message.body, TaskEntry):
+                known = self._replica.posted.get(entry.task)
+                if known is None or (entry.withdrawn and not known.withdrawn):
+                    entries.append(entry)
+        return entries
 
     def withdraw(self, task: str) -> list[Publish]:
         """Take ``task`` off the board, if it was posted and is not off already."""
@@ -340,7 +318,10 @@ class RegisterAnnouncer:
 
     def next_release_s(self) -> float | None:
         """When the next task appears in a mission that has begun."""
-        return None if self.zero_s is None else self.tasks.next_deadline_s(self.zero_s)
+        if self.zero_s is None:
+            return None
+        tasks = unreleased_tasks(self._replica, self._mission)
+        return min((self.zero_s + task.appears_s for task in tasks), default=None)
 
 
 def _register(body: Body) -> tuple[type[Body], str | None]:

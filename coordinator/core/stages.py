@@ -154,7 +154,7 @@ class StagedMission:
             actions += self._start_if_ready(now_s)
         if self.stage is MissionStage.RUNNING:
             actions += self._announcer.post(now_s)
-            more_to_come = self._announcer.tasks.more_to_come
+            more_to_come = self._announcer.more_to_come
             reason = self.end_condition.reason(now_s, more_to_come=more_to_come)
             if reason is not None:
                 actions += self.end(reason, now_s)

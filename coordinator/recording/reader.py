@@ -206,14 +206,11 @@ class Recording:
 
     path: Path
     mission: str
-    scenario: str
-    """What was flown, as the one who recorded called it; may be empty."""
     speedup: float
     """Seconds of the recording core's clock per wall second."""
     timing: Timing
     """Of the recording core [s of its clock]."""
     virtual: bool
-    version: str
     start_s: float
     """When the core began, by its clock [s]."""
     entries: Sequence[RecordedFact]
@@ -294,13 +291,13 @@ def _about(path: Path, told: dict[str, str] | None) -> dict[str, Any]:
         speedup = float(told["speedup"])
         if not (valid_id(told["mission"]) and 0.0 < speedup < float("inf")):
             raise ValueError
+        if not {"scenario", "version"} <= told.keys():
+            raise ValueError
         return {
             "mission": told["mission"],
-            "scenario": told["scenario"],
             "speedup": speedup,
             "timing": timing,
             "virtual": told["clock"] == "virtual",
-            "version": told["version"],
         }
     except (KeyError, ValueError, ValidationError, RecursionError):
         problem = "has metadata that no recording has"

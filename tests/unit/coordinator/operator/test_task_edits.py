@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coordinator.core.lifecycle import Withdraw
-from coordinator.core.publication import TaskReleaser, mission_config_of, scenario_differences
+from coordinator.core.publication import RegisterAnnouncer, mission_config_of, scenario_differences
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.events import LinkChanged, PeerSeen, Publish
 from swarm.protocol.messages import (
@@ -17,6 +17,7 @@ from swarm.protocol.messages import (
     TaskEntry,
 )
 from swarm.protocol.registers import Replica
+from swarm.protocol.timing import Timing
 from tests.support.builders import (
     MISSION,
     done,
@@ -125,7 +126,7 @@ def test_what_another_coordinator_posted_is_kept_whatever_the_operator_says_of_i
     replica = Replica()
     replica.join(message(COORDINATOR, mission_config_of(mission([U0], [T0]), LAYERS, 1)))
     replica.join(message(OPERATOR, order("popup", withdrawn=True)))
-    postings = TaskReleaser(mission([U0], [T0, POPUP]), replica)
+    postings = RegisterAnnouncer(mission([U0], [T0, POPUP]), LAYERS, 1, replica, Timing())
     theirs = [message(COORDINATOR, entry("popup"), 5)]
 
     assert postings.merged(theirs) == [entry("popup")]
