@@ -145,7 +145,11 @@ def _draw_paths(
     plan: Plan,
     looks: Mapping[UavId, PathStyle],
 ) -> None:
-    for points, look in _paths(mission, plan, looks):
+    places_m = {task.id: task.position_enu_m[:2] for task in mission.tasks}
+    for uav in mission.uavs:
+        look = looks[uav.id]
+        route = (places_m[task] for task in plan.routes[uav.id])
+        points = np.array([uav.position_enu_m[:2], *route])
         axes.plot(
             *points.T,
             color=look.colour,
@@ -171,19 +175,6 @@ def _draw_paths(
                 },
                 zorder=3,
             )
-
-
-def _paths(
-    mission: Mission, plan: Plan, looks: Mapping[UavId, PathStyle]
-) -> list[tuple[np.ndarray, PathStyle]]:
-    tasks = {task.id: task.position_enu_m[:2] for task in mission.tasks}
-    return [
-        (
-            np.array([uav.position_enu_m[:2], *(tasks[task] for task in plan.routes[uav.id])]),
-            looks[uav.id],
-        )
-        for uav in mission.uavs
-    ]
 
 
 def _draw_tasks(

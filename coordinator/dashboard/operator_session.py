@@ -182,11 +182,8 @@ class OperatorSession:
             case MessageReceived(message):
                 return self._is_later(message, known)
             case SnapshotsReceived(snapshots):
-                return any(
-                    self._is_later(message, known)
-                    for snapshot in snapshots
-                    for message in snapshot.messages
-                )
+                told = (message for snapshot in snapshots for message in snapshot.messages)
+                return any(self._is_later(message, known) for message in told)
             case _:
                 return False
 

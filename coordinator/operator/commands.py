@@ -185,18 +185,13 @@ class CommandHandler(RequestHandler[CommandRequest, OperatorCommand]):
         del now_s  # it is as good later
         stamp, command = self._mission_state.replica.commands[self._wish.target]
         if stamp != said.stamp:
-            text = f"another operator has said {command.kind} meanwhile"
-            return RequestVerdict.bad(text)
-        found = [self._effect(uav) for uav in self.concerned]
-        if any(effect is None for effect in found):
-            if not late:
-                return None
-            open_still = zip(self.concerned, found, strict=True)
-            texts = [self._unseen(uav) for uav, effect in open_still if effect is None]
-            return RequestVerdict.bad("; ".join(texts))
-        effects = [effect for effect in found if effect is not None]
-        obeyed = all(effect.result is RequestResult.OBEYED for effect in effects)
-        text = _in_short({u: e.text for u, e in zip(self.concerned, effects, strict=True)})
+            return RequestVerdict.bad(f"another operator has said {command.kind} meanwhile")
+        found = {uav: self._effect(uav) for uav in self.concerned}
+        if open_still := [uav for uav, effect in found.items() if effect is None]:
+            return RequestVerdict.bad("; ".join(map(self._unseen, open_still))) if late else None
+        effects = {uav: effect for uav, effect in found.items() if effect is not None}
+        obeyed = all(effect.result is RequestResult.OBEYED for effect in effects.values())
+        text = _in_short({uav: effect.text for uav, effect in effects.items()})
         return RequestVerdict.good(text) if obeyed else RequestVerdict.bad(text)
 
     @property
