@@ -66,14 +66,8 @@ async def run_coordinator(
 ) -> int:
     """Coordinate ``mission``, or stand by for it, until it has ended and all agents have left.
 
-    Args:
-        core: decides; one that stands by says nothing before it takes the seat.
-        mission: the scenario.
-        bus: open; closed by whoever opened it.
-        clock: gives ``now_s``.
-        make_plan: plans a mission by method and seed; told to stop once nobody waits for the plan.
-        save: keeps what the core knows for its next life.
-        answer_s: how long a question waits for the slowest answer [wall s].
+    ``save`` keeps what the core knows for its next life. A question waits ``answer_s`` for the
+    slowest answer [wall s]. Whoever opened ``bus`` closes it.
 
     Returns:
         Exit status: 0 when every task was done, 1 otherwise, also when the core has stood

@@ -78,15 +78,10 @@ def flight_of(
     facts: Sequence[tuple[float, CommonEvent]] = (),
     cut_short: str | None = None,
 ) -> Flight:
-    """What an observer has seen, for the users of the interface.
+    """What an observer has seen in the end, for the users of the interface.
 
-    Args:
-        state: of the observer, in the end.
-        result: what was executed.
-        value: of what was flown [value·s].
-        mission: with all tasks that appeared; the observer's own when None.
-        facts: what the observer heard, and when [s].
-        cut_short: why it ends before its time.
+    ``value`` is that of what was flown [value·s]; ``mission`` has all tasks that appeared, and is
+    the observer's own when None; ``cut_short`` says why it ends before its time.
     """
     return Flight(
         mission=state.mission if mission is None else mission,

@@ -89,10 +89,8 @@ async def joined(
 ) -> AsyncIterator[tuple[str, Bus]]:
     """The name of a mission and an open seat on its bus, which is closed at the end.
 
-    Args:
-        mission: its name; None for that of the keys, or the only one there is.
-        config: how to reach the others.
-        patience_s: how long to wait for the bus, and then for a mission [wall s].
+    The ``mission`` is that of the keys, or the only one there is, when None. Waits ``patience_s``
+    for the bus, and then for a mission [wall s].
 
     Raises:
         BusError: the bus cannot be reached.
@@ -166,14 +164,8 @@ async def watch(
 ) -> None:
     """Show a mission until it is over and nobody is there any more.
 
-    Args:
-        mission: its name; None for that of the keys, or the only one there is.
-        config: how to reach the others.
-        timing: timers, in the seconds of ``clock``.
-        clock: of the observer.
-        shows: what is known, a few times a second.
-        patience_s: how long to wait for the bus, and then for the mission [wall s]; None
-            for as long as it takes.
+    The ``mission`` is that of the keys, or the only one there is, when None. Waits ``patience_s``
+    for the bus, and then for the mission [wall s]; for as long as it takes when None.
 
     Raises:
         BusError: the bus cannot be reached, or not in that time.

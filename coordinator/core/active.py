@@ -57,7 +57,6 @@ class CoordinatorCore:
 
     Args:
         incarnation: greater than in any earlier life of this coordinator.
-        start_timeout_s: UAVs that are not airborne by then are given up [s].
         memory: of an earlier life, its mission time brought to now; None if there is none.
         memory_age_s: how old that is [s].
     """

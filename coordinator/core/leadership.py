@@ -250,13 +250,8 @@ def reunion(
     """What has become known to who leads, of others that lead or have led.
 
     Newer statements from this seat than the own ones are of a coordinator that is gone: they
-    hold, unless it had only begun a mission that runs already.
-
-    Args:
-        snapshots: what the others answer; no coordinator is among them to whom this one yields.
-        overheard: what was heard from this seat besides.
-        bid: of who leads.
-        runs: whether its mission has begun, and so has a time.
+    hold, unless it had only begun a mission that runs already. No coordinator to whom this one
+    yields is among ``snapshots``; ``overheard`` is what was heard from this seat besides.
     """
     # Who has only begun a flight takes the brief of the one that runs for its own.
     inherited = inherited_state(snapshots if runs else _without_incarnation(snapshots, bid.term))

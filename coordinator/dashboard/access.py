@@ -241,10 +241,7 @@ def parse_serve_address(
 ) -> ServeAddress:
     """The place that ``[HOST:]PORT`` names; of port 0 any that is free.
 
-    Args:
-        text: what was given.
-        environment: may hold the token.
-        must_be_free: whether a port that is taken is a fault now.
+    The ``environment`` may hold the token. That a port is taken is a fault if it ``must_be_free``.
 
     Raises:
         InputError: it is no place, it is taken, or what serves is not installed.

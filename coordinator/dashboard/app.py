@@ -67,11 +67,8 @@ class Dashboard:
     """The dashboard of ``source``; serve its ``app``, and tell its ``hub`` when it ends.
 
     Args:
-        source: what is shown and commanded.
-        access: who may look and command.
         display: what the page is told of itself; plain when None.
         clock: by which the pace of requests is judged; the machine's when None.
-        static: folder with the page.
     """
 
     def __init__(

@@ -200,15 +200,9 @@ def replan(
 ) -> ReplanResult:
     """The best plan found in a second's work or so for what is open, from where everybody is.
 
-    Predicted is what comes of the lists as they are published, see `complete_lists`.
-
-    Args:
-        situation: to plan from.
-        course: by which the fleet goes on until there is another one.
-        method: one of the online methods.
-        seed: >= 0.
-        stop: ends it earlier, searching and predicting.
-        threads: as many as there are processors when None; changes nothing but speed.
+    Predicted is what comes of the lists as they are published, see `complete_lists`. The fleet goes
+    on by ``course`` until there is another one; ``stop`` ends searching and predicting earlier;
+    ``threads`` (one for each processor when None) change nothing but speed.
 
     Raises:
         ValueError: there is no such rule.

@@ -231,12 +231,8 @@ def recording_to(
 ) -> Iterator[FlightRecorder]:
     """Record into a new file while the context lasts; then it is closed.
 
-    Args:
-        path: of the file.
-        about: what is recorded.
-        time_ns: see `FlightRecorder`.
-        say: given a line when not everything is recorded; maybe from another thread.
-        patient: see `RecordingThread`.
+    ``say`` is given a line when not everything is recorded, maybe from another thread. For
+    ``time_ns`` and ``patient`` see `FlightRecorder` and `RecordingThread`.
 
     Raises:
         InputError: the file exists or cannot be made.

@@ -58,9 +58,7 @@ class Patch:
 class GrowingMcap:
     """Messages in, patches out: with each of them applied the file is complete.
 
-    Args:
-        metadata: told at the beginning of the file, under ``name``.
-        name: of the metadata.
+    It begins with the ``metadata`` of that ``name``.
     """
 
     def __init__(

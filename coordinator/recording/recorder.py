@@ -148,13 +148,7 @@ class Recorder:
         """Time of the newest fact, by both clocks."""
 
     def note(self, what: RecordableFact, now_s: float, time_ns: int) -> None:
-        """Write down a fact.
-
-        Args:
-            what: the fact, or a plan that was made.
-            now_s: when, by the clock of the core that got it [s].
-            time_ns: when, by the wall's or the virtual clock [ns].
-        """
+        """Write down a fact or a plan; ``time_ns`` is by the wall's or the virtual clock [ns]."""
         match what:
             case RecordingStarted():
                 self._observer.start(now_s)

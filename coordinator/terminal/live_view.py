@@ -61,14 +61,8 @@ def live_picture(
 ) -> RenderableType:
     """What ``mission_state`` knows, as exactly ``height`` lines of at most ``width`` cells.
 
-    Args:
-        mission_state: of the mission.
-        now_s: time of the observer's clock [s].
-        width: columns.
-        height: lines; from 8 on everything has a place.
-        speedup: mission seconds per wall second, shown when not 1.
-        secure: say that the mission has keys, and how much was refused.
-        ascii_only: for consoles without UTF-8.
+    From 8 lines on everything has a place. The speed-up [mission s per wall s] is shown when not 1;
+    ``secure`` missions have keys, and it says how much was refused.
     """
     signs = signs_for(ascii_only)
     scene = scene_of(mission_state, now_s)
