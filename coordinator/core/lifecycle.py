@@ -327,7 +327,7 @@ class MissionEndCondition:
             self._over_at_s = max(self._over_at_s, grace_until_s)
 
     def reason(self, now_s: float, *, more_to_come: bool) -> str | None:
-        """Why the mission is over; None if it is not. Tasks may be yet to come: ``more_to_come``."""
+        """Why the mission is over; None if it is not. More tasks may be yet to come."""
         prospect, patience_s = self._outlook(more_to_come=more_to_come)
         if prospect is None:
             self._prospect = self._over_at_s = None

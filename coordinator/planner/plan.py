@@ -22,7 +22,12 @@ from coordinator.planner.options import (
     never,
     part_of,
 )
-from coordinator.planner.sequence_search import EXHAUSTIVE_UAVS, SearchLimits, search_sequence
+from coordinator.planner.sequence_search import (
+    EXHAUSTIVE_UAVS,
+    Progress,
+    SearchLimits,
+    search_sequence,
+)
 from swarm.allocation import RULE_NAMES, Rule, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule, team_arrays
@@ -36,7 +41,6 @@ __all__ = [
     "METHODS",
     "ONLINE_METHODS",
     "GuidedPlan",
-    "Progress",
     "check_online_method",
     "guided_plan",
     "make_plan",
@@ -45,8 +49,6 @@ __all__ = [
 ONLINE_METHODS = (*RULE_NAMES, GuidedRule.name)
 """Those whose rule agents can follow by themselves."""
 METHODS = (*ONLINE_METHODS, "exact")
-Progress = Callable[[int, float], None]
-"""Told the iterations spent and the best J to go so far [value·s]."""
 
 
 _ITERATIONS_PER_TASK, _FEWEST_ITERATIONS, _MOST_ITERATIONS = 400, 4_000, 300_000

@@ -47,7 +47,7 @@ __all__ = [
 EXHAUSTIVE_UAVS = 8
 """Up to this many active UAVs every distinct first round is tried."""
 Progress = Callable[[int, float], None]
-"""Told the evaluations spent so far and the best J found by them [value·s]."""
+"""Told the evaluations or iterations spent so far and the best J found by them [value·s]."""
 _CLIMBS_IN_VAIN = 20
 _RANDOM_STARTS = 12
 _NEIGHBOURS = 32

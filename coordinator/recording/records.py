@@ -281,15 +281,7 @@ def encode(
     match what:
         case MessageReceived(message):
             name = body_name(message.body)
-            said = _SAID[name](
-                message.mission,
-                message.writer,
-                message.stamp.incarnation,
-                message.stamp.counter,
-                message.body,
-                now_s,
-                mission_s,
-            )
+            said = _SAID[name](*_parts(message), now_s, mission_s)
             return _line(_topic(message), f"peckorder.{name}", said)
         case SnapshotsReceived(snapshots):
             schema, shape = "peckorder.Answers", _Answers(now_s, tuple(map(_answer, snapshots)))
@@ -327,21 +319,18 @@ def _topic(message: Message) -> str:
             return key
 
 
+def _parts(message: Message) -> tuple[object, ...]:
+    stamp = message.stamp
+    return message.mission, message.writer, stamp.incarnation, stamp.counter, message.body
+
+
 def _answer(snapshot: Snapshot) -> Any:
-    messages = tuple(
-        _KNOWN[name](
-            name,
-            message.mission,
-            message.writer,
-            message.stamp.incarnation,
-            message.stamp.counter,
-            message.body,
-        )
-        for message in snapshot.messages
-        if (name := body_name(message.body))
-    )
+    messages = []
+    for message in snapshot.messages:
+        name = body_name(message.body)
+        messages.append(_KNOWN[name](name, *_parts(message)))
     return _Answer(
-        snapshot.mission, snapshot.writer, snapshot.incarnation, snapshot.mission_s, messages
+        snapshot.mission, snapshot.writer, snapshot.incarnation, snapshot.mission_s, tuple(messages)
     )
 
 
