@@ -92,16 +92,13 @@ async def run_coordinator(
         epoch = core.replica.epoch
         return {} if epoch is None else {"epoch": epoch.number}
 
-    def as_event(fact: CoordinatorEvent) -> CoordinatorEvent:
-        return fact
-
     shell: Shell[CoordinatorEvent, CoordinatorAction] = Shell(
         core,
         bus,
         clock,
         mission=mission.name,
         name=COORDINATOR,
-        from_bus=as_event,
+        from_bus=lambda fact: fact,
         execute=execute,
         snapshot=core.snapshot,
         known=known,

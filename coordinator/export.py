@@ -128,12 +128,8 @@ def _items(
     yield {"command": int(MavCommand.CHANGE_SPEED), "frame": int(MavFrame.MISSION), "params": speed}
     for task in route:
         yield _at(MavCommand.WAYPOINT, task.service_s, place(task.position_enu_m))
-    home: list[float] = [0] * 7
-    yield {
-        "command": int(MavCommand.RETURN_TO_LAUNCH),
-        "frame": int(MavFrame.MISSION),
-        "params": home,
-    }
+    home = {"command": int(MavCommand.RETURN_TO_LAUNCH), "frame": int(MavFrame.MISSION)}
+    yield {**home, "params": [0] * 7}
 
 
 def _at(command: MavCommand, first: float, place: tuple[float, float, float]) -> dict[str, object]:

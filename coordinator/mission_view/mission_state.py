@@ -115,7 +115,7 @@ class MissionState:
                     ask |= self._welcome_back(message.writer, now_s)
                 if message.writer == COORDINATOR:
                     self._hear_coordinator(message, now_s)
-                self._hear(message, now_s)
+                self.take_note(message, now_s)
             case SnapshotsReceived(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
@@ -151,7 +151,7 @@ class MissionState:
             if is_word and snapshot.mission_s is not None:
                 self._clock.hear(snapshot.mission_s, now_s)
             for message in snapshot.messages:
-                self._hear(message, now_s)
+                self.take_note(message, now_s)
         if self._narrator.joining:
             self._narrator.story.order_since(told)
             self._narrator.joining = False
@@ -180,10 +180,6 @@ class MissionState:
     def pace(self) -> float:
         """Mission seconds per second of ``now_s``; see `keep_time`."""
         return self._clock.pace
-
-    def take_note(self, message: Message, now_s: float) -> None:
-        """Take in what is being said by this very process."""
-        self._hear(message, now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `step` wants a tick."""
@@ -253,7 +249,8 @@ class MissionState:
 
     # -- what was said ------------------------------------------------------------------
 
-    def _hear(self, message: Message, now_s: float) -> None:
+    def take_note(self, message: Message, now_s: float) -> None:
+        """Take in what somebody says, be it this very process."""
         writer = message.writer
         if isinstance(message.body, Status):
             before = self.statuses.get(writer)
