@@ -12,34 +12,28 @@ import asyncio
 import contextlib
 import functools
 import struct
-import tempfile
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import AsyncIterator, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from rich.console import Group, RenderableType
-from rich.text import Text
+from rich.console import RenderableType
 
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.ardupilot import ArduCopter
-from sim.bench.links import survey_mission
-from sim.bench.machine import MachineInfo, cpu_s, this_machine
-from sim.fleet.child_process import ChildProcess
+from sim.bench.fleets import scenario_file, started, survey_mission
+from sim.bench.machine import cpu_s, this_machine
+from sim.bench.results import BenchResult, Progress, table_of, unheard
 from swarm.model import Mission, Origin
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.runtime.clock import Clock, SystemClock
-from swarm.runtime.table import Column, ResultTable
-from swarm.scenario.write import format_scenario
+from swarm.runtime.table import Column
 
 __all__ = [
     "AutopilotLoad",
     "FrameCounter",
     "StreamRate",
-    "autopilot_load_as_json",
-    "autopilot_load_as_rich",
     "measure_autopilot",
     "rates_asked_hz",
     "stream_rates",
@@ -75,10 +69,9 @@ class StreamRate:
 
 
 @dataclass(frozen=True, slots=True)
-class AutopilotLoad:
+class AutopilotLoad(BenchResult):
     """What was measured."""
 
-    machine: MachineInfo
     vehicles: int
     seconds: float
     """Length of the measurement [s]."""
@@ -91,6 +84,28 @@ class AutopilotLoad:
     latency_p50_s: float | None
     latency_p99_s: float | None
     latency_largest_s: float | None
+
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        yield f"{self.vehicles} flying vehicles in one process, {self.seconds:.0f} s:"
+        yield table_of(
+            self.streams,
+            Column("message", words=True, key="message"),
+            Column("asked", "g", "Hz", key="asked_hz"),
+            Column("delivered", ".2%", key="delivered_frac"),
+        )
+        latencies_s = (self.latency_p50_s, self.latency_p99_s, self.latency_largest_s)
+        answers = "no answer was timed"
+        if None not in latencies_s:
+            median, p99, largest = (f"{1e3 * (time_s or 0.0):.1f} ms" for time_s in latencies_s)
+            answers = (
+                f"answers after {median} (median), {p99} (p99), {largest} (largest), the client's "
+                "own time included"
+            )
+        yield (
+            f"{self.delivered_frac:.2%} of what was asked for, {self.messages_per_s:.0f} messages "
+            f"per second by {self.cores:.2f} cores; {answers}."
+        )
 
 
 class FrameCounter:
@@ -211,7 +226,7 @@ class _Client(asyncio.Protocol):
 
 
 async def measure_autopilot(
-    vehicles: int, seconds: float, seed: int, on_progress: Callable[[str], None] | None = None
+    vehicles: int, seconds: float, seed: int, tell: Progress = unheard
 ) -> AutopilotLoad:
     """Fly ``vehicles`` in one process, and measure for ``seconds``.
 
@@ -219,7 +234,6 @@ async def measure_autopilot(
         ChildFailedError: the process did not start.
         OSError: a vehicle could not be reached, or there is no /proc.
     """
-    tell = on_progress or (lambda _: None)
     machine, clock = this_machine(), SystemClock()
     mission = survey_mission(vehicles, 1, seed)
     origin = mission.origin or DEFAULT_ORIGIN
@@ -267,16 +281,14 @@ async def measure_autopilot(
 
 @contextlib.asynccontextmanager
 async def _served(
-    mission: Mission, clock: Clock, rtts_s: list[float], tell: Callable[[str], None]
+    mission: Mission, clock: Clock, rtts_s: list[float], tell: Progress
 ) -> AsyncIterator[tuple[int, list[_Client]]]:
     """The process that simulates the UAVs of a mission, and a client of each."""
     tell(f"starting {len(mission.uavs)} vehicles")
     loop = asyncio.get_running_loop()
     async with contextlib.AsyncExitStack() as stack:
-        scenario = stack.enter_context(_file(format_scenario(mission)))
-        child = ChildProcess("autopilots", ["autopilot", str(scenario), "--json"])
-        stack.push_async_callback(child.stop)
-        await child.start()
+        scenario = stack.enter_context(scenario_file(mission))
+        child = await started(stack, "autopilots", ["autopilot", str(scenario), "--json"])
         clients = []
         for said in await child.ready(len(mission.uavs)):
             _, host, port = str(said["url"]).split(":")
@@ -304,47 +316,5 @@ async def _time_answers(client: _Client, pause_s: float) -> None:
         await asyncio.sleep(1.0)
 
 
-def autopilot_load_as_rich(load: AutopilotLoad) -> RenderableType:
-    """Everything for a terminal."""
-    table = ResultTable(
-        (Column("message", words=True), Column("asked", "g", "Hz"), Column("delivered", ".2%")),
-        [(each.message, each.asked_hz, each.delivered_frac) for each in load.streams],
-    )
-    answers = "no answer was timed"
-    if (
-        load.latency_p50_s is not None
-        and load.latency_p99_s is not None
-        and load.latency_largest_s is not None
-    ):
-        answers = (
-            f"answers after {load.latency_p50_s * 1e3:.1f} ms (median), "
-            f"{load.latency_p99_s * 1e3:.1f} ms (p99), {load.latency_largest_s * 1e3:.1f} ms "
-            "(largest), the client's own time included"
-        )
-    return Group(
-        Text(str(load.machine)),
-        Text(f"{load.vehicles} flying vehicles in one process, {load.seconds:.0f} s:"),
-        table,
-        Text(
-            f"{load.delivered_frac:.2%} of what was asked for, {load.messages_per_s:.0f} messages "
-            f"per second by {load.cores:.2f} cores; {answers}."
-        ),
-    )
-
-
-def autopilot_load_as_json(load: AutopilotLoad) -> dict[str, object]:
-    """Everything for programs, ready for `json.dumps`."""
-    return asdict(load)
-
-
 def _heard(clients: list[_Client]) -> Counter[int]:
     return sum((client.frames.counts for client in clients), Counter[int]())
-
-
-@contextlib.contextmanager
-def _file(text: str) -> Iterator[Path]:
-    """A scenario in a file that is gone afterwards."""
-    with tempfile.TemporaryDirectory(prefix="swarm-bench-") as folder:
-        path = Path(folder) / "mission.toml"
-        path.write_text(text, encoding="utf-8")
-        yield path

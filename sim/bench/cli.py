@@ -8,22 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sim.bench.command_line import each, size_of
-from sim.bench.legs import LEGS_HELP, legs
+from sim.bench.command_line import LONGEST_S, each, integer, progress, show, size_of
+from sim.bench.legs import legs
 from sim.bench.performance_commands import (
-    AUTOPILOT_HELP,
-    DASHBOARD_HELP,
-    MISSIONS_HELP,
-    TURNAROUND_HELP,
     autopilot,
     dashboard,
     missions,
     turnaround,
 )
 from sim.bench.robustness_commands import (
-    FAILOVER_HELP,
-    FLOOD_HELP,
-    SECURE_HELP,
     failover,
     flood,
     secure,
@@ -40,27 +33,7 @@ __all__ = ["bench"]
 
 _DEFAULT_SIZES = "10x50,50x500"
 _SCALING_SIZES = "10x50,10x500,50x500,50x2000,100x1000,200x2000,200x5000"
-_LONGEST_S = 86_400.0
-_PLAN_HELP = """Compare planning methods side by side, each with the same time.
-
-Without SCENARIO and --sizes: random missions of 10 × 50 and 50 × 500.
-
-\b
-Examples:
-    swarm bench plan
-    swarm bench plan --sizes 20x100 --time-limit-s 1,3,10 --plot value.png
-    swarm bench plan valley-survey --methods guided,cbba,exact --json
-    swarm bench plan --scaling --out scaling.md
-"""
-_DECIDE_HELP = """Time one online decision of each rule.
-
-A whole random mission is decided, task by task, and each decision timed.
-
-\b
-Examples:
-    swarm bench decide
-    swarm bench decide --size 10x50 --json
-"""
+_SEED = integer(0, 10**18 - 1, "no seed", "give whole numbers from 0 on, such as 0,1")
 bench = typer.Typer(
     help="Benchmarks, each printing machine, seeds and ratios.",
     rich_markup_mode=None,
@@ -73,7 +46,7 @@ def _family() -> None:
     """Keep the family a family, however many commands it has."""
 
 
-@bench.command("plan", help=_PLAN_HELP, short_help="Compare planning methods side by side.")
+@bench.command("plan", short_help="Compare planning methods side by side.")
 def plan(
     scenario: Annotated[
         Path | None,
@@ -114,7 +87,7 @@ def plan(
         typer.Option(
             "--long-run-s",
             min=0.01,
-            max=_LONGEST_S,
+            max=LONGEST_S,
             metavar="S",
             help="Also run guided for this long, and compare with that.",
             show_default=False,
@@ -148,56 +121,54 @@ def plan(
         ),
     ] = None,
 ) -> int:
-    """See `_PLAN_HELP`."""
-    from json import dumps
+    """Compare planning methods side by side, each with the same time.
 
-    from rich.console import Console
+    Without SCENARIO and --sizes: random missions of 10 × 50 and 50 × 500.
 
-    from sim.bench.plan_report import as_json, as_markdown, as_rich, comparison_grids, scaling_grid
+    Examples:
+        swarm bench plan
+        swarm bench plan --sizes 20x100 --time-limit-s 1,3,10 --plot value.png
+        swarm bench plan valley-survey --methods guided,cbba,exact --json
+        swarm bench plan --scaling --out scaling.md
+    """
+    from sim.bench.plan_report import (
+        PlanReport,
+        comparison_figure,
+        comparison_grids,
+        scaling_figure,
+        scaling_grid,
+        write_figure,
+    )
     from sim.bench.plans import measure_plans
     from sim.bench.solvers import METHODS
 
     limits_s = each("--time-limit-s", time_limit_s, _limit_s)
-    all_seeds = each("--seeds", seeds, _seed)
+    all_seeds = each("--seeds", seeds, _SEED)
     default_methods = "guided,greedy" if scaling else ",".join(METHODS)
     names = each("--methods", methods or default_methods, _method)
     _check_files(plot, out)
     if scaling:
         limits_s, all_seeds = limits_s[:1], all_seeds[:1]
-    default_sizes = _SCALING_SIZES if scaling else _DEFAULT_SIZES
-    sources = _sources(scenario, sizes, default_sizes)
+    sources = _sources(scenario, sizes, _SCALING_SIZES if scaling else _DEFAULT_SIZES)
     if methods is not None and any(name.startswith("ortools") for name in names):
         from sim.study.baselines.ortools_routing import require_installed
 
         require_installed()
 
-    console = Console(stderr=True)
-    with console.status("", spinner_style="dim") as status:
-        done = measure_plans(
-            sources,
-            names,
-            limits_s,
-            all_seeds,
-            long_run_s=long_run_s,
-            on_progress=status.update if console.is_terminal else None,
-        )
+    with progress() as tell:
+        done = measure_plans(sources, names, limits_s, all_seeds, long_run_s=long_run_s, tell=tell)
     grids = [scaling_grid(done)] if scaling else comparison_grids(done)
+    report = PlanReport(done.machine, done, grids)
     if plot is not None:
-        from sim.bench.plan_report import comparison_figure, scaling_figure, write_figure
-
         figure = scaling_figure(done) if scaling else comparison_figure(done)
         _write("--plot", plot, lambda path: write_figure(figure, path))
     if out is not None:
-        text = as_markdown(done, grids)
-        _write("--out", out, lambda path: path.write_text(text, encoding="utf-8"))
-    if json:
-        print(dumps(as_json(done), allow_nan=False))
-    else:
-        Console(highlight=False).print(as_rich(done, grids))
+        _write("--out", out, lambda path: path.write_text(report.as_markdown(), encoding="utf-8"))
+    show(report, json=json)
     return 0
 
 
-@bench.command("decide", help=_DECIDE_HELP, short_help="Time one online decision of each rule.")
+@bench.command("decide", short_help="Time one online decision of each rule.")
 def decide(
     size: Annotated[
         str, typer.Option("--size", metavar="NxM", help="UAVs and tasks of the random mission.")
@@ -205,41 +176,30 @@ def decide(
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
-    """See `_DECIDE_HELP`."""
-    from json import dumps
+    """Time one online decision of each rule.
 
-    from rich.console import Console
+    A whole random mission is decided, task by task, and each decision timed.
 
-    from sim.bench.decisions import decide_as_json, decide_as_rich, measure_decisions
+    Examples:
+        swarm bench decide
+        swarm bench decide --size 10x50 --json
+    """
+    from sim.bench.decisions import measure_decisions
     from swarm.runtime.clock import SystemClock
 
     n_uav, n_task = size_of("--size", size)
-    done = measure_decisions(n_uav, n_task, seed, SystemClock())
-    if json:
-        print(dumps(decide_as_json(done), allow_nan=False))
-    else:
-        Console(highlight=False).print(decide_as_rich(done))
+    show(measure_decisions(n_uav, n_task, seed, SystemClock()), json=json)
     return 0
 
 
-bench.command("failover", help=FAILOVER_HELP, short_help="Measure fleets in trouble.")(failover)
-bench.command("flood", help=FLOOD_HELP, short_help="Fly while a hostile peer floods the bus.")(
-    flood
-)
-bench.command("missions", help=MISSIONS_HELP, short_help="Fly many missions in virtual time.")(
-    missions
-)
-bench.command("dashboard", help=DASHBOARD_HELP, short_help="Measure what a dashboard costs.")(
-    dashboard
-)
-bench.command("autopilot", help=AUTOPILOT_HELP, short_help="Measure simulated vehicles.")(autopilot)
-bench.command("secure", help=SECURE_HELP, short_help="Measure what keys and encryption cost.")(
-    secure
-)
-bench.command(
-    "turnaround", help=TURNAROUND_HELP, short_help="Time from each arrival to the next target."
-)(turnaround)
-bench.command("legs", help=LEGS_HELP, short_help="Time of legs flown, beyond length / speed.")(legs)
+bench.command("failover", short_help="Measure fleets in trouble.")(failover)
+bench.command("flood", short_help="Fly while a hostile peer floods the bus.")(flood)
+bench.command("missions", short_help="Fly many missions in virtual time.")(missions)
+bench.command("dashboard", short_help="Measure what a dashboard costs.")(dashboard)
+bench.command("autopilot", short_help="Measure simulated vehicles.")(autopilot)
+bench.command("secure", short_help="Measure what keys and encryption cost.")(secure)
+bench.command("turnaround", short_help="Time from each arrival to the next target.")(turnaround)
+bench.command("legs", short_help="Time of legs flown, beyond length / speed.")(legs)
 
 
 def _sources(
@@ -264,16 +224,10 @@ def _limit_s(flag: str, word: str) -> float:
         limit_s = float(word)
     except ValueError:
         limit_s = -1.0
-    if not 0.0 < limit_s <= _LONGEST_S:
+    if not 0.0 < limit_s <= LONGEST_S:
         remedy = "give seconds above 0, such as 10 or 1,3,10"
         raise InputError(Fault(flag, word, "no time limit", remedy))
     return limit_s
-
-
-def _seed(flag: str, word: str) -> int:
-    if not (word.isascii() and word.isdigit() and len(word) <= 18):
-        raise InputError(Fault(flag, word, "no seed", "give whole numbers from 0 on, such as 0,1"))
-    return int(word)
 
 
 def _method(flag: str, word: str) -> str:

@@ -1,29 +1,77 @@
-"""What commands of `swarm bench` share: values between commas, sizes, buses, and progress."""
+"""What the commands of `swarm bench` share: options, values between commas, progress, output."""
 
 from __future__ import annotations
 
 import contextlib
 import re
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
 
 from swarm.runtime.errors import Fault, InputError
+from swarm.scenario.files import resolve_scenario
 
 if TYPE_CHECKING:
-    from sim.fleet.layout import BusKind
+    from sim.bench.results import BenchResult, Progress
+    from sim.fleet.autopilots import Autopilots
+    from sim.fleet.layout import BusKind, LaunchOptions
 
-__all__ = ["bus_of", "each", "progress", "size_of"]
+__all__ = [
+    "LONGEST_S",
+    "BusKindOption",
+    "ValleyArgument",
+    "bus_of",
+    "each",
+    "integer",
+    "launch_options",
+    "progress",
+    "require_proc",
+    "show",
+    "size_of",
+]
 
+
+LONGEST_S = 86_400.0
+"""The longest time that an option takes."""
 
 T = TypeVar("T")
+Reader = Callable[[str, str], T]
+"""The value that a word behind an option stands for; raises `InputError` where it is none."""
 
 _SIZE = re.compile(r"([1-9]\d{0,3})[x×]([1-9]\d{0,4})")
 
+ValleyArgument = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="[SCENARIO]",
+        help="Scenario file, or the name of a shipped one; default: valley-survey.",
+        parser=resolve_scenario,
+        show_default=False,
+    ),
+]
+BusKindOption = Annotated[
+    str, typer.Option("--bus", metavar="mesh|router", help="How the processes talk.")
+]
 
-def each(flag: str, text: str, read: Callable[[str, str], T]) -> list[T]:
+
+def each(flag: str, text: str, read: Reader[T]) -> list[T]:
     """The values between commas, each once."""
     words = [word.strip() for word in text.split(",")]
     return list(dict.fromkeys(read(flag, word) for word in words))
+
+
+def integer(least: int, most: int, problem: str, remedy: str) -> Reader[int]:
+    """Reads whole numbers within least..most, and refuses others with these words."""
+
+    def read(flag: str, word: str) -> int:
+        digits = word.isascii() and word.isdigit() and len(word) <= len(str(most))
+        if not (digits and least <= int(word) <= most):
+            raise InputError(Fault(flag, word, problem, remedy))
+        return int(word)
+
+    return read
 
 
 def size_of(flag: str, word: str) -> tuple[int, int]:
@@ -38,19 +86,6 @@ def size_of(flag: str, word: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-@contextlib.contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
-    """A place to say what is being done: a line that changes, on a terminal only."""
-    from rich.console import Console
-
-    from swarm.runtime.log import LogLevel, configure_logging
-
-    configure_logging(LogLevel.ERROR)
-    console = Console(stderr=True)
-    with console.status("", spinner_style="dim") as status:
-        yield status.update if console.is_terminal else lambda _: None
-
-
 def bus_of(word: str) -> BusKind:
     """The bus of that name.
 
@@ -62,3 +97,68 @@ def bus_of(word: str) -> BusKind:
     if word not in (BusKind.MESH, BusKind.ROUTER):
         raise InputError(Fault("--bus", word, "no such bus", "choose mesh or router"))
     return BusKind(word)
+
+
+def require_proc(command: str) -> None:
+    """Refuse where the processor time of other processes cannot be read.
+
+    Raises:
+        InputError: there is no /proc.
+    """
+    if not Path("/proc/self/stat").exists():
+        problem = "there is no /proc that tells processor time"
+        raise InputError(Fault(f"swarm bench {command}", "", problem, "run it on Linux"))
+
+
+def launch_options(
+    scenario: Path,
+    n_uav: int,
+    autopilots: Autopilots,
+    bus: BusKind,
+    *,
+    seed: int,
+    speedup: float,
+    position_rate_hz: float,
+) -> LaunchOptions:
+    """How to fly a scenario by guided agents whose logs are read."""
+    from sim.fleet.layout import LaunchOptions, defaults_for
+    from swarm.runtime.log import LogFormat
+
+    defaults = defaults_for(autopilots, n_uav)
+    return LaunchOptions(
+        scenario=scenario,
+        method="guided",
+        seed=seed,
+        speedup=speedup,
+        bus=bus,
+        position_rate_hz=position_rate_hz,
+        acceptance_radius_m=defaults.acceptance_radius_m,
+        start_timeout_s=defaults.start_timeout_s,
+        autopilots=autopilots,
+        log_format=LogFormat.JSON,
+    )
+
+
+@contextlib.contextmanager
+def progress() -> Iterator[Progress]:
+    """A place to say what is being done: a line that changes, on a terminal only."""
+    from rich.console import Console
+
+    from swarm.runtime.log import LogLevel, configure_logging
+
+    configure_logging(LogLevel.ERROR)
+    console = Console(stderr=True)
+    with console.status("", spinner_style="dim") as status:
+        yield status.update if console.is_terminal else lambda _: None
+
+
+def show(done: BenchResult, *, json: bool) -> None:
+    """Print a result for programs, or for people."""
+    if json:
+        from json import dumps
+
+        typer.echo(dumps(done.as_json(), allow_nan=False))
+        return
+    from rich.console import Console
+
+    Console(highlight=False).print(done)

@@ -10,30 +10,24 @@ import asyncio
 import contextlib
 import json
 import re
-from collections.abc import AsyncIterator, Callable
-from dataclasses import asdict, dataclass, field
+from collections.abc import AsyncIterator, Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 import websockets.asyncio.client as websockets
-from rich.console import Group, RenderableType
-from rich.text import Text
+from rich.console import RenderableType
 
-from sim.bench.links import survey_mission
-from sim.bench.machine import MachineInfo, cpu_s, memory_bytes, this_machine
+from sim.bench.fleets import started, survey_mission
+from sim.bench.machine import cpu_s, memory_bytes, this_machine
+from sim.bench.results import BenchResult, Progress, table_of, unheard
 from sim.bench.scripted_mission import MARK, ScriptedMission
 from sim.fleet.child_process import ChildFailedError, ChildProcess
 from swarm.bus.config import BusConfig, ClientTopology
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.runtime.clock import Clock, SystemClock
-from swarm.runtime.table import Column, ResultTable
+from swarm.runtime.table import Column
 
-__all__ = [
-    "DashboardLoad",
-    "FollowerLoad",
-    "dashboard_load_as_json",
-    "dashboard_load_as_rich",
-    "measure_dashboard",
-]
+__all__ = ["DashboardLoad", "FollowerLoad", "measure_dashboard"]
 
 
 SETTLE_S = 5.0
@@ -63,10 +57,9 @@ class FollowerLoad:
 
 
 @dataclass(frozen=True, slots=True)
-class DashboardLoad:
+class DashboardLoad(BenchResult):
     """What was measured."""
 
-    machine: MachineInfo
     uavs: int
     tasks: int
     rate_hz: float
@@ -79,6 +72,25 @@ class DashboardLoad:
     whole_bytes: int
     """Of the first frame to a page."""
     followings: tuple[FollowerLoad, ...]
+
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        yield (
+            f"seed {self.seed}; {self.uavs} UAVs × {self.tasks} tasks, statuses at "
+            f"{self.rate_hz:g} Hz, {self.messages_per_s:.0f} messages per second on the bus, "
+            f"{self.seconds:g} s each; a whole frame has {self.whole_bytes / 1000.0:.0f} kB:"
+        )
+        yield table_of(
+            self.followings,
+            Column("pages", key="clients"),
+            Column("cores", ".3f", key="cores"),
+            Column("RAM", ".0f", "MiB", 2.0**-20, key="memory_bytes"),
+            Column("to each page", ".1f", "kB/s", 1e-3, key="bytes_per_s"),
+            Column("frames/s", ".2f", key="frames_per_s"),
+            Column("latency p50", ".0f", "ms", 1e3, key="latency_p50_s"),
+            Column("p99", ".0f", "ms", 1e3, key="latency_p99_s"),
+        )
+        yield "Latency is from a UAV's word to the frame that holds it, of two a second."
 
 
 @dataclass(slots=True)
@@ -118,7 +130,7 @@ async def measure_dashboard(
     clients: tuple[int, ...],
     seconds: float,
     seed: int,
-    on_progress: Callable[[str], None] | None = None,
+    tell: Progress = unheard,
 ) -> DashboardLoad:
     """Act a mission and let it be followed by so many pages at a time, one number after the other.
 
@@ -126,7 +138,6 @@ async def measure_dashboard(
         ChildFailedError: a process did not start, or does not show the mission.
         OSError: there is no /proc.
     """
-    tell = on_progress or (lambda _: None)
     machine, clock = this_machine(), SystemClock()
     mission = survey_mission(uavs, tasks, seed)
     async with _served(mission.name) as (endpoint, dashboard, url):
@@ -170,14 +181,11 @@ async def measure_dashboard(
 async def _served(mission: str) -> AsyncIterator[tuple[str, ChildProcess, str]]:
     """A router's endpoint, the dashboard's process and its feed."""
     async with contextlib.AsyncExitStack() as stack:
-        router = ChildProcess("router", ["router", "--json", "--listen", "tcp/127.0.0.1:0"])
-        stack.push_async_callback(router.stop)
-        await router.start()
+        listening = ["router", "--json", "--listen", "tcp/127.0.0.1:0"]
+        router = await started(stack, "router", listening)
         endpoint = str((await router.ready())[0]["endpoints"][0])
         words = ["dashboard", "--json", "--port", "0", "--mission", mission]
-        dashboard = ChildProcess("dashboard", [*words, "--connect", endpoint])
-        stack.push_async_callback(dashboard.stop)
-        await dashboard.start()
+        dashboard = await started(stack, "dashboard", [*words, "--connect", endpoint])
         url = str((await dashboard.ready())[0]["url"])
         yield endpoint, dashboard, url.replace("http", "ws", 1) + "feed"
 
@@ -242,45 +250,3 @@ async def _follow(
         latency_p50_s=float(np.median(times_s)) if times_s else None,
         latency_p99_s=float(np.quantile(times_s, 0.99)) if times_s else None,
     )
-
-
-def dashboard_load_as_rich(load: DashboardLoad) -> RenderableType:
-    """Everything for a terminal."""
-    table = ResultTable(
-        (
-            Column("pages"),
-            Column("cores", ".3f"),
-            Column("RAM", ".0f", "MiB", 2.0**-20),
-            Column("to each page", ".1f", "kB/s", 1e-3),
-            Column("frames/s", ".2f"),
-            Column("latency p50", ".0f", "ms", 1e3),
-            Column("p99", ".0f", "ms", 1e3),
-        ),
-        [
-            (
-                each.clients,
-                each.cores,
-                each.memory_bytes,
-                each.bytes_per_s,
-                each.frames_per_s,
-                each.latency_p50_s,
-                each.latency_p99_s,
-            )
-            for each in load.followings
-        ],
-    )
-    return Group(
-        Text(str(load.machine)),
-        Text(
-            f"seed {load.seed}; {load.uavs} UAVs × {load.tasks} tasks, statuses at "
-            f"{load.rate_hz:g} Hz, {load.messages_per_s:.0f} messages per second on the bus, "
-            f"{load.seconds:g} s each; a whole frame has {load.whole_bytes / 1000.0:.0f} kB:"
-        ),
-        table,
-        Text("Latency is from a UAV's word to the frame that holds it, of two a second."),
-    )
-
-
-def dashboard_load_as_json(load: DashboardLoad) -> dict[str, object]:
-    """Everything for programs, ready for `json.dumps`."""
-    return asdict(load)

@@ -7,15 +7,15 @@ makes it. Leaves out: the speed of the batch beside a loop tuned by hand, which 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from rich.console import Group, RenderableType
-from rich.text import Text
+from rich.console import RenderableType
 
-from sim.bench.machine import MachineInfo, this_machine
+from sim.bench.machine import this_machine
+from sim.bench.results import BenchResult, table_of
 from sim.bench.solvers import MissionSource, problem_of
 from swarm.allocation import Problem, TeamState, rank_of, rule_by_name
 from swarm.allocation.lower_level import Decision, Rule, decisions
@@ -25,9 +25,9 @@ from swarm.kernels.lower_level import GREEDY, default_threads, evaluate_sequence
 from swarm.kernels.routes import optimise_routes
 from swarm.model import TaskId
 from swarm.runtime.clock import Clock
-from swarm.runtime.table import Column, ResultTable
+from swarm.runtime.table import Column
 
-__all__ = ["DecideBench", "DecisionTimes", "decide_as_json", "decide_as_rich", "measure_decisions"]
+__all__ = ["DecideBench", "DecisionTimes", "measure_decisions"]
 
 
 _DISTURBED_FRAC = 0.3
@@ -49,10 +49,9 @@ class DecisionTimes:
 
 
 @dataclass(frozen=True, slots=True)
-class DecideBench:
+class DecideBench(BenchResult):
     """Everything measured in one run."""
 
-    machine: MachineInfo
     n_uav: int
     n_task: int
     seed: int
@@ -64,6 +63,28 @@ class DecideBench:
     threads: int
     sequences_per_s_threaded: float
     """By that many threads."""
+
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        yield f"One online decision at {self.n_uav} × {self.n_task}, seed {self.seed}:"
+        yield table_of(
+            self.times,
+            Column("rule", words=True, key="name"),
+            Column("decisions", key="decisions"),
+            *(
+                Column(name, _duration, key=f"{name}_s")
+                for name in ("median", "p99", "largest", "first")
+            ),
+        )
+        yield (
+            f"A batch of {self.sequences} greedy sequences: {self.sequences_per_s:.0f} per "
+            f"second by one thread, {self.sequences_per_s_threaded:.0f} by {self.threads}."
+        )
+        yield (
+            f"disturbed: {_DISTURBED_FRAC:.0%} of the UAVs are lost and {_DISTURBED_FRAC:.0%} of "
+            "the tasks are on no list, so lists are repaired at every decision. first: the first "
+            "decision on a new mission."
+        )
 
 
 class _TimedRule:
@@ -126,41 +147,6 @@ def measure_decisions(
         threads=threads,
         sequences_per_s_threaded=_sequences_per_s(problem, ranks, threads, clock),
     )
-
-
-def decide_as_rich(bench: DecideBench) -> RenderableType:
-    """Everything for a terminal."""
-    headings = ("median", "p99", "largest", "first")
-    table = ResultTable(
-        (
-            Column("rule", words=True),
-            Column("decisions"),
-            *(Column(name, _duration) for name in headings),
-        ),
-        [
-            (row.name, row.decisions, row.median_s, row.p99_s, row.largest_s, row.first_s)
-            for row in bench.times
-        ],
-    )
-    return Group(
-        Text(str(bench.machine)),
-        Text(f"One online decision at {bench.n_uav} × {bench.n_task}, seed {bench.seed}:"),
-        table,
-        Text(
-            f"A batch of {bench.sequences} greedy sequences: {bench.sequences_per_s:.0f} per "
-            f"second by one thread, {bench.sequences_per_s_threaded:.0f} by {bench.threads}."
-        ),
-        Text(
-            f"disturbed: {_DISTURBED_FRAC:.0%} of the UAVs are lost and {_DISTURBED_FRAC:.0%} of "
-            "the tasks are on no list, so lists are repaired at every decision. first: the first "
-            "decision on a new mission."
-        ),
-    )
-
-
-def decide_as_json(bench: DecideBench) -> dict[str, object]:
-    """Everything for programs, ready for `json.dumps`."""
-    return asdict(bench)
 
 
 def _rules(

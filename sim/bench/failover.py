@@ -6,17 +6,16 @@ Leaves out: how each is measured (sim.bench.takeover, sim.bench.links, sim.bench
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from rich.console import Group, RenderableType
+from rich.console import RenderableType
 
 from sim.bench.latency import DecisionLatencies, measure_latencies
 from sim.bench.links import (
     BAD_LINKS,
-    BadLink,
     FalseLosses,
     PartitionResult,
     Traffic,
@@ -24,20 +23,14 @@ from sim.bench.links import (
     measure_partition,
     measure_traffic,
 )
-from sim.bench.machine import MachineInfo, this_machine
+from sim.bench.machine import this_machine
+from sim.bench.results import BenchResult, Progress, table_of, unheard
 from sim.bench.takeover import FailureMode, Takeovers, measure_takeovers
 from sim.fleet.layout import BusKind
 from swarm.protocol.timing import LinkKind, preset
 from swarm.runtime.table import Column, ResultTable
 
-__all__ = [
-    "FailoverMeasure",
-    "FailoverResults",
-    "FailoverSettings",
-    "failover_as_json",
-    "failover_as_rich",
-    "measure_failover",
-]
+__all__ = ["FailoverMeasure", "FailoverResults", "FailoverSettings", "measure_failover"]
 
 
 KILL_TARGET_S = 1.0
@@ -81,10 +74,9 @@ class FailoverSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class FailoverResults:
+class FailoverResults(BenchResult):
     """All that was measured."""
 
-    machine: MachineInfo
     settings: FailoverSettings
     takeovers: tuple[Takeovers, ...]
     losses: tuple[FalseLosses, ...]
@@ -92,11 +84,63 @@ class FailoverResults:
     traffic: tuple[Traffic, ...]
     latencies: tuple[DecisionLatencies, ...]
 
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        takeovers = zip(_of_takeovers(self.takeovers).as_records(), self.takeovers, strict=True)
+        return {
+            "machine": asdict(self.machine),
+            "seed": self.settings.seed,
+            "takeovers": [{**record, "times_s": list(each.times_s)} for record, each in takeovers],
+            "losses": _of_losses(self.losses).as_records(),
+            "partitions": [asdict(each) for each in self.partitions],
+            "traffic": [
+                {**asdict(each), **{name: getattr(each, name) for name in _PER_UAV}}
+                for each in self.traffic
+            ],
+            "latencies": _of_latencies(self.latencies).as_records(),
+        }
+
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        yield f"seed {self.settings.seed}"
+        tables = (
+            _of_takeovers(self.takeovers),
+            _of_losses(self.losses),
+            table_of(
+                self.partitions,
+                Column("UAVs", key="uavs"),
+                Column("parted", ".0f", "s", key="parted_s"),
+                Column("tasks", key="tasks"),
+                Column("done", key="done"),
+                Column("duplicate visits", key="duplicates"),
+                Column("agreed after", ".2f", "s", key="agreement_s"),
+                Column("faults", lambda faults: str(len(faults)), key="faults"),
+                title="A fleet in two halves",
+            ),
+            table_of(
+                self.traffic,
+                Column("UAVs", key="uavs"),
+                Column("messages", ".1f", key="messages_per_uav_s"),
+                Column("of them status", ".1f", key="status_per_uav_s"),
+                Column("bytes", ".0f", key="bytes_per_uav_s"),
+                Column("bytes heard by each agent", ".0f", key="received_bytes_per_uav_s"),
+                title="What is said, per UAV and second; payload without headers",
+            ),
+            _of_latencies(self.latencies),
+        )
+        for table in tables:
+            if table.rows:
+                yield from ("", table)
+
+
+_PER_UAV = ("messages_per_uav_s", "bytes_per_uav_s", "received_bytes_per_uav_s")
+"""What programs are told of `Traffic` besides its fields."""
+
 
 def measure_failover(
     what: Sequence[FailoverMeasure],
     settings: FailoverSettings,
-    on_progress: Callable[[str], None] | None = None,
+    tell: Progress = unheard,
 ) -> FailoverResults:
     """Measure ``what``, one after the other.
 
@@ -104,61 +148,42 @@ def measure_failover(
         SwarmError: a process did not start.
         TimeoutError: a fleet did not do in time what it has to do.
     """
-    tell = on_progress or (lambda _: None)
-    machine = this_machine()
+    machine, seed = this_machine(), settings.seed
+    takeovers = [
+        asyncio.run(
+            measure_takeovers(
+                blow, settings.trials, link=settings.link, bus=settings.bus, seed=seed, tell=tell
+            )
+        )
+        for blow in FailureMode
+        if FailoverMeasure(blow) in what
+    ]
+    losses = []
+    for bad in BAD_LINKS if FailoverMeasure.LOSS in what else ():
+        tell(f"loss: {bad.quality.loss_frac:.0%}, {1e3 * bad.quality.delay_s:.0f} ms")
+        losses.append(measure_false_losses(bad, settings.watch_s, seed=seed, relay=settings.relay))
+    partitions = []
+    for number in range(settings.partitions if FailoverMeasure.PARTITION in what else 0):
+        tell(f"partition: {number} of {settings.partitions}")
+        parting = measure_partition(settings.parted_s, seed=seed + number, tell=tell)
+        partitions.append(asyncio.run(parting))
+    traffic = []
+    for size in settings.sizes if FailoverMeasure.TRAFFIC in what else ():
+        tell(f"traffic: {size} UAVs")
+        traffic.append(asyncio.run(measure_traffic(size, settings.traffic_s, seed=seed)))
+    latencies = [
+        asyncio.run(measure_latencies(method, seed=seed, tell=tell))
+        for method in (settings.methods if FailoverMeasure.LATENCY in what else ())
+    ]
     return FailoverResults(
         machine,
         settings,
-        tuple(
-            _struck(blow, settings, tell) for blow in FailureMode if FailoverMeasure(blow) in what
-        ),
-        tuple(_on_bad_link(b, settings, tell) for b in BAD_LINKS if FailoverMeasure.LOSS in what),
-        tuple(_parted(settings, tell)) if FailoverMeasure.PARTITION in what else (),
-        tuple(_said(settings, tell)) if FailoverMeasure.TRAFFIC in what else (),
-        tuple(_decided(settings, tell)) if FailoverMeasure.LATENCY in what else (),
+        tuple(takeovers),
+        tuple(losses),
+        tuple(partitions),
+        tuple(traffic),
+        tuple(latencies),
     )
-
-
-def _struck(
-    blow: FailureMode, settings: FailoverSettings, tell: Callable[[str], None]
-) -> Takeovers:
-    return asyncio.run(
-        measure_takeovers(
-            blow,
-            settings.trials,
-            link=settings.link,
-            bus=settings.bus,
-            seed=settings.seed,
-            on_progress=tell,
-        )
-    )
-
-
-def _on_bad_link(
-    bad: BadLink, settings: FailoverSettings, tell: Callable[[str], None]
-) -> FalseLosses:
-    tell(f"loss: {bad.quality.loss_frac:.0%}, {1e3 * bad.quality.delay_s:.0f} ms")
-    return measure_false_losses(bad, settings.watch_s, seed=settings.seed, relay=settings.relay)
-
-
-def _parted(settings: FailoverSettings, tell: Callable[[str], None]) -> Iterator[PartitionResult]:
-    for number in range(settings.partitions):
-        tell(f"partition: {number} of {settings.partitions}")
-        seed = settings.seed + number
-        yield asyncio.run(measure_partition(settings.parted_s, seed=seed, on_progress=tell))
-
-
-def _said(settings: FailoverSettings, tell: Callable[[str], None]) -> Iterator[Traffic]:
-    for size in settings.sizes:
-        tell(f"traffic: {size} UAVs")
-        yield asyncio.run(measure_traffic(size, settings.traffic_s, seed=settings.seed))
-
-
-def _decided(
-    settings: FailoverSettings, tell: Callable[[str], None]
-) -> Iterator[DecisionLatencies]:
-    for method in settings.methods:
-        yield asyncio.run(measure_latencies(method, seed=settings.seed, on_progress=tell))
 
 
 def bound_s(blow: FailureMode, link: LinkKind) -> float:
@@ -169,55 +194,7 @@ def bound_s(blow: FailureMode, link: LinkKind) -> float:
     return chosen.lease_s + chosen.timing.silence_s
 
 
-# -- for programs -------------------------------------------------------------------------
-
-
-def failover_as_json(done: FailoverResults) -> dict[str, Any]:
-    """Everything, ready for `json.dumps`."""
-    return {
-        "machine": asdict(done.machine),
-        "seed": done.settings.seed,
-        "takeovers": [
-            {**record, "times_s": list(each.times_s)}
-            for record, each in zip(
-                _takeovers(done.takeovers).as_records(), done.takeovers, strict=True
-            )
-        ],
-        "losses": _losses(done.losses).as_records(),
-        "partitions": [{**asdict(each), "faults": list(each.faults)} for each in done.partitions],
-        "traffic": [
-            {
-                **asdict(each),
-                "messages_per_uav_s": each.messages_per_uav_s,
-                "bytes_per_uav_s": each.bytes_per_uav_s,
-                "received_bytes_per_uav_s": each.received_bytes_per_uav_s,
-            }
-            for each in done.traffic
-        ],
-        "latencies": _latencies(done.latencies).as_records(),
-    }
-
-
-# -- for people ---------------------------------------------------------------------------
-
-
-def failover_as_rich(done: FailoverResults) -> RenderableType:
-    """Everything, in the width of a terminal of 80 columns."""
-    parts: list[RenderableType] = [str(done.machine), f"seed {done.settings.seed}"]
-    if done.takeovers:
-        parts += ["", _takeovers(done.takeovers)]
-    if done.losses:
-        parts += ["", _losses(done.losses)]
-    if done.partitions:
-        parts += ["", _partitions(done.partitions)]
-    if done.traffic:
-        parts += ["", _traffic(done.traffic)]
-    if done.latencies:
-        parts += ["", _latencies(done.latencies)]
-    return Group(*parts)
-
-
-def _takeovers(rows: Sequence[Takeovers]) -> ResultTable:
+def _of_takeovers(rows: Sequence[Takeovers]) -> ResultTable:
     return ResultTable(
         (
             *(Column(name, words=True, key=name) for name in ("blow", "link", "bus")),
@@ -241,8 +218,7 @@ def _takeovers(rows: Sequence[Takeovers]) -> ResultTable:
     )
 
 
-def _losses(rows: Sequence[FalseLosses]) -> ResultTable:
-    ways = {"tun": "real"}
+def _of_losses(rows: Sequence[FalseLosses]) -> ResultTable:
     return ResultTable(
         (
             Column("loss", ".0%", key="loss_frac"),
@@ -250,7 +226,7 @@ def _losses(rows: Sequence[FalseLosses]) -> ResultTable:
             Column("link", key="link", words=True),
             Column("UAVs", key="uavs"),
             Column("watched", ".0f", "s", key="watched_s"),
-            Column("path", lambda path: ways.get(path, "imitated"), key="path", words=True),
+            Column("path", _path, key="path", words=True),
             Column("false losses", key="false_losses"),
             Column("packets", _counted, key="packets"),
             Column("of them lost", _counted, key="packets_lost"),
@@ -273,63 +249,11 @@ def _losses(rows: Sequence[FalseLosses]) -> ResultTable:
     )
 
 
-def _partitions(rows: Sequence[PartitionResult]) -> ResultTable:
-    return ResultTable(
-        (
-            Column("UAVs"),
-            Column("parted", ".0f", "s"),
-            Column("tasks"),
-            Column("done"),
-            Column("duplicate visits"),
-            Column("agreed after", ".2f", "s"),
-            Column("faults"),
-        ),
-        [
-            (
-                each.uavs,
-                each.parted_s,
-                each.tasks,
-                each.done,
-                each.duplicates,
-                each.agreement_s,
-                len(each.faults),
-            )
-            for each in rows
-        ],
-        "A fleet in two halves",
-    )
-
-
-def _traffic(rows: Sequence[Traffic]) -> ResultTable:
-    return ResultTable(
-        (
-            Column("UAVs"),
-            Column("messages", ".1f"),
-            Column("of them status", ".1f"),
-            Column("bytes", ".0f"),
-            Column("bytes heard by each agent", ".0f"),
-        ),
-        [
-            (
-                each.uavs,
-                each.messages_per_uav_s,
-                each.messages.get("Status", 0) / each.uavs / each.watched_s,
-                each.bytes_per_uav_s,
-                each.received_bytes_per_uav_s,
-            )
-            for each in rows
-        ],
-        "What is said, per UAV and second; payload without headers",
-    )
-
-
-def _latencies(rows: Sequence[DecisionLatencies]) -> ResultTable:
+def _of_latencies(rows: Sequence[DecisionLatencies]) -> ResultTable:
     return ResultTable(
         (
             Column("rule", key="method", words=True),
-            Column("UAVs", key="uavs"),
-            Column("tasks", key="tasks"),
-            Column("decisions", key="decisions"),
+            *(Column(name, key=name.lower()) for name in ("UAVs", "tasks", "decisions")),
             *_quantile_columns(1e3),
         ),
         [
@@ -351,6 +275,10 @@ _SHARES = {"p50": 0.5, "p99": 0.99, "max": 1.0}
 
 def _quantile_columns(scale: float) -> list[Column]:
     return [Column(name, ".2f", scale=scale, key=f"{name}_s", none="never") for name in _SHARES]
+
+
+def _path(path: str) -> str:
+    return "real" if path == "tun" else "imitated"
 
 
 def _counted(packets: int) -> str:

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.bench.links import survey_mission
-from sim.bench.takeover import options_for
+from sim.bench.fleets import options_for, started, survey_mission
+from sim.bench.results import Progress, quantile, unheard
 from sim.fleet.child_process import ChildProcess
 from sim.fleet.layout import BusKind, LaunchOptions, Layout
 from swarm.bus.zenoh_bus import open_zenoh_bus
@@ -55,9 +55,7 @@ class DecisionLatencies:
 
     def quantile_s(self, share: float) -> float | None:
         """The smallest time that is not exceeded in that share of all decisions."""
-        if not self.times_s:
-            return None
-        return float(np.quantile(self.times_s, share, method="inverted_cdf"))
+        return quantile(self.times_s, share)
 
 
 class MavlinkTap:
@@ -102,7 +100,7 @@ async def measure_latencies(
     tasks: int = 40,
     seed: int = 0,
     speedup: float = 1.0,
-    on_progress: Callable[[str], None] | None = None,
+    tell: Progress = unheard,
 ) -> DecisionLatencies:
     """Fly a survey and time every decision but the first of each UAV, in wall seconds.
 
@@ -110,7 +108,6 @@ async def measure_latencies(
         ChildFailedError: a process did not start.
         TimeoutError: the mission took too long.
     """
-    tell = on_progress or (lambda _: None)
     mission = survey_mission(uavs, tasks, seed, service_s=0.0)
     clock = SystemClock()
     taps: list[MavlinkTap] = []
@@ -122,17 +119,17 @@ async def measure_latencies(
         )
         async with contextlib.AsyncExitStack() as stack:
             for router in layout.routers:
-                await (await _started(stack, router, layout.router(router))).ready()
+                await (await started(stack, router, layout.router(router))).ready()
             ids = [uav.id for uav in mission.uavs]
-            vehicles = await _started(stack, "autopilots", layout.autopilot(ids))
-            await _started(stack, COORDINATOR, layout.coordinator())
+            vehicles = await started(stack, "autopilots", layout.autopilot(ids))
+            await started(stack, COORDINATOR, layout.coordinator())
             agents = []
             for said in await vehicles.ready(len(ids)):
                 tap = MavlinkTap(clock)
                 taps.append(tap)
                 url = await stack.enter_async_context(_tapped(str(said["url"]), tap))
                 arguments = layout.agent(said["uav"], url, int(said["system_id"]))
-                agents.append(await _started(stack, said["uav"], arguments))
+                agents.append(await started(stack, said["uav"], arguments))
             tell(f"{method}: flying {tasks} tasks with {uavs} UAVs")
             async with asyncio.timeout(LIMIT_S):
                 await asyncio.gather(*(agent.ended() for agent in agents))
@@ -182,15 +179,6 @@ async def _pass_on(
             tell(data)
             writer.write(data)
             await writer.drain()
-
-
-async def _started(
-    stack: contextlib.AsyncExitStack, name: str, arguments: list[str]
-) -> ChildProcess:
-    child = ChildProcess(name, arguments)
-    stack.push_async_callback(child.stop)
-    await child.start()
-    return child
 
 
 def _parser() -> mavlink.MAVLink:

@@ -20,7 +20,7 @@ from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.options import JsonOption
 from swarm.scenario.files import resolve_scenario
 
-__all__ = ["LEGS_HELP", "FlownLeg", "LegTimes", "leg_times", "legs", "legs_flown", "load_run"]
+__all__ = ["FlownLeg", "LegTimes", "leg_times", "legs", "legs_flown", "load_run"]
 
 
 _REMEDY = "name what swarm run SCENARIO --json printed of a flight of that scenario"
@@ -124,19 +124,6 @@ def leg_times(legs: Sequence[FlownLeg], acceleration_m_s2: float | None) -> LegT
     return LegTimes(len(legs), statistics.median(excess_s), excess_s[0], excess_s[-1], beyond_s)
 
 
-LEGS_HELP = """Time of legs flown, beyond length ÷ cruise speed.
-
-RUN is what swarm run --json printed of a flight of SCENARIO; several are counted together.
-Legs go from rest to rest: a vehicle with the acceleration a takes v/a longer at best.
-
-\b
-Examples:
-    swarm run orchard --autopilot ardupilot --json > flight.json
-    swarm bench legs orchard flight.json --acceleration-m-s2 2.5
-    swarm bench legs orchard flight.json --json
-"""
-
-
 def legs(
     scenario: Annotated[
         Path,
@@ -162,7 +149,16 @@ def legs(
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """See `LEGS_HELP`."""
+    """Time of legs flown, beyond length ÷ cruise speed.
+
+    RUN is what swarm run --json printed of a flight of SCENARIO; several are counted together.
+    Legs go from rest to rest: a vehicle with the acceleration a takes v/a longer at best.
+
+    Examples:
+        swarm run orchard --autopilot ardupilot --json > flight.json
+        swarm bench legs orchard flight.json --acceleration-m-s2 2.5
+        swarm bench legs orchard flight.json --json
+    """
     from dataclasses import asdict
     from json import dumps
 

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -14,13 +14,14 @@ from multiprocessing import get_context
 import numpy as np
 
 from coordinator.recording.records import body_name
-from sim.bench.takeover import far_mission, flying, options_for
+from sim.bench.fleets import far_mission, flying, options_for, survey_mission
+from sim.bench.results import Progress, unheard
 from sim.fleet.faults.recorder import BusEntry
 from sim.fleet.faults.relay import RelayNetwork, RelayQuality
 from sim.fleet.faults.tun import HERE, THERE, TunPath, TunUnavailableError, enter_own_network
 from sim.fleet.layout import BusKind, DialedLink
 from sim.fleet.run import Run, open_run
-from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.model import Mission
 from swarm.protocol.messages import Message, MissionPhase
 from swarm.protocol.timing import LinkKind
 from swarm.protocol.uav_messages import ClaimPhase
@@ -36,7 +37,6 @@ __all__ = [
     "measure_false_losses",
     "measure_partition",
     "measure_traffic",
-    "survey_mission",
 ]
 
 
@@ -108,6 +108,11 @@ class Traffic:
     def messages_per_uav_s(self) -> float:
         """Messages said per UAV and second, all processes together."""
         return sum(self.messages.values()) / self.uavs / self.watched_s
+
+    @property
+    def status_per_uav_s(self) -> float:
+        """Those of them that are statuses."""
+        return self.messages.get("Status", 0) / self.uavs / self.watched_s
 
     @property
     def bytes_per_uav_s(self) -> float:
@@ -208,14 +213,13 @@ async def measure_partition(
     uavs: int = 10,
     tasks: int = 120,
     seed: int = 0,
-    on_progress: Callable[[str], None] | None = None,
+    tell: Progress = unheard,
 ) -> PartitionResult:
     """Part a mesh of agents in two halves for a while, and let it finish.
 
     Raises:
         TimeoutError: the mission did not get on.
     """
-    tell = on_progress or (lambda _: None)
     mission = survey_mission(uavs, tasks, seed)
     far = {uav.id for number, uav in enumerate(mission.uavs) if number % 2}
     async with flying(
@@ -274,27 +278,3 @@ def _traffic(entries: list[BusEntry], uavs: int, watched_s: float) -> Traffic:
             messages[kind] += 1
             sizes[kind] += entry.size_bytes
     return Traffic(uavs, watched_s, dict(messages), dict(sizes))
-
-
-def survey_mission(n_uav: int, n_task: int, seed: int, service_s: float = 2.0) -> Mission:
-    """UAVs in a row beside a square of tasks, as dense for every size of fleet."""
-    rng = np.random.default_rng(seed)
-    side_m = 40.0 * n_task**0.5
-    return Mission(
-        name="survey",
-        horizon_s=3600.0,
-        uavs=tuple(
-            Uav(UavId(f"uav{number:03}"), (12.0 * number, -10.0, 0.0), 10.0)
-            for number in range(1, n_uav + 1)
-        ),
-        tasks=tuple(
-            Task(
-                TaskId(f"t{number:03}"),
-                (float(east_m), float(north_m), 0.0),
-                1.0,
-                service_s=service_s,
-            )
-            for number, (east_m, north_m) in enumerate(rng.uniform(0.0, side_m, (n_task, 2)), 1)
-        ),
-        origin=Origin(46.8, 9.7, 1100.0),
-    )

@@ -8,17 +8,17 @@ real time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from time import process_time
 
-from rich.console import Group, RenderableType
-from rich.text import Text
+from rich.console import RenderableType
 
 from coordinator.planner.plan import make_plan
-from sim.bench.machine import MachineInfo, this_machine
+from sim.bench.machine import this_machine
+from sim.bench.results import BenchResult, table_of
 from sim.study.generator import mission_of, random_mission
 from sim.study.policies.agents import GREEDY
 from sim.study.policies.roster import Planner
@@ -26,17 +26,9 @@ from sim.world.outcome import score
 from sim.world.uncertainty import Uncertainty
 from swarm.model import Plan
 from swarm.runtime.clock import Clock, SystemClock
-from swarm.runtime.table import Column, ResultTable
+from swarm.runtime.table import Column
 
-__all__ = [
-    "BatchResult",
-    "MissionBatch",
-    "MissionsBench",
-    "fly_block",
-    "measure_missions",
-    "missions_as_json",
-    "missions_as_rich",
-]
+__all__ = ["BatchResult", "MissionBatch", "MissionsBench", "fly_block", "measure_missions"]
 
 
 _BLOCK = 10
@@ -69,10 +61,9 @@ class BatchResult:
 
 
 @dataclass(frozen=True, slots=True)
-class MissionsBench:
+class MissionsBench(BenchResult):
     """Everything measured in one run."""
 
-    machine: MachineInfo
     n_uav: int
     n_task: int
     missions: int
@@ -92,6 +83,31 @@ class MissionsBench:
     """Tasks done in all missions."""
     lost: int
     """UAVs lost in all missions."""
+
+    @property
+    def cpu_s(self) -> float:
+        """Per mission, planning and flying [s]."""
+        return self.plan_cpu_s + self.fly_cpu_s
+
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        yield (
+            f"{self.missions} random missions of {self.n_uav} × {self.n_task}, seeds "
+            f"{self.seed}..{self.seed + self.missions - 1}, by the greedy rule, {self.jobs} "
+            f"process{'es' if self.jobs > 1 else ''}:"
+        )
+        yield table_of(
+            [self],
+            Column("wall time", ".1f", "s", key="wall_s"),
+            Column("missions/min", ".0f", key="missions_per_min"),
+            Column("CPU per mission", ".0f", "ms", 1e3, key="cpu_s"),
+            Column("planning", ".0f", "ms", 1e3, key="plan_cpu_s"),
+            Column("flying", ".0f", "ms", 1e3, key="fly_cpu_s"),
+        )
+        yield (
+            f"{self.loss:.0%} of the UAVs are lost ({self.lost} were), {self.popup:.0%} of the "
+            f"tasks pop up; {self.done} tasks were done."
+        )
 
 
 def measure_missions(
@@ -150,48 +166,9 @@ def fly_block(which: MissionBatch) -> BatchResult:
     return BatchResult(plan_cpu_s, fly_cpu_s, done, lost)
 
 
-def missions_as_rich(bench: MissionsBench) -> RenderableType:
-    """Everything for a terminal."""
-    table = ResultTable(
-        (
-            Column("wall time", ".1f", "s"),
-            Column("missions/min", ".0f"),
-            *(Column(name, ".0f", "ms", 1e3) for name in ("CPU per mission", "planning", "flying")),
-        ),
-        [
-            (
-                bench.wall_s,
-                bench.missions_per_min,
-                bench.plan_cpu_s + bench.fly_cpu_s,
-                bench.plan_cpu_s,
-                bench.fly_cpu_s,
-            )
-        ],
-    )
-    last = bench.seed + bench.missions - 1
-    return Group(
-        Text(str(bench.machine)),
-        Text(
-            f"{bench.missions} random missions of {bench.n_uav} × {bench.n_task}, seeds "
-            f"{bench.seed}..{last}, by the greedy rule, {bench.jobs} "
-            f"process{'es' if bench.jobs > 1 else ''}:"
-        ),
-        table,
-        Text(
-            f"{bench.loss:.0%} of the UAVs are lost ({bench.lost} were), {bench.popup:.0%} of the "
-            f"tasks pop up; {bench.done} tasks were done."
-        ),
-    )
-
-
-def missions_as_json(bench: MissionsBench) -> dict[str, object]:
-    """Everything for programs, ready for `json.dumps`."""
-    return asdict(bench)
-
-
 def _flown(which: MissionBatch, jobs: int) -> Iterator[tuple[range, BatchResult]]:
     blocks = [which.seeds[at : at + _BLOCK] for at in range(0, len(which.seeds), _BLOCK)]
-    parts = [MissionBatch(which.n_uav, which.n_task, b, which.uncertainty) for b in blocks]
+    parts = [replace(which, seeds=block) for block in blocks]
     if jobs == 1:
         yield from zip(blocks, map(fly_block, parts), strict=True)
         return

@@ -5,55 +5,29 @@ They measure how long things take, and how much one process carries.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sim.bench.command_line import each, progress, size_of
+from sim.bench.command_line import (
+    ValleyArgument,
+    each,
+    integer,
+    launch_options,
+    progress,
+    require_proc,
+    show,
+    size_of,
+)
 from sim.options import LossOption, PopupOption
-from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.options import JsonOption, SeedOption, SpeedupOption
 from swarm.scenario.files import resolve_scenario
 
-__all__ = [
-    "AUTOPILOT_HELP",
-    "DASHBOARD_HELP",
-    "MISSIONS_HELP",
-    "TURNAROUND_HELP",
-    "autopilot",
-    "dashboard",
-    "missions",
-    "turnaround",
-]
-
-
-TURNAROUND_HELP = """Time from each arrival, or end of a service, to the next target sent.
-
-Flies a scenario with real processes: what each agent's process takes to send its vehicle
-on, and the makespan beside the plan's. Exit status 0: every task was done.
-
-At wall speed valley-survey takes about seven minutes. A speed-up saves time, but has as
-many turnarounds and messages in less of it: then processes wait for processors too.
-
-\b
-Examples:
-    swarm bench turnaround
-    swarm bench turnaround --speedup 4 --rounds 3
-    swarm bench turnaround --command mission --json
-"""
+__all__ = ["autopilot", "dashboard", "missions", "turnaround"]
 
 
 def turnaround(
-    scenario: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="[SCENARIO]",
-            help="Scenario file, or the name of a shipped one; default: valley-survey.",
-            parser=resolve_scenario,
-            show_default=False,
-        ),
-    ] = None,
+    scenario: ValleyArgument = None,
     rounds: Annotated[
         int, typer.Option("--rounds", min=1, max=1000, metavar="N", help="Flights.")
     ] = 1,
@@ -89,66 +63,53 @@ def turnaround(
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
-    """See `TURNAROUND_HELP`."""
+    """Time from each arrival, or end of a service, to the next target sent.
+
+    Flies a scenario with real processes: what each agent's process takes to send its vehicle
+    on, and the makespan beside the plan's. Exit status 0: every task was done.
+
+    At wall speed valley-survey takes about seven minutes. A speed-up saves time, but has as
+    many turnarounds and messages in less of it: then processes wait for processors too.
+
+    Examples:
+        swarm bench turnaround
+        swarm bench turnaround --speedup 4 --rounds 3
+        swarm bench turnaround --command mission --json
+    """
     import os
-    from json import dumps
+    from dataclasses import replace
 
-    from rich.console import Console
-
-    from sim.bench.machine import this_machine
-    from sim.bench.turnaround import measure_turnarounds, turnarounds_as_json, turnarounds_as_rich
+    from sim.bench.turnaround import measure_turnarounds
     from sim.fleet.autopilots import parse_autopilots
     from sim.fleet.firmware import SitlFirmware
-    from sim.fleet.layout import BusKind, LaunchOptions, defaults_for
+    from sim.fleet.layout import BusKind
     from sim.fleet.passthrough import PassthroughOptions, parse_command_styles
-    from swarm.runtime.log import LogFormat
     from swarm.scenario import load_scenario
 
     path = scenario or resolve_scenario("valley-survey")
     mission = load_scenario(path)
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, None, os.environ)
-    defaults = defaults_for(autopilots, len(uavs))
-    options = LaunchOptions(
-        scenario=path,
-        method="guided",
+    options = launch_options(
+        path,
+        len(uavs),
+        autopilots,
+        BusKind.AUTO,
         seed=seed,
         speedup=speedup,
-        bus=BusKind.AUTO,
         position_rate_hz=position_rate_hz,
-        acceptance_radius_m=defaults.acceptance_radius_m,
-        start_timeout_s=defaults.start_timeout_s,
-        autopilots=autopilots,
-        passthrough=PassthroughOptions(
-            command=parse_command_styles(command, uavs),
-            accept_no_failsafe=isinstance(autopilots, SitlFirmware),
-        ),
-        log_format=LogFormat.JSON,
     )
-    machine = this_machine()
+    passthrough = PassthroughOptions(
+        command=parse_command_styles(command, uavs),
+        accept_no_failsafe=isinstance(autopilots, SitlFirmware),
+    )
     with progress() as tell:
-        done = measure_turnarounds(mission, options, rounds, tell)
-    if json:
-        typer.echo(dumps(turnarounds_as_json(machine, seed, done), allow_nan=False))
-    else:
-        Console(highlight=False).print(turnarounds_as_rich(machine, seed, done))
+        done = measure_turnarounds(mission, replace(options, passthrough=passthrough), rounds, tell)
+    show(done, json=json)
     return 0 if done.ok else 1
 
 
-AUTOPILOT_HELP = """Measure how many flying vehicles one process simulates.
-
-Every vehicle has a TCP client of its own that asks for positions at 10 Hz and the status
-messages that an agent asks for. Exit status 0: at least 99.5 % of them came, for less than
-one core. Needs Linux.
-
-\b
-Examples:
-    swarm bench autopilot
-    swarm bench autopilot --vehicles 20 --seconds 5 --json
-"""
-
 _LEAST_DELIVERED_FRAC = 0.995
-
 _AUTOPILOT_MOST_CORES = 1.0
 
 
@@ -163,43 +124,27 @@ def autopilot(
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
-    """See `AUTOPILOT_HELP`."""
+    """Measure how many flying vehicles one process simulates.
+
+    Every vehicle has a TCP client of its own that asks for positions at 10 Hz and the status
+    messages that an agent asks for. Exit status 0: at least 99.5 % of them came, for less than
+    one core. Needs Linux.
+
+    Examples:
+        swarm bench autopilot
+        swarm bench autopilot --vehicles 20 --seconds 5 --json
+    """
     import asyncio
-    from json import dumps
-    from pathlib import Path
 
-    from rich.console import Console
+    from sim.bench.autopilot_load import measure_autopilot
 
-    from sim.bench.autopilot_load import (
-        autopilot_load_as_json,
-        autopilot_load_as_rich,
-        measure_autopilot,
-    )
-
-    if not Path("/proc/self/stat").exists():
-        problem = "there is no /proc that tells processor time"
-        raise InputError(Fault("swarm bench autopilot", "", problem, "run it on Linux"))
+    require_proc("autopilot")
     with progress() as tell:
         done = asyncio.run(measure_autopilot(vehicles, seconds, seed, tell))
-    if json:
-        typer.echo(dumps(autopilot_load_as_json(done), allow_nan=False))
-    else:
-        Console(highlight=False).print(autopilot_load_as_rich(done))
+    show(done, json=json)
     enough = done.delivered_frac >= _LEAST_DELIVERED_FRAC and done.cores < _AUTOPILOT_MOST_CORES
     return 0 if enough else 1
 
-
-DASHBOARD_HELP = """Measure what a dashboard costs.
-
-A mission is acted out on a real bus: every UAV tells its status, claims and ends tasks, and
-says why. The dashboard is a process of its own; so many pages follow it. Exit status 0: it
-took less than half a core whatever the pages. Needs Linux.
-
-\b
-Examples:
-    swarm bench dashboard
-    swarm bench dashboard --uavs 300 --rate-hz 5 --clients 1 --seconds 10 --json
-"""
 
 _DASHBOARD_MOST_CORES = 0.5
 
@@ -232,54 +177,30 @@ def dashboard(
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
-    """See `DASHBOARD_HELP`."""
+    """Measure what a dashboard costs.
+
+    A mission is acted out on a real bus: every UAV tells its status, claims and ends tasks, and
+    says why. The dashboard is a process of its own; so many pages follow it. Exit status 0: it
+    took less than half a core whatever the pages. Needs Linux.
+
+    Examples:
+        swarm bench dashboard
+        swarm bench dashboard --uavs 300 --rate-hz 5 --clients 1 --seconds 10 --json
+    """
     import asyncio
-    from json import dumps
-    from pathlib import Path
 
-    from rich.console import Console
+    from sim.bench.dashboard_load import measure_dashboard
 
-    from sim.bench.dashboard_load import (
-        dashboard_load_as_json,
-        dashboard_load_as_rich,
-        measure_dashboard,
-    )
-
-    if not Path("/proc/self/stat").exists():
-        problem = "there is no /proc that tells processor time"
-        raise InputError(Fault("swarm bench dashboard", "", problem, "run it on Linux"))
-    counts = tuple(each("--clients", clients, _count))
+    require_proc("dashboard")
+    read = integer(0, 64, "no number of pages", "give numbers up to 64")
+    counts = tuple(each("--clients", clients, read))
     with progress() as tell:
         done = asyncio.run(measure_dashboard(uavs, tasks, rate_hz, counts, seconds, seed, tell))
-    if json:
-        typer.echo(dumps(dashboard_load_as_json(done), allow_nan=False))
-    else:
-        Console(highlight=False).print(dashboard_load_as_rich(done))
+    show(done, json=json)
     return 0 if max(following.cores for following in done.followings) < _DASHBOARD_MOST_CORES else 1
 
 
-def _count(flag: str, word: str) -> int:
-    if not (word.isascii() and word.isdigit() and int(word) <= 64):
-        raise InputError(Fault(flag, word, "no number of pages", "give numbers up to 64"))
-    return int(word)
-
-
-_LOSS = 0.3
-
-_POPUP = 0.3
-
-MISSIONS_HELP = f"""Fly random missions in virtual time with the agents' real cores.
-
-Each is another mission, planned anew and flown by the greedy rule on an ideal bus, its
-coordinator dead. Unless --loss and --popup say otherwise, {_LOSS:.0%} of the UAVs are lost and
-{_POPUP:.0%} of the tasks pop up.
-
-\b
-Examples:
-    swarm bench missions
-    swarm bench missions --missions 100 --size 20x100 --jobs 1
-    swarm bench missions --loss 0 --popup 0 --json
-"""
+_LOSS = _POPUP = 0.3
 
 
 def missions(
@@ -305,18 +226,21 @@ def missions(
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
-    """See `MISSIONS_HELP`."""
-    from json import dumps
+    """Fly random missions in virtual time with the agents' real cores.
 
+    Each is another mission, planned anew and flown by the greedy rule on an ideal bus, its
+    coordinator dead. Unless --loss and --popup say otherwise, 30% of the UAVs are lost and
+    30% of the tasks pop up.
+
+    Examples:
+        swarm bench missions
+        swarm bench missions --missions 100 --size 20x100 --jobs 1
+        swarm bench missions --loss 0 --popup 0 --json
+    """
     from rich.console import Console
     from rich.progress import Progress
 
-    from sim.bench.missions import (
-        MissionBatch,
-        measure_missions,
-        missions_as_json,
-        missions_as_rich,
-    )
+    from sim.bench.missions import MissionBatch, measure_missions
     from sim.world.uncertainty import Uncertainty
     from swarm.kernels.lower_level import default_threads
     from swarm.runtime.clock import SystemClock
@@ -335,8 +259,5 @@ def missions(
             SystemClock(),
             lambda flown: bar.advance(flying, flown),
         )
-    if json:
-        typer.echo(dumps(missions_as_json(done), allow_nan=False))
-    else:
-        Console(highlight=False).print(missions_as_rich(done))
+    show(done, json=json)
     return 0

@@ -6,15 +6,16 @@ Plots are of value against the time limit or the size, and of time and memory by
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Group, RenderableType
+from rich.console import RenderableType
 from rich.text import Text
 
 from sim.bench.plans import LONG_RUN, MethodSummary, PlanBench, PlanMeasurement, summaries
+from sim.bench.results import BenchResult
 from sim.bench.solvers import HORIZON_SHARE, METHODS
 from sim.study.baselines.ortools_routing import SHORTFALL
 from swarm.runtime.table import Column, ResultTable
@@ -25,9 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "as_json",
-    "as_markdown",
-    "as_rich",
+    "PlanReport",
     "comparison_figure",
     "comparison_grids",
     "scaling_figure",
@@ -119,35 +118,39 @@ def scaling_grid(bench: PlanBench) -> ResultTable:
     return ResultTable(columns, rows, _SCALING_TITLE)
 
 
-def as_rich(bench: PlanBench, grids: Sequence[ResultTable]) -> RenderableType:
-    """Everything for a terminal."""
-    parts: list[RenderableType] = [Text(str(bench.machine)), Text(_seeds(bench))]
-    for grid in grids:
-        # A column of notes would take the width that figures need.
-        figures = ResultTable(grid.columns[:-1], [row[:-1] for row in grid.rows], grid.title)
-        told = [
-            Text(f"{_name(cells)}: {cells[-1]}", style="dim") for cells in grid.cells() if cells[-1]
-        ]
-        parts += [Text(), figures, *told]
-    parts += [Text(), *(Text(note) for note in _notes(bench, grids))]
-    return Group(*parts)
+@dataclass(frozen=True, slots=True)
+class PlanReport(BenchResult):
+    """A run in tables."""
 
+    bench: PlanBench
+    grids: Sequence[ResultTable]
 
-def as_markdown(bench: PlanBench, grids: Sequence[ResultTable]) -> str:
-    """Everything for a document."""
-    about = f"Measured on {bench.machine}. {_seeds(bench)}"
-    parts = [about, *(grid.as_markdown() for grid in grids), *_notes(bench, grids)]
-    return "\n\n".join(parts) + "\n"
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        return {
+            **asdict(self.bench),
+            "summaries": [asdict(summary) for summary in summaries(self.bench)],
+            "notes": _notes(self.bench, ()),
+        }
 
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        yield _seeds(self.bench)
+        for grid in self.grids:
+            # A column of notes would take the width that figures need.
+            yield ""
+            yield ResultTable(grid.columns[:-1], [row[:-1] for row in grid.rows], grid.title)
+            for cells in grid.cells():
+                if cells[-1]:
+                    yield Text(f"{_name(cells)}: {cells[-1]}", style="dim")
+        yield ""
+        yield from _notes(self.bench, self.grids)
 
-def as_json(bench: PlanBench) -> dict[str, object]:
-    """Everything for programs, ready for `json.dumps`."""
-    return {
-        "machine": asdict(bench.machine),
-        "measured": [asdict(row) for row in bench.measured],
-        "summaries": [asdict(summary) for summary in summaries(bench)],
-        "notes": _notes(bench, ()),
-    }
+    def as_markdown(self) -> str:
+        """Everything for a document."""
+        about = f"Measured on {self.machine}. {_seeds(self.bench)}"
+        tables = (grid.as_markdown() for grid in self.grids)
+        return "\n\n".join([about, *tables, *_notes(self.bench, self.grids)]) + "\n"
 
 
 def _comparison_row(summary: MethodSummary, with_long_run: bool) -> tuple[object, ...]:
@@ -271,7 +274,7 @@ def scaling_figure(bench: PlanBench) -> Figure:
             points = [(cases.index(row.case), of(row)) for row in rows]
             if points:
                 xs, ys = zip(*points, strict=True)
-                axes.plot(xs, ys, label=name, color=_colour(name), marker=_marker(name))
+                axes.plot(xs, ys, label=name, **_look(name))
         axes.set_xticks(range(len(cases)), cases, rotation=30)
         axes.set_yscale("log")
         axes.set_xlabel("UAVs × tasks")
@@ -291,7 +294,7 @@ def _lines(
             if s.method == name
         ]
         xs, ys = zip(*sorted(points), strict=True)
-        axes.plot(xs, ys, label=name, clip_on=False, color=_colour(name), marker=_marker(name))
+        axes.plot(xs, ys, label=name, clip_on=False, **_look(name))
     axes.set_xticks(range(len(ticks)), ticks)
 
 
@@ -300,16 +303,9 @@ def _lowest(found: Sequence[MethodSummary]) -> float:
     return max(0.0, math.floor(min(worst, 0.9) / _STEP) * _STEP)
 
 
-def _colour(name: str) -> str:
-    return _COLOURS[_index(name) % len(_COLOURS)]
-
-
-def _marker(name: str) -> str:
-    return _MARKERS[_index(name) % len(_MARKERS)]
-
-
-def _index(name: str) -> int:
-    return list(METHODS).index(name)
+def _look(name: str) -> dict[str, Any]:
+    place = list(METHODS).index(name)
+    return {"color": _COLOURS[place % len(_COLOURS)], "marker": _MARKERS[place % len(_MARKERS)]}
 
 
 def _legend(figure: Figure) -> None:
@@ -327,4 +323,4 @@ def _first_s(row: PlanMeasurement) -> float:
 
 
 def _mib(row: PlanMeasurement) -> float:
-    return row.peak_bytes / 2.0**20
+    return row.peak_bytes / _MIB

@@ -1,7 +1,6 @@
 """Plans of several methods side by side: same missions, same time, one after another.
 
-Every list is scored here by eq. 1, whoever made it. Ratios are within this one run. Leaves out:
-how the figures are shown (`sim.bench.plan_report`, `sim.bench.plan_report`).
+Every list is scored here by eq. 1, whoever made it. Ratios are within this one run.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.bench.machine import MachineInfo, this_machine
+from sim.bench.results import Progress, unheard
 from sim.bench.solvers import (
     METHODS,
     MissionSource,
@@ -103,7 +103,6 @@ class MethodSummary:
 
 
 Runner = Callable[[PlanningJob], PlanningRun]
-Progress = Callable[[str], None]
 
 
 def measure_plans(
@@ -114,7 +113,7 @@ def measure_plans(
     *,
     long_run_s: float | None = None,
     run: Runner = run_in_subprocess,
-    on_progress: Progress | None = None,
+    tell: Progress = unheard,
 ) -> PlanBench:
     """Run everything, one job at a time.
 
@@ -125,9 +124,8 @@ def measure_plans(
         seeds: of random missions, and of methods that draw.
         long_run_s: time for ``guided`` once more on every mission [s].
         run: does one job.
-        on_progress: told what is about to run.
+        tell: told what is about to run.
     """
-    tell = _tell_nobody if on_progress is None else on_progress
     machine = this_machine()
     rows: list[PlanMeasurement] = []
     for case, source in sources:
@@ -155,10 +153,6 @@ def summaries(bench: PlanBench) -> list[MethodSummary]:
     for row in bench.measured:
         groups.setdefault((row.case, row.limit_s, row.method), []).append(row)
     return [_summary(rows) for rows in groups.values()]
-
-
-def _tell_nobody(what: str) -> None:
-    del what
 
 
 def _measured(

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sim.bench.command_line import bus_of, each, progress
+from sim.bench.command_line import (
+    LONGEST_S,
+    BusKindOption,
+    ValleyArgument,
+    bus_of,
+    each,
+    integer,
+    launch_options,
+    progress,
+    show,
+)
 from swarm.protocol.timing import LinkKind
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.options import JsonOption, LinkOption, SeedOption, SpeedupOption
@@ -16,36 +25,7 @@ from swarm.scenario.files import resolve_scenario
 if TYPE_CHECKING:
     from sim.bench.failover import FailoverMeasure
 
-__all__ = ["FAILOVER_HELP", "FLOOD_HELP", "SECURE_HELP", "failover", "flood", "secure"]
-
-
-_LONGEST_S = 86_400.0
-
-FAILOVER_HELP = """Measure fleets of real processes in trouble.
-
-kill, hang, cut, deadlock: time until another UAV holds the task of one that is struck.
-loss: how often somebody is taken for lost on bad links. partition: duplicate visits of a
-fleet in two halves. traffic: messages and bytes against fleet size. latency: from an
-arrival to the next command. All of it takes an hour; run it on a quiet machine.
-
-\b
-Examples:
-    swarm bench failover
-    swarm bench failover --what kill,hang --trials 20 --link clean
-    swarm bench failover --what loss --watch-s 30 --json
-"""
-
-FLOOD_HELP = """Fly while a hostile peer floods the bus with malformed messages.
-
-24 messages of each malformed kind per second, from before take-off almost to the end.
-Exit status 0: every decision was the planned one, every process lived, and every UAV
-counted what it dropped.
-
-\b
-Examples:
-    swarm bench flood
-    swarm bench flood --seconds 15 --bus mesh --json
-"""
+__all__ = ["failover", "flood", "secure"]
 
 
 def failover(
@@ -64,7 +44,7 @@ def failover(
     watch_s: Annotated[
         float,
         typer.Option(
-            "--watch-s", min=1.0, max=_LONGEST_S, metavar="S", help="Time on each kind of bad link."
+            "--watch-s", min=1.0, max=LONGEST_S, metavar="S", help="Time on each kind of bad link."
         ),
     ] = 120.0,
     relay: Annotated[
@@ -74,7 +54,7 @@ def failover(
     parted_s: Annotated[
         float,
         typer.Option(
-            "--parted-s", min=1.0, max=_LONGEST_S, metavar="S", help="Length of a partition."
+            "--parted-s", min=1.0, max=LONGEST_S, metavar="S", help="Length of a partition."
         ),
     ] = 30.0,
     partitions: Annotated[
@@ -87,19 +67,21 @@ def failover(
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
-    """See `FAILOVER_HELP`."""
-    from json import dumps
+    """Measure fleets of real processes in trouble.
 
-    from rich.console import Console
+    kill, hang, cut, deadlock: time until another UAV holds the task of one that is struck.
+    loss: how often somebody is taken for lost on bad links. partition: duplicate visits of a
+    fleet in two halves. traffic: messages and bytes against fleet size. latency: from an
+    arrival to the next command. All of it takes an hour; run it on a quiet machine.
 
-    from sim.bench.failover import (
-        FailoverMeasure,
-        FailoverSettings,
-        failover_as_json,
-        failover_as_rich,
-        measure_failover,
-    )
+    Examples:
+        swarm bench failover
+        swarm bench failover --what kill,hang --trials 20 --link clean
+        swarm bench failover --what loss --watch-s 30 --json
+    """
+    from sim.bench.failover import FailoverMeasure, FailoverSettings, measure_failover
 
+    fleet_size = integer(1, 1000, "no fleet size", "give numbers within 1..1000")
     wanted = list(FailoverMeasure) if what == "all" else each("--what", what, _what)
     settings = FailoverSettings(
         trials=trials,
@@ -109,15 +91,12 @@ def failover(
         relay=relay,
         parted_s=parted_s,
         partitions=partitions,
-        sizes=tuple(each("--sizes", sizes, _fleet_size)),
+        sizes=tuple(each("--sizes", sizes, fleet_size)),
         seed=seed,
     )
     with progress() as tell:
         done = measure_failover(wanted, settings, tell)
-    if json:
-        typer.echo(dumps(failover_as_json(done), allow_nan=False))
-    else:
-        Console(highlight=False).print(failover_as_rich(done))
+    show(done, json=json)
     return 0
 
 
@@ -128,29 +107,30 @@ def flood(
             "--seconds", min=12.0, max=3600.0, metavar="S", help="How long to flood, about."
         ),
     ] = 60.0,
-    bus: Annotated[
-        str, typer.Option("--bus", metavar="mesh|router", help="How the processes talk.")
-    ] = "router",
+    bus: BusKindOption = "router",
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
-    """See `FLOOD_HELP`."""
-    import asyncio
-    from json import dumps
+    """Fly while a hostile peer floods the bus with malformed messages.
 
-    from rich.console import Console
+    24 messages of each malformed kind per second, from before take-off almost to the end.
+    Exit status 0: every decision was the planned one, every process lived, and every UAV
+    counted what it dropped.
+
+    Examples:
+        swarm bench flood
+        swarm bench flood --seconds 15 --bus mesh --json
+    """
+    import asyncio
 
     from sim.bench.machine import this_machine
-    from sim.bench.security_report import flood_as_json, flood_as_rich
+    from sim.bench.security import FloodBench
     from sim.fleet.faults.flood import fly_flooded, times_for
 
     kind, machine = bus_of(bus), this_machine()
     with progress() as tell:
         done = asyncio.run(fly_flooded(times_for(seconds), seed=seed, bus=kind, on_progress=tell))
-    if json:
-        typer.echo(dumps(flood_as_json(machine, seed, done), allow_nan=False))
-    else:
-        Console(highlight=False).print(flood_as_rich(machine, seed, done))
+    show(FloodBench(machine, seed, done), json=json)
     return 0 if done.ok else 1
 
 
@@ -164,38 +144,8 @@ def _what(flag: str, word: str) -> FailoverMeasure:
         raise InputError(Fault(flag, word, "cannot be measured", remedy)) from None
 
 
-def _fleet_size(flag: str, word: str) -> int:
-    if not (word.isascii() and word.isdigit() and 1 <= int(word[:5]) <= 1000):
-        raise InputError(Fault(flag, word, "no fleet size", "give numbers within 1..1000"))
-    return int(word)
-
-
-SECURE_HELP = """Fly with keys and without in turn, and set what it costs side by side.
-
-Flies a scenario with real processes in turn plain, by --secure of swarm run, and secure while a
-hostile agent with valid keys floods the bus: processor time and memory by kind of process, the
-time from each arrival to the next target sent, the time to take off; and the time single claims
-take through a router. Exit status 0: every task was done, and nothing was refused without a flood.
-
-\b
-Examples:
-    swarm bench secure
-    swarm bench secure --speedup 10 --rounds 3
-    swarm bench secure --flood-hz 0 --bus mesh
-    swarm bench secure table-1 --claims 0 --json
-"""
-
-
 def secure(
-    scenario: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="[SCENARIO]",
-            help="Scenario file, or the name of a shipped one; default: valley-survey.",
-            parser=resolve_scenario,
-            show_default=False,
-        ),
-    ] = None,
+    scenario: ValleyArgument = None,
     rounds: Annotated[
         int, typer.Option("--rounds", min=0, max=1000, metavar="N", help="Flights each way.")
     ] = 2,
@@ -220,9 +170,7 @@ def secure(
         ),
     ] = 10_000.0,
     speedup: SpeedupOption = 4.0,
-    bus: Annotated[
-        str, typer.Option("--bus", metavar="mesh|router", help="How the processes talk.")
-    ] = "router",
+    bus: BusKindOption = "router",
     position_rate_hz: Annotated[
         float,
         typer.Option(
@@ -236,17 +184,22 @@ def secure(
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
-    """See `SECURE_HELP`."""
-    from json import dumps
+    """Fly with keys and without in turn, and set what it costs side by side.
 
-    from rich.console import Console
+    Flies a scenario with real processes in turn plain, by --secure of swarm run, and secure while a
+    hostile agent with valid keys floods the bus: processor time and memory by kind of process, the
+    time from each arrival to the next target sent, the time to take off; and the time single claims
+    take through a router. Exit status 0: every task was done, and nothing was refused without a
+    flood.
 
-    from sim.bench.machine import this_machine
+    Examples:
+        swarm bench secure
+        swarm bench secure --speedup 10 --rounds 3
+        swarm bench secure --flood-hz 0 --bus mesh
+        swarm bench secure table-1 --claims 0 --json
+    """
     from sim.bench.security import SecureSettings, measure_secure
-    from sim.bench.security_report import secure_as_json, secure_as_rich
     from sim.fleet.autopilots import SimulatedAutopilots
-    from sim.fleet.layout import LaunchOptions, defaults_for
-    from swarm.runtime.log import LogFormat
     from swarm.scenario import load_scenario
 
     if flood_hz > 0.0 and bus != "router":
@@ -254,23 +207,16 @@ def secure(
         raise InputError(Fault("--flood-hz", f"{flood_hz:g}", problem, "give 0 with --bus mesh"))
     path = scenario or resolve_scenario("valley-survey")
     mission = load_scenario(path)
-    defaults = defaults_for(SimulatedAutopilots(), len(mission.uavs))
-    options = LaunchOptions(
-        scenario=path,
-        method="guided",
+    options = launch_options(
+        path,
+        len(mission.uavs),
+        SimulatedAutopilots(),
+        bus_of(bus),
         seed=seed,
         speedup=speedup,
-        bus=bus_of(bus),
         position_rate_hz=position_rate_hz,
-        acceptance_radius_m=defaults.acceptance_radius_m,
-        start_timeout_s=defaults.start_timeout_s,
-        log_format=LogFormat.JSON,
     )
-    machine = this_machine()
     with progress() as tell:
         done = measure_secure(mission, options, SecureSettings(rounds, claims, flood_hz), tell)
-    if json:
-        typer.echo(dumps(secure_as_json(machine, done), allow_nan=False))
-    else:
-        Console(highlight=False).print(secure_as_rich(machine, done))
+    show(done, json=json)
     return 0 if done.ok else 1

@@ -1,233 +1,46 @@
-"""What identities, encryption and signatures cost a fleet: flights with and without, in turn.
+"""What identities, encryption and signatures cost a fleet, and what malformed messages do to it.
 
-The same mission is flown with real processes, plain, secure, and secure while a hostile agent with
-valid keys floods the bus, one after the other, so that all meet the same moods of the machine. Of
-each flight: processor time and memory by kind of process (Linux alone tells them), the turnarounds
-of the agents, and how long it took to take off.
+The same mission is flown plain, secure, and secure while a hostile agent with valid keys floods
+the bus, in turn, so that all meet the same moods of the machine.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import json
 import math
-import os
-import sys
-from collections import Counter
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
-from enum import StrEnum
-from pathlib import Path
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.results import refusals
-from sim.bench.latency import SPEAKER, measure_hops
-from sim.bench.machine import cpu_s, memory_bytes
-from sim.bench.turnaround import told_turnarounds
-from sim.fleet.child_process import ChildProcess, ProgramEnvironment
-from sim.fleet.launcher import Launcher
+import numpy as np
+from rich.console import RenderableType
+
+from sim.bench.latency import measure_hops
+from sim.bench.machine import this_machine
+from sim.bench.results import BenchResult, Progress, unheard
+from sim.bench.security_flights import CostFlight, SecurityMode, fly_metered, prepared
+from sim.bench.turnaround import SHARES, TARGET_MS, quantiles_ms
+from sim.fleet.faults.flood import Flood
+from sim.fleet.faults.forgery import REASONS
 from sim.fleet.layout import BusKind, LaunchOptions
-from sim.fleet.run import Run, open_run
-from sim.fleet.security import protected
 from swarm.model import Mission
-from swarm.protocol.messages import MissionPhase
+from swarm.runtime.table import Column, ResultTable
 
-__all__ = [
-    "HOSTILE",
-    "LAUNCHER",
-    "CostFlight",
-    "CostsByKind",
-    "FloodTotals",
-    "ProcessMeter",
-    "SecureBench",
-    "SecureSettings",
-    "SecurityMode",
-    "flooded",
-    "in_turn",
-    "kind_of",
-    "measure_secure",
-]
+__all__ = ["FloodBench", "SecureBench", "SecureSettings", "in_turn", "measure_secure"]
 
 
-LAUNCHER = "swarm run"
-
-
-@dataclass(frozen=True, slots=True)
-class CostsByKind:
-    """Of all processes of a run, by kind."""
-
-    processes: Mapping[str, int]
-    """How many there were."""
-    cpu_s: Mapping[str, float]
-    """Processor time of all of them together [s]."""
-    memory_bytes: Mapping[str, float]
-    """Most that one of them held in RAM at a look, on average over them."""
-
-
-class ProcessMeter:
-    """Looks at every process of one launch.
-
-    Args:
-        pid: of the process that launches.
-    """
-
-    def __init__(self, pid: int) -> None:
-        self._kinds = {pid: LAUNCHER}
-        self._began_s = {pid: cpu_s(pid)}
-        self._cpu_s: dict[int, float] = {}
-        self._most_bytes: dict[int, int] = {}
-
-    def look(self, launch: Launcher) -> None:
-        """Note what each living process has used so far."""
-        for child in launch.lives:
-            if child.returncode is None:
-                self._kinds.setdefault(child.pid, kind_of(child.arguments))
-        for pid in self._kinds:
-            with contextlib.suppress(OSError, IndexError):  # gone meanwhile
-                used_s, held = cpu_s(pid), memory_bytes(pid)
-                if held:  # a process that has ended and was not waited for holds nothing
-                    self._cpu_s[pid] = used_s - self._began_s.get(pid, 0.0)
-                    self._most_bytes[pid] = max(held, self._most_bytes.get(pid, 0))
-
-    def costs(self) -> CostsByKind:
-        """As they stood at the last look."""
-        count = Counter(self._kinds[pid] for pid in self._cpu_s)
-        used_s, held = dict.fromkeys(count, 0.0), dict.fromkeys(count, 0.0)
-        for pid, time_s in self._cpu_s.items():
-            kind = self._kinds[pid]
-            used_s[kind] += time_s
-            held[kind] += self._most_bytes[pid] / count[kind]
-        return CostsByKind(dict(count), used_s, held)
-
-
-def kind_of(arguments: tuple[str, ...]) -> str:
-    """The kind of a process with that command line: the `swarm` command, or firmware."""
-    return arguments[0] if arguments[0].isalpha() else "firmware"
-
-
-HOSTILE = "hostile"
-"""Its name among the UAVs of the keys; the mission has no such UAV."""
-
-_LIMIT_S = 86_400.0
-"""A run gives up long before that."""
-
-
-@dataclass(slots=True)
-class FloodTotals:
-    """What a flood came to, as far as has been told."""
-
-    sent: int = 0
-    """Messages it has handed over, whether its router still hears it or has shut it out."""
-    wall_s: float = 0.0
-    """In so many seconds."""
-
-    @property
-    def rate_hz(self) -> float:
-        """Messages a second."""
-        return self.sent / self.wall_s if self.wall_s > 0.0 else 0.0
-
-    def hear(self, _name: str, line: str) -> None:
-        """Take note of a line of the hostile process."""
-        with contextlib.suppress(ValueError, KeyError, TypeError):
-            said = json.loads(line)
-            self.sent, self.wall_s = int(said["sent"]), float(said["wall_s"])
-
-
-@contextlib.asynccontextmanager
-async def flooded(run: Run, rate_hz: float) -> AsyncIterator[FloodTotals]:
-    """Flood ``run``, which has routers and keys for `HOSTILE`, as long as its mission lasts.
-
-    Args:
-        run: just started.
-        rate_hz: messages a second that the hostile process tries to send.
-    """
-    poured = FloodTotals()
-    pouring = asyncio.get_running_loop().create_task(_pour(run, rate_hz, poured))
-    try:
-        yield poured
-    finally:
-        pouring.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await pouring
-
-
-async def _pour(run: Run, rate_hz: float, poured: FloodTotals) -> None:
-    keys, layout = run.launch.options.keys, run.launch.layout
-    if keys is None or not layout.routers:
-        raise ValueError("only a run with keys and routers is flooded")
-    command = [
-        *(sys.executable, "-m", "sim.fleet.faults.torrent"),
-        *("--keys", str(keys.of_seat(HOSTILE)), "--mission", run.launch.mission.name),
-        *("--connect", layout.endpoint(layout.routers[0]), "--rate-hz", repr(rate_hz)),
-        *(word for uav in run.launch.mission.uavs for word in ("--other", uav.id)),
-    ]
-    child = ChildProcess(
-        HOSTILE, command, setting=ProgramEnvironment(Path.cwd(), {}), on_log=poured.hear
-    )
-    mission_state, clock = run.mission_state, run.clock
-    await run.until(
-        lambda: mission_state.mission_s(clock.now_s()) is not None,
-        limit_s=_LIMIT_S,
-        what="the start",
-    )
-    try:
-        await child.start()
-        await run.until(
-            lambda: mission_state.phase is MissionPhase.ENDED, limit_s=_LIMIT_S, what="the end"
-        )
-    finally:
-        await child.stop()
-
+FLOOD_MS = 100.0
+"""What 99 of 100 turnarounds of the others shall not exceed while somebody floods."""
 
 _HOP_ROUNDS = 4
 """Routers each way over which claims are sent, in turn."""
-
-
-class SecurityMode(StrEnum):
-    """How a mission is flown."""
-
-    PLAIN = "plain"
-    SECURE = "secure"
-    FLOODED = "flooded"
-    """Secure, while a hostile agent with valid keys floods the bus."""
-
-
-@dataclass(frozen=True, slots=True)
-class CostFlight:
-    """One flight."""
-
-    way: SecurityMode
-    start: CostsByKind
-    """Until the mission began: interpreters, imports, keys, preparation, take-off."""
-    whole: CostsByKind
-    """Until it ended."""
-    takeoff_wall_s: float
-    """From the first process to mission time 0."""
-    flight_wall_s: float
-    """From there to the end."""
-    target_ms: tuple[float, ...]
-    """Wall times of agents from an arrival or the end of a service to the next target sent."""
-    done: int
-    tasks: int
-    as_planned: bool
-    """Whether every list flown was the one planned."""
-    refused: Mapping[str, int]
-    poured_hz: float
-    """Messages a second of the hostile agent; 0 without one."""
-    load: float
-    """Processes that wanted to run during the last minute of the flight."""
-
-    @property
-    def ok(self) -> bool:
-        """Whether every task was done."""
-        return self.done == self.tasks
-
-    def flight_cpu_s(self, kind: str) -> float:
-        """Processor time of all processes of a kind from the mission's beginning to its end."""
-        return self.whole.cpu_s.get(kind, 0.0) - self.start.cpu_s.get(kind, 0.0)
+_UNDISTURBED = (SecurityMode.PLAIN, SecurityMode.SECURE)
+_COSTS = (
+    ("in flight", ".2f", "s", 1.0),
+    ("before", ".2f", "s", 1.0),
+    ("memory each", ".1f", "MB", 1e-6),
+)
+"""What is told of each kind of process: name, form, unit and scale."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,7 +56,16 @@ class SecureSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class SecureBench:
+class _WayCosts:
+    """What the flights of one way cost on average, by kind of process."""
+
+    flight_cpu_s: dict[str, float]
+    start_cpu_s: dict[str, float]
+    memory_bytes: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class SecureBench(BenchResult):
     """Everything measured in one run of the benchmark."""
 
     scenario: str
@@ -265,12 +87,188 @@ class SecureBench:
             for each in self.flights
         )
 
+    @property
+    def kinds(self) -> list[str]:
+        """Kinds of processes, those that cost most in flight first."""
+        names = {kind for each in self.flights for kind in each.whole.cpu_s}
+        return sorted(names, key=lambda kind: -sum(f.flight_cpu_s(kind) for f in self.flights))
+
     def of(self, way: SecurityMode) -> list[CostFlight]:
         """The flights of one way."""
         return [each for each in self.flights if each.way is way]
 
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        return {
+            "machine": asdict(self.machine),
+            "seed": self.seed,
+            "scenario": self.scenario,
+            "uavs": self.uavs,
+            "tasks": self.tasks,
+            "speedup": self.speedup,
+            "bus": self.bus,
+            "ok": self.ok,
+            "target_ms": TARGET_MS,
+            "flood_ms": FLOOD_MS,
+            **{way: self._way_as_json(way) for way in SecurityMode},
+            "flights": [self._flight_as_json(each) for each in self.flights],
+        }
 
-_UNDISTURBED = (SecurityMode.PLAIN, SecurityMode.SECURE)
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        n_flight = len(self.of(SecurityMode.SECURE))
+        yield (
+            f"{self.scenario}, {self.uavs} UAVs × {self.tasks} tasks at {self.speedup:g} times "
+            f"wall speed, bus {self.bus}; {n_flight} flight{'s' if n_flight > 1 else ''} each way, "
+            f"in turn; seed {self.seed}"
+        )
+        if self.flights:
+            yield from ("", self._costs(), "", self._turnarounds(), "", self._flown())
+        if self.hops_s:
+            yield from ("", self._hops())
+        yield ""
+        yield from self._verdict()
+
+    def _way_as_json(self, way: SecurityMode) -> dict[str, Any]:
+        flights = self.of(way)
+        times_ms, hops_ms = self._target_ms(way), self._hops_ms(way)
+        return {
+            **asdict(self._costs_of(way)),
+            "takeoff_wall_s": _mean(f.takeoff_wall_s for f in flights),
+            "turnaround_ms": {"count": len(times_ms), **quantiles_ms(times_ms)},
+            "hop_ms": {"count": len(hops_ms), **quantiles_ms(hops_ms)},
+            "poured_hz": _mean(f.poured_hz for f in flights),
+        }
+
+    def _flight_as_json(self, flight: CostFlight) -> dict[str, Any]:
+        return {
+            "way": flight.way,
+            "done": flight.done,
+            "tasks": flight.tasks,
+            "as_planned": flight.as_planned,
+            "refused": dict(flight.refused),
+            "load": flight.load,
+            "takeoff_wall_s": flight.takeoff_wall_s,
+            "flight_wall_s": flight.flight_wall_s,
+            "flight_cpu_s": {kind: flight.flight_cpu_s(kind) for kind in self.kinds},
+            "turnaround_ms": quantiles_ms(flight.target_ms),
+        }
+
+    def _costs_of(self, way: SecurityMode) -> _WayCosts:
+        flights, kinds = self.of(way), self.kinds
+        return _WayCosts(
+            {k: _mean(f.flight_cpu_s(k) for f in flights) for k in kinds},
+            {k: _mean(f.start.cpu_s.get(k, 0.0) for f in flights) for k in kinds},
+            {k: _mean(f.whole.memory_bytes.get(k, 0.0) for f in flights) for k in kinds},
+        )
+
+    def _costs(self) -> ResultTable:
+        """Processor time and memory, plain beside secure."""
+        columns = [
+            Column(f"{name}, {way}", form, unit, scale, none="")
+            for name, form, unit, scale in _COSTS
+            for way in _UNDISTURBED
+        ]
+        by_way = [self._costs_of(way) for way in _UNDISTURBED]
+        rows: list[list[object]] = [
+            [
+                kind,
+                max(each.whole.processes.get(kind, 0) for each in self.flights),
+                *(costs.flight_cpu_s[kind] for costs in by_way),
+                *(costs.start_cpu_s[kind] for costs in by_way),
+                *(costs.memory_bytes[kind] for costs in by_way),
+            ]
+            for kind in self.kinds
+        ]
+        totals = [_total_s(self.of(way)) for way in _UNDISTURBED]
+        rows.append(["all", None, *totals, *[None] * (len(columns) - len(totals))])
+        return ResultTable(
+            (Column("process", words=True), Column("number", none=""), *columns), rows
+        )
+
+    def _turnarounds(self) -> ResultTable:
+        """Turnarounds and the time to take off, plain beside secure."""
+        return ResultTable(
+            (
+                Column("next target sent", words=True),
+                Column("arrivals"),
+                *_quantile_columns(),
+                Column("take-off after", ".1f", "s"),
+            ),
+            [
+                (
+                    way,
+                    len(times_ms := self._target_ms(way)),
+                    *quantiles_ms(times_ms).values(),
+                    _mean(each.takeoff_wall_s for each in flights),
+                )
+                for way in SecurityMode
+                if (flights := self.of(way))
+            ],
+        )
+
+    def _hops(self) -> ResultTable:
+        return ResultTable(
+            (Column("through a router", words=True), Column("claims"), *_quantile_columns()),
+            [
+                (way, len(hops_ms := self._hops_ms(way)), *quantiles_ms(hops_ms).values())
+                for way in _UNDISTURBED
+            ],
+        )
+
+    def _flown(self) -> ResultTable:
+        return ResultTable(
+            (
+                Column("flight"),
+                Column("", words=True),
+                Column("tasks done"),
+                Column("lists", words=True),
+                Column("in flight", ".2f", "s"),
+                Column("p99", ".1f", "ms"),
+                Column("refused"),
+                Column("load", ".1f"),
+            ),
+            [
+                (
+                    number,
+                    each.way,
+                    f"{each.done} of {each.tasks}",
+                    "as planned" if each.as_planned else "differ",
+                    _total_s([each]),
+                    quantiles_ms(each.target_ms)["p99"],
+                    sum(each.refused.values()),
+                    each.load,
+                )
+                for number, each in enumerate(self.flights, 1)
+            ],
+        )
+
+    def _verdict(self) -> Iterable[str]:
+        """What it comes to, beside what is wanted."""
+        plain_s, secure_s = (_total_s(self.of(way)) for way in _UNDISTURBED)
+        if plain_s > 0.0:
+            yield f"processor time in flight: {secure_s / plain_s:.3f} times that of plain"
+        for way, limit_ms in ((SecurityMode.SECURE, TARGET_MS), (SecurityMode.FLOODED, FLOOD_MS)):
+            p99_ms = quantiles_ms(self._target_ms(way))["p99"]
+            if p99_ms is not None:
+                held = "held" if p99_ms < limit_ms else "NOT held"
+                yield f"wanted: p99 of next target sent below {limit_ms:g} ms, {way}: {held}"
+        if flooded := self.of(SecurityMode.FLOODED):
+            rate_hz = _mean(each.poured_hz for each in flooded)
+            refused = sum(sum(each.refused.values()) for each in flooded)
+            yield (
+                f"flooded with {rate_hz:.0f} messages a second; {refused} refused behind the router"
+            )
+        if self.flights:
+            yield "every task was done, and nothing honest was refused" if self.ok else "FAILED"
+
+    def _target_ms(self, way: SecurityMode) -> list[float]:
+        """Turnarounds of all flights of one way."""
+        return [time for each in self.of(way) for time in each.target_ms]
+
+    def _hops_ms(self, way: SecurityMode) -> list[float]:
+        """Times of claims through the router."""
+        return [1e3 * time_s for time_s in self.hops_s.get(way, ())]
 
 
 def in_turn(ways: Sequence[SecurityMode], rounds: int) -> list[SecurityMode]:
@@ -279,10 +277,7 @@ def in_turn(ways: Sequence[SecurityMode], rounds: int) -> list[SecurityMode]:
 
 
 def measure_secure(
-    mission: Mission,
-    options: LaunchOptions,
-    settings: SecureSettings,
-    on_progress: Callable[[str], None] | None = None,
+    mission: Mission, options: LaunchOptions, settings: SecureSettings, tell: Progress = unheard
 ) -> SecureBench:
     """Fly ``mission`` and send claims, plain and secure in turn.
 
@@ -290,28 +285,29 @@ def measure_secure(
         mission: the scenario of ``options``.
         options: how to fly it, without keys; their log format is JSON.
         settings: how often.
-        on_progress: told what is being done.
+        tell: told what is being done.
 
     Raises:
         ChildFailedError: a process did not start.
         InputError: keys cannot be made for the scenario.
     """
-    tell = on_progress or (lambda _: None)
-    flights: list[CostFlight] = []
+    machine, flights = this_machine(), list[CostFlight]()
     order = in_turn(list(SecurityMode) if settings.flood_hz else _UNDISTURBED, settings.rounds)
     for number, way in enumerate(order, 1):
         tell(f"{mission.name}: flight {number} of {len(order)}, {way}")
         flood_hz = settings.flood_hz if way is SecurityMode.FLOODED else 0.0
-        with _prepared(mission, options, way) as chosen:
-            flights.append(asyncio.run(_fly(mission, chosen, way, flood_hz)))
-    hops_s: dict[SecurityMode, list[float]] = {}
+        with prepared(mission, options, way) as chosen:
+            flights.append(asyncio.run(fly_metered(mission, chosen, way, flood_hz)))
+    hops_s: dict[SecurityMode, tuple[float, ...]] = {}
     routed = replace(options, bus=BusKind.ROUTER, routers=1)
     for way in in_turn(_UNDISTURBED, _HOP_ROUNDS) if settings.claims else ():
         tell(f"claims through a router, {way}")
         count = math.ceil(settings.claims / _HOP_ROUNDS)
-        with _prepared(mission, routed, way) as chosen:
-            hops_s.setdefault(way, []).extend(asyncio.run(measure_hops(mission, chosen, count)))
+        with prepared(mission, routed, way) as chosen:
+            timed_s = asyncio.run(measure_hops(mission, chosen, count))
+            hops_s[way] = (*hops_s.get(way, ()), *timed_s)
     return SecureBench(
+        machine=machine,
         scenario=mission.name,
         uavs=len(mission.uavs),
         tasks=len(mission.tasks),
@@ -319,71 +315,71 @@ def measure_secure(
         bus=options.bus,
         seed=options.seed,
         flights=tuple(flights),
-        hops_s={way: tuple(times_s) for way, times_s in hops_s.items()},
+        hops_s=hops_s,
     )
 
 
-def _prepared(
-    mission: Mission, options: LaunchOptions, way: SecurityMode
-) -> AbstractContextManager[LaunchOptions]:
-    """``options`` with keys where there are to be any."""
-    strangers = (SPEAKER, HOSTILE)
-    secure = way is not SecurityMode.PLAIN
-    return protected(mission, options, secure=secure, keys=None, strangers=strangers)
+def _quantile_columns() -> list[Column]:
+    return [Column(share, ".1f", "ms") for share in SHARES]
 
 
-async def _fly(
-    mission: Mission, options: LaunchOptions, way: SecurityMode, flood_hz: float
-) -> CostFlight:
-    """Fly ``mission`` once and count what it costs."""
-    told: list[dict[str, Any]] = []
-    meter = _FlightMeter()
-    async with open_run(
-        mission,
-        options,
-        on_frame=meter.look,
-        on_log=lambda _name, line: told.extend(told_turnarounds(line)),
-    ) as run:
-        meter.run = run
-        async with flooded(run, flood_hz) if flood_hz else nullcontext(FloodTotals()) as poured:
-            await run.finish()
-    flight = run.flight()
-    planned = {} if flight.plan is None else flight.plan.routes
-    takeoff_s = 0.0 if flight.takeoff_s is None else flight.takeoff_s
-    start = meter.costs.costs() if meter.start is None else meter.start
-    return CostFlight(
-        way=way,
-        start=start,
-        whole=start if meter.end is None else meter.end,
-        takeoff_wall_s=takeoff_s / options.speedup,
-        flight_wall_s=flight.result.makespan_s / options.speedup,
-        target_ms=tuple(time_ms for each in told for time_ms in each["target_ms"]),
-        done=len(flight.result.done),
-        tasks=len(mission.tasks),
-        as_planned=all(
-            tuple(planned.get(uav, ())) == route
-            for uav, route in flight.result.executed_routes.items()
-        ),
-        refused=refusals(flight.dropped),
-        poured_hz=poured.rate_hz,
-        load=os.getloadavg()[0],
-    )
+def _total_s(flights: Sequence[CostFlight]) -> float:
+    """Processor time in flight of all processes, on average over flights."""
+    return _mean(sum(each.flight_cpu_s(kind) for kind in each.whole.cpu_s) for each in flights)
 
 
-class _FlightMeter:
-    """Looks at the processes with every frame of a run."""
+def _mean(values: Iterable[float]) -> float:
+    listed = list(values)
+    return float(np.mean(listed)) if listed else 0.0
 
-    def __init__(self) -> None:
-        self.run: Run | None = None
-        self.costs = ProcessMeter(os.getpid())
-        self.start: CostsByKind | None = None
-        self.end: CostsByKind | None = None
 
-    def look(self, mission_state: MissionState, now_s: float) -> None:
-        if self.run is None or self.end is not None:
-            return
-        self.costs.look(self.run.launch)
-        if self.start is None and mission_state.mission_s(now_s) is not None:
-            self.start = self.costs.costs()
-        if mission_state.phase is MissionPhase.ENDED:
-            self.end = self.costs.costs()
+@dataclass(frozen=True, slots=True)
+class FloodBench(BenchResult):
+    """A flight beside a hostile peer that says malformed things."""
+
+    seed: int
+    flood: Flood
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        done = self.flood
+        return {
+            "machine": asdict(self.machine),
+            "seed": self.seed,
+            "ok": done.ok,
+            "flood_s": done.flood_s,
+            "sent": dict(done.sent),
+            "expected": dict(done.expected),
+            "answers": done.answers,
+            "counted": {uav: dict(counts) for uav, counts in done.counted.items()},
+            "planned_routes": dict(done.planned),
+            "executed_routes": dict(done.result.executed_routes),
+            "decisions_kept": done.decisions_kept,
+            "done": done.result.done,
+            "processes": done.fates,
+        }
+
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        done = self.flood
+        yield (
+            f"seed {self.seed}; flooded for {done.flood_s:.1f} s; {done.answers} malformed answers"
+        )
+        lists = "every list flown as planned" if done.decisions_kept else "lists flown DIFFER"
+        fates = "; ".join(done.fates) or "every process lived"
+        yield f"{lists}; {len(done.result.done)} tasks done; {fates}"
+        yield ""
+        yield ResultTable(
+            (Column("kind", words=True), Column("sent"), Column("counted as", words=True)),
+            [(kind, count, REASONS[kind]) for kind, count in done.sent.items()],
+        )
+        yield ""
+        yield ResultTable(
+            (Column("dropped as", words=True), Column("sent"), *map(Column, done.counted)),
+            [
+                (reason, expected, *(counts.get(reason, 0) for counts in done.counted.values()))
+                for reason, expected in done.expected.items()
+            ],
+        )
+        yield ""
+        yield "nothing has changed and everything was counted" if done.ok else "FAILED"

@@ -10,38 +10,30 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import os
 import signal
 import tempfile
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
 
-from sim.fleet.faults.flight import ChaosFlight, open_chaos_flight
-from sim.fleet.layout import BusKind, LaunchOptions, default_position_rate_hz
-from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from sim.bench.fleets import far_mission, flying
+from sim.bench.results import Progress, quantile, unheard
+from sim.fleet.faults.flight import ChaosFlight
+from sim.fleet.layout import BusKind
+from swarm.model import Mission
 from swarm.protocol.messages import Message
 from swarm.protocol.timing import LinkKind
 from swarm.protocol.uav_messages import Claim, ClaimPhase
 from swarm.runtime.clock import SystemClock
-from swarm.scenario.write import format_scenario
 
-__all__ = [
-    "FailureMode",
-    "Takeovers",
-    "far_mission",
-    "flying",
-    "measure_takeovers",
-    "options_for",
-    "stuck_on_demand",
-]
+__all__ = ["FailureMode", "Takeovers", "measure_takeovers", "stuck_on_demand"]
 
 
-FAR_M = 10_000.0
-SPEED_M_S = 1.0
 START_S = 90.0
 """Until the whole fleet flies [wall s]."""
 SETTLE_S = 60.0
@@ -101,11 +93,7 @@ class Takeovers:
 
     def quantile_s(self, share: float) -> float | None:
         """The smallest time that is not exceeded in that share of all trials, missed included."""
-        if not self.times_s and not self.missed:
-            return None
-        times = np.sort(np.array([*self.times_s, *[np.inf] * self.missed]))
-        worst = float(times[max(0, int(np.ceil(share * times.size)) - 1)])
-        return worst if np.isfinite(worst) else None
+        return quantile([*self.times_s, *[math.inf] * self.missed], share)
 
 
 async def measure_takeovers(
@@ -115,7 +103,7 @@ async def measure_takeovers(
     link: LinkKind = LinkKind.NORMAL,
     bus: BusKind = BusKind.ROUTER,
     seed: int = 0,
-    on_progress: Callable[[str], None] | None = None,
+    tell: Progress = unheard,
 ) -> Takeovers:
     """Strike ``trials`` times, and wait each time until another UAV holds the task.
 
@@ -125,13 +113,12 @@ async def measure_takeovers(
         link: preset of all processes.
         bus: how they reach each other.
         seed: of who is struck, and when.
-        on_progress: told how far it is.
+        tell: told how far it is.
 
     Raises:
         ChildFailedError: a process did not start.
         TimeoutError: the fleet was not complete again in time after a blow.
     """
-    tell = on_progress or (lambda _: None)
     rng, clock = np.random.default_rng(seed), SystemClock()
     times_s: list[float] = []
     missed = 0
@@ -152,66 +139,6 @@ async def measure_takeovers(
                     times_s.append(held_s - struck_s)
                 await _revive(flight, blow, victim)
     return Takeovers(blow, link, bus, tuple(times_s), missed)
-
-
-def far_mission(n_uav: int, n_task: int) -> Mission:
-    """Tasks that nobody reaches within hours."""
-    return Mission(
-        name="failover",
-        horizon_s=1e6,
-        uavs=tuple(
-            Uav(UavId(f"uav{number}"), (20.0 * number, 0.0, 0.0), SPEED_M_S)
-            for number in range(1, n_uav + 1)
-        ),
-        tasks=tuple(
-            Task(TaskId(f"t{number}"), (20.0 * number, FAR_M, 0.0), 1.0)
-            for number in range(1, n_task + 1)
-        ),
-        origin=Origin(46.8, 9.7, 1100.0),
-    )
-
-
-@contextlib.contextmanager
-def options_for(
-    mission: Mission,
-    *,
-    link: LinkKind,
-    bus: BusKind,
-    method: str = "greedy",
-    address: str = "127.0.0.1",
-) -> Iterator[LaunchOptions]:
-    """Options to fly ``mission`` with, as long as the context lasts."""
-    with tempfile.TemporaryDirectory() as folder:
-        scenario = Path(folder) / "scenario.toml"
-        scenario.write_text(format_scenario(mission), encoding="utf-8")
-        yield LaunchOptions(
-            scenario=scenario,
-            method=method,
-            seed=0,
-            speedup=1.0,
-            bus=bus,
-            position_rate_hz=min(20.0, default_position_rate_hz(len(mission.uavs))),
-            acceptance_radius_m=0.5,
-            start_timeout_s=120.0,
-            link=link,
-            address=address,
-        )
-
-
-@contextlib.asynccontextmanager
-async def flying(
-    mission: Mission,
-    *,
-    link: LinkKind,
-    bus: BusKind,
-    relayed: bool = False,
-    method: str = "greedy",
-    seed: int = 0,
-) -> AsyncIterator[ChaosFlight]:
-    """Start to fly ``mission``; all processes are gone when the context ends."""
-    with options_for(mission, link=link, bus=bus, method=method) as options:
-        async with open_chaos_flight(mission, options, relayed=relayed, seed=seed) as flight:
-            yield flight
 
 
 async def _calm(flight: ChaosFlight, mission: Mission, calm_s: float) -> dict[str, str]:

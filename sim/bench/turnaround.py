@@ -11,15 +11,15 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-from rich.console import Group, RenderableType
+from rich.console import RenderableType
 
 from agent.links.mavlink_vehicle import TURNAROUNDS
-from sim.bench.machine import MachineInfo
+from sim.bench.machine import this_machine
+from sim.bench.results import BenchResult, Progress, quantile, unheard
 from sim.fleet.layout import LaunchOptions
 from sim.fleet.run import fly
 from swarm.model import Mission
@@ -32,9 +32,8 @@ __all__ = [
     "TurnaroundFlight",
     "Turnarounds",
     "measure_turnarounds",
+    "quantiles_ms",
     "told_turnarounds",
-    "turnarounds_as_json",
-    "turnarounds_as_rich",
 ]
 
 
@@ -70,9 +69,10 @@ class TurnaroundFlight:
 
 
 @dataclass(frozen=True, slots=True)
-class Turnarounds:
+class Turnarounds(BenchResult):
     """Several flights of one scenario."""
 
+    seed: int
     scenario: str
     uavs: int
     speedup: float
@@ -84,12 +84,72 @@ class Turnarounds:
         """Whether every task of every flight was done."""
         return all(each.done == each.tasks for each in self.rounds)
 
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        return {
+            "machine": asdict(self.machine),
+            "seed": self.seed,
+            "scenario": self.scenario,
+            "uavs": self.uavs,
+            "speedup": self.speedup,
+            "position_rate_hz": self.position_rate_hz,
+            "target_ms": TARGET_MS,
+            "target_ratio": TARGET_RATIO,
+            **_summaries(self.rounds),
+            "idled": sum(each.idled for each in self.rounds),
+            "rounds": [
+                {**flight, **_summaries([each])}
+                for flight, each in zip(self._flights().as_records(), self.rounds, strict=True)
+            ],
+        }
+
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        yield (
+            f"{self.scenario}, {self.uavs} UAVs at {self.speedup:g} times wall speed, "
+            f"{self.position_rate_hz:g} position reports a second each; seed {self.seed}"
+        )
+        yield ""
+        until = ("next target sent", "its mission in force")
+        found = zip(until, _summaries(self.rounds).values(), strict=True)
+        yield ResultTable(
+            (
+                Column("arrival or end of service until", words=True),
+                Column("count"),
+                *(Column(share, ".1f", "ms") for share in SHARES),
+            ),
+            [(name, *summary.values()) for name, summary in found if summary["count"]],
+        )
+        idled = sum(each.idled for each in self.rounds)
+        yield f"besides {idled} after finding nothing to do at first"
+        yield ""
+        yield self._flights()
+        yield ""
+        yield (
+            f"wanted: p99 of next target sent below {TARGET_MS:g} ms, "
+            f"ratio at most {TARGET_RATIO:g}"
+        )
+
+    def _flights(self) -> ResultTable:
+        return ResultTable(
+            (
+                Column("flight"),
+                Column("makespan", ".2f", "s", key="makespan_s"),
+                Column("planned", ".2f", "s", key="planned_s"),
+                Column("ratio", ".4f", key="ratio"),
+                Column("tasks done", key="done"),
+                Column("of", key="tasks"),
+                Column("load", ".1f", key="load"),
+            ),
+            [
+                (n, each.makespan_s, each.planned_s, each.ratio, each.done, each.tasks, each.load)
+                for n, each in enumerate(self.rounds, 1)
+            ],
+        )
+
 
 def measure_turnarounds(
-    mission: Mission,
-    options: LaunchOptions,
-    rounds: int,
-    on_progress: Callable[[str], None] | None = None,
+    mission: Mission, options: LaunchOptions, rounds: int, tell: Progress = unheard
 ) -> Turnarounds:
     """Fly ``mission`` several times, one after the other.
 
@@ -97,18 +157,23 @@ def measure_turnarounds(
         mission: the scenario of ``options``.
         options: how to fly it; their log format is JSON.
         rounds: how often.
-        on_progress: told what is being done.
+        tell: told what is being done.
 
     Raises:
         ChildFailedError: a process did not start.
     """
-    tell = on_progress or (lambda _: None)
-    flown = []
+    machine, flown = this_machine(), []
     for number in range(1, rounds + 1):
         tell(f"{mission.name}: flight {number} of {rounds}")
         flown.append(asyncio.run(_fly(mission, options)))
     return Turnarounds(
-        mission.name, len(mission.uavs), options.speedup, options.position_rate_hz, tuple(flown)
+        machine,
+        options.seed,
+        mission.name,
+        len(mission.uavs),
+        options.speedup,
+        options.position_rate_hz,
+        tuple(flown),
     )
 
 
@@ -147,88 +212,13 @@ def told_turnarounds(line: str) -> Iterable[dict[str, Any]]:
 def quantiles_ms(times_ms: Iterable[float]) -> dict[str, float | None]:
     """Measured times that so many do not exceed, by the names of `SHARES`; None without any."""
     times = list(times_ms)
-    if not times:
-        return dict.fromkeys(SHARES)
-    return {
-        name: float(np.quantile(times, share, method="inverted_cdf"))
-        for name, share in SHARES.items()
+    return {name: quantile(times, share) for name, share in SHARES.items()}
+
+
+def _summaries(rounds: Sequence[TurnaroundFlight]) -> dict[str, dict[str, float | None]]:
+    """Count and quantiles of both kinds of times, of all ``rounds`` together."""
+    times_ms = {
+        "sent_ms": [time_ms for each in rounds for time_ms in each.target_ms],
+        "in_force_ms": [time_ms for each in rounds for time_ms in each.in_force_ms],
     }
-
-
-def turnarounds_as_json(machine: MachineInfo, seed: int, done: Turnarounds) -> dict[str, Any]:
-    """Everything, ready for `json.dumps`."""
-    return {
-        "machine": asdict(machine),
-        "seed": seed,
-        "scenario": done.scenario,
-        "uavs": done.uavs,
-        "speedup": done.speedup,
-        "position_rate_hz": done.position_rate_hz,
-        "target_ms": TARGET_MS,
-        "target_ratio": TARGET_RATIO,
-        **{name: _summary(getter, done.rounds) for name, getter in _KINDS.items()},
-        "idled": sum(each.idled for each in done.rounds),
-        "rounds": [
-            {**flight, **{name: _summary(getter, [each]) for name, getter in _KINDS.items()}}
-            for flight, each in zip(_flights(done).as_records(), done.rounds, strict=True)
-        ],
-    }
-
-
-_KINDS: dict[str, Callable[[TurnaroundFlight], tuple[float, ...]]] = {
-    "sent_ms": lambda each: each.target_ms,
-    "in_force_ms": lambda each: each.in_force_ms,
-}
-
-
-def _summary(
-    getter: Callable[[TurnaroundFlight], tuple[float, ...]], rounds: Iterable[TurnaroundFlight]
-) -> dict[str, float | None]:
-    times_ms = [time_ms for each in rounds for time_ms in getter(each)]
-    return {"count": len(times_ms), **quantiles_ms(times_ms)}
-
-
-def turnarounds_as_rich(machine: MachineInfo, seed: int, done: Turnarounds) -> RenderableType:
-    """Everything, for people."""
-    summaries = {
-        "next target sent": _summary(_KINDS["sent_ms"], done.rounds),
-        "its mission in force": _summary(_KINDS["in_force_ms"], done.rounds),
-    }
-    times = ResultTable(
-        (
-            Column("arrival or end of service until", words=True),
-            Column("count"),
-            *(Column(share, ".1f", "ms") for share in SHARES),
-        ),
-        [(until, *found.values()) for until, found in summaries.items() if found["count"]],
-    )
-    return Group(
-        str(machine),
-        f"{done.scenario}, {done.uavs} UAVs at {done.speedup:g} times wall speed, "
-        f"{done.position_rate_hz:g} position reports a second each; seed {seed}",
-        "",
-        times,
-        f"besides {sum(each.idled for each in done.rounds)} after finding nothing to do at first",
-        "",
-        _flights(done),
-        "",
-        f"wanted: p99 of next target sent below {TARGET_MS:g} ms, ratio at most {TARGET_RATIO:g}",
-    )
-
-
-def _flights(done: Turnarounds) -> ResultTable:
-    return ResultTable(
-        (
-            Column("flight"),
-            Column("makespan", ".2f", "s", key="makespan_s"),
-            Column("planned", ".2f", "s", key="planned_s"),
-            Column("ratio", ".4f", key="ratio"),
-            Column("tasks done", key="done"),
-            Column("of", key="tasks"),
-            Column("load", ".1f", key="load"),
-        ),
-        [
-            (n, each.makespan_s, each.planned_s, each.ratio, each.done, each.tasks, each.load)
-            for n, each in enumerate(done.rounds, 1)
-        ],
-    )
+    return {name: {"count": len(them), **quantiles_ms(them)} for name, them in times_ms.items()}

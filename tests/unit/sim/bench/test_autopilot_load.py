@@ -15,8 +15,6 @@ from rich.console import Console
 from sim.bench.autopilot_load import (
     AutopilotLoad,
     FrameCounter,
-    autopilot_load_as_json,
-    autopilot_load_as_rich,
     rates_asked_hz,
     stream_rates,
 )
@@ -74,9 +72,9 @@ def test_report_shows_rates_cores_and_latency(latency_s: float | None) -> None:
 
     screen = io.StringIO()
     console = Console(file=screen, width=300)
-    console.print(autopilot_load_as_rich(load))
+    console.print(load)
     text = screen.getvalue()
     assert "99.00%" in text
     assert "0.25 cores" in text
     assert ("4.2 ms" in text) is (latency_s is not None)
-    assert json.loads(json.dumps(autopilot_load_as_json(load)))["cores"] == 0.25
+    assert json.loads(json.dumps(load.as_json()))["cores"] == 0.25

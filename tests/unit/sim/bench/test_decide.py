@@ -5,7 +5,7 @@ import json
 
 from rich.console import Console
 
-from sim.bench.decisions import decide_as_json, decide_as_rich, measure_decisions
+from sim.bench.decisions import measure_decisions
 from swarm.runtime.clock import SystemClock
 
 
@@ -31,11 +31,11 @@ def test_a_long_mission_may_be_cut_short() -> None:
 def test_it_is_told_to_people_and_programs() -> None:
     bench = measure_decisions(3, 9, 1, SystemClock(), sequences=5)
     stream = io.StringIO()
-    Console(file=stream, width=80).print(decide_as_rich(bench))
+    Console(file=stream, width=80).print(bench)
     text = stream.getvalue()
     assert "One online decision at 3 × 9, seed 1" in text
     assert "guided, disturbed" in text
     assert "…" not in text
-    said = json.loads(json.dumps(decide_as_json(bench), allow_nan=False))
+    said = json.loads(json.dumps(bench.as_json(), allow_nan=False))
     assert said["n_task"] == 9
     assert len(said["times"]) == 4

@@ -13,13 +13,12 @@ from sim.bench.failover import (
     FailoverResults,
     FailoverSettings,
     bound_s,
-    failover_as_json,
-    failover_as_rich,
 )
+from sim.bench.fleets import survey_mission
 from sim.bench.latency import DecisionLatencies
-from sim.bench.links import BAD_LINKS, FalseLosses, PartitionResult, Traffic, survey_mission
+from sim.bench.links import BAD_LINKS, FalseLosses, PartitionResult, Traffic
 from sim.bench.machine import MachineInfo
-from sim.bench.security_report import flood_as_json, flood_as_rich
+from sim.bench.security import FloodBench
 from sim.bench.takeover import FailureMode, Takeovers
 from sim.fleet.faults.flood import RATE_HZ, Flood, long_mission, times_for
 from sim.fleet.faults.forgery import Malformation
@@ -49,7 +48,7 @@ DONE = FailoverResults(
 def test_everything_measured_is_shown_in_80_columns() -> None:
     console = Console(width=80, color_system=None)
     with console.capture() as capture:
-        console.print(failover_as_rich(DONE))
+        console.print(DONE)
     lines = [" ".join(line.split()) for line in capture.get().splitlines()]
 
     assert max(len(line) for line in capture.get().splitlines()) <= 80
@@ -64,7 +63,7 @@ def test_everything_measured_is_shown_in_80_columns() -> None:
 
 
 def test_json_holds_the_same_and_every_time() -> None:
-    told = json.loads(json.dumps(failover_as_json(DONE), allow_nan=False))
+    told = json.loads(json.dumps(DONE.as_json(), allow_nan=False))
 
     kill, hang = told["takeovers"]
     assert (kill["p99_s"], kill["bound_s"], kill["times_s"]) == (0.53, 1.0, [0.51, 0.53])
@@ -122,9 +121,9 @@ def test_a_flood_is_survived_when_nothing_changes_and_all_is_counted() -> None:
 def test_a_flood_is_shown_with_all_counts() -> None:
     console = Console(width=80, color_system=None)
     with console.capture() as capture:
-        console.print(flood_as_rich(MACHINE, 3, flooded()))
+        console.print(FloodBench(MACHINE, 3, flooded()))
     lines = [" ".join(line.split()) for line in capture.get().splitlines()]
-    told = json.loads(json.dumps(flood_as_json(MACHINE, 3, flooded())))
+    told = json.loads(json.dumps(FloodBench(MACHINE, 3, flooded()).as_json()))
 
     assert "random bytes 24 malformed" in lines
     assert "stale 24 24" in lines

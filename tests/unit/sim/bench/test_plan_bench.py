@@ -25,7 +25,7 @@ def small_bench(long_run_s: float | None = None) -> PlanBench:
 def test_every_method_meets_every_mission_and_limit() -> None:
     told: list[str] = []
     bench = measure_plans(
-        [SMALL], ["nearest", "cbba"], [0.1, 0.2], [0, 5], run=in_process, on_progress=told.append
+        [SMALL], ["nearest", "cbba"], [0.1, 0.2], [0, 5], run=in_process, tell=told.append
     )
     keys = [(row.case, row.seed, row.method, row.limit_s) for row in bench.measured]
     assert len(keys) == len(set(keys)) == 8

@@ -10,9 +10,7 @@ import pytest
 from rich.console import Console
 
 from sim.bench.plan_report import (
-    as_json,
-    as_markdown,
-    as_rich,
+    PlanReport,
     comparison_figure,
     comparison_grids,
     scaling_figure,
@@ -45,7 +43,7 @@ def scaling() -> PlanBench:
 
 def told(bench: PlanBench, grids: list[ResultTable], width: int = 80) -> str:
     stream = io.StringIO()
-    Console(file=stream, width=width).print(as_rich(bench, grids))
+    Console(file=stream, width=width).print(PlanReport(bench.machine, bench, grids))
     return stream.getvalue()
 
 
@@ -77,7 +75,7 @@ def test_terminals_of_80_columns_show_all_figures(bench: PlanBench) -> None:
 
 def test_markdown_has_the_same_tables(bench: PlanBench) -> None:
     grids = comparison_grids(bench)
-    text = as_markdown(bench, grids)
+    text = PlanReport(bench.machine, bench, grids).as_markdown()
     assert text.count("| --- | --: |") == 4
     for grid in grids:
         assert f"**{grid.title}**" in text
@@ -88,7 +86,7 @@ def test_markdown_has_the_same_tables(bench: PlanBench) -> None:
 
 
 def test_json_has_every_measurement(bench: PlanBench) -> None:
-    said = json.loads(json.dumps(as_json(bench), allow_nan=False))
+    said = json.loads(json.dumps(PlanReport(bench.machine, bench, ()).as_json(), allow_nan=False))
     assert len(said["measured"]) == len(bench.measured)
     assert said["machine"]["cores"] >= 1
     assert {"case", "ratio", "peak_bytes", "trace"} <= said["measured"][0].keys()
@@ -106,7 +104,7 @@ def test_scaling_tells_the_first_plan_and_memory(scaling: PlanBench) -> None:
     text = told(scaling, [grid])
     assert "…" not in text
     assert "3×8 guided: " in text
-    assert SHORTFALL not in as_markdown(scaling, [grid])
+    assert SHORTFALL not in PlanReport(scaling.machine, scaling, [grid]).as_markdown()
 
 
 def test_refused_sizes_stay_in_the_scaling_table() -> None:

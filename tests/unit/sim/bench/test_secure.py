@@ -12,18 +12,16 @@ import pytest
 from rich.console import Console
 
 from sim.bench.machine import this_machine
-from sim.bench.security import (
+from sim.bench.security import SecureBench, in_turn
+from sim.bench.security_flights import (
     LAUNCHER,
     CostFlight,
     CostsByKind,
     FloodTotals,
     ProcessMeter,
-    SecureBench,
     SecurityMode,
-    in_turn,
     kind_of,
 )
-from sim.bench.security_report import secure_as_json, secure_as_rich
 from sim.fleet.launcher import Launcher
 from tests.support.builders import mission, task, uav
 from tests.unit.sim.fleet.test_fleet import OPTIONS
@@ -49,6 +47,7 @@ SECURE = replace(
     target_ms=(2.0, 4.0),
 )
 BENCH = SecureBench(
+    this_machine(),
     "table-1",
     2,
     5,
@@ -63,7 +62,7 @@ BENCH = SecureBench(
 def shown(bench: SecureBench) -> str:
     console = Console(file=io.StringIO(), width=120, color_system=None)
     with console.capture() as captured:
-        console.print(secure_as_rich(this_machine(), bench))
+        console.print(bench)
     return captured.get()
 
 
@@ -141,7 +140,7 @@ def test_a_hostile_process_tells_how_much_it_has_sent() -> None:
 
 
 def test_programs_are_told_the_same() -> None:
-    told = json.loads(json.dumps(secure_as_json(this_machine(), BENCH), allow_nan=False))
+    told = json.loads(json.dumps(BENCH.as_json(), allow_nan=False))
 
     assert told["plain"]["flight_cpu_s"] == {"agent": 2.0, "router": 1.0}
     assert told["secure"]["flight_cpu_s"]["agent"] == 2.5

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from sim.bench.takeover import FailureMode, Takeovers, far_mission
+from sim.bench.fleets import far_mission
+from sim.bench.takeover import FailureMode, Takeovers
 from sim.fleet.layout import BusKind
 from swarm.protocol.timing import LinkKind
 

@@ -13,11 +13,11 @@ from sim.bench.turnaround import (
     TurnaroundFlight,
     Turnarounds,
     told_turnarounds,
-    turnarounds_as_json,
-    turnarounds_as_rich,
 )
 
 FLIGHTS = Turnarounds(
+    this_machine(),
+    7,
     "valley",
     2,
     4.0,
@@ -44,7 +44,7 @@ def test_other_lines_tell_of_none(line: str) -> None:
 
 
 def test_times_of_all_flights_are_summed_up_and_each_flight_is_set_beside_its_plan() -> None:
-    told = turnarounds_as_json(this_machine(), 7, FLIGHTS)
+    told = FLIGHTS.as_json()
 
     assert told["sent_ms"] == {"count": 4, "p50": 2.0, "p90": 9.0, "p99": 9.0, "max": 9.0}
     assert told["in_force_ms"]["count"] == 1
@@ -63,7 +63,7 @@ def test_times_of_all_flights_are_summed_up_and_each_flight_is_set_beside_its_pl
 def test_people_are_shown_times_ratio_and_what_was_wanted() -> None:
     console = Console(width=120)
     with console.capture() as captured:
-        console.print(turnarounds_as_rich(this_machine(), 7, FLIGHTS))
+        console.print(FLIGHTS)
 
     shown = captured.get()
     for words in (
