@@ -1,13 +1,18 @@
 """Options of the commands that fly missions, so that they look alike, and their report.
 
-Leaves out: the commands themselves, and laying out a report (coordinator.terminal).
+A group of options is a dataclass whose fields are made by `option`. A command has one parameter
+of that class and is decorated with `with_options`; on the command line it has the options of the
+fields instead.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -20,231 +25,176 @@ if TYPE_CHECKING:
     from swarm.model import Mission
 
 __all__ = [
+    "ChanceOptions",
     "CoordinatorLostOption",
-    "DelayOption",
-    "JitterOption",
-    "LegSdOption",
-    "LossOption",
-    "MessageLossOption",
     "MethodOption",
-    "OutcomesOption",
-    "PartitionLengthOption",
-    "PartitionRateOption",
-    "PopupOption",
-    "PopupRateOption",
-    "PositionErrorOption",
-    "ReattemptOption",
     "ReportOption",
-    "SpeedSdOption",
-    "SurvivalOption",
-    "WindOption",
-    "WithdrawRateOption",
-    "asked_for",
+    "argument",
+    "option",
+    "option_of",
     "print_report",
+    "with_options",
     "with_reattempts",
 ]
 
 
-def _number(*names: str, most: float, metavar: str, help_text: str) -> Any:
-    return typer.Option(
-        *names, min=0.0, max=most, metavar=metavar, help=help_text, show_default=False
+_OPTION = "option"
+
+
+def option(default: object, *names: str, **settings: Any) -> Any:
+    """A field of a group, as `typer.Option`; its default is shown unless it is None."""
+    return _field(default, typer.Option(*names, **settings, show_default=default is not None))
+
+
+def argument(default: object, **settings: Any) -> Any:
+    """The same for an argument."""
+    return _field(default, typer.Argument(**settings, show_default=default is not None))
+
+
+def _field(default: object, parameter: Any) -> Any:
+    return field(default=default, metadata={_OPTION: parameter})
+
+
+def option_of(group: type, name: str) -> Any:
+    """One option of a group, for a command that has no other of it."""
+    return next(each.metadata[_OPTION] for each in fields(group) if each.name == name)
+
+
+def with_options(command: Callable[..., int]) -> Callable[..., int]:
+    """Give a command the options of every group that is a parameter of it."""
+    own = inspect.signature(command, eval_str=True).parameters
+    groups: dict[str, Any] = {
+        name: each.annotation for name, each in own.items() if is_dataclass(each.annotation)
+    }
+
+    @functools.wraps(command)
+    def run(**given: Any) -> int:
+        for name, group in groups.items():
+            given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
+        return command(**given)
+
+    parameters: list[inspect.Parameter] = []
+    for name, parameter in own.items():
+        if name in groups:
+            parameters += _parameters(groups[name])
+        else:
+            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+    run.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]  # functions have one
+    run.__annotations__ = {each.name: each.annotation for each in parameters} | {"return": int}
+    del run.__wrapped__  # or its own signature would be read
+    return run
+
+
+def _parameters(group: Any) -> list[inspect.Parameter]:
+    hints = get_type_hints(group)
+    return [
+        inspect.Parameter(
+            each.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=each.default,
+            annotation=Annotated[hints[each.name], each.metadata[_OPTION]],
+        )
+        for each in fields(group)
+    ]
+
+
+def _number(names: str, most: float, metavar: str, text: str) -> Any:
+    return option(None, *names.split(), min=0.0, max=most, metavar=metavar, help=text)
+
+
+def _switch(name: str, text: str) -> Any:
+    return option(None, f"--{name}/--no-{name}", help=text)
+
+
+@dataclass(frozen=True, slots=True)
+class ChanceOptions:
+    """What may go wrong by chance, by the names of `Uncertainty`; None where nothing is said."""
+
+    loss: float | None = _number(
+        "--loss", 1.0, "P", "Probability that a UAV is lost, at a random moment."
+    )
+    popup: float | None = _number(
+        "--popup", 1.0, "P", "Probability that a task appears only during the mission."
+    )
+    popups_per_min: float | None = _number(
+        "--popup-rate",
+        1e4,
+        "N",
+        "Tasks that appear besides, per minute on average; each is like one of the scenario's, at"
+        " a random place among them.",
+    )
+    withdrawals_per_min: float | None = _number(
+        "--withdraw-rate", 1e4, "N", "Tasks that are withdrawn, per minute on average."
+    )
+    outcomes: bool | None = _switch(
+        "outcomes",
+        "Let attempts succeed or fail by chance, with the scenario's probabilities of success.",
+    )
+    survival: bool | None = _switch(
+        "survival", "Let tasks cost UAVs by chance, with the scenario's probabilities of survival."
+    )
+    reattempt: bool | None = _switch(
+        "reattempt", "Whether failed tasks open again, instead of what the scenario says."
+    )
+    speed_sd_frac: float | None = _number(
+        "--speed-sd",
+        2.0,
+        "FRAC",
+        "Standard deviation of each UAV's speed, as a share of its cruise speed.",
+    )
+    leg_sd_frac: float | None = _number("--leg-sd", 2.0, "FRAC", "The same for each leg by itself.")
+    wind_m_s: float | None = _number(
+        "--wind",
+        100.0,
+        "M/S",
+        "Speed of a steady wind from a random direction. A UAV flies at up to 1.25 times its "
+        "cruise speed, or the wind's if that is more, through the air.",
+    )
+    position_error_m: float | None = _number(
+        "--position-error-m",
+        1e4,
+        "M",
+        "Standard deviation, east and north each, of where a UAV stops for a task.",
+    )
+    message_loss: float | None = _number(
+        "--message-loss", 1.0, "P", "Share of messages that never arrive."
+    )
+    delay_s: float | None = _number(
+        "--delay-s --latency-s", 60.0, "S", "Least delay of every message."
+    )
+    jitter_s: float | None = _number(
+        "--jitter-s", 60.0, "S", "Mean of what comes on top of it, by chance."
+    )
+    partitions_per_min: float | None = _number(
+        "--partition-rate",
+        1e3,
+        "N",
+        "How often, per minute on average, a random half of the fleet is cut off from the rest "
+        "and the coordinator.",
+    )
+    partition_s: float | None = _number(
+        "--partition-s", 1e6, "S", "How long each such partition lasts. Default: 30."
     )
 
-
-LossOption = Annotated[
-    float | None,
-    _number(
-        "--loss",
-        most=1.0,
-        metavar="P",
-        help_text="Probability that a UAV is lost, at a random moment.",
-    ),
-]
-
-
-PopupOption = Annotated[
-    float | None,
-    _number(
-        "--popup",
-        most=1.0,
-        metavar="P",
-        help_text="Probability that a task appears only during the mission.",
-    ),
-]
-
-
-PopupRateOption = Annotated[
-    float | None,
-    _number(
-        "--popup-rate",
-        most=1e4,
-        metavar="N",
-        help_text="Tasks that appear besides, per minute on average; each is like one of the "
-        "scenario's, at a random place among them.",
-    ),
-]
-
-
-WithdrawRateOption = Annotated[
-    float | None,
-    _number(
-        "--withdraw-rate",
-        most=1e4,
-        metavar="N",
-        help_text="Tasks that are withdrawn, per minute on average.",
-    ),
-]
-
-
-OutcomesOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--outcomes/--no-outcomes",
-        help="Let attempts succeed or fail by chance, with the scenario's probabilities of "
-        "success.",
-        show_default=False,
-    ),
-]
-
-
-SurvivalOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--survival/--no-survival",
-        help="Let tasks cost UAVs by chance, with the scenario's probabilities of survival.",
-        show_default=False,
-    ),
-]
-
-
-ReattemptOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--reattempt/--no-reattempt",
-        help="Whether failed tasks open again, instead of what the scenario says.",
-        show_default=False,
-    ),
-]
-
-
-SpeedSdOption = Annotated[
-    float | None,
-    _number(
-        "--speed-sd",
-        most=2.0,
-        metavar="FRAC",
-        help_text="Standard deviation of each UAV's speed, as a share of its cruise speed.",
-    ),
-]
-
-
-LegSdOption = Annotated[
-    float | None,
-    _number(
-        "--leg-sd",
-        most=2.0,
-        metavar="FRAC",
-        help_text="The same for each leg by itself.",
-    ),
-]
-
-
-WindOption = Annotated[
-    float | None,
-    _number(
-        "--wind",
-        most=100.0,
-        metavar="M/S",
-        help_text="Speed of a steady wind from a random direction. A UAV flies at up to 1.25 "
-        "times its cruise speed, or the wind's if that is more, through the air.",
-    ),
-]
-
-
-PositionErrorOption = Annotated[
-    float | None,
-    _number(
-        "--position-error-m",
-        most=1e4,
-        metavar="M",
-        help_text="Standard deviation, east and north each, of where a UAV stops for a task.",
-    ),
-]
-
-
-MessageLossOption = Annotated[
-    float | None,
-    _number(
-        "--message-loss",
-        most=1.0,
-        metavar="P",
-        help_text="Share of messages that never arrive.",
-    ),
-]
-
-
-DelayOption = Annotated[
-    float | None,
-    _number(
-        "--delay-s",
-        "--latency-s",
-        most=60.0,
-        metavar="S",
-        help_text="Least delay of every message.",
-    ),
-]
-
-
-JitterOption = Annotated[
-    float | None,
-    _number(
-        "--jitter-s",
-        most=60.0,
-        metavar="S",
-        help_text="Mean of what comes on top of it, by chance.",
-    ),
-]
-
-
-PartitionRateOption = Annotated[
-    float | None,
-    _number(
-        "--partition-rate",
-        most=1e3,
-        metavar="N",
-        help_text="How often, per minute on average, a random half of the fleet is cut off from "
-        "the rest and the coordinator.",
-    ),
-]
-
-
-PartitionLengthOption = Annotated[
-    float | None,
-    _number(
-        "--partition-s",
-        most=1e6,
-        metavar="S",
-        help_text="How long each such partition lasts. Default: 30.",
-    ),
-]
+    def changed(self, uncertainty: Uncertainty) -> Uncertainty:
+        """``uncertainty`` with what was said."""
+        said = {each.name: getattr(self, each.name) for each in fields(self)}
+        del said["reattempt"]  # which is the mission's
+        return replace(uncertainty, **{name: n for name, n in said.items() if n is not None})
 
 
 CoordinatorLostOption = Annotated[
     float | None,
-    _number(
+    typer.Option(
         "--coordinator-lost-s",
-        most=1e9,
+        min=0.0,
+        max=1e9,
         metavar="S",
-        help_text="The coordinator dies at this mission time. Tasks that appear or are withdrawn "
+        help="The coordinator dies at this mission time. Tasks that appear or are withdrawn "
         "later come from an operator's seat.",
+        show_default=False,
     ),
 ]
-
-
-def asked_for(base: Uncertainty, **given: float | bool | None) -> Uncertainty:
-    """``base`` with the fields of `Uncertainty` that were asked for; None leaves one as it is."""
-    wanted: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    return replace(base, **wanted)
 
 
 def with_reattempts(mission: Mission, *, reattempt: bool | None) -> Mission:

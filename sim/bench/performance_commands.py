@@ -19,7 +19,7 @@ from sim.bench.command_line import (
     show,
     size_of,
 )
-from sim.options import LossOption, PopupOption
+from sim.options import ChanceOptions, option_of
 from swarm.runtime.options import JsonOption, SeedOption, SpeedupOption
 from swarm.scenario.files import resolve_scenario
 
@@ -221,8 +221,8 @@ def missions(
             show_default=False,
         ),
     ] = None,
-    loss: LossOption = None,
-    popup: PopupOption = None,
+    loss: Annotated[float | None, option_of(ChanceOptions, "loss")] = None,
+    popup: Annotated[float | None, option_of(ChanceOptions, "popup")] = None,
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from sim.options import asked_for
+from sim.options import ChanceOptions
 from sim.study.design import (
     NUMBERS,
     Factor,
@@ -17,6 +17,7 @@ from sim.study.design import (
     unlisted,
     wrong_values,
 )
+from sim.study.options import StudyRequest
 from sim.study.policies.roster import PolicyRoster
 from sim.study.study_file import DEFAULT_TRIALS, MOST_TASKS, MOST_UAVS, load_study
 from swarm.runtime.errors import Fault, InputError
@@ -25,7 +26,7 @@ from swarm.scenario.files import read_bytes
 from swarm.scenario.findings import close_match, printable
 from swarm.scenario.read import parse_toml
 
-__all__ = ["StudyRequest", "requested_study", "shipped_studies"]
+__all__ = ["requested_study", "shipped_studies"]
 
 
 _STUDIES = "sim.studies"
@@ -34,33 +35,12 @@ _SCENARIO_KEYS = ("uav", "task", "tasks_from", "origin")
 """Of scenario files alone."""
 
 
-@dataclass(frozen=True, slots=True)
-class StudyRequest:
-    """What the command line says; None where it says nothing."""
-
-    what: str | None = None
-    """A study or scenario: a file or a shipped name."""
-    random: str | None = None
-    """Numbers of UAVs and tasks with a comma between."""
-    trials: int | None = None
-    seed: int | None = None
-    policies: str | None = None
-    """Names with commas between."""
-    reference: str | None = None
-    bound: bool | None = None
-    reattempt: bool | None = None
-    vary: Sequence[str] = ()
-    """Each a name, an equals sign, and numbers with commas between."""
-    uncertainty: Mapping[str, float | bool | None] = field(default_factory=dict)
-    """By field of `Uncertainty`."""
-
-
 def shipped_studies() -> dict[str, Path]:
     """Names and files of the studies that ship with the package."""
     return shipped_scenarios(_STUDIES)
 
 
-def requested_study(asked: StudyRequest, roster: PolicyRoster) -> Study:
+def requested_study(asked: StudyRequest, chance: ChanceOptions, roster: PolicyRoster) -> Study:
     """The study that is meant, with what the command line changes in it.
 
     Raises:
@@ -86,8 +66,8 @@ def requested_study(asked: StudyRequest, roster: PolicyRoster) -> Study:
         study,
         seed=study.seed if asked.seed is None else asked.seed,
         bound=study.bound if asked.bound is None else asked.bound,
-        reattempt=study.reattempt if asked.reattempt is None else asked.reattempt,
-        uncertainty=asked_for(study.uncertainty, **asked.uncertainty),
+        reattempt=study.reattempt if chance.reattempt is None else chance.reattempt,
+        uncertainty=chance.changed(study.uncertainty),
     )
 
 

@@ -13,27 +13,12 @@ import typer
 
 from coordinator.recording.options import RecordOption, check_new_recording
 from sim.options import (
+    ChanceOptions,
     CoordinatorLostOption,
-    DelayOption,
-    JitterOption,
-    LegSdOption,
-    LossOption,
-    MessageLossOption,
     MethodOption,
-    OutcomesOption,
-    PartitionLengthOption,
-    PartitionRateOption,
-    PopupOption,
-    PopupRateOption,
-    PositionErrorOption,
-    ReattemptOption,
     ReportOption,
-    SpeedSdOption,
-    SurvivalOption,
-    WindOption,
-    WithdrawRateOption,
-    asked_for,
     print_report,
+    with_options,
     with_reattempts,
 )
 from swarm.runtime.errors import Fault, InputError
@@ -42,8 +27,10 @@ from swarm.runtime.options import JsonOption, OptionalScenarioArgument, SeedOpti
 __all__ = ["simulate"]
 
 
+@with_options
 def simulate(
     ctx: typer.Context,
+    *,
     scenario: OptionalScenarioArgument = None,
     recording: Annotated[
         Path | None,
@@ -57,22 +44,7 @@ def simulate(
     ] = None,
     method: MethodOption = "greedy",
     seed: SeedOption = 0,
-    loss: LossOption = None,
-    popup: PopupOption = None,
-    popup_rate: PopupRateOption = None,
-    withdraw_rate: WithdrawRateOption = None,
-    outcomes: OutcomesOption = None,
-    reattempt: ReattemptOption = None,
-    survival: SurvivalOption = None,
-    speed_sd: SpeedSdOption = None,
-    leg_sd: LegSdOption = None,
-    wind: WindOption = None,
-    position_error_m: PositionErrorOption = None,
-    message_loss: MessageLossOption = None,
-    delay_s: DelayOption = None,
-    jitter_s: JitterOption = None,
-    partition_rate: PartitionRateOption = None,
-    partition_s: PartitionLengthOption = None,
+    chance: ChanceOptions,
     coordinator_lost_s: CoordinatorLostOption = None,
     faults: Annotated[
         str | None,
@@ -130,24 +102,8 @@ def simulate(
         check_report_path(report)
     if record is not None:
         check_new_recording(record)
-    uncertainty = asked_for(Uncertainty(), loss=loss, popup=popup, popups_per_min=popup_rate)
-    beside_faults = uncertainty
-    uncertainty = asked_for(
-        uncertainty,
-        withdrawals_per_min=withdraw_rate,
-        outcomes=outcomes,
-        survival=survival,
-        speed_sd_frac=speed_sd,
-        leg_sd_frac=leg_sd,
-        wind_m_s=wind,
-        position_error_m=position_error_m,
-        message_loss=message_loss,
-        delay_s=delay_s,
-        jitter_s=jitter_s,
-        partitions_per_min=partition_rate,
-        partition_s=partition_s,
-    )
-    mission = with_reattempts(load_scenario(scenario), reattempt=reattempt)
+    uncertainty = chance.changed(Uncertainty())
+    mission = with_reattempts(load_scenario(scenario), reattempt=chance.reattempt)
     if faults is None:
         with recording_simulation(mission.name, str(scenario), record) as looks_on:
             flown = simulate_mission(
@@ -172,6 +128,11 @@ def simulate(
     if record is not None:
         problem, remedy = "does not go with --faults", "leave one of them out"
         raise InputError(Fault("--record", str(record), problem, remedy))
+    beside_faults = Uncertainty(
+        loss=uncertainty.loss,
+        popup=uncertainty.popup,
+        popups_per_min=uncertainty.popups_per_min,
+    )
     if uncertainty != beside_faults or coordinator_lost_s is not None:
         problem = "goes with --loss, --popup and --popup-rate only"
         remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"

@@ -2,7 +2,7 @@
 
 The mission is the paper's, drawn out so that it lasts: a larger map and a longer horizon
 make the same decisions, none of which is nearly a tie. Leaves out: what is said
-(sim.fleet.faults.forgery) and how the result is shown (sim.bench.security_report).
+(sim.fleet.faults.forgery) and how the result is shown (sim.bench.security).
 """
 
 from __future__ import annotations
