@@ -17,7 +17,6 @@ from swarm.runtime.options import JsonOption
 if TYPE_CHECKING:
     from sim.study.design import Study
     from sim.study.runner import Fly
-    from sim.study.store import RowStore
     from sim.study.summary import StudySummary
     from sim.study.trial import TrialRow
 
@@ -58,7 +57,7 @@ def study(
     from sim.study.progress import StudyProgress
     from sim.study.request import requested_study
     from sim.study.runner import run_study
-    from sim.study.store import FolderStore, MemoryStore, require_parquet
+    from sim.study.store import FolderStore, RowStore
     from sim.study.tables import MarkedFile
     from sim.study.trial import TrialContext
     from swarm.runtime.clock import SystemClock
@@ -67,18 +66,16 @@ def study(
     found = requested_study(asked, chance, ROSTER)
     marked = None if output.update is None else MarkedFile(output.update, found.name)
     if output.file_format == "parquet":
-        require_parquet()
+        require_extra("study", "--format parquet")  # before anything is flown
     errors = Console(stderr=True)
     if found.certain:
         line = "nothing is uncertain, so all trials are alike: try --loss 0.3 --popup 0.3"
         errors.print(line, highlight=False, soft_wrap=True)
     with ExitStack() as stack:
-        store: RowStore
-        if output.out is None:
-            store = MemoryStore(found)
-        else:
-            store = folder_store = FolderStore(output.out, found, ROSTER)
-            stack.callback(folder_store.close)
+        store = RowStore(found)
+        if output.out is not None:
+            store = FolderStore(output.out, found, ROSTER)
+            stack.callback(store.close)
         progress = stack.enter_context(StudyProgress(errors, found.name, SystemClock()))
         try:
             rows = run_study(TrialContext(found, ROSTER), store, _fly(output), progress)

@@ -14,25 +14,22 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from sim.study.design import SameMission, Study
 from sim.study.policies.roster import PolicyRoster
 from sim.study.study_file import format_study, load_study
 from sim.study.trial import COLUMNS, TrialJob, TrialRow, rows_due
 from swarm.runtime.errors import Fault, InputError
-from swarm.runtime.extras import require_extra
 from swarm.scenario import format_scenario
 
 __all__ = [
     "ROWS_FILE",
     "STUDY_FILE",
     "FolderStore",
-    "MemoryStore",
     "RowStore",
     "read_rows",
     "replace_text",
-    "require_parquet",
     "row_line",
     "table_text",
     "write_parquet",
@@ -83,10 +80,7 @@ def read_rows(path: Path) -> list[TrialRow]:
 
 
 def write_parquet(folder: Path, rows: Sequence[TrialRow]) -> Path:
-    """Write all rows as Parquet; ask `require_parquet` before.
-
-    Returns:
-        The file.
+    """Write all rows as Parquet, which needs the extra ``study``; gives the file.
 
     Raises:
         OSError: it cannot be written.
@@ -102,15 +96,6 @@ def write_parquet(folder: Path, rows: Sequence[TrialRow]) -> Path:
     pq.write_table(pa.table(columns, schema=schema), draft)
     draft.replace(path)
     return path
-
-
-def require_parquet() -> None:
-    """Refuse before anything is flown where Parquet files cannot be written.
-
-    Raises:
-        InputError: pyarrow is not installed.
-    """
-    require_extra("study", "--format parquet")
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -151,23 +136,7 @@ ROWS_FILE = "trials.csv"
 _ANOTHER = "name another folder, or remove this one"
 
 
-class RowStore(Protocol):
-    """Keeps rows."""
-
-    def missing(self) -> list[TrialJob]:
-        """The jobs whose rows are not all there."""
-        ...
-
-    def add(self, rows: Sequence[TrialRow]) -> None:
-        """Keep the rows of one job."""
-        ...
-
-    def finish(self) -> list[TrialRow]:
-        """All rows, sorted by point, trial and policy."""
-        ...
-
-
-class MemoryStore:
+class RowStore:
     """Keeps rows for as long as it lives."""
 
     def __init__(self, study: Study) -> None:
@@ -176,7 +145,8 @@ class MemoryStore:
 
     def missing(self) -> list[TrialJob]:
         """The jobs whose rows are not all there."""
-        return _missing(self._study, self._rows)
+        there = {row.key for row in self._rows}
+        return [job for job, keys in rows_due(self._study).items() if not keys <= there]
 
     def add(self, rows: Sequence[TrialRow]) -> None:
         """Keep the rows of one job."""
@@ -187,7 +157,7 @@ class MemoryStore:
         return sorted(self._rows, key=lambda row: row.key)
 
 
-class FolderStore:
+class FolderStore(RowStore):
     """Keeps rows in a folder; close it.
 
     Args:
@@ -200,8 +170,8 @@ class FolderStore:
     """
 
     def __init__(self, folder: Path, study: Study, roster: PolicyRoster) -> None:
+        super().__init__(study)
         self._folder = folder
-        self._study = study
         self._rows_path = folder / ROWS_FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -220,19 +190,15 @@ class FolderStore:
             self._lock.close()
             raise
 
-    def missing(self) -> list[TrialJob]:
-        """The jobs whose rows are not all there."""
-        return _missing(self._study, self._rows)
-
     def add(self, rows: Sequence[TrialRow]) -> None:
         """Append the rows of one job; they are with the operating system when this returns."""
         self._file.write("".join(row_line(row) for row in rows))
         self._file.flush()
-        self._rows += rows
+        super().add(rows)
 
     def finish(self) -> list[TrialRow]:
         """All rows, sorted by point, trial and policy, as the file has them then."""
-        self._rows.sort(key=lambda row: row.key)
+        self._rows = super().finish()
         self._file.close()
         replace_text(self._rows_path, table_text(self._rows))
         self._file = self._rows_path.open("a", encoding="utf-8", newline="")
@@ -277,11 +243,6 @@ class FolderStore:
             if keys <= rows.keys()
             for key in sorted(keys)
         ]
-
-
-def _missing(study: Study, rows: Iterable[TrialRow]) -> list[TrialJob]:
-    there = {row.key for row in rows}
-    return [job for job, keys in rows_due(study).items() if not keys <= there]
 
 
 _IDENTITY = {

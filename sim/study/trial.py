@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,13 +97,7 @@ def row_of(
         at=point.at,
         trial=trial,
         policy=policy,
-        value=scored.value,
-        done=scored.done,
-        failed=scored.failed,
-        missed=scored.missed,
-        duplicate_visits=scored.duplicate_visits,
-        makespan_s=scored.makespan_s,
-        lost_uavs=scored.lost_uavs,
+        **asdict(scored),
         epochs=flight.epochs,
         moved=flight.moved,
         released=flight.released,

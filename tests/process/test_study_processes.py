@@ -17,7 +17,7 @@ from distributed import LocalCluster
 from sim.study.design import Factor, RandomMissions, Study
 from sim.study.policies.roster import ROSTER, PolicyRoster
 from sim.study.runner import Fly, fly_here, in_processes, on_dask, run_study
-from sim.study.store import MemoryStore, read_rows
+from sim.study.store import RowStore, read_rows
 from sim.study.trial import TrialContext, TrialRow, jobs_of, without_wall_times
 from sim.world.uncertainty import Uncertainty
 from swarm.runtime.errors import InputError, SwarmError
@@ -37,7 +37,7 @@ STUDY = Study(
 
 
 def flown(fly: Fly, study: Study = STUDY, roster: PolicyRoster = ROSTER) -> list[TrialRow]:
-    rows = run_study(TrialContext(study, roster), MemoryStore(study), fly, lambda *_: None)
+    rows = run_study(TrialContext(study, roster), RowStore(study), fly, lambda *_: None)
     return [without_wall_times(row) for row in rows]
 
 

@@ -6,12 +6,12 @@ value per time by UAVs whose own lists are done.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from sim.study.baselines.index_rules import Routes
 from sim.study.policies.roster import Planner
-from sim.study.policies.situation import Account, TeamNews, TeamSituation
+from sim.study.policies.situation import Account, Dispatcher, TeamNews, TeamSituation
 from sim.study.policies.team import fly_team
 from sim.world.outcome import FlightOutcome
 from sim.world.uncertainty import Realization
@@ -21,13 +21,12 @@ from swarm.model import TaskId, UavId
 from swarm.runtime.clock import Clock
 
 __all__ = [
+    "FROZEN",
     "NEAREST_FIRST",
-    "PLANNED_BY",
     "VALUE_PER_TIME_ONLINE",
-    "Frozen",
     "ListFollower",
     "RuleDispatcher",
-    "RulePolicy",
+    "TeamPolicy",
     "by_index",
 ]
 
@@ -57,29 +56,8 @@ class RuleDispatcher:
         return None if choice is None else choice.task
 
 
-@dataclass(frozen=True, slots=True)
-class RulePolicy:
-    """Every UAV by the same rule, without any plan."""
-
-    name: str
-    what: str
-    rule: Rule
-
-    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
-        """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
-        del plan
-        return fly_team(fate, RuleDispatcher(self.rule, Account(clock)))
-
-
-NEAREST_FIRST = RulePolicy("nearest", "every free UAV takes the task it reaches soonest", NEAREST)
-
-VALUE_PER_TIME_ONLINE = RulePolicy(
-    "value-per-time", "every free UAV takes the task worth most per time", VALUE_PER_TIME
-)
-
-
 PLANNED_BY = "guided"
-"""Method of the offline plan from which the policies of this package begin."""
+"""Method of the offline plan."""
 
 
 class ListFollower:
@@ -142,23 +120,56 @@ class ListFollower:
         return None if choice is None else choice.task
 
 
-@dataclass(frozen=True, slots=True)
-class Frozen:
-    """The offline plan, never changed."""
-
-    name: str = "frozen"
-    what: str = "the best offline plan, never changed; gaps by value per time"
-
-    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
-        """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
-        best = plan(fate.mission, PLANNED_BY)
-        follower = ListFollower(best.routes, Account(clock))
-        return fly_team(fate, follower, sequence=best.sequence)
-
-
 def by_index(problem: Problem, lists: Mapping[UavId, Sequence[TaskId]]) -> Routes:
     """Lists of ids as lists of indices; unknown tasks are left out."""
     columns = {task: column for column, task in enumerate(problem.task_ids)}
     return [
         [columns[task] for task in lists.get(uav, ()) if task in columns] for uav in problem.uav_ids
     ]
+
+
+Maker = Callable[[Mapping[UavId, Sequence[TaskId]], Account, int], Dispatcher]
+"""Makes a dispatcher of the offline plan's lists, an account of its work, and a seed."""
+
+
+@dataclass(frozen=True, slots=True)
+class TeamPolicy:
+    """A policy by which one dispatcher decides for all UAVs."""
+
+    name: str
+    what: str
+    make: Maker
+    planned: bool = True
+    """Whether it begins with the offline plan."""
+    every_s: float | None = None
+    """How often its dispatcher hears that time has passed [s]; None: never."""
+
+    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
+        """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
+        best = plan(fate.mission, PLANNED_BY) if self.planned else None
+        lists = {} if best is None else best.routes
+        return fly_team(
+            fate,
+            self.make(lists, Account(clock), fate.seed),
+            sequence=None if best is None else best.sequence,
+            every_s=self.every_s,
+        )
+
+
+NEAREST_FIRST = TeamPolicy(
+    "nearest",
+    "every free UAV takes the task it reaches soonest",
+    lambda _lists, account, _seed: RuleDispatcher(NEAREST, account),
+    planned=False,
+)
+VALUE_PER_TIME_ONLINE = TeamPolicy(
+    "value-per-time",
+    "every free UAV takes the task worth most per time",
+    lambda _lists, account, _seed: RuleDispatcher(VALUE_PER_TIME, account),
+    planned=False,
+)
+FROZEN = TeamPolicy(
+    "frozen",
+    "the best offline plan, never changed; gaps by value per time",
+    lambda lists, account, _seed: ListFollower(lists, account),
+)

@@ -7,25 +7,27 @@ coordinator (`coordinator.planner.online`). Leaves out: messages, and the time t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from sim.study.baselines.cbba import cbba
-from sim.study.policies.dispatchers import PLANNED_BY, ListFollower
-from sim.study.policies.roster import Planner
+from sim.study.policies.dispatchers import ListFollower, TeamPolicy
 from sim.study.policies.situation import Account, TeamNews, TeamSituation
-from sim.study.policies.team import fly_team
-from sim.world.outcome import FlightOutcome
-from sim.world.uncertainty import Realization
 from swarm.allocation import Problem, TeamState, evaluate
 from swarm.allocation.rules import team_arrays
 from swarm.kernels.routes import optimise_routes
 from swarm.model import TaskId, UavId
-from swarm.runtime.clock import Clock
 
-__all__ = ["AuctionDispatcher", "Cbba", "Central", "CentralDivert", "CentralOptimiser", "Interval"]
+__all__ = [
+    "CBBA",
+    "CENTRAL",
+    "CENTRAL_DIVERT",
+    "AuctionDispatcher",
+    "CentralOptimiser",
+    "interval",
+]
 
 
 _UPON = frozenset({TeamNews.APPEARED, TeamNews.WITHDRAWN, TeamNews.LOST, TeamNews.REOPENED})
@@ -49,19 +51,6 @@ class AuctionDispatcher(ListFollower):
                 routes = cbba(situation.problem, state=situation.state).routes
             self.put_into_force(routes)
         return ()
-
-
-@dataclass(frozen=True, slots=True)
-class Cbba:
-    """The auction, held anew at every event."""
-
-    name: str = "cbba"
-    what: str = "consensus-based bundle algorithm, re-bidding at every event"
-
-    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
-        """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
-        del plan
-        return fly_team(fate, AuctionDispatcher(Account(clock)))
 
 
 _ITERATIONS_PER_TASK = 400
@@ -154,62 +143,38 @@ class CentralOptimiser(ListFollower):
         self.put_into_force(routes)
 
 
-@dataclass(frozen=True, slots=True)
-class Central:
-    """Re-optimisation at every event; a task flown to stays with its UAV."""
-
-    name: str = "central"
-    what: str = "central re-optimisation at every event, ideal communication"
-
-    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
-        """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
-        best = plan(fate.mission, PLANNED_BY)
-        dispatcher = CentralOptimiser(best.routes, Account(clock), seed=fate.seed)
-        return fly_team(fate, dispatcher, sequence=best.sequence)
-
-
-@dataclass(frozen=True, slots=True)
-class CentralDivert:
-    """The same, and UAVs in flight may be sent elsewhere."""
-
-    name: str = "central-divert"
-    what: str = "central re-optimisation at every event, UAVs in flight are diverted"
-
-    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
-        """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
-        best = plan(fate.mission, PLANNED_BY)
-        dispatcher = CentralOptimiser(best.routes, Account(clock), seed=fate.seed, diverts=True)
-        return fly_team(fate, dispatcher, sequence=best.sequence)
+CBBA = TeamPolicy(
+    "cbba",
+    "consensus-based bundle algorithm, re-bidding at every event",
+    lambda _lists, account, _seed: AuctionDispatcher(account),
+    planned=False,
+)
+CENTRAL = TeamPolicy(
+    "central",
+    "central re-optimisation at every event, ideal communication",
+    lambda lists, account, seed: CentralOptimiser(lists, account, seed=seed),
+)
+"""A task flown to stays with its UAV."""
+CENTRAL_DIVERT = TeamPolicy(
+    "central-divert",
+    "central re-optimisation at every event, UAVs in flight are diverted",
+    lambda lists, account, seed: CentralOptimiser(lists, account, seed=seed, diverts=True),
+)
 
 
-@dataclass(frozen=True, slots=True)
-class Interval:
+def interval(interval_s: float = 60.0) -> TeamPolicy:
     """Re-optimisation at fixed intervals; in between, lists are followed and gaps filled.
 
     Raises:
         ValueError: the interval is not positive and finite.
     """
-
-    interval_s: float = 60.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.interval_s < float("inf"):
-            raise ValueError(f"interval_s must be > 0 and finite, not {self.interval_s}")
-
-    @property
-    def name(self) -> str:
-        """By which studies ask for it."""
-        return f"interval:{self.interval_s:g}"
-
-    @property
-    def what(self) -> str:
-        """In a few words, for a table."""
-        return f"central re-optimisation every {self.interval_s:g} s, ideal communication"
-
-    def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
-        """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
-        best = plan(fate.mission, PLANNED_BY)
-        dispatcher = CentralOptimiser(
-            best.routes, Account(clock), seed=fate.seed, upon=(TeamNews.TIME,)
-        )
-        return fly_team(fate, dispatcher, sequence=best.sequence, every_s=self.interval_s)
+    if not 0.0 < interval_s < math.inf:
+        raise ValueError(f"interval_s must be > 0 and finite, not {interval_s}")
+    return TeamPolicy(
+        f"interval:{interval_s:g}",
+        f"central re-optimisation every {interval_s:g} s, ideal communication",
+        lambda lists, account, seed: CentralOptimiser(
+            lists, account, seed=seed, upon=(TeamNews.TIME,)
+        ),
+        every_s=interval_s,
+    )

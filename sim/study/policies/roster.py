@@ -75,8 +75,7 @@ class PolicyEntry:
 
     module: str
     what: str
-    """In that module: the policy, or a class of policies, which is called without arguments or
-    with the number behind the colon."""
+    """In that module: the policy, or what makes one, from the number behind the colon if any."""
     parameter: str = ""
     """What that number is, with its unit; empty for a policy without."""
     ideal: bool = False
@@ -142,12 +141,13 @@ def _positive(text: str) -> float | None:
 
 def _made(entry: PolicyEntry, *arguments: float) -> Any:
     what = getattr(import_module(entry.module), entry.what)
-    return what(*arguments) if isinstance(what, type) else what
+    return what(*arguments) if callable(what) else what
 
 
 _PACKAGE = "sim.study.policies"
 
-_AGENTS = f"{_PACKAGE}.agents"
+_AGENTS, _DISPATCHERS = f"{_PACKAGE}.agents", f"{_PACKAGE}.dispatchers"
+_REPLANNING = f"{_PACKAGE}.replanning"
 
 ROSTER = PolicyRoster(
     policies={
@@ -155,17 +155,13 @@ ROSTER = PolicyRoster(
         "guided-alone": PolicyEntry(_AGENTS, "GUIDED_ALONE"),
         "greedy": PolicyEntry(_AGENTS, "GREEDY"),
         "lookahead": PolicyEntry(_AGENTS, "LOOKAHEAD"),
-        "central": PolicyEntry(f"{_PACKAGE}.replanning", "Central", ideal=True),
-        "central-divert": PolicyEntry(f"{_PACKAGE}.replanning", "CentralDivert", ideal=True),
-        "interval": PolicyEntry(
-            f"{_PACKAGE}.replanning", "Interval", parameter="an interval [s]", ideal=True
-        ),
-        "frozen": PolicyEntry(f"{_PACKAGE}.dispatchers", "Frozen", ideal=True),
-        "cbba": PolicyEntry(f"{_PACKAGE}.replanning", "Cbba", ideal=True),
-        "nearest": PolicyEntry(f"{_PACKAGE}.dispatchers", "NEAREST_FIRST", ideal=True),
-        "value-per-time": PolicyEntry(
-            f"{_PACKAGE}.dispatchers", "VALUE_PER_TIME_ONLINE", ideal=True
-        ),
+        "central": PolicyEntry(_REPLANNING, "CENTRAL", ideal=True),
+        "central-divert": PolicyEntry(_REPLANNING, "CENTRAL_DIVERT", ideal=True),
+        "interval": PolicyEntry(_REPLANNING, "interval", parameter="an interval [s]", ideal=True),
+        "frozen": PolicyEntry(_DISPATCHERS, "FROZEN", ideal=True),
+        "cbba": PolicyEntry(_REPLANNING, "CBBA", ideal=True),
+        "nearest": PolicyEntry(_DISPATCHERS, "NEAREST_FIRST", ideal=True),
+        "value-per-time": PolicyEntry(_DISPATCHERS, "VALUE_PER_TIME_ONLINE", ideal=True),
     },
     bound=PolicyEntry(f"{_PACKAGE}.clairvoyant", "Clairvoyant"),
 )

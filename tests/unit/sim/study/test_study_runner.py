@@ -10,7 +10,7 @@ import pytest
 
 from sim.study.design import Factor, RandomMissions, SameMission, Study, fate_seed, span_s
 from sim.study.runner import fly_here, run_study
-from sim.study.store import FolderStore, MemoryStore, read_rows, write_parquet
+from sim.study.store import FolderStore, RowStore, read_rows, write_parquet
 from sim.study.summary import summarise
 from sim.study.trial import (
     BOUND,
@@ -41,7 +41,7 @@ def no_progress(done: int, total: int) -> None:
 
 
 def flown(study: Study) -> list[TrialRow]:
-    rows = run_study(TrialContext(study, FAKES), MemoryStore(study), fly_here, no_progress)
+    rows = run_study(TrialContext(study, FAKES), RowStore(study), fly_here, no_progress)
     return [without_wall_times(row) for row in rows]
 
 

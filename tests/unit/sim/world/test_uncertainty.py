@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.options import asked_for
+from sim.options import ChanceOptions
 from sim.world.simulation import simulate_mission
 from sim.world.uncertainty import Realization, Uncertainty
 from sim.world.wind import Wind
@@ -124,7 +124,9 @@ def small(valley: Mission, n_uav: int = 4, n_task: int = 6) -> Mission:
 @pytest.mark.parametrize("off", OFF)
 def test_asking_for_one_kind_less_leaves_all_others_as_they_were(valley: Mission, off: str) -> None:
     every = drawn(EVERYTHING.draw(small(valley), 300.0, 5))
-    without = drawn(asked_for(EVERYTHING, **{off: OFF[off]}).draw(small(valley), 300.0, 5))
+    without = drawn(
+        ChanceOptions(**{off: OFF[off]}).changed(EVERYTHING).draw(small(valley), 300.0, 5)
+    )
 
     assert every.pop(off) != without.pop(off)
     assert every == without

@@ -14,12 +14,18 @@ from sim.study.baselines.cbba import cbba
 from sim.study.baselines.index_rules import nearest_first, value_per_time
 from sim.study.generator import mission_of
 from sim.study.policies.dispatchers import (
+    FROZEN,
     NEAREST_FIRST,
     VALUE_PER_TIME_ONLINE,
-    Frozen,
     RuleDispatcher,
 )
-from sim.study.policies.replanning import Cbba, Central, CentralDivert, CentralOptimiser, Interval
+from sim.study.policies.replanning import (
+    CBBA,
+    CENTRAL,
+    CENTRAL_DIVERT,
+    CentralOptimiser,
+    interval,
+)
 from sim.study.policies.roster import Policy
 from sim.study.policies.situation import Account, TeamNews, TeamSituation
 from sim.study.policies.team import fly_team
@@ -36,11 +42,11 @@ from tests.unit.sim.study.policies.test_team import random_lists
 SEEDS = st.integers(0, 2**32 - 1)
 CLOCK = StillClock()
 POLICIES: tuple[Policy, ...] = (
-    Central(),
-    CentralDivert(),
-    Interval(2.0),
-    Frozen(),
-    Cbba(),
+    CENTRAL,
+    CENTRAL_DIVERT,
+    interval(2.0),
+    FROZEN,
+    CBBA,
     NEAREST_FIRST,
     VALUE_PER_TIME_ONLINE,
 )
@@ -78,7 +84,7 @@ def test_frozen_flies_its_plan(seed: int) -> None:
     rng = np.random.default_rng(seed)
     problem = random_problem(rng, 3, 9, lowest_survival=0.5)
     routes = random_lists(rng, 3, 9)
-    flight = Frozen().fly(calm(problem), planner_of(problem, routes), CLOCK)
+    flight = FROZEN.fly(calm(problem), planner_of(problem, routes), CLOCK)
     objective, expected_s = evaluate(problem, routes)
     assert flown(problem, flight) == routes
     assert times_s(flight) == dict(zip(problem.task_ids, expected_s.tolist(), strict=True))
@@ -104,7 +110,7 @@ def test_rules_fly_what_they_lead_to(seed: int) -> None:
 @given(seed=SEEDS)
 def test_auction_flies_its_paths(seed: int) -> None:
     problem = random_problem(np.random.default_rng(seed), 3, 9, incapable_frac=0.2)
-    flight = Cbba().fly(calm(problem), planner_of(problem, [[], [], []]), CLOCK)
+    flight = CBBA.fly(calm(problem), planner_of(problem, [[], [], []]), CLOCK)
     assert flown(problem, flight) == cbba(problem).routes
     assert flight.epochs == 1
 
@@ -132,7 +138,7 @@ def test_those_who_improve_a_plan_are_never_worse(seed: int) -> None:
     fate = calm(problem)
     lists = {str(uav): tasks for uav, tasks in plan(fate.mission, "guided").routes.items()}
     guided = fly_team(fate, RuleDispatcher(GuidedRule(lists), Account(CLOCK)))
-    flights = [p.fly(fate, plan, CLOCK) for p in (Central(), CentralDivert(), Interval(1.0))]
+    flights = [p.fly(fate, plan, CLOCK) for p in (CENTRAL, CENTRAL_DIVERT, interval(1.0))]
     for flight in (guided, *flights):
         assert value_of(fate, flight.visits) >= worth - 1e-9 * abs(worth)
 
@@ -197,7 +203,7 @@ def diversion() -> tuple[Realization, list[list[int]]]:
 def test_diverting_breaks_the_promise_that_central_keeps() -> None:
     fate, routes = diversion()
     plan = planner_of(Problem.from_mission(fate.mission), routes)
-    kept, diverted = (p.fly(fate, plan, CLOCK) for p in (Central(), CentralDivert()))
+    kept, diverted = (p.fly(fate, plan, CLOCK) for p in (CENTRAL, CENTRAL_DIVERT))
     assert times_s(kept) == {"a": 100.0, "b": 220.0}
     assert times_s(diverted) == {"b": 40.0, "a": 160.0}
     assert (kept.released, diverted.released) == (0, 1)
@@ -210,7 +216,7 @@ def test_diverting_leaves_those_alone_who_serve() -> None:
         horizon_s=500.0,
     )
     plan = planner_of(Problem.from_mission(served), [[0]])
-    assert times_s(CentralDivert().fly(fate_of(served), plan, CLOCK)) == {"a": 105.0, "b": 130.0}
+    assert times_s(CENTRAL_DIVERT.fly(fate_of(served), plan, CLOCK)) == {"a": 105.0, "b": 130.0}
 
 
 def test_intervals_bring_a_new_plan_and_gaps_are_filled_in_between() -> None:
@@ -219,11 +225,11 @@ def test_intervals_bring_a_new_plan_and_gaps_are_filled_in_between() -> None:
         [task("a", 10.0), task("b", 20.0), task("c", 30.0), task("d", 52.0, appears_s=1.0)],
     )
     plan = planner_of(Problem.from_mission(scenario), [[0, 1, 2], []])
-    frozen = Frozen().fly(fate_of(scenario), plan, CLOCK)
+    frozen = FROZEN.fly(fate_of(scenario), plan, CLOCK)
     assert times_s(frozen) == {"d": 3.0, "a": 10.0, "b": 20.0, "c": 30.0}
-    late = Interval(1000.0).fly(fate_of(scenario), plan, CLOCK)
+    late = interval(1000.0).fly(fate_of(scenario), plan, CLOCK)
     assert late.visits == frozen.visits
-    soon = Interval(2.0).fly(fate_of(scenario), plan, CLOCK)
+    soon = interval(2.0).fly(fate_of(scenario), plan, CLOCK)
     assert times_s(soon) == {"d": 3.0, "a": 10.0, "c": 25.0, "b": 20.0}
     assert (soon.epochs, soon.moved) == (2, 1)
 
@@ -234,7 +240,7 @@ def test_frozen_list_of_a_lost_uav_is_taken_by_those_who_have_done_theirs() -> N
     )
     fate = fate_of(scenario, lost_at_s={"u1": 12.0})
     plan = planner_of(Problem.from_mission(scenario), [[0, 1], [2]])
-    flight = Frozen().fly(fate, plan, CLOCK)
+    flight = FROZEN.fly(fate, plan, CLOCK)
     assert [(v.uav, v.task, v.completed_s) for v in flight.visits] == [
         ("u2", "c", 5.0),
         ("u1", "a", 10.0),
@@ -247,7 +253,7 @@ def test_auction_is_held_again_when_a_uav_is_lost() -> None:
         [uav("u1"), uav("u2", 50.0)], [task("a", 10.0), task("b", 20.0), task("c", 45.0)]
     )
     fate = fate_of(scenario, lost_at_s={"u1": 4.0})
-    flight = Cbba().fly(fate, planner_of(Problem.from_mission(scenario), [[], []]), CLOCK)
+    flight = CBBA.fly(fate, planner_of(Problem.from_mission(scenario), [[], []]), CLOCK)
     assert [(v.task, v.completed_s) for v in flight.visits] == [
         ("c", 5.0),
         ("b", 30.0),
@@ -327,4 +333,4 @@ def test_names_tell_policies_apart() -> None:
 @pytest.mark.parametrize("interval_s", [0.0, -1.0, float("inf"), float("nan")])
 def test_intervals_are_positive_and_finite(interval_s: float) -> None:
     with pytest.raises(ValueError, match="interval_s"):
-        Interval(interval_s)
+        interval(interval_s)
