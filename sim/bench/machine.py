@@ -17,7 +17,14 @@ import numpy as np
 
 import swarm
 
-__all__ = ["MachineInfo", "cpu_s", "memory_bytes", "peak_memory_bytes", "this_machine"]
+__all__ = [
+    "MachineInfo",
+    "cpu_s",
+    "memory_bytes",
+    "peak_memory_bytes",
+    "processor_name",
+    "this_machine",
+]
 
 
 _CPU_INFO = Path("/proc/cpuinfo")
@@ -54,7 +61,7 @@ def this_machine() -> MachineInfo:
     with suppress(PackageNotFoundError):
         versions["OR-Tools"] = version("ortools")
     return MachineInfo(
-        cpu=_cpu_model(),
+        cpu=processor_name(),
         cores=len(os.sched_getaffinity(0))
         if hasattr(os, "sched_getaffinity")
         else os.cpu_count() or 1,
@@ -95,12 +102,13 @@ def memory_bytes(pid: int) -> int:
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
-def _cpu_model() -> str:
+def processor_name() -> str:
+    """Model of the processor as it calls itself."""
     try:
         for line in _CPU_INFO.read_text().splitlines():
             name, _, model = line.partition(":")
             if name.strip() == "model name":
-                return model.strip()
+                return " ".join(model.split())
     except OSError:
         pass
     return platform.processor() or platform.machine() or "unknown processor"

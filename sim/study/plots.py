@@ -24,6 +24,7 @@ from sim.study.style import (
     plain_axes,
     policy_label,
     rows_figure,
+    save_figures,
     style_of,
     trials_text,
     two_panels,
@@ -45,7 +46,6 @@ __all__ = [
 ]
 
 
-_KINDS = (".png", ".svg")
 _CLOSE = (0.75, 1.15)
 """Ratios that are drawn; what lies beyond is told."""
 _CHURN = {
@@ -63,18 +63,7 @@ def draw_study(summary: StudySummary, folder: Path) -> list[Path]:
     Raises:
         OSError: a file cannot be written.
     """
-    import matplotlib as mpl
-
-    drawn = []
-    # without date and with fixed ids the same results give the same files
-    with mpl.rc_context({"svg.hashsalt": "peckorder"}):
-        for name, figure in _figures(summary).items():
-            for kind in _KINDS:
-                path = folder / f"{name}{kind}"
-                metadata = {"Date": None} if kind == ".svg" else {}
-                figure.savefig(path, dpi=160, metadata=metadata)
-                drawn.append(path)
-    return drawn
+    return save_figures(_figures(summary), folder)
 
 
 def comparison_figure(summary: StudySummary, setting: PointSummary) -> Figure:

@@ -7,9 +7,10 @@ panels and legends that plots are made of.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Literal
 
@@ -38,6 +39,7 @@ __all__ = [
     "plain_axes",
     "policy_label",
     "rows_figure",
+    "save_figures",
     "spread_text",
     "style_of",
     "trials_text",
@@ -298,3 +300,22 @@ def add_title(figure: Figure, text: str, note: str) -> None:
     if note:
         note = fill(note, int(_LETTERS_PER_IN * figure.get_figwidth()))
         figure.supxlabel(note, x=0.01, ha="left", fontsize=8.5, color="#444444")
+
+
+def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Write figures by their names, each as PNG and as SVG, into an existing folder.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    import matplotlib as mpl
+
+    drawn = []
+    # without date and with fixed ids the same results give the same files
+    with mpl.rc_context({"svg.hashsalt": "peckorder"}):
+        for name, figure in figures.items():
+            for kind, metadata in ((".png", {}), (".svg", {"Date": None})):
+                path = folder / f"{name}{kind}"
+                figure.savefig(path, dpi=160, metadata=metadata)
+                drawn.append(path)
+    return drawn

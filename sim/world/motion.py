@@ -19,17 +19,40 @@ while descending may dip below by its braking distance.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
-__all__ = ["IdealMotion", "Motion", "Point", "SmoothMotion", "StraightLeg"]
+__all__ = ["IdealMotion", "Motion", "Point", "SmoothMotion", "between", "minus", "plus"]
 
 
 Point = tuple[float, float, float]
 """East, north, up [m] of a place, or [m/s] of a velocity, in the mission's local frame."""
 
+_AT_REST: Point = (0.0, 0.0, 0.0)
 
-_NO_VELOCITY: Point = (0.0, 0.0, 0.0)
+
+def plus(a: Point, b: Point) -> Point:
+    """Sum."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def minus(a: Point, b: Point) -> Point:
+    """Difference."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def between(start: Point, stop: Point, frac: float) -> Point:
+    """The place that share of the way from start to stop; exactly the stop at 1."""
+    return stop if frac >= 1.0 else plus(start, _scaled(minus(stop, start), frac))
+
+
+def _scaled(a: Point, by: float) -> Point:
+    return a[0] * by, a[1] * by, a[2] * by
+
+
+def _check_speed(speed_m_s: float) -> None:
+    if not 0.0 < speed_m_s < math.inf:
+        raise ValueError(f"speed must be positive and finite, not {speed_m_s} m/s")
 
 
 class Motion(Protocol):
@@ -62,85 +85,33 @@ class Motion(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class StraightLeg:
-    """A straight line flown at constant speed, with rest before and after.
-
-    Raises:
-        ValueError: the speed is not positive and finite.
-    """
-
-    start_enu_m: Point
-    target_enu_m: Point
-    speed_m_s: float
-    """Along the line in three dimensions [m/s]; > 0."""
-    leaves_s: float
-    arrives_s: float = field(init=False)
-    """When the target is reached [s]."""
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.speed_m_s < math.inf:
-            raise ValueError(f"speed must be positive and finite, not {self.speed_m_s} m/s")
-        length_m = math.dist(self.start_enu_m, self.target_enu_m)
-        object.__setattr__(self, "arrives_s", self.leaves_s + length_m / self.speed_m_s)
-
-    def position_enu_m(self, now_s: float) -> Point:
-        """Place at that instant [m]; the target exactly from the arrival on."""
-        if now_s >= self.arrives_s:
-            return self.target_enu_m
-        if now_s <= self.leaves_s:
-            return self.start_enu_m
-        flown_frac = (now_s - self.leaves_s) / (self.arrives_s - self.leaves_s)
-        (east_m, north_m, up_m), (to_east_m, to_north_m, to_up_m) = (
-            self.start_enu_m,
-            self.target_enu_m,
-        )
-        return (
-            east_m + (to_east_m - east_m) * flown_frac,
-            north_m + (to_north_m - north_m) * flown_frac,
-            up_m + (to_up_m - up_m) * flown_frac,
-        )
-
-    def velocity_enu_m_s(self, now_s: float) -> Point:
-        """Velocity at that instant [m/s]; zero before the start and from the arrival on."""
-        if not self.leaves_s <= now_s < self.arrives_s:
-            return _NO_VELOCITY
-        duration_s = self.arrives_s - self.leaves_s
-        (east_m, north_m, up_m), (to_east_m, to_north_m, to_up_m) = (
-            self.start_enu_m,
-            self.target_enu_m,
-        )
-        return (
-            (to_east_m - east_m) / duration_s,
-            (to_north_m - north_m) / duration_s,
-            (to_up_m - up_m) / duration_s,
-        )
-
-
 class IdealMotion:
     """Straight to the target at the ordered speed, stopping and turning in no time."""
 
     def __init__(self, start_enu_m: Point) -> None:
-        self._rest_enu_m = start_enu_m
-        self._leg: StraightLeg | None = None
-
-    @property
-    def target_enu_m(self) -> Point:
+        self.target_enu_m = start_enu_m
         """Where the vehicle is going to stop [m]."""
-        return self._rest_enu_m if self._leg is None else self._leg.target_enu_m
-
-    @property
-    def arrives_s(self) -> float | None:
+        self.arrives_s: float | None = None
         """When the last ordered target is reached [s], also if that is past."""
-        return None if self._leg is None else self._leg.arrives_s
+        self._start_enu_m = start_enu_m
+        self._leaves_s = 0.0
 
     def position_enu_m(self, now_s: float) -> Point:
-        """Place at that instant [m]."""
-        return self._rest_enu_m if self._leg is None else self._leg.position_enu_m(now_s)
+        """Place at that instant [m]; the target exactly from the arrival on."""
+        if self.arrives_s is None or now_s >= self.arrives_s:
+            return self.target_enu_m
+        if now_s <= self._leaves_s:
+            return self._start_enu_m
+        flown_frac = (now_s - self._leaves_s) / (self.arrives_s - self._leaves_s)
+        return between(self._start_enu_m, self.target_enu_m, flown_frac)
 
     def velocity_enu_m_s(self, now_s: float) -> Point:
-        """Velocity at that instant [m/s]."""
-        return _NO_VELOCITY if self._leg is None else self._leg.velocity_enu_m_s(now_s)
+        """Velocity at that instant [m/s]; zero before the start and from the arrival on."""
+        if self.arrives_s is None or not self._leaves_s <= now_s < self.arrives_s:
+            return _AT_REST
+        duration_s = self.arrives_s - self._leaves_s
+        east_m, north_m, up_m = minus(self.target_enu_m, self._start_enu_m)
+        return east_m / duration_s, north_m / duration_s, up_m / duration_s
 
     def fly_to(self, target_enu_m: Point, speed_m_s: float, now_s: float) -> None:
         """Leave for ``target_enu_m`` at once.
@@ -148,15 +119,16 @@ class IdealMotion:
         Raises:
             ValueError: the speed is not positive and finite.
         """
-        self._leg = StraightLeg(self.position_enu_m(now_s), target_enu_m, speed_m_s, now_s)
+        _check_speed(speed_m_s)
+        self._start_enu_m, self._leaves_s = self.position_enu_m(now_s), now_s
+        self.target_enu_m = target_enu_m
+        self.arrives_s = now_s + math.dist(self._start_enu_m, target_enu_m) / speed_m_s
 
     def stop(self, now_s: float) -> None:
         """Stay where the vehicle is."""
-        self._rest_enu_m = self.position_enu_m(now_s)
-        self._leg = None
+        self.target_enu_m = self.position_enu_m(now_s)
+        self.arrives_s = None
 
-
-_AT_REST: Point = (0.0, 0.0, 0.0)
 
 _SAME_WAY = 1e-6
 """How exactly, as a share, a vehicle must move towards its target and have room to brake
@@ -262,7 +234,7 @@ class _Path:
         at_s = max(0.0, now_s - self.leaves_s)
         place = self.start_enu_m
         for part in self.parts:
-            place = _sum(place, part.displacement_m(at_s))
+            place = plus(place, part.displacement_m(at_s))
         return place
 
     def velocity_enu_m_s(self, now_s: float) -> Point:
@@ -271,7 +243,7 @@ class _Path:
         at_s = max(0.0, now_s - self.leaves_s)
         velocity = _AT_REST
         for part in self.parts:
-            velocity = _sum(velocity, part.velocity_m_s(at_s))
+            velocity = plus(velocity, part.velocity_m_s(at_s))
         return velocity
 
 
@@ -319,8 +291,7 @@ class SmoothMotion:
         Raises:
             ValueError: the speed is not positive and finite.
         """
-        if not 0.0 < speed_m_s < math.inf:
-            raise ValueError(f"speed must be positive and finite, not {speed_m_s} m/s")
+        _check_speed(speed_m_s)
         here, velocity = self.position_enu_m(now_s), self.velocity_enu_m_s(now_s)
         parts = self._straight_on(here, velocity, target_enu_m, speed_m_s)
         if parts is None:
@@ -332,7 +303,7 @@ class SmoothMotion:
         """Brake, and stay where that ends."""
         here, velocity = self.position_enu_m(now_s), self.velocity_enu_m_s(now_s)
         brake = _brake(velocity, self._acceleration_m_s2)
-        target_enu_m = here if brake is None else _sum(here, brake.end_m)
+        target_enu_m = here if brake is None else plus(here, brake.end_m)
         self._path = _Path(here, target_enu_m, now_s, () if brake is None else (brake,))
         self._ordered = False
 
@@ -347,7 +318,7 @@ class SmoothMotion:
             braking_m = 0.5 * first_m_s**2 / limit_m_s2
             if length_m == 0.0 or length_m * (1.0 + _SAME_WAY) < braking_m:
                 return None
-            way = _scaled(_difference(target_enu_m, here), 1.0 / length_m)
+            way = _scaled(minus(target_enu_m, here), 1.0 / length_m)
             if math.dist(velocity, _scaled(way, first_m_s)) > _SAME_WAY * first_m_s:
                 return None
         return _part(here, target_enu_m, first_m_s, speed_m_s, limit_m_s2, limit_m_s2)
@@ -360,7 +331,7 @@ class SmoothMotion:
         brake = _brake(velocity, half_m_s2)
         if brake is None:
             raise ValueError("a vehicle at rest flies straight on")
-        bend = _sum(here, brake.end_m)
+        bend = plus(here, brake.end_m)
         way = _part(bend, target_enu_m, 0.0, speed_m_s, half_m_s2, limit_m_s2)
         if way and way[0].ramps.braking_s < brake.ramps.duration_s:
             way = _part(bend, target_enu_m, 0.0, speed_m_s, half_m_s2, half_m_s2)
@@ -376,7 +347,7 @@ def _part(
     brake_m_s2: float,
 ) -> tuple[_Part, ...]:
     """A way between two places; none when they are the same."""
-    whole = _difference(end, start)
+    whole = minus(end, start)
     length_m = math.hypot(*whole)
     if length_m == 0.0:
         return ()
@@ -392,15 +363,3 @@ def _brake(velocity: Point, brake_m_s2: float) -> _Part | None:
     way = _scaled(velocity, 1.0 / speed_m_s)
     ramps = _Ramps(speed_m_s, speed_m_s, 0.0, brake_m_s2, 0.0, 0.0)
     return _Part(way, ramps, _scaled(way, 0.5 * speed_m_s**2 / brake_m_s2))
-
-
-def _sum(a: Point, b: Point) -> Point:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def _difference(a: Point, b: Point) -> Point:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _scaled(a: Point, by: float) -> Point:
-    return a[0] * by, a[1] * by, a[2] * by

@@ -28,7 +28,7 @@ from agent.core.interface import (
     VehicleReport,
 )
 from sim.world.engine import EventQueue
-from sim.world.motion import IdealMotion, Point
+from sim.world.motion import IdealMotion, Point, between, minus, plus
 from sim.world.uncertainty import Realization
 from swarm.model import UavId
 
@@ -178,9 +178,9 @@ class StochasticVehicle(IdealVehicle):
         believed = motion.position_enu_m(now_s)
         if task is not None:
             stop = self._fate.stop_enu_m(self._uav.id, task)
-            self._becomes_m = _from_to(task.position_enu_m, stop)
-        here = _moved(believed, self._astray_m)
-        there = _moved(order.position_enu_m, self._becomes_m)
+            self._becomes_m = minus(stop, task.position_enu_m)
+        here = plus(believed, self._astray_m)
+        there = plus(order.position_enu_m, self._becomes_m)
         name = None if task is None else task.id
         true_m_s = self.speed_frac * self._fate.speed_m_s(self._uav, name, here, there)
         length_m, believed_m = math.dist(here, there), math.dist(believed, order.position_enu_m)
@@ -199,15 +199,4 @@ class StochasticVehicle(IdealVehicle):
         if now_s >= arrives_s:
             return self._becomes_m
         share = (now_s - leaves_s) / (arrives_s - leaves_s)
-        east_m, north_m, up_m = (
-            a + share * (b - a) for a, b in zip(self._astray_m, self._becomes_m, strict=True)
-        )
-        return east_m, north_m, up_m
-
-
-def _from_to(one: Point, other: Point) -> Point:
-    return other[0] - one[0], other[1] - one[1], other[2] - one[2]
-
-
-def _moved(place: Point, by: Point) -> Point:
-    return place[0] + by[0], place[1] + by[1], place[2] + by[2]
+        return between(self._astray_m, self._becomes_m, share)

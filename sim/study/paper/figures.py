@@ -17,6 +17,7 @@ from coordinator.plot import plan_figure
 from sim.study.paper.random_problems import STUDIED, RandomResults
 from sim.study.paper.reproduction import Reproduction
 from sim.study.paper.tables import RULES, PaperFigures, TableResults
+from sim.study.style import add_title, plain_axes, save_figures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["draw_figures", "hierarchical_figure", "optimal_figure", "random_figure"]
 
 
-_KINDS = (".png", ".svg")
 _FEW_PROBLEMS = 100
 
 
@@ -48,23 +48,12 @@ def draw_figures(found: Reproduction, folder: Path) -> list[Path]:
     Raises:
         OSError: a file cannot be written.
     """
-    import matplotlib as mpl
-
     figures = {
         "figure-2-hierarchical-plan": hierarchical_figure(found.table),
         "figure-3-optimal-plan": optimal_figure(found.table),
         "figure-4-random-problems": random_figure(found.random, found.expected.paper),
     }
-    drawn = []
-    # without date and with fixed ids the same results give the same files
-    with mpl.rc_context({"svg.hashsalt": "peckorder"}):
-        for name, figure in figures.items():
-            for kind in _KINDS:
-                path = folder / f"{name}{kind}"
-                metadata = {"Date": None} if kind == ".svg" else {}
-                figure.savefig(path, dpi=160, metadata=metadata)
-                drawn.append(path)
-    return drawn
+    return save_figures(figures, folder)
 
 
 def hierarchical_figure(table: TableResults) -> Figure:
@@ -93,16 +82,8 @@ def random_figure(random: RandomResults, paper: PaperFigures) -> Figure:
     left.set_ylim(lowest - 0.02, 1.01)
     for axes in (left, right):
         axes.axhline(1.0, color="#555555", linewidth=0.8, zorder=1)
-        axes.grid(visible=True, axis="y", color="#e4e4e4", linewidth=0.6)
-        axes.set_axisbelow(True)
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
-    figure.suptitle(
-        "Fig. 4: how close the methods come to the optimum on random problems",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
+        plain_axes(axes, "y")
+    add_title(figure, "Fig. 4: how close the methods come to the optimum on random problems", "")
     return figure
 
 

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import permutations
-from pathlib import Path
 from statistics import median
 
 import numpy as np
 
+from sim.bench.machine import processor_name
 from sim.study.generator import random_table_problem
 from sim.study.paper.random_problems import RandomResults, reproduce_random
 from sim.study.paper.tables import RULES, Check, Expectations, TableResults, reproduce_tables
@@ -54,15 +54,6 @@ class ProcessorInfo:
         noun = "processor" if self.processors == 1 else "processors"
         return f"{self.processors} {noun} {self.processor}, {self.system}, Python {self.python}"
 
-    def as_json(self) -> dict[str, str | int]:
-        """Ready for `json.dumps`."""
-        return {
-            "processor": self.processor,
-            "processors": self.processors,
-            "system": self.system,
-            "python": self.python,
-        }
-
 
 @dataclass(frozen=True, slots=True)
 class MethodTimes:
@@ -79,12 +70,7 @@ class MethodTimes:
 
     def as_json(self) -> dict[str, object]:
         """Ready for `json.dumps`."""
-        return {
-            "problems": self.problems,
-            "repeats": self.repeats,
-            "median_s": dict(self.median_s),
-            "of_greedy": {method: self.ratio(method) for method in self.median_s},
-        }
+        return {**asdict(self), "of_greedy": {name: self.ratio(name) for name in self.median_s}}
 
 
 def measure_times(
@@ -113,7 +99,7 @@ def measure_times(
 def this_processor() -> ProcessorInfo:
     """The one this runs on."""
     return ProcessorInfo(
-        processor=_processor(),
+        processor=processor_name(),
         processors=default_threads(),
         system=f"{platform.system()} {platform.machine()}",
         python=platform.python_version(),
@@ -126,18 +112,6 @@ def _work(problem: Problem, method: str) -> Callable[[], object]:
     ranks = np.array([rank_of(order) for order in permutations(range(problem.n_uav))])
     team, code = TeamState.at_start(problem), kernel_rule(method).code
     return lambda: evaluate_sequences(problem.kernel, team, ranks, code, threads=1)
-
-
-def _processor() -> str:
-    try:
-        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-    except OSError:  # no Linux
-        text = ""
-    for line in text.splitlines():
-        key, _, name = line.partition(":")
-        if key.strip() == "model name":
-            return " ".join(name.split())
-    return platform.processor() or "of unknown make"
 
 
 _TIMED_PROBLEMS = 20
@@ -176,15 +150,7 @@ class Reproduction:
         paper = self.expected.paper
         return {
             "ok": self.ok,
-            "checks": [
-                {
-                    "name": check.name,
-                    "ours": check.ours,
-                    "expected": check.expected,
-                    "ok": check.ok,
-                }
-                for check in self.checks
-            ],
+            "checks": [asdict(check) for check in self.checks],
             "paper": {
                 "optimum": paper.optimum.value,
                 "hierarchical": paper.hierarchical.value,
@@ -193,8 +159,8 @@ class Reproduction:
             "table": self.table.as_json(),
             "random": self.random.as_json(),
             "times": self.times.as_json(),
-            "theorems": [theorem.as_json() for theorem in self.theorems],
-            "machine": self.machine.as_json(),
+            "theorems": [asdict(theorem) for theorem in self.theorems],
+            "machine": asdict(self.machine),
             "elapsed_s": self.elapsed_s,
         }
 

@@ -6,7 +6,7 @@ Also what the paper prints, what has been checked before, and how a figure is he
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import permutations
 
 from coordinator.planner.exact import optimum, worst_value
@@ -193,20 +193,12 @@ class TableResults:
             "plans": {
                 method: {
                     "objective": plan.objective,
-                    "sequence": None if plan.sequence is None else list(plan.sequence),
-                    "routes": {uav: list(route) for uav, route in plan.routes.items()},
+                    "sequence": plan.sequence,
+                    "routes": dict(plan.routes),
                 }
                 for method, plan in self.plans.items()
             },
-            "sequences": [
-                {
-                    "rule": each.rule,
-                    "sequence": list(each.sequence),
-                    "objective": each.objective,
-                    "lists": [list(tasks) for tasks in each.lists],
-                }
-                for each in self.sequences
-            ],
+            "sequences": [asdict(each) for each in self.sequences],
             "optimum_at_horizon": [
                 {"horizon_s": horizon_s, "optimum": value}
                 for horizon_s, value in self.optimum_at_horizon.items()

@@ -46,16 +46,6 @@ class TheoremResult:
         ok = self.violations == 0 and self.cases > 0
         return Check(self.name, f"{self.violations} of {self.cases}", "0", ok)
 
-    def as_json(self) -> dict[str, object]:
-        """Ready for `json.dumps`."""
-        return {
-            "name": self.name,
-            "claim": self.claim,
-            "cases": self.cases,
-            "violations": self.violations,
-            "remark": self.remark,
-        }
-
 
 def allocations(n_uav: int, n_task: int) -> int:
     """Theorem 1: ordered disjoint lists of all tasks, M! · C(M + N − 1, N − 1)."""

@@ -14,12 +14,12 @@ from typing import Protocol
 
 import numpy as np
 
-from sim.world.motion import Point
+from sim.world.motion import Point, between
 from swarm.allocation import Problem, TeamState
 from swarm.allocation.problem import FloatArray, IntArray
 from swarm.runtime.clock import Clock
 
-__all__ = ["Account", "Dispatcher", "TeamLeg", "TeamNews", "TeamSituation", "as_point", "between"]
+__all__ = ["Account", "Dispatcher", "TeamLeg", "TeamNews", "TeamSituation", "as_point"]
 
 
 class TeamNews(Enum):
@@ -151,12 +151,4 @@ class Dispatcher(Protocol):
 def as_point(place_enu_m: FloatArray) -> Point:
     """The same place [m]."""
     east_m, north_m, up_m = place_enu_m.tolist()
-    return east_m, north_m, up_m
-
-
-def between(start: Point, stop: Point, frac: float) -> Point:
-    """The place that share of the way from start to stop; exactly the stop at 1."""
-    if frac >= 1.0:
-        return stop
-    east_m, north_m, up_m = (a + (b - a) * frac for a, b in zip(start, stop, strict=True))
     return east_m, north_m, up_m

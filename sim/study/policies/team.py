@@ -19,14 +19,8 @@ from functools import partial
 
 import numpy as np
 
-from sim.study.policies.situation import (
-    Dispatcher,
-    TeamLeg,
-    TeamNews,
-    TeamSituation,
-    as_point,
-    between,
-)
+from sim.study.policies.situation import Dispatcher, TeamLeg, TeamNews, TeamSituation, as_point
+from sim.world.motion import between
 from sim.world.outcome import FlightOutcome, TaskVisit
 from sim.world.uncertainty import Realization
 from swarm.allocation import Problem, TeamState, rank_of

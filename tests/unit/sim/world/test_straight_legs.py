@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.world.motion import IdealMotion, Point, StraightLeg
+from sim.world.motion import IdealMotion, Point
 
 coordinates = st.floats(-1e4, 1e4)
 points = st.tuples(coordinates, coordinates, coordinates)
@@ -61,7 +61,8 @@ def test_stop_keeps_the_place() -> None:
 
 
 def test_leg_to_the_same_place_takes_no_time() -> None:
-    leg = StraightLeg((1.0, 1.0, 1.0), (1.0, 1.0, 1.0), 5.0, leaves_s=2.0)
+    leg = IdealMotion((1.0, 1.0, 1.0))
+    leg.fly_to((1.0, 1.0, 1.0), 5.0, now_s=2.0)
 
     assert leg.arrives_s == 2.0
     assert leg.position_enu_m(2.0) == (1.0, 1.0, 1.0)
@@ -77,7 +78,8 @@ def test_speed_must_be_positive_and_finite(speed_m_s: float) -> None:
 def test_position_lies_on_the_line_as_far_as_was_flown(
     start: Point, target: Point, speed_m_s: float, now_s: float
 ) -> None:
-    leg = StraightLeg(start, target, speed_m_s, leaves_s=5.0)
+    leg = IdealMotion(start)
+    leg.fly_to(target, speed_m_s, now_s=5.0)
     position = leg.position_enu_m(now_s)
     length_m = math.dist(start, target)
 

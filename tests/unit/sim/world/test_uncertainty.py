@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -124,9 +125,9 @@ def small(valley: Mission, n_uav: int = 4, n_task: int = 6) -> Mission:
 @pytest.mark.parametrize("off", OFF)
 def test_asking_for_one_kind_less_leaves_all_others_as_they_were(valley: Mission, off: str) -> None:
     every = drawn(EVERYTHING.draw(small(valley), 300.0, 5))
-    without = drawn(
-        ChanceOptions(**{off: OFF[off]}).changed(EVERYTHING).draw(small(valley), 300.0, 5)
-    )
+    asked: dict[str, Any] = {off: OFF[off]}
+    changed = ChanceOptions(**asked).changed(EVERYTHING)
+    without = drawn(changed.draw(small(valley), 300.0, 5))
 
     assert every.pop(off) != without.pop(off)
     assert every == without
