@@ -1,7 +1,6 @@
 """What ``import swarm`` offers of this package: flying a mission in virtual time.
 
-Found by an entry point (swarm.interface, which documents it). Leaves out: planning and recordings
-(coordinator.interface).
+Found by an entry point (swarm.interface, which documents it).
 """
 
 from __future__ import annotations

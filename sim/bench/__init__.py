@@ -1,4 +1,1 @@
-"""Benchmarks: methods side by side in one run, with the machine and the seeds they ran with.
-
-Leaves out: the methods (`coordinator.planner`, `sim.study.baselines`).
-"""
+"""Benchmarks: methods side by side in one run, with the machine and the seeds they ran with."""

@@ -1,7 +1,6 @@
 """What a dashboard costs: a large mission acted out on a real bus, and pages that follow it.
 
-This process acts the mission and reads the feed; router and dashboard are processes of their
-own. Leaves out: what browsers need to draw it.
+This process acts the mission and reads the feed; router and dashboard are processes of their own.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""`swarm bench failover`: everything measured about fleets in trouble, and its tables.
-
-Leaves out: how each is measured (sim.bench.takeover, sim.bench.links, sim.bench.latency).
-"""
+"""`swarm bench failover`: everything measured about fleets in trouble, and its tables."""
 
 from __future__ import annotations
 

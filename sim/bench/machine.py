@@ -1,7 +1,4 @@
-"""What the figures were measured on.
-
-Leaves out: anything that needs more rights than reading /proc.
-"""
+"""What the figures were measured on."""
 
 from __future__ import annotations
 

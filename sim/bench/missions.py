@@ -1,9 +1,8 @@
 """How long whole missions take in virtual time, flown by the agents' real cores.
 
-Every mission is another random one, planned anew with modest effort and flown by the greedy rule
-on an ideal bus with its coordinator dead, as the policy `greedy` of studies. What happens by
-chance spreads over the mission's horizon. Leaves out: what missions are worth (`swarm study`) and
-real time.
+Every mission is another random one, planned anew with modest effort and flown by the greedy rule on
+an ideal bus with its coordinator dead, as the policy `greedy` of studies. What happens by chance
+spreads over the mission's horizon.
 """
 
 from __future__ import annotations

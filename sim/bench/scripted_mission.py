@@ -1,7 +1,4 @@
-"""A mission that one process acts out on the bus: everything a fleet would say, and nobody flies.
-
-Leaves out: what is measured with it (sim.bench.dashboard_load).
-"""
+"""A mission that one process acts out on the bus: all that a fleet would say, and nobody flies."""
 
 from __future__ import annotations
 

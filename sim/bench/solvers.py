@@ -1,8 +1,8 @@
 """The planning methods that are compared, each behind one face and in a process of its own.
 
 ``python -m sim.bench.solvers`` reads one job as JSON from standard input and writes one result to
-standard output, so that time and memory are the method's own. A method is loaded (its imports
-done) before its time begins. Leaves out: which jobs there are and judging (`sim.bench.plans`).
+standard output, so that time and memory are the method's own. A method is loaded (its imports done)
+before its time begins.
 """
 
 from __future__ import annotations

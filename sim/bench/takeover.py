@@ -1,9 +1,8 @@
 """How long until another UAV holds the task of one that was killed, hangs or is cut off.
 
-Three UAVs, two tasks so far away that none is ever reached: two fly, one is idle. Whoever
-flies is struck; the idle one takes over, the struck one comes back, and one of them is
-idle again. Times are taken by a recorder that hears the bus directly. Leaves out: other
-measurements of a fleet in trouble (sim.bench.links).
+Three UAVs, two tasks so far away that none is ever reached: two fly, one is idle. Whoever flies is
+struck; the idle one takes over, the struck one comes back, and one of them is idle again. Times are
+taken by a recorder that hears the bus directly.
 """
 
 from __future__ import annotations

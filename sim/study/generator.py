@@ -1,7 +1,7 @@
 """Random missions for benchmarks and studies: of any size, and those the paper draws.
 
 Of any size: UAVs and tasks uniform over a square whose side grows with the root of the number of
-tasks, so that tasks stand equally dense at every size. Leaves out: faults and pop-ups.
+tasks, so that tasks stand equally dense at every size.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 think.
 
 Colours are Okabe and Ito's, and marks differ in shape or filling too. The same rows give the same
-files. Leaves out: working anything out (sim.study.summary).
+files.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""How far a study is, on standard error: a bar on a terminal, else a line now and then.
-
-Leaves out: results.
-"""
+"""How far a study is, on standard error: a bar on a terminal, else a line now and then."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Study files: TOML in, a study out, every fault at once; and the way back.
-
-Leaves out: what a study means (sim.study.design), and comments.
-"""
+"""Study files: TOML in, a study out, every fault at once; and the way back."""
 
 from __future__ import annotations
 

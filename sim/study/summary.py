@@ -1,9 +1,7 @@
 """From the rows of a study to what they say together, per setting and policy.
 
-Every figure stands on whole trials, which are independent of each other. Comparisons use the
-trials that both sides have flown, pair by pair, since these met the same realization. Leaves out:
-the statistics themselves (sim.study.statistics), tables (sim.study.tables) and plots
-(sim.study.plots).
+Every figure stands on whole trials, which are independent of each other. Comparisons use the trials
+that both sides have flown, pair by pair, since these met the same realization.
 """
 
 from __future__ import annotations

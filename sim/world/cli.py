@@ -1,8 +1,4 @@
-"""The command `swarm simulate`.
-
-Leaves out: what it does (sim.world.simulation, sim.faults, sim.world.redecision) and how missions
-are shown (coordinator.terminal).
-"""
+"""The command `swarm simulate`."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
 """The engine of virtual time: event queue, clocks, random streams, and the life of a process.
 
 A stream depends on one seed and on what it is for, and on nothing else: one purpose drawing more
-numbers leaves every other as it was, so that worlds which differ in one respect can be compared.
-A process hands what its core wants to the world. It may be held, as by SIGSTOP or a deadlock: then
-what arrives waits. Leaves out: what the actions do (sim.world.virtual_world) and how anything
-arrives (sim.world.network).
+numbers leaves every other as it was, so that worlds which differ in one respect can be compared. A
+process hands what its core wants to the world. It may be held, as by SIGSTOP or a deadlock: then
+what arrives waits.
 """
 
 from __future__ import annotations

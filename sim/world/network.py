@@ -1,8 +1,6 @@
 """What joins the processes of a virtual world: messages, tokens and questions.
 
-`IdealNetwork` brings everything to everyone after one constant time. Leaves out: a network on which
-anything goes wrong (sim.world.rough_network; here is only what it is like at its best), and what
-the processes make of what they hear.
+`IdealNetwork` brings everything to everyone after one constant time.
 """
 
 from __future__ import annotations

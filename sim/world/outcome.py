@@ -1,7 +1,6 @@
 """What a fleet made of a mission: the visits it flew, and what they are worth.
 
 Visits come from a policy, or are counted from what the processes of a virtual world say.
-Leaves out: who decides, and statistics over many missions (sim.study).
 """
 
 from __future__ import annotations

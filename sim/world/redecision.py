@@ -3,7 +3,7 @@
 A `Choice` names the newest statement of each writer that its UAV knew. Of what is recorded up to
 there the UAV's registers are built again; where their digest is that of the choice they are the
 ones it decided from, and deciding again must give the same task, completion and score to the last
-bit. Leaves out: reading recordings (coordinator.recording).
+bit.
 """
 
 from __future__ import annotations

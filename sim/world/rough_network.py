@@ -1,11 +1,11 @@
 """A network on which messages are late, lost, doubled and out of order, and links break.
 
-It shows what Zenoh shows (ZENOH.md): each process sees the tokens of those it has a transport
-to. A cut or a stopped process takes transports away about one lease later, a death at once; a
-transport that is back shows its tokens again. A message is lost when either end has no
-transport to the other, and also, unlike there, when the way is cut while the transport stands.
-Where there are routers, the own link is the transport to one's router; in a mesh, any
-transport. Losing it takes all tokens away. Leaves out: when any of it happens (sim.faults).
+It shows what Zenoh shows (ZENOH.md): each process sees the tokens of those it has a transport to. A
+cut or a stopped process takes transports away about one lease later, a death at once; a transport
+that is back shows its tokens again. A message is lost when either end has no transport to the
+other, and also, unlike there, when the way is cut while the transport stands. Where there are
+routers, the own link is the transport to one's router; in a mesh, any transport. Losing it takes
+all tokens away.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""What makes a virtual world less than ideal, and who is told what happens in it.
-
-Leaves out: the world itself (sim.world.virtual_world).
-"""
+"""What makes a virtual world less than ideal, and who is told what happens in it."""
 
 from __future__ import annotations
 

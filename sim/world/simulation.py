@@ -1,7 +1,4 @@
-"""One mission in virtual time, from a scenario and one seed, and its recording.
-
-Leaves out: the world itself (sim.world.stochastic_world) and studies of many missions.
-"""
+"""One mission in virtual time, from a scenario and one seed, and its recording."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
 The agents and the coordinator are the real ones and know nothing of the realization; they meet it
 when it happens. When the coordinator is lost, an operator keeps the task board from then on, so
 tasks still appear and are withdrawn in time; the fleet stays out for as long as tasks may yet
-appear. A task that is withdrawn before it appears never does. Leaves out: drawing realizations
-(sim.world.uncertainty) and counting what came of them (sim.world.outcome).
+appear. A task that is withdrawn before it appears never does.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """What is uncertain about a mission, and one drawn future of it, its realization.
 
-Everything follows from one seed by streams of their own, each named after what it decides and
-for whom. So asking for losses does not change which tasks pop up, and another UAV changes nobody's
+Everything follows from one seed by streams of their own, each named after what it decides and for
+whom. So asking for losses does not change which tasks pop up, and another UAV changes nobody's
 speed. A realization answers by UAV, task and attempt, never by the order of the questions, so that
-policies that decide differently meet the same future (common random numbers). Leaves out: what it
-does to a fleet (sim.world.stochastic_world).
+policies that decide differently meet the same future (common random numbers).
 """
 
 from __future__ import annotations

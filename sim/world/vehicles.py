@@ -1,11 +1,10 @@
 """Vehicles in virtual time: one that flies ideally, and one that flies as a realization says.
 
-Both speak agent.core.interface, so that an agent's core cannot tell them from a MAVLink
-autopilot, and both outlive their agent: resumed by the next, they fly on to where they were sent.
-They are airborne at their start at once or after a given time, as take-off is no part of mission
-time. The second flies at its own speed, in wind, and not quite where it thinks; its telemetry tells
-where it believes to be, so its agent notices lateness and failures only. Leaves out: the
-autopilot's protocol (sim.autopilot), and losses (sim.world.stochastic_world).
+Both speak agent.core.interface, so that an agent's core cannot tell them from a MAVLink autopilot,
+and both outlive their agent: resumed by the next, they fly on to where they were sent. They are
+airborne at their start at once or after a given time, as take-off is no part of mission time. The
+second flies at its own speed, in wind, and not quite where it thinks; its telemetry tells where it
+believes to be, so its agent notices lateness and failures only.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """A whole fleet in virtual time: the real cores, their vehicles, and what joins them.
 
-Everything follows from the mission and one seed. By itself the world is ideal: messages
-arrive after a constant delay, in order, and UAVs may be lost at given times. `WorldSettings` give
-it a network on which more goes wrong, and clocks that disagree. Leaves out: sockets,
-processes and autopilots (sim.fleet), how plans are made (passed in), and schedules of
-faults (sim.faults).
+Everything follows from the mission and one seed. By itself the world is ideal: messages arrive
+after a constant delay, in order, and UAVs may be lost at given times. `WorldSettings` give it a
+network on which more goes wrong, and clocks that disagree.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Whole lists by the rules that take the open task with the largest index.
-
-Leaves out: the rules themselves (swarm.allocation.index_rules).
-"""
+"""Whole lists by the rules that take the open task with the largest index."""
 
 from __future__ import annotations
 

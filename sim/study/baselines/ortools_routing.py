@@ -1,8 +1,7 @@
 """Routing with OR-Tools, made to come as near to eq. 1 as its model allows.
 
-It is an optional extra (``peckorder[bench]``), imported when used. How its model falls short of
-the objective is said by `SHORTFALL`. Leaves out: judging the lists, which is eq. 1's business
-(`swarm.allocation.evaluate`).
+It is an optional extra (``peckorder[bench]``), imported when used. How its model falls short of the
+objective is said by `SHORTFALL`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 2 and 3 are maps of Table I: the lists of the hierarchy, and the optimal ones. 4 shows for every
 random problem how close each method comes to the optimum, and the averages beside the paper's.
-Colours are Okabe and Ito's, and marks differ in shape too. Leaves out: computing anything.
+Colours are Okabe and Ito's, and marks differ in shape too.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The random problems: how close the rules come to the optimum on average.
 
-J is normalised as the paper does, worst plan 0 and optimum 1, and in other readings of what it
-may have averaged. Leaves out: drawing the problems (sim.study.generator).
+J is normalised as the paper does, worst plan 0 and optimum 1, and in other readings of what it may
+have averaged.
 """
 
 from __future__ import annotations

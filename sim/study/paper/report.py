@@ -1,7 +1,4 @@
-"""A reproduction for people: tables of 80 columns, ours beside the paper's, and why they differ.
-
-Leaves out: computing it (sim.study.paper.reproduction).
-"""
+"""A reproduction for people: tables of 80 columns, ours beside the paper's, and why they differ."""
 
 from __future__ import annotations
 

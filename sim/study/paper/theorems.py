@@ -1,6 +1,6 @@
 """The paper's theorems held against brute force on small cases.
 
-Brute force here is plain enumeration that shares no code with what it checks. Leaves out: proofs.
+Brute force here is plain enumeration that shares no code with what it checks.
 """
 
 from __future__ import annotations

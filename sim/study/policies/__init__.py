@@ -1,4 +1,4 @@
 """The policies that studies compare, found by name.
 
-Each is imported when a study asks for it, and not before. Leaves out: what they do.
+Each is imported when a study asks for it, and not before.
 """

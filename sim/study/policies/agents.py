@@ -1,10 +1,9 @@
 """Policies in which the real agents decide for themselves, each by its rule, in virtual time.
 
-The coordinator plans once, before the mission; under `guided` it lives on and plans anew, under
-the others it dies as the mission begins, and tasks that appear or are withdrawn come from an
-operator's seat. A UAV that has set out for a task is diverted by nobody's plan. Decisions are
-timed as whole steps of an agent in which it decided. Leaves out: the world they fly in
-(sim.world.stochastic_world) and policies that know of everything at once (other modules here).
+The coordinator plans once, before the mission; under `guided` it lives on and plans anew, under the
+others it dies as the mission begins, and tasks that appear or are withdrawn come from an operator's
+seat. A UAV that has set out for a task is diverted by nobody's plan. Decisions are timed as whole
+steps of an agent in which it decided.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""What one who decides for a whole team is told, and what it answers.
-
-Leaves out: what happens (`sim.study.policies.team`) and how is decided (the other modules of this
-package).
-"""
+"""What one who decides for a whole team is told, and what it answers."""
 
 from __future__ import annotations
 

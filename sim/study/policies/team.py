@@ -5,8 +5,7 @@ time, the outcome of every attempt, how fast a leg is really flown and where it 
 decides knows nominal speeds, the tasks that have appeared, and where UAVs believe to be; without
 uncertainty times are those of `swarm.allocation.evaluate`, float for float. UAVs decide when they
 are free, those free at the same moment in the order of their ranks; idle ones are asked again
-whenever anything has happened. Leaves out: how is decided (the other modules of this package), and
-agents, messages and vehicles (sim.world.virtual_world).
+whenever anything has happened.
 """
 
 from __future__ import annotations
