@@ -181,21 +181,18 @@ class CbbaResult:
     routes: Routes
     """Disjoint lists of task indices per UAV."""
     rounds: int
-    """Rounds of consensus; in each, every UAV sends one message to each neighbour."""
+    """Rounds of consensus; in each, every UAV sends one message to each other one."""
     converged: bool
     """All agree and nobody wants to change; otherwise it was stopped, and its conflicts were
     settled for the best bid."""
     completed: int
-    """Tasks that nobody had won, because of the capacity or the stop, and that were handed out
-    afterwards by value per time."""
+    """Tasks that nobody had won because of the stop, handed out afterwards by value per time."""
 
 
 def cbba(
     problem: Problem,
     *,
     state: TeamState | None = None,
-    capacity: int | None = None,
-    neighbours: BoolArray | None = None,
     should_stop: ShouldStop = never,
 ) -> CbbaResult:
     """Run the auction; the same problem gives the same lists.
@@ -204,23 +201,14 @@ def cbba(
         problem: the mission.
         state: where the team stands: open tasks are auctioned among active UAVs; at its start when
             None.
-        capacity: most tasks in a bundle (L_t); >= 1. None means no limit: bundles are bounded at
-            first, to save work, and the bound is raised for as long as it holds anyone back.
-        neighbours: (n_uav, n_uav) symmetric, connecting all active UAVs: who hears whom;
-            everybody when None.
         should_stop: given the rounds so far, whether to stop.
-
-    Raises:
-        ValueError: capacity or neighbours are not as they must be.
     """
-    if capacity is not None and capacity < 1:
-        raise ValueError(f"capacity must be >= 1, not {capacity}")
     state = TeamState.at_start(problem) if state is None else state
-    auction = _Auction(problem, state, _network(state.active, neighbours))
-    n_open, n_active = int(state.open.sum()), int(state.active.sum())
-    bound = capacity or 2 * -(-n_open // max(1, n_active)) + 2
+    auction = _Auction(problem, state)
+    # Bundles are bounded at first, to save work, for as long as that holds nobody back.
+    bound = 2 * -(-int(state.open.sum()) // max(1, int(state.active.sum()))) + 2
     converged = auction.settle(bound, should_stop)
-    while capacity is None and converged and auction.holds_back(bound):
+    while converged and auction.holds_back(bound):
         bound *= 2
         converged = auction.settle(bound, should_stop)
     routes, completed = _complete(problem, state, auction.paths_won())
@@ -230,7 +218,7 @@ def cbba(
 class _Auction:
     """Beliefs, bundles and paths of all UAVs."""
 
-    def __init__(self, problem: Problem, state: TeamState, neighbours: BoolArray) -> None:
+    def __init__(self, problem: Problem, state: TeamState) -> None:
         self.rounds = 0
         self._problem = problem
         self._eligible: BoolArray = problem.capable & state.open & state.active[:, None]
@@ -238,17 +226,12 @@ class _Auction:
         self._beliefs = Beliefs.blank(problem.n_uav, problem.n_task)
         self._bundles: Routes = [[] for _ in range(problem.n_uav)]
         self._paths: Routes = [[] for _ in range(problem.n_uav)]
-        self._receivers: list[IntArray] = [np.flatnonzero(row) for row in neighbours]
-        n_active = int(state.active.sum())
-        complete = int(neighbours.sum()) == n_active * (n_active - 1)
-        # elsewhere news travel one neighbour a round
-        self._quiet_rounds = 1 if complete else n_active
+        self._active: list[int] = np.flatnonzero(state.active).tolist()
 
     def settle(self, capacity: int, should_stop: ShouldStop) -> bool:
         """Alternate the phases until nothing changes; whether it came to that."""
         stirred = set(range(self._problem.n_uav))
-        quiet = 0
-        while quiet < self._quiet_rounds:
+        while stirred:
             if should_stop(self.rounds):
                 return False
             for uav in sorted(stirred):
@@ -261,7 +244,6 @@ class _Auction:
             stirred = {int(uav) for uav in np.flatnonzero(changed)}
             for uav in stirred:
                 self._release(uav)
-            quiet = 0 if stirred else quiet + 1
         return True
 
     def holds_back(self, capacity: int) -> bool:
@@ -307,9 +289,10 @@ class _Auction:
         return True
 
     def _agree(self, said: Beliefs) -> None:
-        """Phase 2: everybody hears all neighbours, in the order of their indices."""
+        """Phase 2: everybody hears all others, in the order of their indices."""
         self.rounds += 1
-        for sender, receivers in enumerate(self._receivers):
+        for sender in self._active:
+            receivers = np.array([uav for uav in self._active if uav != sender], dtype=np.int64)
             if len(receivers):
                 update_beliefs(self._beliefs, said, sender, receivers, self.rounds)
 
@@ -323,24 +306,6 @@ class _Auction:
                 winner[task], self._beliefs.bid[uav, task] = NOBODY, NO_BID
         del bundle[kept:]
         self._paths[uav] = [task for task in self._paths[uav] if task not in dropped]
-
-
-def _network(active: BoolArray, neighbours: BoolArray | None) -> BoolArray:
-    n_uav = len(active)
-    network: BoolArray = ~np.eye(n_uav, dtype=np.bool_)
-    if neighbours is not None:
-        given = np.array(neighbours, dtype=np.bool_)
-        if given.shape != (n_uav, n_uav) or (given != given.T).any():
-            raise ValueError(f"neighbours must be symmetric, of shape {(n_uav, n_uav)}")
-        network &= given
-    network &= active & active[:, None]
-    reached = np.zeros(n_uav, dtype=np.bool_)
-    reached[np.flatnonzero(active)[:1]] = True
-    for _ in range(n_uav):
-        reached |= network[reached].any(axis=0)
-    if (reached != active).any():
-        raise ValueError("neighbours must connect all active UAVs")
-    return network
 
 
 def _complete(problem: Problem, state: TeamState, routes: Routes) -> tuple[Routes, int]:

@@ -107,21 +107,6 @@ def test_trivial_cases_are_solved_to_the_optimum(seed: int) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(seed=SEEDS)
-def test_a_sparse_network_agrees_too_if_later(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    problem = random_problem(rng, 5, 9)
-    line = np.zeros((5, 5), dtype=np.bool_)
-    for i in range(4):
-        line[i, i + 1] = line[i + 1, i] = True
-    sparse, full = cbba(problem, neighbours=line), cbba(problem)
-    assert sparse.converged
-    assert sparse.completed == 0
-    assert sorted(task for route in sparse.routes for task in route) == list(range(9))
-    assert sparse.rounds >= full.rounds
-
-
-@settings(max_examples=30, deadline=None)
-@given(seed=SEEDS)
 def test_what_is_open_is_auctioned_among_the_living_from_where_they_stand(seed: int) -> None:
     rng = np.random.default_rng(seed)
     problem = random_problem(rng, 4, 9, incapable_frac=0.2)
@@ -163,14 +148,6 @@ def test_nobody_alive_wins_nothing() -> None:
     assert cbba(problem, state=state).routes == [[], [], []]
 
 
-def test_capacity_bounds_bundles_and_the_rest_is_handed_out() -> None:
-    problem = table_1()
-    result = cbba(problem, capacity=1)
-    assert result.completed == 5
-    assert sorted(task for route in result.routes for task in route) == list(range(8))
-    assert cbba(problem, capacity=8).routes == cbba(problem).routes
-
-
 def test_capacity_grows_where_it_would_hold_a_uav_back() -> None:
     rng = np.random.default_rng(5)
     problem = at_one_place(rng, 3, 12)
@@ -179,7 +156,7 @@ def test_capacity_grows_where_it_would_hold_a_uav_back() -> None:
     lopsided = replace(problem, success=success)
     result = cbba(lopsided)
     assert max(map(len, result.routes)) > 2 * 4 + 2
-    assert result.routes == cbba(lopsided, capacity=12).routes
+    assert sorted(task for route in result.routes for task in route) == list(range(12))
 
 
 def test_stopped_auction_still_gives_disjoint_complete_lists() -> None:
@@ -189,13 +166,3 @@ def test_stopped_auction_still_gives_disjoint_complete_lists() -> None:
         assert not result.converged
         assert result.rounds == rounds
         assert sorted(task for route in result.routes for task in route) == list(range(20))
-
-
-def test_wrong_arguments_are_refused_by_name() -> None:
-    problem = table_1()
-    with pytest.raises(ValueError, match="capacity"):
-        cbba(problem, capacity=0)
-    with pytest.raises(ValueError, match="neighbours must be symmetric"):
-        cbba(problem, neighbours=np.triu(np.ones((3, 3), dtype=np.bool_)))
-    with pytest.raises(ValueError, match="neighbours must connect"):
-        cbba(problem, neighbours=np.zeros((3, 3), dtype=np.bool_))
