@@ -50,7 +50,6 @@ SETTLE_S = 2.0
 FAR_E7 = 5_000_000
 """So far away, in 1e-7 degrees, that no vehicle arrives."""
 HEIGHT_M = 10.0
-
 _MAGIC = 0xFD
 _OVERHEAD_BYTES = 12
 _SIGNATURE_BYTES = 13

@@ -35,7 +35,6 @@ __all__ = [
 
 LONGEST_S = 86_400.0
 """The longest time that an option takes."""
-
 T = TypeVar("T")
 Reader = Callable[[str, str], T]
 """The value that a word behind an option stands for; raises `InputError` where it is none."""

@@ -37,10 +37,8 @@ __all__ = ["SPEAKER", "DecisionLatencies", "MavlinkTap", "measure_hops", "measur
 
 REPORT_HZ = 10.0
 """Rate of position reports; 100 ms apart, ten times what a decision may take."""
-
 NOT_BY_ARRIVAL = 2
 """The way to its start and the first task follow from take-off and the mission's beginning."""
-
 LIMIT_S = 300.0
 
 
@@ -189,15 +187,11 @@ def _parser() -> mavlink.MAVLink:
 
 SPEAKER = "speaker"
 """Who says the claims; with keys they have to be those of a UAV of that name."""
-
 _HEARER = "hearer"
-
 _RATE_HZ = 20.0
 """Claims a second: in between, processors that have nothing else to do have gone to sleep."""
-
 _WARM = 20
 """Claims before those that are timed."""
-
 _LATE_S = 0.5
 """What has not come by then counts as lost."""
 

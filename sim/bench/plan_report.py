@@ -213,9 +213,7 @@ def _share(worth: float | None, last: float) -> float | None:
 
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#777777")
-
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-
 _STEP = 0.05
 """The axis of ratios begins at a multiple of this."""
 

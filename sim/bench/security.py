@@ -31,7 +31,6 @@ __all__ = ["FloodBench", "SecureBench", "SecureSettings", "in_turn", "measure_se
 
 FLOOD_MS = 100.0
 """What 99 of 100 turnarounds of the others shall not exceed while somebody floods."""
-
 _HOP_ROUNDS = 4
 """Routers each way over which claims are sent, in turn."""
 _UNDISTURBED = (SecurityMode.PLAIN, SecurityMode.SECURE)

@@ -105,7 +105,6 @@ def kind_of(arguments: tuple[str, ...]) -> str:
 
 HOSTILE = "hostile"
 """Its name among the UAVs of the keys; the mission has no such UAV."""
-
 _LIMIT_S = 86_400.0
 """A run gives up long before that."""
 

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ import numpy as np
 
 from sim.bench.machine import peak_memory_bytes
 from sim.study.baselines import ortools_routing
-from sim.study.baselines.index_rules import makespan_s, value_per_time
+from sim.study.baselines.index_rules import makespan_s, nearest_first, value_per_time
 from sim.study.generator import random_mission
 from swarm.allocation.problem import Problem
 from swarm.runtime.clock import Clock, SystemClock
@@ -49,11 +50,8 @@ TracePoint = tuple[float, float]
 
 
 _GIB = 2.0**30
-
 _MOST_MATRIX_GIB = 2.0
-
 _SUCCESS_IN_ARCS_TASKS = 300
-
 _SUCCESS_SHARE = 0.5
 
 
@@ -146,18 +144,6 @@ def _load_greedy() -> Solver:
     return solve
 
 
-def _load_nearest() -> Solver:
-    from sim.study.baselines.index_rules import nearest_first
-
-    return _at_once(nearest_first)
-
-
-def _load_value_per_time() -> Solver:
-    from sim.study.baselines.index_rules import value_per_time
-
-    return _at_once(value_per_time)
-
-
 def _load_cbba() -> Solver:
     from coordinator.planner.options import after_time
     from sim.study.baselines.cbba import cbba
@@ -173,31 +159,20 @@ def _load_cbba() -> Solver:
     return solve
 
 
-def _load_ortools() -> Solver:
+def _load_ortools(*, warm: bool) -> Solver:
     import_module("ortools.constraint_solver.pywrapcp")  # so that its time is not counted
 
     def solve(problem: Problem, limit_s: float, seed: int, clock: Clock) -> PlanningResult:
         del seed, clock
         # With more tasks it hardly gets beyond a first solution, which is worse with p in the arcs.
-        share = _SUCCESS_SHARE if problem.n_task <= _SUCCESS_IN_ARCS_TASKS else 0.0
-        routes = ortools_routing.ortools_routes(problem, limit_s, success_share=share)
-        return PlanningResult(routes, "each UAV's own p" if share else "average p only")
-
-    return solve
-
-
-def _load_ortools_warm() -> Solver:
-    import_module("ortools.constraint_solver.pywrapcp")  # so that its time is not counted
-    from sim.study.baselines.index_rules import value_per_time
-
-    def solve(problem: Problem, limit_s: float, seed: int, clock: Clock) -> PlanningResult:
-        del seed, clock
-        return PlanningResult(
-            ortools_routing.ortools_routes(
-                problem, limit_s, success_share=_SUCCESS_SHARE, start=value_per_time(problem)
-            ),
-            "each UAV's own p",
+        in_arcs = warm or problem.n_task <= _SUCCESS_IN_ARCS_TASKS
+        routes = ortools_routing.ortools_routes(
+            problem,
+            limit_s,
+            success_share=_SUCCESS_SHARE if in_arcs else 0.0,
+            start=value_per_time(problem) if warm else None,
         )
+        return PlanningResult(routes, "each UAV's own p" if in_arcs else "average p only")
 
     return solve
 
@@ -233,17 +208,22 @@ METHODS: dict[str, PlanningMethod] = {
         PlanningMethod("guided", "lists by the route optimiser", _load_guided),
         PlanningMethod("greedy", "the paper's greedy, best sequence found", _load_greedy),
         PlanningMethod(
-            "value-per-time", "index p·m/(travel + service), one pass", _load_value_per_time
+            "value-per-time",
+            "index p·m/(travel + service), one pass",
+            lambda: _at_once(value_per_time),
         ),
-        PlanningMethod("nearest", "nearest task first, one pass", _load_nearest),
+        PlanningMethod("nearest", "nearest task first, one pass", lambda: _at_once(nearest_first)),
         PlanningMethod("cbba", "consensus-based bundle algorithm", _load_cbba),
         PlanningMethod(
-            "ortools", "OR-Tools routing, from its own start", _load_ortools, _ortools_refusal
+            "ortools",
+            "OR-Tools routing, from its own start",
+            partial(_load_ortools, warm=False),
+            _ortools_refusal,
         ),
         PlanningMethod(
             "ortools-warm",
             "OR-Tools routing, from value-per-time's lists",
-            _load_ortools_warm,
+            partial(_load_ortools, warm=True),
             _ortools_refusal,
         ),
         PlanningMethod("exact", "proven optimum", _load_exact, _exact_refusal),
@@ -254,7 +234,6 @@ METHODS: dict[str, PlanningMethod] = {
 
 HORIZON_SHARE = 1.2
 """D of random missions over the makespan of value-per-time's lists."""
-
 _GRACE_S = 120.0
 """A method that ignores its limit is ended this long after twice the limit."""
 

@@ -160,22 +160,14 @@ def _end_with_parent() -> None:
 
 
 CONNECT_TIMEOUT_S = 10.0
-
 _CHUNKS_PER_THREAD = 8
-
 _LARGEST_CHUNK = 16
-
 _CHUNKS_AHEAD = 2
 """Chunks handed out per thread of the cluster, so that none waits for the next one."""
-
 _RETRIES = 3
-
 _ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]{1,5}")
-
 _RIGHT_ADDRESS = "give the address that 'dask scheduler' prints, such as tcp://10.0.0.1:8786"
-
 _OPTION = "--scheduler"
-
 _LOGGERS = ("distributed", "distributed.client")
 """Those that Dask gives levels of their own."""
 

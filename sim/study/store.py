@@ -130,9 +130,7 @@ _PARSERS = {
 
 
 STUDY_FILE, SCENARIO_FILE = "study.toml", "scenario.toml"
-
 ROWS_FILE = "trials.csv"
-
 _ANOTHER = "name another folder, or remove this one"
 
 

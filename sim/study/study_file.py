@@ -54,15 +54,10 @@ __all__ = [
 
 SCHEMA = 1
 """The version of the format that is read and written."""
-
 DEFAULT_TRIALS = 50
-
 MOST_TRIALS = 1_000_000
-
 MOST_SEED = 2**63 - 1
-
 MOST_UAVS, MOST_TASKS = 1000, 10_000
-
 _WHAT = "study file"
 
 _Trials = Annotated[int, Field(ge=1, le=MOST_TRIALS)]

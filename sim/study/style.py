@@ -123,9 +123,7 @@ def uncertainty_words(uncertainty: Uncertainty) -> str:
 
 IDEAL = "†"
 """Behind the names of policies that are modelled with ideal communication only."""
-
 NONE = "–"
-
 _DECIMALS = 2
 
 
@@ -182,7 +180,6 @@ def _end(value: float, digits: int) -> str:
 
 ROW_IN = 0.32
 """Height of a policy's row in a chart of rows [in]."""
-
 _LETTERS_PER_IN = 13
 
 

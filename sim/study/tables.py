@@ -261,7 +261,6 @@ def _wall_ms(of: Callable[[WallTimes], float]) -> Callable[[PolicyResult], str]:
 
 
 _WHAT = "Markdown file"
-
 _END = "<!-- end of study -->"
 
 

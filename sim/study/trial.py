@@ -80,7 +80,6 @@ class TrialRow:
 
 
 COLUMNS = tuple(field.name for field in fields(TrialRow))
-
 WALL_COLUMNS = tuple(name for name in COLUMNS if name.endswith("_wall_s"))
 """Differ from run to run; all others are the same for the same seed."""
 

@@ -25,7 +25,6 @@ __all__ = ["FleetPartition", "Realization", "Uncertainty", "bounding_box", "logn
 
 _ATTEMPTS = 8
 """Drawn at once."""
-
 _AIRSPEED_FRAC = 1.25
 """Greatest speed through the air, as a share of the cruise speed or the wind's, if that is more."""
 

@@ -94,7 +94,6 @@ def _from_the_end(terms: FloatArray) -> FloatArray:
 
 NOBODY = -1
 """Winner of a task for which no bid is known."""
-
 NO_BID = -np.inf
 """Bid for such a task. The paper has 0, and tasks not worth it stay behind; eq. 1 wants all."""
 

@@ -115,7 +115,6 @@ def _work(problem: Problem, method: str) -> Callable[[], object]:
 
 
 _TIMED_PROBLEMS = 20
-
 _THEOREM_CASES = 500
 
 

@@ -55,16 +55,13 @@ class AuctionDispatcher(ListFollower):
 
 _ITERATIONS_PER_TASK = 400
 """As in `coordinator.planner.online`."""
-
 _ITERATIONS_WITHOUT_NEWS = 100
 """The same when an attempt has ended and nothing else happened: the lists in force answer to that,
 and more work was measured to bring no more value."""
 
 _LEAST_GAIN = 1e-9
 """Of the value still to be won: less is rounding."""
-
 _EVENTS = frozenset(TeamNews) - {TeamNews.BEGUN, TeamNews.TIME}
-
 _NO_NEWS = frozenset({TeamNews.ENDED})
 
 

@@ -145,7 +145,6 @@ def _made(entry: PolicyEntry, *arguments: float) -> Any:
 
 
 _PACKAGE = "sim.study.policies"
-
 _AGENTS, _DISPATCHERS = f"{_PACKAGE}.agents", f"{_PACKAGE}.dispatchers"
 _REPLANNING = f"{_PACKAGE}.replanning"
 
