@@ -148,14 +148,7 @@ def rates_asked_hz(origin: Origin) -> dict[int, float]:
 def stream_rates(
     heard: Counter[int], asked_hz: dict[int, float], vehicles: int, seconds: float
 ) -> tuple[StreamRate, ...]:
-    """How much of each stream was delivered.
-
-    Args:
-        heard: messages of all vehicles in the measurement, by id.
-        asked_hz: rate of each message of every vehicle, by id.
-        vehicles: how many there are; >= 1.
-        seconds: length of the measurement; > 0.
-    """
+    """How much of each stream was delivered; messages and rates are by message id."""
     return tuple(
         StreamRate(
             mavlink.mavlink_map[message_id].msgname,

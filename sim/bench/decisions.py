@@ -114,15 +114,9 @@ def measure_decisions(
     most_decisions: int | None = None,
     sequences: int = 200,
 ) -> DecideBench:
-    """Time decisions of each rule on one random mission.
+    """Time decisions of each rule on one random mission, and a batch of greedy sequences.
 
-    Args:
-        n_uav: number of UAVs; >= 1.
-        n_task: number of tasks; >= 1.
-        seed: of the mission, the lists and what is disturbed.
-        clock: measures.
-        most_decisions: per rule; all of the mission when None.
-        sequences: size of the batch; >= 1.
+    ``most_decisions`` of each rule are made; all of the mission when None.
     """
     machine = this_machine()
     problem = problem_of(MissionSource(n_uav=n_uav, n_task=n_task, seed=seed))

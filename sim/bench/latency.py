@@ -199,10 +199,7 @@ _LATE_S = 0.5
 async def measure_hops(mission: Mission, options: LaunchOptions, claims: int) -> tuple[float, ...]:
     """Wall times that so many claims took [s]; of one that was lost, none.
 
-    Args:
-        mission: whose bus it is; nobody flies it.
-        options: of a bus with a router.
-        claims: how many are timed.
+    Nobody flies ``mission``; ``options`` are of a bus with a router.
 
     Raises:
         ChildFailedError: the router did not start.

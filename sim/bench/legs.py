@@ -77,12 +77,7 @@ def load_run(path: Path) -> Mapping[str, Any]:
 
 
 def legs_flown(mission: Mission, run: Mapping[str, Any], source: str) -> list[FlownLeg]:
-    """The legs of one flight.
-
-    Args:
-        mission: its scenario.
-        run: what `swarm run --json` said of it.
-        source: where that is from, for people.
+    """The legs of one flight, of which `swarm run --json` said ``run``; ``source`` is for people.
 
     Raises:
         InputError: it flew another scenario.
@@ -108,12 +103,7 @@ def legs_flown(mission: Mission, run: Mapping[str, Any], source: str) -> list[Fl
 
 
 def leg_times(legs: Sequence[FlownLeg], acceleration_m_s2: float | None) -> LegTimes | None:
-    """Median and spread; None without any leg.
-
-    Args:
-        legs: of one flight or of several.
-        acceleration_m_s2: the vehicles'; None if it is not known.
-    """
+    """Median and spread; None without any leg. The acceleration is None if it is not known."""
     if not legs:
         return None
     excess_s = sorted(leg.excess_s for leg in legs)

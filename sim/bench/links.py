@@ -136,14 +136,8 @@ def measure_false_losses(
     """Fly on bad links for a while, and count who was taken for lost.
 
     Every agent and the coordinator is linked to one router by a bad link of its own, so what
-    one says to another passes two. Where the system lets us, real packets are lost.
-
-    Args:
-        bad: the links.
-        watch_s: how long to watch once all fly [wall s].
-        uavs: size of the fleet.
-        seed: of delays and losses.
-        relay: imitate losses by relays, even where packets could be lost.
+    one says to another passes two. Where the system lets us, real packets are lost, unless
+    losses are to be imitated by a ``relay``. The watch begins once all fly [wall s].
     """
     if not relay:
         # A network namespace is entered by a process, and not left again.

@@ -112,13 +112,10 @@ class MissionsBench(BenchResult):
 def measure_missions(
     which: MissionBatch, jobs: int, clock: Clock, progress: Callable[[int], None] = lambda _: None
 ) -> MissionsBench:
-    """Fly missions in several processes.
+    """Fly missions, at least one, in several processes; with one job in this one.
 
-    Args:
-        which: the missions; at least one.
-        jobs: processes; with 1 this one flies them.
-        clock: measures the wall time, that of starting processes included.
-        progress: told the number of missions flown since it was last told.
+    The wall time includes that of starting processes. ``progress`` is told the number of missions
+    flown since it was last told.
     """
     machine, begin_s = this_machine(), clock.now_s()
     flown: list[BatchResult] = []

@@ -117,14 +117,8 @@ def measure_plans(
 ) -> PlanBench:
     """Run everything, one job at a time.
 
-    Args:
-        sources: cases by name; random ones are drawn anew for every seed.
-        methods: names in `METHODS`.
-        limits_s: time limits [s]; > 0.
-        seeds: of random missions, and of methods that draw.
-        long_run_s: time for ``guided`` once more on every mission [s].
-        run: does one job.
-        tell: told what is about to run.
+    Random missions are drawn anew for every seed. ``guided`` runs on every mission once more for
+    ``long_run_s``, if there is one.
     """
     machine = this_machine()
     rows: list[PlanMeasurement] = []

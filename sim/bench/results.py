@@ -55,12 +55,7 @@ def table_of(rows: Iterable[object], *columns: Column, title: str = "") -> Resul
 def quantile(times: Sequence[float], share: float) -> float | None:
     """The smallest time that is not exceeded in that share of all.
 
-    Args:
-        times: in any order and unit; infinite for what never happened.
-        share: within 0..1.
-
-    Returns:
-        None without any time, and where it never happened.
+    Times are infinite for what never happened. None where that is so, and without any time.
     """
     if not times:
         return None

@@ -60,12 +60,7 @@ class _Actor:
 class ScriptedMission:
     """All that is said of one mission, by one seat on the bus.
 
-    Args:
-        mission: what is flown.
-        bus: open.
-        clock: mission time, from the first word on.
-        rate_hz: statuses of every UAV per second.
-        seed: of places and times.
+    Mission time begins with the first word. Every UAV says ``rate_hz`` statuses per second.
     """
 
     def __init__(self, mission: Mission, bus: Bus, clock: Clock, rate_hz: float, seed: int) -> None:

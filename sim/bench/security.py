@@ -280,11 +280,7 @@ def measure_secure(
 ) -> SecureBench:
     """Fly ``mission`` and send claims, plain and secure in turn.
 
-    Args:
-        mission: the scenario of ``options``.
-        options: how to fly it, without keys; their log format is JSON.
-        settings: how often.
-        tell: told what is being done.
+    ``options`` are without keys, and their log format is JSON.
 
     Raises:
         ChildFailedError: a process did not start.

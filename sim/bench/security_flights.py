@@ -63,11 +63,7 @@ class CostsByKind:
 
 
 class ProcessMeter:
-    """Looks at every process of one launch.
-
-    Args:
-        pid: of the process that launches.
-    """
+    """Looks at every process of one launch, begun by the process ``pid``."""
 
     def __init__(self, pid: int) -> None:
         self._kinds = {pid: LAUNCHER}
@@ -134,9 +130,7 @@ class FloodTotals:
 async def flooded(run: Run, rate_hz: float) -> AsyncIterator[FloodTotals]:
     """Flood ``run``, which has routers and keys for `HOSTILE`, as long as its mission lasts.
 
-    Args:
-        run: just started.
-        rate_hz: messages a second that the hostile process tries to send.
+    The hostile process tries to send ``rate_hz`` messages a second.
     """
     poured = FloodTotals()
     pouring = asyncio.get_running_loop().create_task(_pour(run, rate_hz, poured))

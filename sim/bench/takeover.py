@@ -106,13 +106,7 @@ async def measure_takeovers(
 ) -> Takeovers:
     """Strike ``trials`` times, and wait each time until another UAV holds the task.
 
-    Args:
-        blow: what happens.
-        trials: how often.
-        link: preset of all processes.
-        bus: how they reach each other.
-        seed: of who is struck, and when.
-        tell: told how far it is.
+    The seed says who is struck, and when.
 
     Raises:
         ChildFailedError: a process did not start.

@@ -151,13 +151,7 @@ class Turnarounds(BenchResult):
 def measure_turnarounds(
     mission: Mission, options: LaunchOptions, rounds: int, tell: Progress = unheard
 ) -> Turnarounds:
-    """Fly ``mission`` several times, one after the other.
-
-    Args:
-        mission: the scenario of ``options``.
-        options: how to fly it; their log format is JSON.
-        rounds: how often.
-        tell: told what is being done.
+    """Fly ``mission`` several times, one after the other; the log format of ``options`` is JSON.
 
     Raises:
         ChildFailedError: a process did not start.

@@ -34,12 +34,8 @@ def random_mission(
 ) -> Problem:
     """Speeds 8–15 m/s, p 0.6–1, values 1–10, service 0–20 s, all uniform.
 
-    Args:
-        n_uav: number of UAVs; >= 1.
-        n_task: number of tasks; >= 1.
-        seed: of the drawing.
-        horizon_s: D [s]; some 1.2 × the makespan of a good plan when None.
-        lowest_survival: survival probabilities are uniform from this to 1.
+    Survival probabilities are uniform from ``lowest_survival`` to 1. D is some 1.2 × the makespan
+    of a good plan when None.
     """
     rng = np.random.default_rng(seed)
     side_m = _SIDE_M * math.sqrt(n_task / _TASKS_ON_IT)
@@ -96,13 +92,8 @@ def mission_of(problem: Problem, name: str) -> Mission:
 def random_table_problem(table: Problem, seed: int, index: int) -> Problem:
     """One of the paper's random problems: targets uniform in 10 × 10, all UAVs at one (x, 0).
 
-    x is uniform within 0..10; everything else is as in ``table``. Each index is drawn by itself,
-    so that the first problems are the same however many follow.
-
-    Args:
-        table: Table I.
-        seed: of all problems; >= 0.
-        index: which of them; >= 0.
+    x is uniform within 0..10; everything else is as in ``table``, Table I. Each index is drawn by
+    itself, so that the first problems are the same however many follow.
     """
     rng = np.random.default_rng([seed, index])
     start_enu_m = np.zeros((table.n_uav, 3))

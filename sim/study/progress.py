@@ -19,13 +19,7 @@ _LINE_EVERY_S = 30.0
 
 
 class StudyProgress:
-    """Shows the jobs done, their total, and the time left; call it with both numbers.
-
-    Args:
-        console: of standard error.
-        name: of the study.
-        clock: of the time left.
-    """
+    """Shows the jobs done, their total, and the time left; call it with both numbers."""
 
     def __init__(self, console: Console, name: str, clock: Clock) -> None:
         self._console = console

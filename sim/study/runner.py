@@ -44,16 +44,10 @@ _JOBS_AHEAD = 3
 def run_study(
     briefing: TrialContext, store: RowStore, fly: Fly, progress: Callable[[int, int], None]
 ) -> list[TrialRow]:
-    """Fly what ``store`` does not have yet.
+    """Fly what ``store`` does not have yet; all rows, sorted by point, trial and policy.
 
-    Args:
-        briefing: the study.
-        store: told the rows of each job as it is done, so that an interruption loses little.
-        fly: where the jobs are flown.
-        progress: told the jobs done and their total, at the beginning and after each.
-
-    Returns:
-        All rows, sorted by point, trial and policy.
+    The store is told the rows of each job as it is done, so that an interruption loses little.
+    ``progress`` is told the jobs done and their total, at the beginning and after each.
     """
     jobs = store.missing()
     progress(0, len(jobs))

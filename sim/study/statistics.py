@@ -69,15 +69,7 @@ def mean_of(values: Sequence[float] | _Array) -> Estimate:
 
 
 def difference_of(ours: Sequence[float] | _Array, theirs: Sequence[float] | _Array) -> Estimate:
-    """Mean of ours − theirs, pair by pair: Student's t on the differences.
-
-    Args:
-        ours: (n,), n >= 1.
-        theirs: (n,) of the same trials in the same order.
-
-    Raises:
-        ValueError: there are none, one is not finite, or they are not as many.
-    """
+    """Mean of ours − theirs, pair by pair: Student's t on the differences; see `ratio_of`."""
     ys, xs = _pairs(ours, theirs)
     return mean_of(ys - xs)
 

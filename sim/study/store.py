@@ -156,12 +156,7 @@ class RowStore:
 
 
 class FolderStore(RowStore):
-    """Keeps rows in a folder; close it.
-
-    Args:
-        folder: made if it is not there.
-        study: whose rows they are.
-        roster: policies, to read the study of the folder.
+    """Keeps rows in a folder, which is made if it is not there; close it.
 
     Raises:
         InputError: the folder cannot be written, is in use, or holds another study.

@@ -149,13 +149,9 @@ def load_study(path: Path, roster: PolicyRoster) -> Study:
 
 
 def parse_study(data: bytes, source: str, roster: PolicyRoster, folder: Path = Path()) -> Study:
-    """The study that ``data`` describes.
+    """The study that ``data``, the bytes of the file ``source``, describes.
 
-    Args:
-        data: the bytes of a study file.
-        source: name of the file, for messages.
-        roster: policies that it may name.
-        folder: where a scenario is looked for, before the shipped ones.
+    A scenario is looked for in ``folder`` before the shipped ones.
 
     Raises:
         InputError: with every fault of the file, in its order, then those of its scenario.
@@ -279,9 +275,7 @@ def _not_one_of(place: tuple[str | int, ...], name: str, known: Collection[str])
 def format_study(study: Study, scenario: str) -> str:
     """The text of a study file for ``study``, with nothing left to defaults.
 
-    Args:
-        study: what to write.
-        scenario: file beside it that holds the mission, where every trial flies the same.
+    The file ``scenario`` beside it holds the mission, where every trial flies the same.
     """
     head = [
         f"schema = {SCHEMA}",

@@ -226,13 +226,7 @@ class StudySummary:
 def summarise(
     rows: Iterable[TrialRow], reference: str, about: StudyDescription | None = None
 ) -> StudySummary:
-    """What ``rows`` say together, in whatever order they are, also while some are missing.
-
-    Args:
-        rows: of one study.
-        reference: the policy to which the others are compared.
-        about: what is told beside the figures.
-    """
+    """What ``rows`` say together, in whatever order they are, also while some are missing."""
     flown: dict[tuple[int, str, float | None], dict[str, dict[int, TrialRow]]] = {}
     for row in rows:
         setting = flown.setdefault((row.point, row.vary, row.at), {})

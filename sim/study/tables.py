@@ -265,11 +265,9 @@ _END = "<!-- end of study -->"
 
 
 class MarkedFile:
-    """A Markdown file with the markers of one study.
+    """A Markdown file with the markers of the study ``name``.
 
-    Args:
-        path: the file; read at once, so that it is refused before anything is flown.
-        name: of the study.
+    It is read at once, so that it is refused before anything is flown.
 
     Raises:
         InputError: the file cannot be read, or the markers are not there.

@@ -153,12 +153,7 @@ def rows_due(study: Study) -> dict[TrialJob, set[tuple[int, int, str]]]:
 
 
 class TrialRunner:
-    """Flies trials of one study, one after the other.
-
-    Args:
-        briefing: the study, and where its policies come from.
-        clock: times decisions.
-    """
+    """Flies trials of one study, one after the other; the clock times decisions."""
 
     def __init__(self, briefing: TrialContext, clock: Clock) -> None:
         study = briefing.study

@@ -80,13 +80,8 @@ class SteppedBridge(Protocol):
 class BridgedVehicle:
     """One vehicle behind its bridge; see `sim.world.vehicles.SimulatedVehicle`.
 
-    Args:
-        queue: virtual time; the autopilot is powered up at once.
-        uav: whose it is.
-        report: called with everything the bridge says, at the time it says it.
-        equipment: what flies.
-        seed: of the frames that are lost.
-        make_bridge: makes the bridge of each life of the agent.
+    The autopilot is powered up at once. ``report`` is called with everything the bridge says, at
+    the time it says it; ``make_bridge`` makes the bridge of each life of the agent.
     """
 
     def __init__(

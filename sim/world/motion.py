@@ -250,10 +250,6 @@ class _Path:
 class SmoothMotion:
     """Straight to the target where that is possible, with limited acceleration everywhere.
 
-    Args:
-        start_enu_m: where the vehicle stands [m].
-        acceleration_m_s2: greatest magnitude of its acceleration; > 0.
-
     Raises:
         ValueError: the acceleration is not positive and finite.
     """

@@ -70,12 +70,7 @@ class Network(Protocol):
 
 
 class IdealNetwork:
-    """Everyone hears everything after the same time, in order.
-
-    Args:
-        queue: virtual time.
-        latency_s: of everything that is told [s].
-    """
+    """Everyone hears everything after the same time, in order."""
 
     def __init__(self, queue: EventQueue, latency_s: float) -> None:
         self._queue = queue

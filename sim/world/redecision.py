@@ -72,11 +72,7 @@ class RedecisionResult:
 
 
 def redecide(facts: Iterable[CommonEvent]) -> RedecisionResult:
-    """Make every recorded choice anew.
-
-    Args:
-        facts: what somebody on the bus heard and learned of one mission.
-    """
+    """Make every choice anew of what somebody on the bus heard and learned of one mission."""
     heard = _Heard(facts)
     agreeing, without_inputs, differing = 0, 0, list[DecisionDifference]()
     for uav, choices in heard.lives():

@@ -52,13 +52,7 @@ class _PendingQuestion:
 
 
 class RoughNetwork:
-    """Joins seats as well as it can.
-
-    Args:
-        queue: virtual time.
-        conditions: at its best.
-        seed: of every delay and loss.
-    """
+    """Joins seats as well as it can."""
 
     def __init__(self, queue: EventQueue, conditions: NetworkConditions, seed: int) -> None:
         self.weather = 0.0

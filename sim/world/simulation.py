@@ -41,12 +41,7 @@ class SimulatedMission:
 
 
 def plan_once(make: Planner, made: Iterable[tuple[Mission, Plan]] = ()) -> Planner:
-    """Plan by ``make``, and no mission twice that begins alike.
-
-    Args:
-        make: plans what is known of a mission at its start.
-        made: plans that are there already, and what for.
-    """
+    """Plan by ``make``, and no mission twice that begins alike; some are ``made`` already."""
     plans = [(mission.known_at_start(), plan) for mission, plan in made]
 
     def planner(mission: Mission, method: str, seed: int) -> Plan:
@@ -76,16 +71,15 @@ def simulate_mission(
     make_agent: Callable[..., AgentCore] = AgentCore,
     planner: Planner | None = None,
 ) -> SimulatedMission:
-    """Fly ``mission`` in virtual time to its end.
+    """Fly ``mission``, pop-ups included, in virtual time to its end.
 
     Args:
-        mission: the scenario, pop-ups included.
+        mission: the scenario.
         method: planning method whose rule the agents use.
         seed: of the planner and of all that is uncertain.
         uncertainty: what may go wrong; moments are spread over the time the scenario's plan takes.
         coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
-        make_observer: makes the core that looks on, as for a recording; nothing that is flown
-            depends on it.
+        make_observer: makes the core that looks on; nothing that is flown depends on it.
         make_agent: makes the core of an agent.
         planner: makes every plan; `plan_once` with `make_plan` when None.
     """

@@ -64,15 +64,8 @@ ObserverMaker = Callable[[MissionState, Timing], Core[CommonEvent, CommonAction]
 class StochasticWorld:
     """One mission in virtual time, and all that befalls it.
 
-    Args:
-        fate: what happens.
-        make_plan: plans a mission by method and seed.
-        method: planning method.
-        seed: of the planner.
-        coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
-        watch: is told all that happens.
-        make_agent: makes the core of an agent.
-        make_onlooker: makes the core of the observer around its mission state, given the timers.
+    The coordinator dies at the mission time ``coordinator_lost_s``, unless that is None. ``watch``
+    is told all that happens; see `World` for the others.
     """
 
     def __init__(

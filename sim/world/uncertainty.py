@@ -260,13 +260,9 @@ class Realization:
         return east_m + sd_m * float(error[0]), north_m + sd_m * float(error[1]), up_m
 
     def speed_m_s(self, uav: Uav, task: TaskId | None, start: Point, stop: Point) -> float:
-        """Speed over ground of ``uav`` on its way from ``start`` to ``stop`` [m/s].
+        """Speed over ground of ``uav`` from one true place to another [m/s].
 
-        Args:
-            uav: who flies.
-            task: to which the leg belongs; None for any other leg.
-            start: true place at its beginning [m].
-            stop: true place at its end [m].
+        The leg belongs to ``task``; None for any other leg.
         """
         speed_m_s = uav.speed_m_s * self.speed_frac.get(uav.id, 1.0)
         if task is not None and self.uncertainty.leg_sd_frac > 0.0:

@@ -55,12 +55,9 @@ VehicleFactory = Callable[[EventQueue, str, Callable[[VehicleReport], None]], Si
 
 
 class IdealVehicle:
-    """One ideal vehicle.
+    """One ideal vehicle, airborne ``takeoff_s`` after it is told to.
 
-    Args:
-        queue: virtual time.
-        report: called with everything the vehicle says, at the time it says it.
-        takeoff_s: until it is airborne once it is told to.
+    ``report`` is called with everything the vehicle says, at the time it says it.
     """
 
     def __init__(
@@ -138,15 +135,7 @@ _NOWHERE_ELSE = 0.0, 0.0, 0.0
 
 
 class StochasticVehicle(IdealVehicle):
-    """One vehicle in a realization.
-
-    Args:
-        queue: virtual time.
-        uav: whose vehicle it is.
-        report: called with everything the vehicle says, at the time it says it.
-        fate: what happens to it.
-        takeoff_s: until it is airborne once it is told to.
-    """
+    """One vehicle in a realization."""
 
     def __init__(
         self,

@@ -78,10 +78,7 @@ class Wind:
     def ground_speed_m_s(self, way: Point, ordered_m_s: float, airspeed_m_s: float) -> float:
         """Speed over ground along a way that is in reach [m/s].
 
-        Args:
-            way: direction of flight, of length 1.
-            ordered_m_s: speed over ground that was asked for.
-            airspeed_m_s: greatest speed through the air; above the wind's.
+        ``way`` has length 1; the greatest speed through the air is above the wind's.
         """
         east_m_s, north_m_s = self.velocity_enu_m_s
         along_m_s = east_m_s * way[0] + north_m_s * way[1]
@@ -90,14 +87,10 @@ class Wind:
 
 
 class WindyMotion:
-    """Another motion, in wind.
+    """The motion ``still``, of still air, in wind.
 
-    Args:
-        still: how the vehicle would move in still air.
-        wind: the air.
-        airspeed_m_s: its greatest speed through the air; at least any speed that is ordered
-            is taken.
-        ground_up_m: height of the ground [m].
+    The greatest airspeed is exceeded where a greater speed is ordered. The ground is at
+    ``ground_up_m``.
 
     Raises:
         ValueError: the vehicle could not fly against the wind.

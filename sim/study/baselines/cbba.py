@@ -29,11 +29,7 @@ __all__ = ["NOBODY", "NO_BID", "Beliefs", "CbbaResult", "Insertion", "cbba", "up
 
 
 class Insertion:
-    """Gains of insertion into paths that begin where the team stands.
-
-    Args:
-        problem: the mission.
-        state: when and where each UAV is free, and what it has survived; at its start when None.
+    """Gains of insertion into paths that begin where the team stands; at its start when None.
 
     Keeps (n_task,) travel times for every UAV and task that has been on its path.
     """
@@ -196,11 +192,8 @@ def cbba(
 ) -> CbbaResult:
     """Run the auction; the same problem gives the same lists.
 
-    Args:
-        problem: the mission.
-        state: where the team stands: open tasks are auctioned among active UAVs; at its start when
-            None.
-        should_stop: given the rounds so far, whether to stop.
+    Open tasks are auctioned among active UAVs from where they stand; ``state`` is the start when
+    None. ``should_stop`` is given the rounds so far.
     """
     state = TeamState.at_start(problem) if state is None else state
     auction = _Auction(problem, state)

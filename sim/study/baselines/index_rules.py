@@ -19,13 +19,7 @@ Routes = list[list[int]]
 
 
 def routes_by(rule: IndexRule, problem: Problem, sequence: Sequence[int] | None = None) -> Routes:
-    """The lists to which ``rule`` leads.
-
-    Args:
-        rule: how every UAV decides.
-        problem: the mission.
-        sequence: UAV indices, first decider first; as in the problem when None.
-    """
+    """The lists to which ``rule`` leads; UAVs decide in ``sequence``, or as in the problem."""
     order = range(problem.n_uav) if sequence is None else sequence
     return run(problem, TeamState.at_start(problem), rank_of(order), rule)[0]
 

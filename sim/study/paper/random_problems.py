@@ -186,14 +186,8 @@ def reproduce_random(
 ) -> RandomResults:
     """Solve random problems; the result is the same for any number of threads.
 
-    Nearly all the work is done by kernels, which let other threads run meanwhile.
-
-    Args:
-        table: Table I, of which all but the places is kept.
-        problems: how many; >= 1.
-        seed: of their drawing and of guided's search.
-        threads: how many work at it; >= 1.
-        progress: told how many problems are done, after each.
+    Nearly all the work is done by kernels, which let other threads run meanwhile. Of ``table``,
+    Table I, all but the places is kept. ``progress`` is told how many problems are done.
     """
     if problems < 1:
         raise ValueError(f"problems must be >= 1, not {problems}")

@@ -78,11 +78,7 @@ def measure_times(
 ) -> MethodTimes:
     """Take turns over problems and methods, so that what else the machine does hits all alike.
 
-    Args:
-        draw: the problem of an index; anew each time, since kernels remember tours of a problem.
-        problems: how many are drawn; >= 1.
-        clock: of the machine.
-        repeats: how often each method solves each problem; >= 1.
+    Problems are drawn anew each time, since kernels remember tours of a problem.
     """
     taken_s: dict[str, list[float]] = {"optimum": [], **{rule: [] for rule in reversed(RULES)}}
     for _ in range(repeats):
@@ -176,14 +172,8 @@ def reproduce_paper(
 ) -> Reproduction:
     """Compute all of it; only times depend on the machine and on ``threads``.
 
-    Args:
-        problems: how many random problems; >= 1.
-        seed: of everything random; >= 0.
-        clock: of the machine.
-        expected: what must come out; the paper's and the checked figures when None.
-        threads: how many work at random problems; >= 1.
-        theorem_cases: random cases of each theorem; >= 1.
-        progress: told how many random problems are done.
+    What must come out is `Expectations` when None. ``progress`` is told how many random problems
+    are done.
     """
     begin_s = clock.now_s()
     wanted = Expectations() if expected is None else expected

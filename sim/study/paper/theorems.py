@@ -55,9 +55,7 @@ def allocations(n_uav: int, n_task: int) -> int:
 def check_theorems(seed: int, cases: int) -> list[TheoremResult]:
     """Theorem 1 for every small size, Theorems 3 and 5 on ``cases`` random cases each.
 
-    Args:
-        seed: of the random cases.
-        cases: >= 1; Theorem 5 counts only certified decisions.
+    Theorem 5 counts only certified decisions.
     """
     return [
         _theorem_1(),

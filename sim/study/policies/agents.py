@@ -56,13 +56,7 @@ class AgentsPolicy:
     """Mission time at which the coordinator dies [s]; None if it lives."""
 
     def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
-        """Fly a mission to its end.
-
-        Args:
-            fate: what happens.
-            plan: offline planner.
-            clock: times decisions, and decides nothing.
-        """
+        """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
 
         def make_plan(mission: Mission, method: str, seed: int) -> Plan:
             del seed  # the planner has its own

@@ -61,12 +61,7 @@ PLANNED_BY = "guided"
 
 
 class ListFollower:
-    """Every UAV does its list; see the module.
-
-    Args:
-        lists: task ids by UAV id, in order.
-        account: of its work.
-    """
+    """Every UAV does its list of task ids; see the module."""
 
     def __init__(self, lists: Mapping[UavId, Sequence[TaskId]], account: Account) -> None:
         self._planned = lists

@@ -34,11 +34,7 @@ _UPON = frozenset({TeamNews.APPEARED, TeamNews.WITHDRAWN, TeamNews.LOST, TeamNew
 
 
 class AuctionDispatcher(ListFollower):
-    """Follows paths won at auction.
-
-    Args:
-        account: of its work.
-    """
+    """Follows paths won at auction."""
 
     def __init__(self, account: Account) -> None:
         super().__init__({}, account)
@@ -66,15 +62,7 @@ _NO_NEWS = frozenset({TeamNews.ENDED})
 
 
 class CentralOptimiser(ListFollower):
-    """Follows lists that it improves whenever it hears certain news.
-
-    Args:
-        lists: to begin with: task ids by UAV id, in order.
-        account: of its work.
-        seed: of the search; >= 0.
-        upon: news upon which it plans anew.
-        diverts: whether UAVs in flight may be sent elsewhere.
-    """
+    """Follows lists that it improves ``upon`` certain news; it may divert UAVs in flight."""
 
     def __init__(
         self,

@@ -41,13 +41,7 @@ class Policy(Protocol):
         ...
 
     def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
-        """Fly a mission to its end.
-
-        Args:
-            fate: what happens.
-            plan: offline planner.
-            clock: times decisions, and decides nothing.
-        """
+        """Fly a mission to its end; the clock times decisions, and decides nothing."""
         ...
 
 

@@ -42,7 +42,7 @@ def fly_team(
         fate: what happens.
         dispatcher: decides.
         sequence: UAVs, first decider first; those not in it follow, as the mission has them.
-        every_s: the dispatcher hears that this interval has passed, again and again [s]; > 0.
+        every_s: how often the dispatcher hears that time has passed [s]; > 0.
 
     Raises:
         ValueError: the interval is not positive, or the dispatcher wants what it must not.
