@@ -19,9 +19,9 @@ from sim.bench.results import Progress, unheard
 from sim.fleet.faults.recorder import BusEntry
 from sim.fleet.faults.relay import RelayNetwork, RelayQuality
 from sim.fleet.faults.tun import HERE, THERE, TunPath, TunUnavailableError, enter_own_network
+from sim.fleet.launcher import Through
 from sim.fleet.layout import BusKind, DialedLink
-from sim.fleet.run import Run, open_run
-from swarm.model import Mission
+from sim.fleet.run import open_run
 from swarm.protocol.messages import Message, MissionPhase
 from swarm.protocol.timing import LinkKind
 from swarm.protocol.uav_messages import ClaimPhase
@@ -161,41 +161,38 @@ async def _watch_on_tun(bad: BadLink, watch_s: float, uavs: int, seed: int) -> F
     async def through(_link: DialedLink, endpoint: str) -> str:
         return endpoint.replace(HERE, THERE)
 
-    mission = far_mission(uavs, uavs)
     with TunPath(bad.quality, np.random.default_rng(seed)) as path:
-        lines: list[str] = []
-        with options_for(mission, link=bad.link, bus=BusKind.ROUTER, address=HERE) as options:
-            async with open_run(
-                mission, options, through=through, on_log=lambda _, line: lines.append(line)
-            ) as run:
-                losses = await _watch(run, lines, mission, watch_s)
+        losses = await _watch(bad, watch_s, uavs, through, HERE)
         return FalseLosses(bad, uavs, watch_s, "tun", losses, path.carried + path.lost, path.lost)
 
 
 async def _watch_relayed(bad: BadLink, watch_s: float, uavs: int, seed: int) -> FalseLosses:
-    mission = far_mission(uavs, uavs)
-    lines: list[str] = []
     async with RelayNetwork(seed=seed) as network:
         network.degrade(bad.quality)
-        with options_for(mission, link=bad.link, bus=BusKind.ROUTER) as options:
-            async with open_run(
-                mission, options, through=network.through, on_log=lambda _, line: lines.append(line)
-            ) as run:
-                losses = await _watch(run, lines, mission, watch_s)
+        losses = await _watch(bad, watch_s, uavs, network.through)
     return FalseLosses(bad, uavs, watch_s, "relay", losses, 0, 0)
 
 
-async def _watch(run: Run, lines: list[str], mission: Mission, watch_s: float) -> int:
-    """Wait until all hold their tasks, and count losses from then on."""
+async def _watch(
+    bad: BadLink, watch_s: float, uavs: int, through: Through, address: str = "127.0.0.1"
+) -> int:
+    """Fly until all hold their tasks, and count losses from then on."""
+    mission = far_mission(uavs, uavs)
+    lines: list[str] = []
+    with options_for(mission, link=bad.link, bus=BusKind.ROUTER, address=address) as options:
+        async with open_run(
+            mission, options, through=through, on_log=lambda _, line: lines.append(line)
+        ) as run:
+            replica = run.mission_state.replica
 
-    def all_hold() -> bool:
-        claims = run.mission_state.replica.claims.values()
-        return sum(claim.phase is ClaimPhase.HELD for claim in claims) == len(mission.uavs)
+            def all_hold() -> bool:
+                held = [each.phase is ClaimPhase.HELD for each in replica.claims.values()]
+                return sum(held) == uavs
 
-    await run.until(all_hold, limit_s=START_S, what="everyone on the way")
-    before = len(lines)
-    await asyncio.sleep(watch_s)
-    return sum(bool(_LOST.search(line)) for line in lines[before:])
+            await run.until(all_hold, limit_s=START_S, what="everyone on the way")
+            before = len(lines)
+            await asyncio.sleep(watch_s)
+            return sum(bool(_LOST.search(line)) for line in lines[before:])
 
 
 # -- partitions -------------------------------------------------------------------------

@@ -6,7 +6,8 @@ Plots are of value against the time limit or the size, and of time and memory by
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +37,7 @@ __all__ = [
 
 
 _MIB = 2.0**20
+_SIZE = re.compile(r"\d+×\d+")
 
 _RANDOM = (
     "Random missions: UAVs and tasks uniform over a square (5 km for 500 tasks, its area in "
@@ -189,7 +191,7 @@ def _notes(bench: PlanBench, grids: Sequence[ResultTable]) -> list[str]:
         notes.append(_SCALING)
     if any(name.startswith("ortools") for name in methods):
         notes.append(SHORTFALL)
-    if any(_is_size(row.case) for row in bench.measured):
+    if any(_SIZE.fullmatch(row.case) for row in bench.measured):
         notes.append(_RANDOM)
     return notes
 
@@ -197,10 +199,6 @@ def _notes(bench: PlanBench, grids: Sequence[ResultTable]) -> list[str]:
 def _seeds(bench: PlanBench) -> str:
     seeds = list(dict.fromkeys(row.seed for row in bench.measured))
     return f"Seeds {', '.join(map(str, seeds))}; J / best: mean over seeds, best of this run = 1."
-
-
-def _is_size(case: str) -> bool:
-    return all(part.isdigit() for part in case.split("×")) and "×" in case
 
 
 def _name(row: Sequence[str]) -> str:
@@ -265,7 +263,11 @@ def scaling_figure(bench: PlanBench) -> Figure:
     figure = Figure(figsize=(10.4, 4.4), layout="constrained")
     names = list(dict.fromkeys(row.method for row in bench.measured))
     cases = list(dict.fromkeys(row.case for row in bench.measured))
-    for i, (title, of) in enumerate((("first plan [s]", _first_s), ("peak memory [MiB]", _mib))):
+    panels: tuple[tuple[str, Callable[[PlanMeasurement], float]], ...] = (
+        ("first plan [s]", lambda row: max(1e-4, row.trace[0][0] if row.trace else row.elapsed_s)),
+        ("peak memory [MiB]", lambda row: row.peak_bytes / _MIB),
+    )
+    for i, (title, of) in enumerate(panels):
         axes = figure.add_subplot(1, 2, i + 1)
         for name in names:
             rows = [r for r in bench.measured if r.method == name and r.objective is not None]
@@ -314,11 +316,3 @@ def _legend(figure: Figure) -> None:
         entries.update(zip(labels, handles, strict=True))
     if entries:
         figure.legend(list(entries.values()), list(entries), loc="outside right upper")
-
-
-def _first_s(row: PlanMeasurement) -> float:
-    return max(1e-4, row.trace[0][0] if row.trace else row.elapsed_s)
-
-
-def _mib(row: PlanMeasurement) -> float:
-    return row.peak_bytes / _MIB

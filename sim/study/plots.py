@@ -69,11 +69,7 @@ def draw_study(summary: StudySummary, folder: Path) -> list[Path]:
 def comparison_figure(summary: StudySummary, setting: PointSummary) -> Figure:
     """All policies in one setting, best first: ratio to the reference and its interval."""
     figure, (axes,) = rows_figure(len(setting.policies))
-    ratios = [
-        (name, setting.policies[name].ratio)
-        for name in summary.policies
-        if name in setting.policies
-    ]
+    ratios = [(each.policy, each.ratio) for each in summary.of(setting)]
     for place, (name, ratio) in enumerate(ratios):
         if ratio is None or math.isnan(ratio.value):
             continue
@@ -160,8 +156,7 @@ def churn_bars_figure(summary: StudySummary, setting: PointSummary) -> Figure:
     """Tasks done twice, and tasks moved or released, of all policies in one setting."""
     from matplotlib.colors import to_rgba
 
-    measured = [setting.policies[name] for name in summary.policies if name in setting.policies]
-    found = [each for each in measured if _CHURN.keys() <= each.means.keys()]
+    found = [each for each in summary.of(setting) if _CHURN.keys() <= each.means.keys()]
     figure, panels = rows_figure(len(found), panels=2)
     for axes, (column, label) in zip(panels, _CHURN.items(), strict=True):
         for place, each in enumerate(found):
@@ -259,7 +254,7 @@ def _line(
         markersize=6.0,
         linewidth=1.4,
         linestyle=_style(summary, name),
-        label=_label(name),
+        label=f"{name} (bound)" if name == BOUND else name,
         zorder=2 if name == BOUND else 3,
     )
 
@@ -334,10 +329,6 @@ def _style(summary: StudySummary, name: str) -> str:
     if name == BOUND:
         return ":"
     return "--" if name in summary.about.ideal else "-"
-
-
-def _label(name: str) -> str:
-    return f"{name} (bound)" if name == BOUND else name
 
 
 def _ideal_note(summary: StudySummary, sign: str) -> str:

@@ -11,8 +11,9 @@ import csv
 import fcntl
 import io
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -115,16 +116,14 @@ def _row(cells: Sequence[str]) -> TrialRow:
     return TrialRow(**values)
 
 
-def _integer(cell: str) -> int | None:
-    return int(cell) if cell else None
-
-
-def _float(cell: str) -> float | None:
-    return float(cell) if cell else None
+def _or_none(number: Callable[[str], float], cell: str) -> float | None:
+    return number(cell) if cell else None
 
 
 _PARSERS = {
-    item.name: str if item.type == "str" else _integer if "int" in str(item.type) else _float
+    item.name: str
+    if item.type == "str"
+    else partial(_or_none, int if "int" in str(item.type) else float)
     for item in fields(TrialRow)
 }
 

@@ -106,13 +106,12 @@ class PolicyResult:
 
     def as_json(self) -> dict[str, object]:
         """Ready for `json.dumps`."""
-        estimates = {
-            name: _json(getattr(self, name))
-            for name in ("value", "ratio", "difference", "better", "of_bound", "complete")
-        }
+        names = ("value", "ratio", "difference", "better", "of_bound", "complete")
+        found: list[Estimate | None] = [getattr(self, name) for name in names]
+        estimates = [None if each is None else each.as_json() for each in found]
         return {
             "trials": self.trials,
-            **estimates,
+            **dict(zip(names, estimates, strict=True)),
             "means": {name: mean.as_json() for name, mean in self.means.items()},
             "decision_wall_s": None
             if self.wall is None
@@ -147,6 +146,10 @@ class StudySummary:
     settings: tuple[PointSummary, ...]
     """By point."""
     about: StudyDescription = field(default_factory=StudyDescription)
+
+    def of(self, setting: PointSummary) -> list[PolicyResult]:
+        """All policies of one setting, in the order of `policies`."""
+        return [setting.policies[name] for name in self.policies if name in setting.policies]
 
     @property
     def own(self) -> PointSummary | None:
@@ -212,11 +215,7 @@ class StudySummary:
                     "vary": each.vary or None,
                     "at": each.at,
                     "trials": each.trials,
-                    "policies": {
-                        name: each.policies[name].as_json()
-                        for name in self.policies
-                        if name in each.policies
-                    },
+                    "policies": {result.policy: result.as_json() for result in self.of(each)},
                 }
                 for each in self.settings
             ],
@@ -251,23 +250,20 @@ def summarise(
 def _measured(policy: str, flights: Flights, reference: Flights, bound: Flights) -> PolicyResult:
     rows = [flights[trial] for trial in sorted(flights)]
     ours, theirs = _paired(flights, reference)
+    won = [a - b > _ROUNDING * abs(b) for a, b in zip(ours, theirs, strict=True)]
+    undone = _sums(rows, "failed", "missed")
     under, above = _paired(flights, bound)
     return PolicyResult(
         policy=policy,
         value=mean_of([row.value for row in rows]),
         ratio=ratio_of(ours, theirs) if ours else None,
         difference=difference_of(ours, theirs) if ours else None,
-        better=_better(ours, theirs),
+        better=share_of(sum(won), len(won)) if won else None,
         of_bound=ratio_of(under, above) if under else None,
-        complete=_complete(rows),
+        complete=share_of(undone.count(0.0), len(undone)) if undone else None,
         means=_means(rows),
         wall=_wall(rows),
     )
-
-
-def _better(ours: Sequence[float], theirs: Sequence[float]) -> Estimate | None:
-    won = [a - b > _ROUNDING * abs(b) for a, b in zip(ours, theirs, strict=True)]
-    return share_of(sum(won), len(won)) if won else None
 
 
 def _paired(flights: Flights, others: Flights) -> tuple[list[float], list[float]]:
@@ -280,11 +276,6 @@ def _means(rows: Sequence[TrialRow]) -> dict[str, Estimate]:
     columns = {name: _column(rows, name) for name in _COUNTED}
     columns["churn"] = _sums(rows, "moved", "released")
     return {name: mean_of(values) for name, values in columns.items() if values}
-
-
-def _complete(rows: Sequence[TrialRow]) -> Estimate | None:
-    undone = _sums(rows, "failed", "missed")
-    return share_of(undone.count(0.0), len(undone)) if undone else None
 
 
 def _wall(rows: Sequence[TrialRow]) -> WallTimes | None:
@@ -304,7 +295,3 @@ def _column(rows: Sequence[TrialRow], name: str) -> list[float]:
 def _sums(rows: Sequence[TrialRow], one: str, other: str) -> list[float]:
     """Sum of two columns, of rows that have both or neither."""
     return [a + b for a, b in zip(_column(rows, one), _column(rows, other), strict=True)]
-
-
-def _json(estimate: Estimate | None) -> dict[str, float | int | None] | None:
-    return None if estimate is None else estimate.as_json()

@@ -85,11 +85,14 @@ def _grids(summary: StudySummary, *, every_setting: bool) -> Iterator[ResultTabl
 def _of_setting(summary: StudySummary, setting: PointSummary) -> Iterator[ResultTable]:
     """Two tables: values, and what happened."""
     where = _where(summary, setting)
-    found = [setting.policies[name] for name in summary.policies if name in setting.policies]
+    found = summary.of(setting)
     reference = summary.reference
     columns: list[tuple[str, Callable[[PolicyResult], str]]] = [
         ("J [value·s]", lambda each: number_text(each.value.value)),
-        (f"J / {reference}'s", lambda each: _ratio(summary, each)),
+        (
+            f"J / {reference}'s",
+            lambda each: "1" if each.policy == reference else interval_text(each.ratio),
+        ),
         ("better in", lambda each: _share(None if each.policy == reference else each.better)),
         ("J / bound", lambda each: "1" if each.policy == BOUND else interval_text(each.of_bound)),
         ("all done in", lambda each: _share(each.complete)),
@@ -118,8 +121,7 @@ def _of_setting(summary: StudySummary, setting: PointSummary) -> Iterator[Result
 
 
 def _times(summary: StudySummary, setting: PointSummary) -> ResultTable | None:
-    found = [setting.policies[name] for name in summary.policies if name in setting.policies]
-    timed = [each for each in found if each.wall is not None]
+    timed = [each for each in summary.of(setting) if each.wall is not None]
     if not timed:
         return None
     on = f", on {summary.about.machine}" if summary.about.machine else ""
@@ -236,10 +238,6 @@ def _about(summary: StudySummary) -> list[str]:
     if about.ideal:
         lines.append(f"{IDEAL} modelled with ideal communication only.")
     return lines
-
-
-def _ratio(summary: StudySummary, each: PolicyResult) -> str:
-    return "1" if each.policy == summary.reference else interval_text(each.ratio)
 
 
 def _spread(summary: StudySummary, each: PolicyResult | None) -> str:

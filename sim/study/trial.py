@@ -6,7 +6,6 @@ Rows depend on the study alone, wall times apart, whoever flies the trial and in
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -178,13 +177,12 @@ class TrialRunner:
         if self._bound is not None:
             value = self._bound.value(fate, self._plan)
             rows.append(TrialRow(world.index, world.vary, world.at, job.trial, BOUND, value))
-        return list(self._at_all_points(rows, job))
-
-    def _at_all_points(self, rows: Iterable[TrialRow], job: TrialJob) -> Iterable[TrialRow]:
         points = [p for p in self._points if p.world == job.world and job.trial < p.trials]
-        for row in rows:
-            for point in points:
-                yield replace(row, point=point.index, vary=point.vary, at=point.at)
+        return [
+            replace(row, point=point.index, vary=point.vary, at=point.at)
+            for row in rows
+            for point in points
+        ]
 
     def _plan(self, mission: Mission, method: str) -> Plan:
         """Plans are the same for whoever asks, and in trials whose missions begin alike."""

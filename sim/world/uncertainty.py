@@ -135,7 +135,12 @@ class Uncertainty:
             lost_at_s=gone_at_s,
             withdrawn_at_s=self._withdrawals(drawn, span_s, seed),
             partitions=self._partitions(mission, span_s, seed),
-            speed_frac={uav.id: self._speed_frac(uav, seed) for uav in mission.uavs},
+            speed_frac={
+                uav.id: lognormal(
+                    float(stream(seed, "speed", uav.id).standard_normal()), self.speed_sd_frac
+                )
+                for uav in mission.uavs
+            },
             wind=self._wind(seed),
             uncertainty=self,
         )
@@ -196,9 +201,6 @@ class Uncertainty:
 
         times_s = _poisson_s(rng, self.partitions_per_min, span_s)
         return tuple(FleetPartition(when_s, self.partition_s, half()) for when_s in times_s)
-
-    def _speed_frac(self, uav: Uav, seed: int) -> float:
-        return lognormal(float(stream(seed, "speed", uav.id).standard_normal()), self.speed_sd_frac)
 
     def _wind(self, seed: int) -> Wind:
         way_rad = float(stream(seed, "wind").uniform(0.0, math.tau))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import starmap
 from pathlib import Path
 
 from rich.console import Group, RenderableType
@@ -34,7 +33,7 @@ def reproduction_text(found: Reproduction, drawn: Sequence[Path] = ()) -> Render
         *_theorems_part(found),
     ]
     if drawn:
-        parts += [_head("Figures"), *(_said(line) for line in _drawn_lines(found, drawn)), ""]
+        parts += [_head("Figures"), *(Text(line) for line in _drawn_lines(found, drawn)), ""]
     return Group(*parts, *_verdict_part(found))
 
 
@@ -64,14 +63,19 @@ def _table_part(found: Reproduction) -> list[RenderableType]:
     sequences = ResultTable(
         (
             Column("sequence", words=True),
-            *(column for rule in RULES for column in (Column(rule, ".4f"), _lists_column())),
+            *(
+                column
+                for rule in RULES
+                for column in (Column(rule, ".4f"), Column("lists", lists_text, words=True))
+            ),
         ),
         [
             (_sequence(pair[0]), *(cell for each in pair for cell in (each.objective, each.lists)))
             for pair in zip(*(table.of_rule(rule) for rule in RULES), strict=True)
         ],
     )
-    horizons = ", ".join(starmap(_horizon_text, table.optimum_at_horizon.items()))
+    optima = table.optimum_at_horizon.items()
+    horizons = ", ".join(f"{horizon_s:g}: {value:.2f}" for horizon_s, value in optima)
     n_uav, n_task = len(table.mission.uavs), len(table.mission.tasks)
     return [
         _head(f"Tables I and II: {n_uav} UAVs, {n_task} targets, D = {table.mission.horizon_s:g}"),
@@ -79,8 +83,8 @@ def _table_part(found: Reproduction) -> list[RenderableType]:
         "",
         sequences,
         "",
-        _said(_why_not_hierarchical(found)),
-        _said(f"Optimum at D = {horizons}."),
+        Text(_why_not_hierarchical(found)),
+        Text(f"Optimum at D = {horizons}."),
         "",
     ]
 
@@ -122,7 +126,7 @@ def _random_part(found: Reproduction) -> list[RenderableType]:
     noun = "problem" if len(random.problems) == 1 else "problems"
     return [
         _head(f"{len(random.problems)} random {noun}, seed {random.seed}"),
-        _said(
+        Text(
             "Targets uniform in 10 × 10, all UAVs at (x, 0) with x uniform in 0..10, the rest as "
             "in Table I. J is 0 for the worst plan and 1 for the optimum; greedy and lookahead "
             "by their best sequence, guided by its planned lists."
@@ -148,7 +152,7 @@ def _random_part(found: Reproduction) -> list[RenderableType]:
             readings,
         ),
         "",
-        _said(_why_not_average(found)),
+        Text(_why_not_average(found)),
         "",
     ]
 
@@ -193,7 +197,7 @@ def _times_part(times: MethodTimes, machine: str) -> list[RenderableType]:
         _head("Times relative to each other"),
         rows,
         "",
-        _said(
+        Text(
             f"One thread, {times.problems} of the random problems, {times.repeats} rounds taking "
             f"turns; {machine}. The paper's own ratios are not at hand. Compiled dynamic "
             "programming makes the optimum cheap at this size, but it grows as 3^M, lookahead as "
@@ -208,7 +212,7 @@ def _theorems_part(found: Reproduction) -> list[RenderableType]:
         (Column("against brute force", words=True), Column("violations"), Column("cases")),
         [(theorem.name, theorem.violations, theorem.cases) for theorem in found.theorems],
     )
-    said = [_said(f"{each.name}: {each.claim} ({each.remark}).") for each in found.theorems]
+    said = [Text(f"{each.name}: {each.claim} ({each.remark}).") for each in found.theorems]
     return [_head("Theorems"), rows, "", *said, ""]
 
 
@@ -243,25 +247,12 @@ def _verdict_part(found: Reproduction) -> list[RenderableType]:
     ]
 
 
-def _lists_column() -> Column:
-    return Column("lists", lists_text, words=True)
-
-
 def _head(text: str) -> Text:
     return Text(text, style="bold underline")
 
 
-def _said(text: str) -> Text:
-    """Words, free of markup."""
-    return Text(text)
-
-
 def _sequence(each: SequenceValue) -> str:
     return f"({', '.join(str(uav) for uav in each.sequence)})"
-
-
-def _horizon_text(horizon_s: float, value: float) -> str:
-    return f"{horizon_s:g}: {value:.2f}"
 
 
 def _average(average: Average) -> str:

@@ -175,7 +175,7 @@ class TableResults:
         for rule, figures in (("greedy", expected.greedy), ("lookahead", expected.lookahead)):
             values = {each.sequence: each.objective for each in self.of_rule(rule)}
             for sequence, figure in figures.items():
-                name = f"{rule}, sequence {_numbers(sequence)}"
+                name = f"{rule}, sequence ({','.join(map(str, sequence))})"
                 found.append(printed_check(name, values[sequence], figure))
             highest = max(figures.values(), key=lambda figure: figure.value)
             plan = self.plans[rule].objective
@@ -249,7 +249,3 @@ def _lists_check(
     name: str, ours: tuple[tuple[int, ...], ...], expected: tuple[tuple[int, ...], ...]
 ) -> Check:
     return Check(name, lists_text(ours), lists_text(expected), ours == expected)
-
-
-def _numbers(sequence: tuple[int, ...]) -> str:
-    return f"({','.join(str(uav) for uav in sequence)})"
