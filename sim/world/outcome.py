@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from agent.core.interface import GoTo
 from sim.world.engine import Process
 from sim.world.uncertainty import Realization
 from swarm.model import TaskId, UavId
@@ -126,7 +125,7 @@ def score(fate: Realization, flight: FlightOutcome) -> Score:
 
 
 class Tally:
-    """Watches a world and counts."""
+    """Counts what is flown and said in a world."""
 
     def __init__(self) -> None:
         self.visits: list[TaskVisit] = []
@@ -154,20 +153,6 @@ class Tally:
                 self._closed.add(task)
             case _:
                 pass
-
-    def stepped(self, process: Process) -> None:
-        """Steps are not counted."""
-
-    def raised(self, process: Process, fault: Exception) -> None:
-        """A core has raised.
-
-        Raises:
-            RuntimeError: always; a flight with a broken process is none to count.
-        """
-        raise RuntimeError(f"{process.name} has broken down") from fault
-
-    def refused(self, process: Process, order: GoTo) -> None:
-        """No vehicle refuses anything here."""
 
     def noted(self, process: Process, note: LogLine) -> None:
         """Count a task that is given up on the way."""

@@ -11,7 +11,7 @@ from agent.core.agent_core import AgentCore
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import MissionResult
 from coordinator.planner.plan import make_plan
-from sim.world.outcome import Tally, value_of
+from sim.world.outcome import value_of
 from sim.world.settings import Planner
 from sim.world.stochastic_world import ObserverMaker, StochasticWorld
 from sim.world.uncertainty import Uncertainty
@@ -86,14 +86,12 @@ def simulate_mission(
     planner = plan_once(_plan_by_method) if planner is None else planner
     span_s = max(planner(mission, method, seed).completion_s.values(), default=0.0)
     fate = uncertainty.draw(mission, span_s, seed)
-    tally = Tally()
     flown = StochasticWorld(
         fate,
         planner,
         method=method,
         seed=seed,
         coordinator_lost_s=coordinator_lost_s,
-        watch=tally,
         make_agent=make_agent,
         make_observer=make_observer,
     )
@@ -102,7 +100,7 @@ def simulate_mission(
         world=flown.world,
         result=replace(flown.world.mission_state.result(), lost_uavs=tuple(flown.lost)),
         lost_because=dict(flown.lost),
-        value=value_of(fate, tally.visits),
+        value=value_of(fate, flown.tally.visits),
         in_time=in_time,
     )
 

@@ -20,9 +20,10 @@ from agent.core.interface import GoTo, VehicleReport
 from coordinator.mission_view.mission_state import MissionState
 from sim.world.engine import EventQueue, Process
 from sim.world.network import IdealNetwork, Network, NetworkConditions, Topology
+from sim.world.outcome import Tally
 from sim.world.rough_network import RoughNetwork
 from sim.world.scripted_operator import ScriptedOperator
-from sim.world.settings import QUIET, Planner, WorldListener, WorldSettings
+from sim.world.settings import QUIET, Planner, WorldSettings
 from sim.world.uncertainty import FleetPartition, Realization, Uncertainty
 from sim.world.vehicles import IdealVehicle, SimulatedVehicle, StochasticVehicle
 from sim.world.virtual_world import World
@@ -64,8 +65,8 @@ ObserverMaker = Callable[[MissionState, Timing], Core[CommonEvent, CommonAction]
 class StochasticWorld:
     """One mission in virtual time, and all that befalls it.
 
-    The coordinator dies at the mission time ``coordinator_lost_s``, unless that is None. ``watch``
-    is told all that happens; see `World` for the others.
+    The coordinator dies at the mission time ``coordinator_lost_s``, unless that is None; see
+    `World` for the others.
     """
 
     def __init__(
@@ -76,13 +77,14 @@ class StochasticWorld:
         method: str,
         seed: int,
         coordinator_lost_s: float | None = None,
-        watch: WorldListener | None = None,
         make_agent: Callable[..., AgentCore] = AgentCore,
         make_observer: ObserverMaker | None = None,
     ) -> None:
         self.fate = fate
         self.lost: dict[UavId, str] = {}
         """UAVs lost on their mission, in that order, and why."""
+        self.tally = Tally()
+        """What has been flown and said."""
         self._coordinator_lost_s = coordinator_lost_s
         self._uavs: dict[str, Uav] = {str(uav.id): uav for uav in fate.mission.uavs}
         self._tasks: dict[str, Task] = {str(task.id): task for task in fate.mission.tasks}
@@ -94,7 +96,6 @@ class StochasticWorld:
             # There nobody's decision hangs on it, and nothing is drawn for each message.
             self._timing = replace(self._timing, status_s=_WATCHED_STATUS_S)
         timing = self._timing
-        self._next: WorldListener | None = watch
         self._outcomes: set[tuple[str, str, int]] = set()
         self._begun = False
         self.world = World(
@@ -123,8 +124,7 @@ class StochasticWorld:
 
     def said(self, process: Process, message: Message) -> None:
         """A mission may have begun, or an attempt ended that its UAV does not survive."""
-        if self._next is not None:
-            self._next.said(process, message)
+        self.tally.said(process, message)
         match message.body:
             case Outcome() as outcome:
                 self._survive(process, outcome)
@@ -136,28 +136,21 @@ class StochasticWorld:
 
     def stepped(self, process: Process) -> None:
         """Nothing follows from a step."""
-        if self._next is not None:
-            self._next.stepped(process)
 
     def raised(self, process: Process, fault: Exception) -> None:
         """A core has raised.
 
         Raises:
-            Exception: ``fault``, when nobody watches.
+            RuntimeError: always; a flight with a broken process is none to count.
         """
-        if self._next is None:
-            raise fault
-        self._next.raised(process, fault)
+        raise RuntimeError(f"{process.name} has broken down") from fault
 
     def refused(self, process: Process, order: GoTo) -> None:
-        """Nothing follows from a refusal."""
-        if self._next is not None:
-            self._next.refused(process, order)
+        """No vehicle refuses anything here."""
 
     def noted(self, process: Process, note: LogLine) -> None:
-        """Nothing follows from a note."""
-        if self._next is not None:
-            self._next.noted(process, note)
+        """A task may have been given up on the way."""
+        self.tally.noted(process, note)
 
     # -- what happens -------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ from typing import Any
 from agent.core.agent_core import AgentCore
 from agent.core.interface import Action, Event
 from sim.study.policies.roster import Planner
-from sim.world.outcome import FlightOutcome, Tally
+from sim.world.outcome import FlightOutcome
 from sim.world.stochastic_world import StochasticWorld
 from sim.world.uncertainty import Realization
 from swarm.model import Mission, Plan
@@ -62,17 +62,17 @@ class AgentsPolicy:
             del seed  # the planner has its own
             return plan(mission, method)
 
-        tally, taken_s = Tally(), list[float]()
+        taken_s: list[float] = []
         flown = StochasticWorld(
             fate,
             make_plan,
             method=self.method,
             seed=fate.seed,
             coordinator_lost_s=self.coordinator_lost_s,
-            watch=tally,
             make_agent=partial(_TimedAgent, clock=clock, taken_s=taken_s),
         )
         flown.run()
+        tally = flown.tally
         return FlightOutcome(
             visits=tuple(tally.visits),
             lost_uavs=tuple(flown.lost),

@@ -9,7 +9,6 @@ import pytest
 
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import make_plan
-from sim.world.outcome import Tally
 from sim.world.stochastic_world import StochasticWorld
 from sim.world.uncertainty import Realization, Uncertainty
 from swarm.model import Mission, Plan, TaskId, UavId
@@ -34,16 +33,15 @@ class Flown:
     def __init__(
         self, fate: Realization, method: str = "greedy", coordinator_lost_s: float | None = None
     ) -> None:
-        self.tally = Tally()
         self.world = StochasticWorld(
             fate,
             planner,
             method=method,
             seed=fate.seed,
             coordinator_lost_s=coordinator_lost_s,
-            watch=self.tally,
         )
         assert self.world.run()
+        self.tally = self.world.tally
         self.story = [(told.mission_s, told.text) for told in self.world.world.mission_state.story]
 
     @property
