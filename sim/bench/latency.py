@@ -19,7 +19,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.bench.fleets import options_for, started, survey_mission
 from sim.bench.results import Progress, quantile, unheard
-from sim.fleet.child_process import ChildProcess
 from sim.fleet.layout import BusKind, LaunchOptions, Layout
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.model import Mission
@@ -206,76 +205,51 @@ async def measure_hops(mission: Mission, options: LaunchOptions, claims: int) ->
     """
     layout = Layout(options, mission, np.random.default_rng())
     (name, *_) = layout.routers
-    router = ChildProcess(name, layout.router(name))
     clock = SystemClock()
-    said, heard = _Speaker(mission.name, clock), _Hearer(clock)
-    await router.start()
-    try:
-        await router.ready()
+    said, heard = _Noting(clock, says=True), _Noting(clock, says=False)
+    body = Claim(ClaimPhase.HELD, "t1", 1.0, 0, 2.0)
+    async with contextlib.AsyncExitStack() as stack:
+        await (await started(stack, name, layout.router(name))).ready()
         async with (
             _seated(said, layout, mission, SPEAKER, clock) as speaking,
             _seated(heard, layout, mission, _HEARER, clock),
         ):
-            for _ in range(_WARM + claims):
+            for number in range(1, _WARM + claims + 1):
                 await asyncio.sleep(1.0 / _RATE_HZ)
-                speaking.step(MessageReceived(said.claim()))
+                claim = Message(mission.name, SPEAKER, Stamp(1, number), body)
+                speaking.step(MessageReceived(claim))
             await asyncio.sleep(_LATE_S)
-    finally:
-        await router.stop()
     timed = [number for number in heard.at_s if number > _WARM]
     return tuple(heard.at_s[number] - said.at_s[number] for number in timed)
 
 
-class _Silent:
-    """What both cores have in common: they want nothing of their own accord."""
+class _Noting:
+    """A core that notes when it comes by each claim, and says it if it is the speaker's."""
+
+    def __init__(self, clock: Clock, *, says: bool) -> None:
+        self.at_s: dict[int, float] = {}
+        """By number of the claim."""
+        self._clock = clock
+        self._says = says
 
     def start(self, now_s: float) -> Sequence[CommonAction]:
         del now_s
+        return []
+
+    def step(self, event: CommonEvent, now_s: float) -> Sequence[CommonAction]:
+        del now_s
+        if isinstance(event, MessageReceived) and isinstance(event.message.body, Claim):
+            self.at_s.setdefault(event.message.stamp.counter, self._clock.now_s())
+            return [Publish(event.message)] if self._says else []
         return []
 
     def next_deadline_s(self) -> float | None:
         return None
 
 
-class _Speaker(_Silent):
-    """Says what it is told as its own, and notes when."""
-
-    def __init__(self, mission: str, clock: Clock) -> None:
-        self.at_s: dict[int, float] = {}
-        self._mission = mission
-        self._clock = clock
-
-    def claim(self) -> Message:
-        """The next one to say."""
-        stamp = Stamp(1, len(self.at_s) + 1)
-        body = Claim(ClaimPhase.HELD, "t1", 1.0, 0, 2.0)
-        return Message(self._mission, SPEAKER, stamp, body)
-
-    def step(self, event: CommonEvent, now_s: float) -> Sequence[CommonAction]:
-        del now_s
-        if isinstance(event, MessageReceived) and isinstance(event.message.body, Claim):
-            self.at_s[event.message.stamp.counter] = self._clock.now_s()
-            return [Publish(event.message)]
-        return []
-
-
-class _Hearer(_Silent):
-    """Notes when it hears each claim."""
-
-    def __init__(self, clock: Clock) -> None:
-        self.at_s: dict[int, float] = {}
-        self._clock = clock
-
-    def step(self, event: CommonEvent, now_s: float) -> Sequence[CommonAction]:
-        del now_s
-        if isinstance(event, MessageReceived) and isinstance(event.message.body, Claim):
-            self.at_s.setdefault(event.message.stamp.counter, self._clock.now_s())
-        return []
-
-
 @contextlib.asynccontextmanager
 async def _seated(
-    core: _Speaker | _Hearer, layout: Layout, mission: Mission, name: str, clock: Clock
+    core: _Noting, layout: Layout, mission: Mission, name: str, clock: Clock
 ) -> AsyncIterator[Shell[CommonEvent, CommonAction]]:
     """A shell around ``core`` on the bus, for as long as the context lasts."""
     bus = await open_zenoh_bus(layout.observer_seat(name))

@@ -175,7 +175,7 @@ class TrialRunner:
             row = row_of(world, job.trial, name, score(fate, flight), flight)
             rows.append(row)
         if self._bound is not None:
-            value = self._bound.value(fate, self._plan)
+            value = self._bound.value(fate)
             rows.append(TrialRow(world.index, world.vary, world.at, job.trial, BOUND, value))
         points = [p for p in self._points if p.world == job.world and job.trial < p.trials]
         return [

@@ -66,7 +66,7 @@ class Everything:
     name = "clairvoyant"
     what = "everything at once"
 
-    def value(self, fate: Realization, plan: Planner) -> float:
+    def value(self, fate: Realization) -> float:
         return sum(task.value for task in fate.mission.tasks) * fate.mission.horizon_s
 
 

@@ -41,7 +41,6 @@ from functools import partial
 import numpy as np
 
 from coordinator.planner.bound import lagrangian_bound
-from sim.study.policies.roster import Planner
 from sim.world.motion import Point
 from sim.world.uncertainty import Realization
 from swarm.allocation import Problem
@@ -81,9 +80,8 @@ class Clairvoyant:
     name = "clairvoyant"
     what = "no policy can be better: an upper bound that knows all draws"
 
-    def value(self, fate: Realization, plan: Planner) -> float:
-        """The bound for that realization [value·s]; it needs no plan."""
-        del plan
+    def value(self, fate: Realization) -> float:
+        """The bound for that realization [value·s]."""
         return clairvoyant_bound(fate)
 
 

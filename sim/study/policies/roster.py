@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 from swarm.model import Mission, Plan
 
 if TYPE_CHECKING:
+    from sim.study.policies.clairvoyant import Clairvoyant
     from sim.world.outcome import FlightOutcome
     from sim.world.uncertainty import Realization
     from swarm.runtime.clock import Clock
 
-__all__ = ["ROSTER", "Bound", "Planner", "Policy", "PolicyEntry", "PolicyRoster"]
+__all__ = ["ROSTER", "Planner", "Policy", "PolicyEntry", "PolicyRoster"]
 
 
 Planner = Callable[[Mission, str], Plan]
@@ -42,24 +43,6 @@ class Policy(Protocol):
 
     def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
         """Fly a mission to its end; the clock times decisions, and decides nothing."""
-        ...
-
-
-class Bound(Protocol):
-    """A value that no policy can exceed."""
-
-    @property
-    def name(self) -> str:
-        """By which studies ask for it."""
-        ...
-
-    @property
-    def what(self) -> str:
-        """In a few words, for a table."""
-        ...
-
-    def value(self, fate: Realization, plan: Planner) -> float:
-        """The bound for that realization [value·s]."""
         ...
 
 
@@ -118,9 +101,9 @@ class PolicyRoster:
         """Whether the policy of that name is modelled with ideal communication only."""
         return self.policies[name.partition(":")[0]].ideal
 
-    def make_bound(self) -> Bound:
+    def make_bound(self) -> Clairvoyant:
         """The bound."""
-        bound: Bound = _made(self.bound)
+        bound: Clairvoyant = _made(self.bound)
         return bound
 
 

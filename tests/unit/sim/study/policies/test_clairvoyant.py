@@ -20,7 +20,7 @@ from sim.study.policies.agents import GUIDED, GUIDED_ALONE
 from sim.study.policies.clairvoyant import Clairvoyant, clairvoyant_bound
 from sim.world.outcome import TaskVisit, value_of
 from sim.world.uncertainty import Realization, Uncertainty
-from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
+from swarm.model import Mission, Task, TaskId, Uav, UavId
 from tests.unit.sim.study.policies.test_policies import CLOCK, POLICIES, drawn, planned
 
 CALM = Uncertainty()
@@ -220,10 +220,7 @@ def test_a_mission_with_nobody_or_nothing_is_worth_nothing() -> None:
         assert clairvoyant_bound(CALM.draw(empty, SPAN_S, 0)) == 0.0
 
 
-def test_it_asks_for_no_plan_and_comes_out_the_same_again() -> None:
+def test_it_comes_out_the_same_again() -> None:
     fate = tiny_fate(5, 2, 4)
 
-    def plan(mission: Mission, method: str) -> Plan:
-        raise AssertionError(f"{method} of {mission.name} is not needed")
-
-    assert Clairvoyant().value(fate, plan) == clairvoyant_bound(fate) > 0.0
+    assert Clairvoyant().value(fate) == clairvoyant_bound(fate) > 0.0
