@@ -25,8 +25,6 @@ from swarm.model import Mission, Plan
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import remedy_for_name
 
-__all__ = ["simulate"]
-
 
 def simulate(
     mission: Mission,

@@ -24,20 +24,6 @@ if TYPE_CHECKING:
     from sim.world.uncertainty import Uncertainty
     from swarm.model import Mission
 
-__all__ = [
-    "ChanceOptions",
-    "CoordinatorLostOption",
-    "MethodOption",
-    "ReportOption",
-    "argument",
-    "option",
-    "option_of",
-    "print_report",
-    "with_options",
-    "with_reattempts",
-]
-
-
 _OPTION = "option"
 
 

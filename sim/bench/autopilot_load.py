@@ -30,16 +30,6 @@ from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.runtime.clock import Clock, SystemClock
 from swarm.runtime.table import Column
 
-__all__ = [
-    "AutopilotLoad",
-    "FrameCounter",
-    "StreamRate",
-    "measure_autopilot",
-    "rates_asked_hz",
-    "stream_rates",
-]
-
-
 POSITION_HZ = 10.0
 READY_S = 4.0
 """From power-up until a vehicle can be armed [s]."""

@@ -28,9 +28,6 @@ from swarm.scenario.files import resolve_scenario
 if TYPE_CHECKING:
     from sim.bench.solvers import MissionSource
 
-__all__ = ["bench"]
-
-
 _DEFAULT_SIZES = "10x50,50x500"
 _SCALING_SIZES = "10x50,10x500,50x500,50x2000,100x1000,200x2000,200x5000"
 _SEED = integer(0, 10**18 - 1, "no seed", "give whole numbers from 0 on, such as 0,1")

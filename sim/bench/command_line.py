@@ -18,21 +18,6 @@ if TYPE_CHECKING:
     from sim.fleet.autopilots import Autopilots
     from sim.fleet.layout import BusKind, LaunchOptions
 
-__all__ = [
-    "LONGEST_S",
-    "BusKindOption",
-    "ValleyArgument",
-    "bus_of",
-    "each",
-    "integer",
-    "launch_options",
-    "progress",
-    "require_proc",
-    "show",
-    "size_of",
-]
-
-
 LONGEST_S = 86_400.0
 """The longest time that an option takes."""
 T = TypeVar("T")

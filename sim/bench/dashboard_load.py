@@ -26,9 +26,6 @@ from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.runtime.clock import Clock, SystemClock
 from swarm.runtime.table import Column
 
-__all__ = ["DashboardLoad", "FollowerLoad", "measure_dashboard"]
-
-
 SETTLE_S = 5.0
 """Wall time before a measurement: those who have just come are told everything."""
 RESTATE_S = 2.0

@@ -27,9 +27,6 @@ from swarm.model import TaskId
 from swarm.runtime.clock import Clock
 from swarm.runtime.table import Column
 
-__all__ = ["DecideBench", "DecisionTimes", "measure_decisions"]
-
-
 _DISTURBED_FRAC = 0.3
 """UAVs lost and tasks on no list, in the row after a disturbance."""
 _ITERATIONS_PER_TASK = 20

@@ -27,9 +27,6 @@ from sim.fleet.layout import BusKind
 from swarm.protocol.timing import LinkKind, preset
 from swarm.runtime.table import Column, ResultTable
 
-__all__ = ["FailoverMeasure", "FailoverResults", "FailoverSettings", "measure_failover"]
-
-
 KILL_TARGET_S = 1.0
 
 

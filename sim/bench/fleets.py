@@ -16,9 +16,6 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.protocol.timing import LinkKind
 from swarm.scenario.write import format_scenario
 
-__all__ = ["far_mission", "flying", "options_for", "scenario_file", "started", "survey_mission"]
-
-
 _FAR_M = 10_000.0
 _SLOW_M_S = 1.0
 _ORIGIN = Origin(46.8, 9.7, 1100.0)

@@ -31,9 +31,6 @@ from swarm.protocol.uav_messages import Claim, ClaimPhase
 from swarm.runtime.clock import Clock, SystemClock
 from swarm.runtime.shell import Shell
 
-__all__ = ["SPEAKER", "DecisionLatencies", "MavlinkTap", "measure_hops", "measure_latencies"]
-
-
 REPORT_HZ = 10.0
 """Rate of position reports; 100 ms apart, ten times what a decision may take."""
 NOT_BY_ARRIVAL = 2

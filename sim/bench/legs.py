@@ -20,9 +20,6 @@ from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.options import JsonOption
 from swarm.scenario.files import resolve_scenario
 
-__all__ = ["FlownLeg", "LegTimes", "leg_times", "legs", "legs_flown", "load_run"]
-
-
 _REMEDY = "name what swarm run SCENARIO --json printed of a flight of that scenario"
 
 

@@ -28,18 +28,6 @@ from swarm.protocol.uav_messages import ClaimPhase
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.log import LogLevel, configure_logging
 
-__all__ = [
-    "BAD_LINKS",
-    "BadLink",
-    "FalseLosses",
-    "PartitionResult",
-    "Traffic",
-    "measure_false_losses",
-    "measure_partition",
-    "measure_traffic",
-]
-
-
 START_S = 150.0
 """Until the whole fleet flies, on whatever links [wall s]."""
 END_S = 400.0

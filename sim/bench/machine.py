@@ -14,16 +14,6 @@ import numpy as np
 
 import swarm
 
-__all__ = [
-    "MachineInfo",
-    "cpu_s",
-    "memory_bytes",
-    "peak_memory_bytes",
-    "processor_name",
-    "this_machine",
-]
-
-
 _CPU_INFO = Path("/proc/cpuinfo")
 _STATUS = Path("/proc/self/status")
 

@@ -27,9 +27,6 @@ from swarm.model import Plan
 from swarm.runtime.clock import Clock, SystemClock
 from swarm.runtime.table import Column
 
-__all__ = ["BatchResult", "MissionBatch", "MissionsBench", "fly_block", "measure_missions"]
-
-
 _BLOCK = 10
 """Missions a process flies between two reports."""
 

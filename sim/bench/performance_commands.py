@@ -23,8 +23,6 @@ from sim.options import ChanceOptions, option_of
 from swarm.runtime.options import JsonOption, SeedOption, SpeedupOption
 from swarm.scenario.files import resolve_scenario
 
-__all__ = ["autopilot", "dashboard", "missions", "turnaround"]
-
 
 def turnaround(
     scenario: ValleyArgument = None,

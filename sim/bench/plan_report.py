@@ -26,16 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "PlanReport",
-    "comparison_figure",
-    "comparison_grids",
-    "scaling_figure",
-    "scaling_grid",
-    "write_figure",
-]
-
-
 _MIB = 2.0**20
 _SIZE = re.compile(r"\d+×\d+")
 

@@ -25,16 +25,6 @@ from swarm.allocation import evaluate
 from swarm.allocation.problem import Problem
 from swarm.runtime.errors import SwarmError
 
-__all__ = [
-    "LONG_RUN",
-    "MethodSummary",
-    "PlanBench",
-    "PlanMeasurement",
-    "measure_plans",
-    "summaries",
-]
-
-
 LONG_RUN = "guided-long"
 """Name of the long run of ``guided`` that others may be compared with."""
 

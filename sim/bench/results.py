@@ -14,9 +14,6 @@ from rich.text import Text
 from sim.bench.machine import MachineInfo
 from swarm.runtime.table import Column, ResultTable
 
-__all__ = ["BenchResult", "Progress", "quantile", "table_of", "unheard"]
-
-
 Progress = Callable[[str], None]
 """Is told what is being done."""
 

@@ -25,8 +25,6 @@ from swarm.scenario.files import resolve_scenario
 if TYPE_CHECKING:
     from sim.bench.failover import FailoverMeasure
 
-__all__ = ["failover", "flood", "secure"]
-
 
 def failover(
     what: Annotated[

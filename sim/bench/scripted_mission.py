@@ -31,9 +31,6 @@ from swarm.protocol.uav_messages import (
 )
 from swarm.runtime.clock import Clock
 
-__all__ = ["MARK", "ScriptedMission"]
-
-
 MARK = "mark "
 """Begins the note in each status of the first UAV; a number follows."""
 SERVED_S = 20.0

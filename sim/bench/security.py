@@ -26,9 +26,6 @@ from sim.fleet.layout import BusKind, LaunchOptions
 from swarm.model import Mission
 from swarm.runtime.table import Column, ResultTable
 
-__all__ = ["FloodBench", "SecureBench", "SecureSettings", "in_turn", "measure_secure"]
-
-
 FLOOD_MS = 100.0
 """What 99 of 100 turnarounds of the others shall not exceed while somebody floods."""
 _HOP_ROUNDS = 4

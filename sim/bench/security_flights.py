@@ -32,21 +32,6 @@ from sim.fleet.security import protected
 from swarm.model import Mission
 from swarm.protocol.messages import MissionPhase
 
-__all__ = [
-    "HOSTILE",
-    "LAUNCHER",
-    "CostFlight",
-    "CostsByKind",
-    "FloodTotals",
-    "ProcessMeter",
-    "SecurityMode",
-    "flooded",
-    "fly_metered",
-    "kind_of",
-    "prepared",
-]
-
-
 LAUNCHER = "swarm run"
 
 

@@ -29,22 +29,6 @@ from swarm.runtime.clock import Clock, SystemClock
 from swarm.runtime.errors import SwarmError
 from swarm.scenario import load_scenario
 
-__all__ = [
-    "HORIZON_SHARE",
-    "METHODS",
-    "MissionSource",
-    "PlanningJob",
-    "PlanningMethod",
-    "PlanningResult",
-    "PlanningRun",
-    "Solver",
-    "TracePoint",
-    "problem_of",
-    "run_in_subprocess",
-    "run_job",
-]
-
-
 TracePoint = tuple[float, float]
 """Seconds since the start, and the best J found by then [value·s]."""
 

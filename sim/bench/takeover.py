@@ -30,9 +30,6 @@ from swarm.protocol.timing import LinkKind
 from swarm.protocol.uav_messages import Claim, ClaimPhase
 from swarm.runtime.clock import SystemClock
 
-__all__ = ["FailureMode", "Takeovers", "measure_takeovers", "stuck_on_demand"]
-
-
 START_S = 90.0
 """Until the whole fleet flies [wall s]."""
 SETTLE_S = 60.0

@@ -25,18 +25,6 @@ from sim.fleet.run import fly
 from swarm.model import Mission
 from swarm.runtime.table import Column, ResultTable
 
-__all__ = [
-    "SHARES",
-    "TARGET_MS",
-    "TARGET_RATIO",
-    "TurnaroundFlight",
-    "Turnarounds",
-    "measure_turnarounds",
-    "quantiles_ms",
-    "told_turnarounds",
-]
-
-
 TARGET_MS = 20.0
 """What 99 of 100 turnarounds shall not exceed."""
 TARGET_RATIO = 1.02

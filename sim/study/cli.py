@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from sim.study.summary import StudySummary
     from sim.study.trial import TrialRow
 
-__all__ = ["study"]
-
-
 _INTERRUPTED = 130
 _SUMMARY_FILE = "summary.md"
 _WIDTH = 100

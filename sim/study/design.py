@@ -20,25 +20,6 @@ from swarm.allocation.problem import Problem
 from swarm.model import Mission
 from swarm.scenario.findings import number_of, shown
 
-__all__ = [
-    "LISTED",
-    "NUMBERS",
-    "PROBABILITIES",
-    "SWITCHES",
-    "DesignPoint",
-    "Factor",
-    "RandomMissions",
-    "SameMission",
-    "Study",
-    "fate_seed",
-    "right_number",
-    "span_s",
-    "unlisted",
-    "wrong_number",
-    "wrong_values",
-]
-
-
 NUMBERS = tuple(item.name for item in fields(Uncertainty) if item.type == "float")
 """What of the uncertainty can be varied."""
 SWITCHES = tuple(item.name for item in fields(Uncertainty) if item.type == "bool")

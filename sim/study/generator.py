@@ -13,9 +13,6 @@ import numpy as np
 from swarm.allocation.problem import Problem
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 
-__all__ = ["mission_of", "random_mission", "random_table_problem"]
-
-
 _TABLE_SIDE_M = 10.0
 """Of the paper's square of targets."""
 _SIDE_M = 5000.0

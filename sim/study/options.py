@@ -8,8 +8,6 @@ from pathlib import Path
 from sim.options import argument, option
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["StudyOutput", "StudyRequest"]
-
 
 @dataclass(frozen=True, slots=True)
 class StudyRequest:

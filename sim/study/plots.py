@@ -36,16 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "churn_bars_figure",
-    "churn_figure",
-    "comparison_figure",
-    "draw_study",
-    "time_figure",
-    "value_figure",
-]
-
-
 _CLOSE = (0.75, 1.15)
 """Ratios that are drawn; what lies beyond is told."""
 _CHURN = {

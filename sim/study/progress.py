@@ -11,9 +11,6 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-__all__ = ["StudyProgress", "duration_text"]
-
-
 _LINE_EVERY_S = 30.0
 """Between lines where there is no terminal; the last one comes in any case."""
 

@@ -26,9 +26,6 @@ from swarm.scenario.files import read_bytes
 from swarm.scenario.findings import close_match, printable
 from swarm.scenario.read import parse_toml
 
-__all__ = ["requested_study", "shipped_studies"]
-
-
 _STUDIES = "sim.studies"
 _USUAL_REFERENCE = "central"
 _SCENARIO_KEYS = ("uav", "task", "tasks_from", "origin")

@@ -29,9 +29,6 @@ from swarm.runtime.errors import Fault, InputError, SwarmError
 from swarm.runtime.extras import require_extra
 from swarm.scenario.findings import printable
 
-__all__ = ["Fly", "fly_here", "in_processes", "on_dask", "run_study"]
-
-
 Fly = Callable[[TrialContext, Sequence[TrialJob]], Generator[list[TrialRow]]]
 """Flies jobs and yields the rows of each as soon as it is done, in any order. Closing it gives
 up what is left."""

@@ -15,9 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Estimate", "difference_of", "mean_of", "ratio_of", "share_of"]
-
-
 _CONFIDENCE = 0.95
 _TAIL = 0.5 + 0.5 * _CONFIDENCE
 

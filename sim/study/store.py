@@ -24,19 +24,6 @@ from sim.study.trial import COLUMNS, TrialJob, TrialRow, rows_due
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario import format_scenario
 
-__all__ = [
-    "ROWS_FILE",
-    "STUDY_FILE",
-    "FolderStore",
-    "RowStore",
-    "read_rows",
-    "replace_text",
-    "row_line",
-    "table_text",
-    "write_parquet",
-]
-
-
 _PARQUET_FILE = "trials.parquet"
 
 

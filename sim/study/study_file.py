@@ -39,19 +39,6 @@ from swarm.scenario.validation import (
 )
 from swarm.scenario.write import toml_float, toml_string
 
-__all__ = [
-    "DEFAULT_TRIALS",
-    "MOST_SEED",
-    "MOST_TASKS",
-    "MOST_TRIALS",
-    "MOST_UAVS",
-    "SCHEMA",
-    "format_study",
-    "load_study",
-    "parse_study",
-]
-
-
 SCHEMA = 1
 """The version of the format that is read and written."""
 DEFAULT_TRIALS = 50

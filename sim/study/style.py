@@ -23,30 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "IDEAL",
-    "NONE",
-    "QUANTITIES",
-    "ROW_IN",
-    "PolicyStyle",
-    "Quantity",
-    "add_legend",
-    "add_title",
-    "error_lengths",
-    "interval_text",
-    "name_rows",
-    "number_text",
-    "plain_axes",
-    "policy_label",
-    "rows_figure",
-    "save_figures",
-    "spread_text",
-    "style_of",
-    "trials_text",
-    "two_panels",
-    "uncertainty_words",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Quantity:

@@ -18,16 +18,6 @@ from sim.world.uncertainty import Uncertainty
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-__all__ = [
-    "PointSummary",
-    "PolicyResult",
-    "StudyDescription",
-    "StudySummary",
-    "WallTimes",
-    "summarise",
-]
-
-
 Flights = Mapping[int, TrialRow]
 """Rows of one setting and policy by trial."""
 

@@ -32,9 +32,6 @@ from swarm.runtime.table import Column, ResultTable
 from swarm.scenario.files import decode, read_bytes
 from swarm.scenario.findings import printable
 
-__all__ = ["MarkedFile", "TerminalTables", "as_markdown"]
-
-
 _GAP = 2
 
 

@@ -18,21 +18,6 @@ from sim.world.outcome import FlightOutcome, Score, score
 from swarm.model import Mission, Plan
 from swarm.runtime.clock import Clock
 
-__all__ = [
-    "BOUND",
-    "COLUMNS",
-    "WALL_COLUMNS",
-    "TrialContext",
-    "TrialJob",
-    "TrialRow",
-    "TrialRunner",
-    "jobs_of",
-    "row_of",
-    "rows_due",
-    "without_wall_times",
-]
-
-
 BOUND = "clairvoyant"
 """In place of a policy's name in rows of the bound, which have a value and nothing else."""
 

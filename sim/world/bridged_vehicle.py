@@ -29,9 +29,6 @@ from sim.autopilot.pilot import Pilot
 from sim.autopilot.vehicle import COMPONENT_ID, SimulatedAutopilot
 from sim.world.engine import EventQueue, stream, uniforms
 
-__all__ = ["BridgedVehicle", "Equipment", "LinkQuality", "SteppedBridge"]
-
-
 _LEAST_SLEEP_S = 0.001
 
 

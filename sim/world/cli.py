@@ -20,8 +20,6 @@ from sim.options import (
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.options import JsonOption, OptionalScenarioArgument, SeedOption
 
-__all__ = ["simulate"]
-
 
 @with_options
 def simulate(

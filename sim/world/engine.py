@@ -23,8 +23,6 @@ from swarm.protocol.events import CommonEvent, LinkChanged, MessageReceived, Sna
 from swarm.protocol.messages import Snapshot
 from swarm.runtime.shell import Core
 
-__all__ = ["EventQueue", "LocalClock", "Process", "ProcessOwner", "stream", "uniforms"]
-
 
 class EventQueue:
     """Runs callbacks in order of their time; equal times in order of scheduling."""

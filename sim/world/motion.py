@@ -22,9 +22,6 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-__all__ = ["IdealMotion", "Motion", "Point", "SmoothMotion", "between", "minus", "plus"]
-
-
 Point = tuple[float, float, float]
 """East, north, up [m] of a place, or [m/s] of a velocity, in the mission's local frame."""
 

@@ -22,8 +22,6 @@ from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.timing import PRESETS, LinkKind
 from swarm.protocol.uav_messages import Choice, Status
 
-__all__ = ["IdealNetwork", "Network", "NetworkConditions", "Node", "Topology"]
-
 
 class Node(Protocol):
     """One life of one process, as the network sees it."""

@@ -18,8 +18,6 @@ from swarm.protocol.events import LogLine
 from swarm.protocol.messages import Message, MissionPhase, PlanEpoch, TaskEdit, TaskEntry
 from swarm.protocol.uav_messages import AttemptResult, Choice, Claim, Outcome
 
-__all__ = ["FlightOutcome", "Score", "Tally", "TaskVisit", "score", "value_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class TaskVisit:

@@ -23,14 +23,6 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.sync import combined
 from swarm.protocol.uav_messages import Choice, ChoiceBasis, Status, choice_id
 
-__all__ = [
-    "DecisionDifference",
-    "RedecisionResult",
-    "redecide",
-    "redecided_as_json",
-    "redecided_lines",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class DecisionDifference:

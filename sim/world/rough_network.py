@@ -29,8 +29,6 @@ from swarm.protocol.events import (
 from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.uav_messages import Choice, Status
 
-__all__ = ["RoughNetwork"]
-
 
 @dataclass(slots=True)
 class _DirectedLink:

@@ -19,8 +19,6 @@ from swarm.protocol.messages import Message, TaskEdit
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.timing import Timing
 
-__all__ = ["ScriptedOperator"]
-
 
 class ScriptedOperator:
     """A core that posts and withdraws tasks when their time has come.

@@ -21,17 +21,6 @@ from swarm.protocol.messages import Message
 from swarm.protocol.timing import Timing
 from swarm.runtime.shell import Core
 
-__all__ = [
-    "QUIET",
-    "Planner",
-    "Replanner",
-    "RestartMemory",
-    "ScheduledLosses",
-    "WorldListener",
-    "WorldSettings",
-]
-
-
 QUIET = Timing(announce_s=1e4, status_s=1e4, silence_s=2.5e4)
 """Timers for an ideal bus: nothing is said twice, and who is silent has nothing to say."""
 

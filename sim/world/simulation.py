@@ -22,8 +22,6 @@ from swarm.protocol.timing import Timing
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import SwarmError
 
-__all__ = ["SimulatedMission", "plan_once", "recording_simulation", "simulate_mission"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedMission:

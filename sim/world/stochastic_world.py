@@ -35,9 +35,6 @@ from swarm.protocol.timing import PRESETS, LinkKind, LinkPreset, Timing
 from swarm.protocol.uav_messages import Outcome
 from swarm.runtime.shell import Core
 
-__all__ = ["ObserverMaker", "StochasticWorld"]
-
-
 _HEARD_S = 0.1
 """How often it is looked whether the start of the mission has been heard of."""
 _OPERATOR_SITS_DOWN_S = 1.0

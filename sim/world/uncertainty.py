@@ -20,9 +20,6 @@ from sim.world.motion import Point
 from sim.world.wind import Wind
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 
-__all__ = ["FleetPartition", "Realization", "Uncertainty", "bounding_box", "lognormal"]
-
-
 _ATTEMPTS = 8
 """Drawn at once."""
 _AIRSPEED_FRAC = 1.25

@@ -31,8 +31,6 @@ from sim.world.motion import IdealMotion, Point, between, minus, plus
 from sim.world.uncertainty import Realization
 from swarm.model import UavId
 
-__all__ = ["IdealVehicle", "SimulatedVehicle", "StochasticVehicle", "VehicleFactory"]
-
 
 class SimulatedVehicle(Protocol):
     """The vehicle of one UAV in virtual time, whatever lies between it and its agent."""

@@ -56,8 +56,6 @@ from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoc
 from swarm.protocol.timing import Timing
 from swarm.runtime.shell import Core
 
-__all__ = ["ONLOOKER", "STANDBY", "World"]
-
 ONLOOKER = "onlooker"
 """Name of the process that only watches."""
 STANDBY = "standby"

@@ -19,9 +19,6 @@ import numpy as np
 
 from sim.world.motion import Motion, Point
 
-__all__ = ["Gusts", "Wind", "WindyMotion", "gusts_of"]
-
-
 _WAVES = 4
 _PERIODS_S = (4.0, 20.0)
 _GIVE_FRAC = 0.1

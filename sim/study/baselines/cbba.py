@@ -25,8 +25,6 @@ from swarm.allocation.index_rules import VALUE_PER_TIME
 from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import BoolArray, FloatArray, IntArray, Problem
 
-__all__ = ["NOBODY", "NO_BID", "Beliefs", "CbbaResult", "Insertion", "cbba", "update_beliefs"]
-
 
 class Insertion:
     """Gains of insertion into paths that begin where the team stands; at its start when None.

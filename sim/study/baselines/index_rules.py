@@ -11,9 +11,6 @@ from swarm.allocation.index_rules import NEAREST, VALUE_PER_TIME, IndexRule
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
 
-__all__ = ["Routes", "makespan_s", "nearest_first", "routes_by", "value_per_time"]
-
-
 Routes = list[list[int]]
 """Task indices per UAV in order of execution."""
 

@@ -16,9 +16,6 @@ from sim.study.baselines.index_rules import Routes
 from swarm.allocation.problem import IntArray, Problem
 from swarm.runtime.extras import MissingExtraError
 
-__all__ = ["SHORTFALL", "is_installed", "matrix_bytes", "ortools_routes", "require_installed"]
-
-
 SHORTFALL = (
     "OR-Tools has no value that falls with time and depends on who serves: a task's lateness "
     "costs its value times the average p of the fleet (a soft upper bound of 0 on its arrival), "

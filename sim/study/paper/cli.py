@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from sim.study.paper.reproduction import Reproduction
 
-__all__ = ["reproduce"]
-
 
 def reproduce(
     problems: Annotated[

@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_figures", "hierarchical_figure", "optimal_figure", "random_figure"]
-
-
 _FEW_PROBLEMS = 100
 
 

@@ -24,17 +24,6 @@ from swarm.allocation.rules import kernel_rule
 from swarm.kernels import exact as kernel
 from swarm.kernels.lower_level import evaluate_sequences
 
-__all__ = [
-    "READINGS",
-    "STUDIED",
-    "Average",
-    "ProblemResult",
-    "RandomResults",
-    "Reading",
-    "reproduce_random",
-]
-
-
 STUDIED = (*RULES, "guided")
 _ROUNDING = 1e-9
 """Of sums of eq. 1 in different orders, on the scale from worst plan to optimum."""

@@ -13,9 +13,6 @@ from sim.study.paper.reproduction import MethodTimes, Reproduction
 from sim.study.paper.tables import RULES, SequenceValue, lists_text
 from swarm.runtime.table import Column, ResultTable
 
-__all__ = ["reproduction_text"]
-
-
 _SCALES = {"worst": "worst plan 0, optimum 1", "ratio": "J / optimum"}
 _SEQUENCES = {
     "best": "best of the sequences",

@@ -27,16 +27,6 @@ from swarm.runtime.clock import Clock
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
 
-__all__ = [
-    "MethodTimes",
-    "ProcessorInfo",
-    "Reproduction",
-    "measure_times",
-    "reproduce_paper",
-    "this_processor",
-]
-
-
 _REPEATS = 25
 
 

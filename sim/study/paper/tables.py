@@ -15,19 +15,6 @@ from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name
 from swarm.model import Mission, Plan
 from swarm.runtime.clock import Clock
 
-__all__ = [
-    "RULES",
-    "Check",
-    "Expectations",
-    "PaperFigures",
-    "Printed",
-    "SequenceValue",
-    "TableResults",
-    "lists_text",
-    "printed_check",
-    "reproduce_tables",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Printed:

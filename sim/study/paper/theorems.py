@@ -18,9 +18,6 @@ from swarm.allocation import Problem, TeamState, next_decision, rank_of, rule_by
 from swarm.allocation.problem import FloatArray
 from swarm.model import TaskId, UavId
 
-__all__ = ["TheoremResult", "allocations", "check_theorems"]
-
-
 _MOST_UAVS, _MOST_TASKS = 4, 5
 """Of the allocations that are counted one by one."""
 _MOST_ASSIGNED = 5

@@ -22,8 +22,6 @@ from swarm.model import Mission, Plan
 from swarm.protocol.events import LogLine
 from swarm.runtime.clock import Clock
 
-__all__ = ["GREEDY", "GUIDED", "GUIDED_ALONE", "LOOKAHEAD", "AgentsPolicy"]
-
 
 class _TimedAgent(AgentCore):
     """An agent that notes how long it takes to decide."""

@@ -50,9 +50,6 @@ from swarm.kernels.routes import TeamArrays
 from swarm.kernels.routes_bound import Timetable, priced_lists
 from swarm.model import Task, Uav
 
-__all__ = ["Clairvoyant", "clairvoyant_bound"]
-
-
 _CYCLES = 60
 _OPERATIONS = 1e10
 """Of the dynamic programme in all: some ten seconds."""

@@ -20,16 +20,6 @@ from swarm.allocation.index_rules import NEAREST, VALUE_PER_TIME
 from swarm.model import TaskId, UavId
 from swarm.runtime.clock import Clock
 
-__all__ = [
-    "FROZEN",
-    "NEAREST_FIRST",
-    "VALUE_PER_TIME_ONLINE",
-    "ListFollower",
-    "RuleDispatcher",
-    "TeamPolicy",
-    "by_index",
-]
-
 
 class RuleDispatcher:
     """Asks a rule."""

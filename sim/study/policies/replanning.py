@@ -20,16 +20,6 @@ from swarm.allocation.rules import team_arrays
 from swarm.kernels.routes import optimise_routes
 from swarm.model import TaskId, UavId
 
-__all__ = [
-    "CBBA",
-    "CENTRAL",
-    "CENTRAL_DIVERT",
-    "AuctionDispatcher",
-    "CentralOptimiser",
-    "interval",
-]
-
-
 _UPON = frozenset({TeamNews.APPEARED, TeamNews.WITHDRAWN, TeamNews.LOST, TeamNews.REOPENED})
 
 

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from sim.world.uncertainty import Realization
     from swarm.runtime.clock import Clock
 
-__all__ = ["ROSTER", "Planner", "Policy", "PolicyEntry", "PolicyRoster"]
-
-
 Planner = Callable[[Mission, str], Plan]
 """The offline plan of what is known of a mission at its start, by method; the same for all
 policies that meet the same realization, and worked out once."""

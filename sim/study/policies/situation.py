@@ -15,8 +15,6 @@ from swarm.allocation import Problem, TeamState
 from swarm.allocation.problem import FloatArray, IntArray
 from swarm.runtime.clock import Clock
 
-__all__ = ["Account", "Dispatcher", "TeamLeg", "TeamNews", "TeamSituation", "as_point"]
-
 
 class TeamNews(Enum):
     """What may have happened since choices were last made."""

@@ -26,8 +26,6 @@ from swarm.allocation import Problem, TeamState, rank_of
 from swarm.allocation.problem import straight_m
 from swarm.model import UavId
 
-__all__ = ["fly_team"]
-
 
 def fly_team(
     fate: Realization,
