@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 from rich.console import RenderableType
@@ -108,21 +107,16 @@ def measure_decisions(
     seed: int,
     clock: Clock,
     *,
-    most_decisions: int | None = None,
     sequences: int = 200,
 ) -> DecideBench:
-    """Time decisions of each rule on one random mission, and a batch of greedy sequences.
-
-    ``most_decisions`` of each rule are made; all of the mission when None.
-    """
+    """Time all decisions of each rule on one random mission, and a batch of greedy sequences."""
     machine = this_machine()
     problem = problem_of(MissionSource(n_uav=n_uav, n_task=n_task, seed=seed))
     rng = np.random.default_rng(seed)
     times = []
     for name, rule, state in _rules(problem, rng, seed):
         timed = _TimedRule(rule, clock)
-        made = decisions(problem, state, rank_of(range(n_uav)), timed)
-        for _ in islice(made, most_decisions):
+        for _ in decisions(problem, state, rank_of(range(n_uav)), timed):
             pass
         times.append(_times(name, timed.times_s))
     ranks = np.array([rng.permutation(n_uav) for _ in range(sequences)])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,8 +64,6 @@ class TrialRow:
 
 
 COLUMNS = tuple(field.name for field in fields(TrialRow))
-WALL_COLUMNS = tuple(name for name in COLUMNS if name.endswith("_wall_s"))
-"""Differ from run to run; all others are the same for the same seed."""
 
 
 def row_of(
@@ -90,12 +88,6 @@ def row_of(
         decision_p99_wall_s=float(np.quantile(wall_s, 0.99)) if some else None,
         decision_max_wall_s=float(wall_s.max()) if some else None,
     )
-
-
-def without_wall_times(row: TrialRow) -> TrialRow:
-    """What of ``row`` is the same in every run of the same study."""
-    cleared: dict[str, Any] = dict.fromkeys(WALL_COLUMNS)
-    return replace(row, **cleared)
 
 
 _PLANS_KEPT = 16

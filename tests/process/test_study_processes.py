@@ -18,11 +18,12 @@ from sim.study.design import Factor, RandomMissions, Study
 from sim.study.policies.roster import ROSTER, PolicyRoster
 from sim.study.runner import Fly, fly_here, in_processes, on_dask, run_study
 from sim.study.store import RowStore, read_rows
-from sim.study.trial import TrialContext, TrialRow, jobs_of, without_wall_times
+from sim.study.trial import TrialContext, TrialRow, jobs_of
 from sim.world.uncertainty import Uncertainty
 from swarm.runtime.errors import InputError, SwarmError
 from tests.process.mission import wait_until
 from tests.support.fake_policies import FAKES
+from tests.support.study_rows import without_wall_times
 
 pytestmark = pytest.mark.process
 

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from sim.study.trial import BOUND, TrialRow
+from sim.study.trial import BOUND, COLUMNS, TrialRow
 
 _WORTH = {"central": 1.0, "guided": 1.02, "greedy": 0.8}
+
+
+def without_wall_times(row: TrialRow) -> TrialRow:
+    """What of ``row`` is the same in every run of the same study."""
+    cleared: dict[str, Any] = {name: None for name in COLUMNS if name.endswith("_wall_s")}
+    return replace(row, **cleared)
 
 
 def study_rows(

@@ -7,7 +7,6 @@ Colours are Okabe and Ito's, and marks differ in shape too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,26 +16,13 @@ from coordinator.plot import plan_figure
 from sim.study.paper.random_problems import STUDIED, RandomResults
 from sim.study.paper.reproduction import Reproduction
 from sim.study.paper.tables import RULES, PaperFigures, TableResults
-from sim.study.style import add_title, plain_axes, save_figures
+from sim.study.style import add_title, plain_axes, save_figures, style_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _FEW_PROBLEMS = 100
-
-
-@dataclass(frozen=True, slots=True)
-class _Mark:
-    colour: str
-    marker: str
-
-
-_MARKS = {
-    "greedy": _Mark("#0072B2", "o"),
-    "lookahead": _Mark("#D55E00", "^"),
-    "guided": _Mark("#009E73", "s"),
-}
 
 
 def draw_figures(found: Reproduction, folder: Path) -> list[Path]:
@@ -96,7 +82,7 @@ def _draw_problems(axes: Axes, random: RandomResults) -> None:
     size = 5.0 if n <= _FEW_PROBLEMS else 2.5
     # guided lies on 1 nearly everywhere: wide and hollow, it hides no other mark
     for method in STUDIED:
-        mark, hollow = _MARKS[method], method == "guided"
+        mark, hollow = style_of(method, STUDIED), method == "guided"
         axes.plot(
             np.arange(1, n + 1),
             random.normalised(method)[order],
@@ -117,7 +103,7 @@ def _draw_problems(axes: Axes, random: RandomResults) -> None:
 
 def _draw_averages(axes: Axes, random: RandomResults, paper: PaperFigures) -> None:
     for place, method in enumerate(STUDIED):
-        mark, average = _MARKS[method], random.average(method)
+        mark, average = style_of(method, STUDIED), random.average(method)
         axes.errorbar(
             place,
             average.mean,

@@ -23,11 +23,6 @@ def test_decisions_of_every_rule_are_timed() -> None:
     assert bench.sequences_per_s_threaded > 0.0
 
 
-def test_a_long_mission_may_be_cut_short() -> None:
-    bench = measure_decisions(4, 20, 0, SystemClock(), most_decisions=5, sequences=1)
-    assert [row.decisions for row in bench.times[:2]] == [5, 5]
-
-
 def test_it_is_told_to_people_and_programs() -> None:
     bench = measure_decisions(3, 9, 1, SystemClock(), sequences=5)
     stream = io.StringIO()

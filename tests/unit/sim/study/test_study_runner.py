@@ -19,12 +19,12 @@ from sim.study.trial import (
     TrialJob,
     TrialRow,
     jobs_of,
-    without_wall_times,
 )
 from sim.world.uncertainty import Uncertainty
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario, shipped_scenarios
 from tests.support.fake_policies import FAKES, Interrupted
+from tests.support.study_rows import without_wall_times
 
 STUDY = Study(
     name="test",
