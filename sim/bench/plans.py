@@ -38,22 +38,22 @@ class PlanMeasurement:
     seed: int
     method: str
     limit_s: float
-    objective: float | None
+    objective: float | None = None
     """J [value·s]; None if there are no lists."""
-    ratio: float | None
+    ratio: float | None = None
     """J over the best J of all methods on this mission in this run, long run apart."""
-    ratio_long: float | None
+    ratio_long: float | None = None
     """J over that of the long run; None without one."""
-    unassigned: int
+    unassigned: int = 0
     """Tasks on no list though some UAV is capable of them."""
-    late: int
+    late: int = 0
     """Tasks completed after D, whose terms are negative."""
-    elapsed_s: float
-    cpu_s: float
-    peak_bytes: int
-    base_bytes: int
-    trace: tuple[TracePoint, ...]
-    note: str
+    elapsed_s: float = 0.0
+    cpu_s: float = 0.0
+    peak_bytes: int = 0
+    base_bytes: int = 0
+    trace: tuple[TracePoint, ...] = ()
+    note: str = ""
     """What to know of it, or why there are no lists."""
 
 
@@ -144,23 +144,7 @@ def _measured(
 ) -> PlanMeasurement:
     refusal = METHODS[job.method].refusal
     refused = None if refusal is None else refusal(problem, job.limit_s)
-    blank = PlanMeasurement(
-        case=case,
-        seed=job.seed,
-        method=name,
-        limit_s=job.limit_s,
-        objective=None,
-        ratio=None,
-        ratio_long=None,
-        unassigned=0,
-        late=0,
-        elapsed_s=0.0,
-        cpu_s=0.0,
-        peak_bytes=0,
-        base_bytes=0,
-        trace=(),
-        note=refused or "",
-    )
+    blank = PlanMeasurement(case, job.seed, name, job.limit_s, note=refused or "")
     if refused is not None:
         return blank
     try:

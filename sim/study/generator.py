@@ -7,6 +7,7 @@ tasks, so that tasks stand equally dense at every size.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -58,8 +59,7 @@ def random_mission(
 
 def mission_of(problem: Problem, name: str) -> Mission:
     """``problem`` as a mission of that name, all of whose tasks are known at the start."""
-    east_north_up = [tuple(map(float, place)) for place in problem.task_enu_m]
-    starts = [tuple(map(float, place)) for place in problem.start_enu_m]
+    starts_m, places_m = problem.start_enu_m.tolist(), problem.task_enu_m.tolist()
     ids = problem.task_ids
     return Mission(
         name=name,
@@ -67,7 +67,7 @@ def mission_of(problem: Problem, name: str) -> Mission:
         uavs=tuple(
             Uav(
                 id=uav,
-                position_enu_m=(starts[row][0], starts[row][1], starts[row][2]),
+                position_enu_m=tuple(starts_m[row]),
                 speed_m_s=float(problem.speed_m_s[row]),
                 success=dict(zip(ids, problem.success[row].tolist(), strict=True)),
                 survival=dict(zip(ids, problem.survival[row].tolist(), strict=True)),
@@ -77,11 +77,11 @@ def mission_of(problem: Problem, name: str) -> Mission:
         tasks=tuple(
             Task(
                 id=task,
-                position_enu_m=(place[0], place[1], place[2]),
+                position_enu_m=tuple(place_m),
                 value=float(problem.value[column]),
                 service_s=float(problem.service_s[column]),
             )
-            for column, (task, place) in enumerate(zip(ids, east_north_up, strict=True))
+            for column, (task, place_m) in enumerate(zip(ids, places_m, strict=True))
         ),
     )
 
@@ -97,15 +97,4 @@ def random_table_problem(table: Problem, seed: int, index: int) -> Problem:
     start_enu_m[:, 0] = rng.uniform(0.0, _TABLE_SIDE_M)
     task_enu_m = np.zeros((table.n_task, 3))
     task_enu_m[:, :2] = rng.uniform(0.0, _TABLE_SIDE_M, (table.n_task, 2))
-    return Problem(
-        uav_ids=table.uav_ids,
-        task_ids=table.task_ids,
-        start_enu_m=start_enu_m,
-        task_enu_m=task_enu_m,
-        speed_m_s=table.speed_m_s,
-        value=table.value,
-        service_s=table.service_s,
-        success=table.success,
-        survival=table.survival,
-        horizon_s=table.horizon_s,
-    )
+    return replace(table, start_enu_m=start_enu_m, task_enu_m=task_enu_m)

@@ -14,6 +14,7 @@ import heapq
 import itertools
 import math
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -267,15 +268,12 @@ class _TeamFlight:
     def _problem_of(self, n_known: int) -> Problem:
         """The mission as far as its first tasks."""
         known = self._all
-        return Problem(
-            uav_ids=known.uav_ids,
+        return replace(
+            known,
             task_ids=known.task_ids[:n_known],
-            start_enu_m=known.start_enu_m,
             task_enu_m=known.task_enu_m[:n_known],
-            speed_m_s=known.speed_m_s,
             value=known.value[:n_known],
             service_s=known.service_s[:n_known],
             success=known.success[:, :n_known],
             survival=known.survival[:, :n_known],
-            horizon_s=known.horizon_s,
         )
