@@ -68,9 +68,7 @@ def comparison_figure(summary: StudySummary, setting: PointSummary) -> Figure:
             ratio.value,
             place,
             xerr=error_lengths([ratio]),
-            color=look.colour,
-            marker="|" if name == BOUND else look.marker,
-            markerfacecolor=look.face,
+            **look.marks | ({"marker": "|"} if name == BOUND else {}),
             markersize=7.0,
             capsize=4.0,
             zorder=3,
@@ -234,13 +232,10 @@ def _from_zero(axes: Axes, along: Literal["x", "y"]) -> None:
 def _line(
     axes: Axes, summary: StudySummary, name: str, xs: Sequence[float], ys: Sequence[float]
 ) -> None:
-    look = style_of(name, summary.policies)
     axes.plot(
         xs,
         ys,
-        color=look.colour,
-        marker=look.marker,
-        markerfacecolor=look.face,
+        **style_of(name, summary.policies).marks,
         markersize=6.0,
         linewidth=1.4,
         linestyle=_style(summary, name),
@@ -261,15 +256,13 @@ def _intervals(
 
     if not ratios:
         return
-    look, known = style_of(name, summary.policies), [ratio for _, ratio in ratios]
+    known = [ratio for _, ratio in ratios]
     aside = ScaledTranslation(shift_pt / 72.0, 0.0, axes.figure.dpi_scale_trans)
     axes.errorbar(
         [x for x, _ in ratios],
         [ratio.value for ratio in known],
         yerr=error_lengths(known),
-        color=look.colour,
-        marker=look.marker,
-        markerfacecolor=look.face,
+        **style_of(name, summary.policies).marks,
         markersize=5.0,
         linewidth=1.2,
         linestyle=_style(summary, name),

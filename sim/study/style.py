@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from sim.study.statistics import Estimate
 from sim.study.summary import PointSummary, StudySummary
@@ -168,9 +168,10 @@ class PolicyStyle:
     filled: bool = True
 
     @property
-    def face(self) -> str:
-        """Colour within its marks."""
-        return self.colour if self.filled else "white"
+    def marks(self) -> dict[str, Any]:
+        """Of a line of matplotlib's."""
+        face = self.colour if self.filled else "white"
+        return {"color": self.colour, "marker": self.marker, "markerfacecolor": face}
 
 
 _STYLES = {
