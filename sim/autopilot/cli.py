@@ -43,12 +43,7 @@ def autopilot(
     scenario: ScenarioArgument,
     uav: Annotated[
         list[str] | None,
-        typer.Option(
-            "--uav",
-            metavar="ID",
-            help="Simulate this UAV only; may be repeated.",
-            show_default=False,
-        ),
+        typer.Option("--uav", metavar="ID", help="Simulate this UAV only; may be repeated."),
     ] = None,
     listen: Annotated[
         str,
@@ -72,7 +67,6 @@ def autopilot(
             max=254,
             metavar="N",
             help="MAVLink system id of the first vehicle; default: its place in the scenario.",
-            show_default=False,
         ),
     ] = None,
     signing_key: Annotated[
@@ -83,7 +77,6 @@ def autopilot(
             help="Key of every vehicle, 32 bytes or 64 hexadecimal digits: it signs what it "
             "says and hears nobody who does not. Of a folder made by swarm keys, each takes its "
             "UAV's own.",
-            show_default=False,
         ),
     ] = None,
     acceleration_m_s2: Annotated[
@@ -93,7 +86,6 @@ def autopilot(
             min=0.01,
             metavar="A",
             help="Greatest acceleration [m/s²]; default: speeds change in no time.",
-            show_default=False,
         ),
     ] = None,
     wind_m_s: Annotated[
@@ -102,7 +94,6 @@ def autopilot(
             "--wind-m-s",
             metavar="EAST,NORTH",
             help="Steady wind, by where it blows to [m/s]; default: none.",
-            show_default=False,
         ),
     ] = None,
     gust_m_s: Annotated[
@@ -117,7 +108,6 @@ def autopilot(
             min=1.0,
             metavar="S",
             help="Armed time that empties a battery [s]; default: it stays full.",
-            show_default=False,
         ),
     ] = None,
     battery_failsafe: Annotated[
@@ -133,14 +123,11 @@ def autopilot(
             min=0.01,
             metavar="S",
             help="Without GPS for so long, the firmware lands [s]; default: it hovers.",
-            show_default=False,
         ),
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(
-            "--fault", metavar="UAV:KIND@T[+DURATION]", help=_FAULT_HELP, show_default=False
-        ),
+        typer.Option("--fault", metavar="UAV:KIND@T[+DURATION]", help=_FAULT_HELP),
     ] = None,
     json: JsonOption = False,
     lifeline: LifelineOption = False,

@@ -1,8 +1,7 @@
 """Carries out MAV_CMD commands and answers each with a MAV_RESULT.
 
-A COMMAND_LONG is read as the COMMAND_INT it stands for. Sources:
-https://mavlink.io/en/services/command.html; which result a refusal gets differs
-between firmwares. Leaves out: commands for payloads, calibration, parameters.
+A COMMAND_LONG is read as the COMMAND_INT it stands for. Which result a refusal gets differs
+between firmwares. Source: https://mavlink.io/en/services/command.html.
 """
 
 from __future__ import annotations
@@ -89,35 +88,58 @@ class CommandExecutor:
         self._outbox = outbox
         self.reboot_asked = False
         """Set by a reboot command, for the vehicle to carry out after the answer."""
-        self._handlers: dict[int, Callable[[AutopilotCommand, Sender, float], int]] = {
-            mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
-            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
-            mavlink.MAV_CMD_NAV_TAKEOFF: self._take_off,
-            mavlink.MAV_CMD_NAV_LAND: self._land,
-            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return_to_launch,
-            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
-            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
-            mavlink.MAV_CMD_MISSION_START: self._mission_start,
-            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_mission_current,
-            mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
-            mavlink.MAV_CMD_GET_HOME_POSITION: self._get_home,
-            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
-            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
-            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
-            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._capabilities,
-            mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
-        }
 
     def handle(self, command: AutopilotCommand, sender: Sender, now_s: float) -> None:
         """Carry ``command`` out and acknowledge it."""
-        handler = self._handlers.get(command.id)
-        times = 1
-        if command.id == mavlink.MAV_CMD_DO_SET_MODE:
-            times = self._pilot.flavour.modes.acknowledgements
-        if handler is None:
-            self._answer(command.id, lambda: _UNSUPPORTED, sender)
-        else:
-            self._answer(command.id, lambda: handler(command, sender, now_s), sender, times)
+        is_mode = command.id == mavlink.MAV_CMD_DO_SET_MODE
+        times = self._pilot.flavour.modes.acknowledgements if is_mode else 1
+        self._answer(command.id, lambda: self._carry_out(command, sender, now_s), sender, times)
+
+    def _carry_out(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
+        """The MAV_RESULT of doing it."""
+        pilot = self._pilot
+        match command.id:
+            case mavlink.MAV_CMD_DO_SET_MODE:
+                return self._set_mode(command, now_s)
+            case mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+                return self._arm_disarm(command, now_s)
+            case mavlink.MAV_CMD_NAV_TAKEOFF:
+                return self._take_off(command, now_s)
+            case mavlink.MAV_CMD_NAV_LAND:
+                return self._result(pilot.set_mode(FlightMode.LAND, now_s))
+            case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+                pilot.narrator.tell(FirmwareEvent.RETURN_ORDERED)
+                return self._result(pilot.set_mode(FlightMode.RTL, now_s))
+            case mavlink.MAV_CMD_DO_REPOSITION:
+                return self._reposition(command, now_s)
+            case mavlink.MAV_CMD_DO_CHANGE_SPEED:
+                return self._change_speed(command, now_s)
+            case mavlink.MAV_CMD_MISSION_START:
+                if command.params[0] != 0.0 or command.params[1] != 0.0:
+                    return _DENIED  # flying a part of the mission is not supported
+                return self._result(pilot.start_mission(now_s))
+            case mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
+                seq = command.params[0]
+                if not math.isfinite(seq) or seq < 0.0:
+                    return _DENIED
+                return _ACCEPTED if self.set_mission_current(int(seq), sender, now_s) else _FAILED
+            case mavlink.MAV_CMD_DO_SET_HOME:
+                return self._set_home(command, now_s)
+            case mavlink.MAV_CMD_GET_HOME_POSITION:
+                return self._send(mavlink.MAVLINK_MSG_ID_HOME_POSITION, sender, now_s)
+            case mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+                return self._set_message_interval(command, sender, now_s)
+            case mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
+                return self._get_message_interval(command, sender)
+            case mavlink.MAV_CMD_REQUEST_MESSAGE:
+                asked = command.params[0]
+                return self._send(int(asked), sender, now_s) if math.isfinite(asked) else _DENIED
+            case mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
+                return self._send(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sender, now_s)
+            case mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
+                return self._reboot(command)
+            case _:
+                return _UNSUPPORTED
 
     def handle_set_mode(self, base_mode: int, mode: int, sender: Sender, now_s: float) -> None:
         """Obey the older message SET_MODE; acknowledged like a command."""
@@ -151,16 +173,14 @@ class CommandExecutor:
         """MAV_RESULT of something the vehicle may be unable to do now."""
         return _ACCEPTED if done else self._pilot.flavour.refusals.not_now
 
-    def _set_mode(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del sender
+    def _set_mode(self, command: AutopilotCommand, now_s: float) -> int:
         flags = command.params[0]
         if not math.isfinite(flags) or not int(flags) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return _DENIED
         custom_mode = self._pilot.flavour.mode_commanded(command.params[1], command.params[2])
         return self._set_custom_mode(custom_mode, now_s)
 
-    def _arm_disarm(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del sender
+    def _arm_disarm(self, command: AutopilotCommand, now_s: float) -> int:
         forced = command.params[1] == _FORCE_ARM
         if command.params[0] == 1.0:
             return self._result(self._pilot.arm(now_s, forced=forced))
@@ -168,8 +188,7 @@ class CommandExecutor:
             return self._result(self._pilot.disarm(now_s, forced=forced))
         return _UNSUPPORTED
 
-    def _take_off(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del sender
+    def _take_off(self, command: AutopilotCommand, now_s: float) -> int:
         pilot = self._pilot
         up_m: float | None = None
         if pilot.flavour.take_off_above_home:
@@ -180,17 +199,7 @@ class CommandExecutor:
             up_m = command.height_m - pilot.config.origin.alt_m
         return self._result(pilot.take_off(up_m, now_s))
 
-    def _land(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del command, sender
-        return self._result(self._pilot.set_mode(FlightMode.LAND, now_s))
-
-    def _return_to_launch(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del command, sender
-        self._pilot.narrator.tell(FirmwareEvent.RETURN_ORDERED)
-        return self._result(self._pilot.set_mode(FlightMode.RTL, now_s))
-
-    def _reposition(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del sender
+    def _reposition(self, command: AutopilotCommand, now_s: float) -> int:
         pilot = self._pilot
         speed_m_s, flags = command.params[:2]
         behaviour = pilot.flavour.modes
@@ -226,26 +235,13 @@ class CommandExecutor:
             self._pilot.flight.home_enu_m[2],
         )
 
-    def _change_speed(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del sender
+    def _change_speed(self, command: AutopilotCommand, now_s: float) -> int:
         kind, speed_m_s = command.params[:2]
         if kind not in (mavlink.SPEED_TYPE_AIRSPEED, mavlink.SPEED_TYPE_GROUNDSPEED):
             return _FAILED
         if not 0.0 < speed_m_s < math.inf:
             return _FAILED
         return self._result(self._pilot.change_speed(speed_m_s, now_s))
-
-    def _mission_start(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del sender
-        if command.params[0] != 0.0 or command.params[1] != 0.0:
-            return _DENIED  # flying a part of the mission is not supported
-        return self._result(self._pilot.start_mission(now_s))
-
-    def _set_mission_current(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        seq = command.params[0]
-        if not math.isfinite(seq) or seq < 0.0:
-            return _DENIED
-        return _ACCEPTED if self.set_mission_current(int(seq), sender, now_s) else _FAILED
 
     def set_mission_current(self, seq: int, sender: Sender, now_s: float) -> bool:
         """Go to a mission item and say which one is current; False if there is no such item."""
@@ -254,8 +250,7 @@ class CommandExecutor:
         self._send(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, sender, now_s)
         return True
 
-    def _set_home(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del sender
+    def _set_home(self, command: AutopilotCommand, now_s: float) -> int:
         if command.params[0] == 1.0:
             home_enu_m: Point | None = self._pilot.position_enu_m(now_s)
         elif command.lat_e7 == 0 and command.lon_e7 == 0:
@@ -268,20 +263,6 @@ class CommandExecutor:
             return _FAILED
         self._pilot.set_home(home_enu_m, now_s, lock=True)
         return _ACCEPTED
-
-    def _get_home(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del command
-        return self._send(mavlink.MAVLINK_MSG_ID_HOME_POSITION, sender, now_s)
-
-    def _capabilities(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del command
-        return self._send(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sender, now_s)
-
-    def _request_message(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        message_id = command.params[0]
-        if not math.isfinite(message_id):
-            return _DENIED
-        return self._send(int(message_id), sender, now_s)
 
     def _send(self, message_id: int, sender: Sender, now_s: float) -> int:
         message = self._telemetry.build(message_id, now_s)
@@ -305,8 +286,7 @@ class CommandExecutor:
         self._streams.set_interval(sender.channel, int(message_id), interval_s, now_s)
         return _ACCEPTED
 
-    def _get_message_interval(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del now_s
+    def _get_message_interval(self, command: AutopilotCommand, sender: Sender) -> int:
         message_id = command.params[0]
         if not math.isfinite(message_id) or not 0 <= int(message_id) <= 0xFFFF:
             return _DENIED
@@ -320,8 +300,7 @@ class CommandExecutor:
         )
         return _ACCEPTED
 
-    def _reboot(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
-        del sender, now_s
+    def _reboot(self, command: AutopilotCommand) -> int:
         if command.params[0] not in (1.0, 3.0):
             return _UNSUPPORTED
         if self._pilot.armed and command.raw[1] != _FORCE_REBOOT:

@@ -2,28 +2,26 @@
 
 Sources: recordings of both firmwares; ArduCopter's events.cpp and ekf_check.cpp,
 AP_BattMonitor; PX4's failsafe framework, which says the same line whatever the cause, and
-holds for some seconds before it returns. Leaves out: failsafes that continue a mission,
-and what a firmware says without acting.
+holds for some seconds before it returns. Left out are failsafes that continue a mission, and
+what a firmware says without acting.
 """
 
 from __future__ import annotations
 
 import math
 from enum import Enum, auto
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.battery import BatteryModel, ChargeLevel
-from sim.autopilot.config import VehicleConfig
-from sim.autopilot.events import Outbox, TextTemplate
-from sim.autopilot.firmware.model import FirmwareModel
-from sim.autopilot.flight import FlightMode, FlightStateMachine
-from sim.autopilot.parameters import ParameterTable
-from sim.autopilot.readiness import Readiness
-from sim.world.motion import Point
+from sim.autopilot.battery import ChargeLevel
+from sim.autopilot.events import TextTemplate
+from sim.autopilot.flight import FlightMode
 
-__all__ = ["FailsafeMonitor", "FailsafePilot"]
+if TYPE_CHECKING:
+    from sim.autopilot.pilot import Pilot
+
+__all__ = ["FailsafeMonitor"]
 
 
 _RADIO = (TextTemplate(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe"),)
@@ -39,42 +37,12 @@ class _Cause(Enum):
     RADIO = auto()
 
 
-class FailsafePilot(Protocol):
-    """What failsafes ask of the autopilot."""
-
-    config: VehicleConfig
-    flavour: FirmwareModel
-    outbox: Outbox
-    readiness: Readiness
-    flight: FlightStateMachine
-    parameters: ParameterTable
-    mode: FlightMode
-    armed: bool
-
-    def position_enu_m(self, now_s: float) -> Point:
-        """Where the vehicle is [m]."""
-        ...
-
-    def set_mode(self, mode: FlightMode, now_s: float) -> bool:
-        """Change the mode; False where that is refused."""
-        ...
-
-    def disarm(self, now_s: float, *, forced: bool) -> bool:
-        """Stop the motors; False where that is refused."""
-        ...
-
-
 class FailsafeMonitor:
-    """The failsafes of one autopilot, from power-up on.
+    """The failsafes of one autopilot, from power-up on."""
 
-    Args:
-        pilot: the autopilot.
-        battery: what it flies on; outlasts a reboot.
-    """
-
-    def __init__(self, pilot: FailsafePilot, battery: BatteryModel) -> None:
+    def __init__(self, pilot: Pilot) -> None:
         self._pilot = pilot
-        self._battery = battery
+        self._battery = pilot.battery
         self._behaviour = pilot.flavour.failsafe_behaviour
         self._position_s: float | None = None
         self._ground_s: dict[int, float] = {}

@@ -1,22 +1,18 @@
-"""Flies the mission that stands on the vehicle, item after item.
-
-Leaves out: how the vehicle flies (the `MissionPilot` does) and when it may
-(sim.autopilot.pilot).
-"""
+"""Flies the mission that stands on the vehicle, item after item."""
 
 from __future__ import annotations
 
 from enum import Enum
-from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import FirmwareEvent, Narrator, Outbox
 from sim.autopilot.firmware.model import MissionBehaviour
 from sim.autopilot.flight import Milestone
+from sim.autopilot.mission_flight import MissionFlight
 from sim.autopilot.mission_store import MissionStore, StoredMissionItem
 
-__all__ = ["MissionPilot", "MissionRun", "MissionRunState"]
+__all__ = ["MissionRun", "MissionRunState"]
 
 
 _ITEMS_COMPARED = 3
@@ -33,45 +29,13 @@ class MissionRunState(Enum):
     COMPLETE = "complete"
 
 
-class MissionPilot(Protocol):
-    """What a mission asks of the vehicle."""
-
-    def mission_take_off(self, item: StoredMissionItem, now_s: float) -> None:
-        """Rise to the height of the item."""
-        ...
-
-    def mission_navigate(self, item: StoredMissionItem, now_s: float) -> None:
-        """Fly to the place of the item."""
-        ...
-
-    def mission_give_way(self, now_s: float) -> None:
-        """Stay where the vehicle is, and fly to the targets that are told."""
-        ...
-
-    def mission_land(self, now_s: float) -> None:
-        """Land where the vehicle is."""
-        ...
-
-    def mission_return(self, now_s: float) -> None:
-        """Return home and land."""
-        ...
-
-    def mission_change_speed(self, speed_m_s: float, now_s: float) -> None:
-        """Fly at another speed [m/s]."""
-        ...
-
-    def mission_finished(self, now_s: float) -> None:
-        """The last item is done."""
-        ...
-
-
 class MissionRun:
     """Where in the mission the vehicle is."""
 
     def __init__(
         self,
         store: MissionStore,
-        pilot: MissionPilot,
+        flight: MissionFlight,
         outbox: Outbox,
         narrator: Narrator,
         behaviour: MissionBehaviour,
@@ -82,15 +46,17 @@ class MissionRun:
         self.told = 0
         """The number that is told as the current one."""
         self._store = store
-        self._pilot = pilot
+        self._flight = flight
         self._outbox = outbox
         self._narrator = narrator
         self._behaviour = behaviour
         self._first_seq = behaviour.first_item
-        self._repeat_s: float | None = None
+        self.repeat_s: float | None = None
+        """When the last item reached is told again [s]."""
         self._repeats_left = 0
         self._reached_seq = 0
-        self._hold_until_s: float | None = None
+        self.hold_until_s: float | None = None
+        """When the time on the spot is over [s]."""
         self._set_seq: int | None = None
         """Item that was asked for while the mission did not run, if it is begun there."""
         self._limit_s = 0.0
@@ -133,8 +99,8 @@ class MissionRun:
         """Leave the mission where it is; `start_or_resume` flies the current item again."""
         if self.state is MissionRunState.RUNNING:
             self.state = MissionRunState.STOPPED
-        self._hold_until_s = None
-        self._repeat_s = None
+        self.hold_until_s = None
+        self.repeat_s = None
 
     def reset(self) -> None:
         """Forget the place in the mission, as disarming does."""
@@ -149,7 +115,7 @@ class MissionRun:
         """Delete the mission; False while it is being flown."""
         if self.state is MissionRunState.RUNNING:
             return False
-        self._store.replace(())
+        self._store.items = ()
         self._rewind()
         return True
 
@@ -179,7 +145,7 @@ class MissionRun:
                 self._rewind()
             return False
         if rewinds:
-            self._repeat_s = None
+            self.repeat_s = None
             self._begin_from(self._first_seq, now_s)
             return True
         same = self._upcoming(old) == self._upcoming(self._store.items)
@@ -188,24 +154,16 @@ class MissionRun:
         self._begin_from(self.current, now_s)
         return True
 
-    def deadline_s(self) -> float | None:
-        """When the time on the spot is over [s]."""
-        return self._hold_until_s
-
-    def advance(self, at_s: float) -> None:
-        """End the time on the spot at its deadline ``at_s``."""
-        self._hold_until_s = None
+    def end_hold(self, at_s: float) -> None:
+        """End the time on the spot."""
+        self.hold_until_s = None
         self._complete_current(at_s)
 
-    def repeat_deadline_s(self) -> float | None:
-        """When the last item reached is told again [s]."""
-        return self._repeat_s
-
     def repeat(self, at_s: float) -> None:
-        """Tell the last item reached again, at its deadline ``at_s``."""
+        """Tell the last item reached again."""
         self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(self._reached_seq))
         self._repeats_left -= 1
-        self._repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
+        self.repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
 
     def on_milestone(self, milestone: Milestone, at_s: float) -> None:
         """Hear what the flight came to while the mission runs."""
@@ -213,7 +171,7 @@ class MissionRun:
         if (
             self.state is not MissionRunState.RUNNING
             or item is None
-            or self._hold_until_s is not None
+            or self.hold_until_s is not None
         ):
             return
         match item.command, milestone:
@@ -245,7 +203,7 @@ class MissionRun:
 
     def _begin_from(self, seq: int, now_s: float) -> None:
         """Do what is done at once, and begin the first item that takes time."""
-        self._hold_until_s = self._set_seq = None
+        self.hold_until_s = self._set_seq = None
         self._landing = False
         self.begun = True
         done: list[int] = []
@@ -256,7 +214,7 @@ class MissionRun:
             if item.command == mavlink.MAV_CMD_DO_GUIDED_LIMITS:
                 self._limit_s = item.params[0]
             elif item.params[1] > 0.0:
-                self._pilot.mission_change_speed(item.params[1], now_s)
+                self._flight.change_speed(item.params[1], now_s)
             done.append(seq)
             seq += 1
         # Told once the next item that takes time is begun.
@@ -267,26 +225,26 @@ class MissionRun:
             self._begin(item, now_s)
             return
         self.state = MissionRunState.COMPLETE
-        self._repeat_s = None
-        self._pilot.mission_finished(now_s)
+        self.repeat_s = None
+        self._flight.finish(now_s)
 
     def _begin(self, item: StoredMissionItem, now_s: float) -> None:
         match item.command:
             case mavlink.MAV_CMD_NAV_TAKEOFF:
-                self._pilot.mission_take_off(item, now_s)
+                self._flight.take_off(item, now_s)
             case mavlink.MAV_CMD_NAV_GUIDED_ENABLE if item.params[0] == 0.0:
                 self._complete_current(now_s)
             case mavlink.MAV_CMD_NAV_GUIDED_ENABLE:
-                self._pilot.mission_give_way(now_s)
-                self._hold_until_s = now_s + self._limit_s if self._limit_s > 0.0 else None
+                self._flight.give_way(now_s)
+                self.hold_until_s = now_s + self._limit_s if self._limit_s > 0.0 else None
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH if self._behaviour.forgets_mode:
                 self._leave_by_returning(now_s)
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-                self._pilot.mission_return(now_s)
+                self._flight.return_home(now_s)
             case mavlink.MAV_CMD_NAV_LAND if item.lat_e7 == 0 and item.lon_e7 == 0:
                 self._land(now_s)
             case _:
-                self._pilot.mission_navigate(item, now_s)
+                self._flight.navigate(item, now_s)
 
     def _leave_by_returning(self, now_s: float) -> None:
         """Call the item done and leave the mission, for the mode that returns home."""
@@ -297,7 +255,7 @@ class MissionRun:
         else:
             self._reached(seq, now_s)
             self._go_to(following)
-        self._pilot.mission_return(now_s)
+        self._flight.return_home(now_s)
 
     def _go_to(self, seq: int) -> None:
         self.current = self.told = seq
@@ -307,21 +265,21 @@ class MissionRun:
         self.current = self._set_seq = None
         self.begun = False
         self.told = 0
-        self._repeat_s = None
+        self.repeat_s = None
 
     def _reached(self, seq: int, at_s: float) -> None:
         self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
         self._reached_seq = seq
         self._repeats_left = self._behaviour.repeats_reached
-        self._repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
+        self.repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
 
     def _land(self, now_s: float) -> None:
         self._landing = True
-        self._pilot.mission_land(now_s)
+        self._flight.land(now_s)
 
     def _hold(self, duration_s: float, now_s: float) -> None:
         if duration_s > 0.0:
-            self._hold_until_s = now_s + duration_s
+            self.hold_until_s = now_s + duration_s
         else:
             self._complete_current(now_s)
 
@@ -330,11 +288,12 @@ class MissionRun:
             return
         seq = self.current
         following = self._store.item(seq + 1)
-        returns = (
-            following is not None and following.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
-        )
         # Where returning leaves the mission, that is done at once too, and alone is told.
-        if not (returns and self._behaviour.forgets_mode):
+        if (
+            following is None
+            or following.command != mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+            or not self._behaviour.forgets_mode
+        ):
             self._reached(seq, at_s)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
             self._narrator.tell(FirmwareEvent.WAYPOINT_REACHED, seq=seq)

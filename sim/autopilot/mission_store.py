@@ -2,40 +2,33 @@
 
 Ground stations upload, download and clear it by the mission protocol, seen here from the vehicle.
 Sources: https://mavlink.io/en/services/mission.html and
-https://mavlink.io/en/messages/common.html#MAV_CMD. An upload takes the place of
-the mission only when its last item has come. Leaves out: flight (sim.autopilot.mission_run),
-fences and rally points (answered as unsupported), partial writes.
+https://mavlink.io/en/messages/common.html#MAV_CMD. An upload takes the place of the mission only
+when its last item has come. Fences and rally points are answered as unsupported.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.events import Outbox, Sender
-from sim.autopilot.firmware.model import MissionBehaviour
+from sim.autopilot.events import Sender
 from sim.autopilot.positions import ABOVE_HOME_FRAMES, ABOVE_SEA_FRAMES, place_enu_m, place_wgs84_e7
 from sim.world.motion import Point
 from swarm.model.frames import Origin
 
-__all__ = [
-    "MAX_ITEMS",
-    "MissionServer",
-    "MissionStore",
-    "StoredMissionItem",
-    "home_item",
-    "int_frame",
-    "item_from_message",
-    "item_place_enu_m",
-]
+if TYPE_CHECKING:
+    from sim.autopilot.pilot import Pilot
+
+__all__ = ["MissionServer", "MissionStore", "StoredMissionItem", "home_item", "item_place_enu_m"]
 
 
-MAX_ITEMS = 724
+_MAX_ITEMS = 724
 """Room for items, home included."""
-
+_RESEND_S = 1.0
+_TIMEOUT_S = 8.0
 
 _PLACES = frozenset(
     {
@@ -103,20 +96,10 @@ _FRAMES_KEPT = {
 _INT_FRAMES: dict[int, int] = {kept: sent for sent, kept in _FRAMES_KEPT.items()}
 
 
-def int_frame(frame: int) -> int:
-    """The variant of a frame that says that places are whole numbers."""
-    return _INT_FRAMES.get(frame, frame)
-
-
-def item_from_message(
+def _item_from_message(
     message: mavlink.MAVLink_message, *, gives_way: bool
 ) -> StoredMissionItem | int:
-    """The item in a MISSION_ITEM or MISSION_ITEM_INT, or the MAV_MISSION_RESULT of refusing it.
-
-    Args:
-        message: the message.
-        gives_way: the firmware knows items that let targets be told for a time.
-    """
+    """The item in a MISSION_ITEM or MISSION_ITEM_INT, or the MAV_MISSION_RESULT of refusing it."""
     if message.command not in _NAMES or (message.command in _GIVES_WAY and not gives_way):
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     # Yaw is given as NaN where it doesn't matter; one NaN, so that equal items are equal.
@@ -181,10 +164,6 @@ class MissionStore:
         self.items: tuple[StoredMissionItem, ...] = ()
         """As uploaded; whether the first is home is the flavour's affair."""
 
-    def replace(self, items: tuple[StoredMissionItem, ...]) -> None:
-        """Put another mission in place of this one."""
-        self.items = items
-
     def item(self, seq: int) -> StoredMissionItem | None:
         """The item of that number, if there is one."""
         return self.items[seq] if 0 <= seq < len(self.items) else None
@@ -195,11 +174,6 @@ class MissionStore:
             if self.items[number].is_navigation:
                 return number
         return None
-
-
-_RESEND_S = 1.0
-
-_TIMEOUT_S = 8.0
 
 
 @dataclass(slots=True)
@@ -216,27 +190,11 @@ class _Upload:
 class MissionServer:
     """One upload at a time, and any number of downloads."""
 
-    def __init__(
-        self,
-        store: MissionStore,
-        outbox: Outbox,
-        *,
-        behaviour: MissionBehaviour,
-        current: Callable[[], int],
-        home_item: Callable[[], StoredMissionItem] | None,
-        uploaded: Callable[[tuple[StoredMissionItem, ...], float], None],
-        clear: Callable[[], bool],
-    ) -> None:
-        self._store = store
-        self._outbox = outbox
-        self._behaviour = behaviour
-        self._current = current
-        """Gives the number of the current item."""
-        self._home_item = home_item
-        """Gives item 0, where that is home and not the first waypoint."""
-        self._uploaded = uploaded
-        """Called with the mission that was replaced, after the acknowledgement."""
-        self._clear = clear
+    def __init__(self, pilot: Pilot) -> None:
+        self._pilot = pilot
+        self._store = pilot.store
+        self._outbox = pilot.outbox
+        self._behaviour = pilot.flavour.missions
         self._upload: _Upload | None = None
 
     def deadline_s(self) -> float | None:
@@ -288,7 +246,7 @@ class MissionServer:
                 message.seq, sender, as_int=kind == mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT
             )
         elif kind == mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL:
-            cleared = self._upload is None and self._clear()
+            cleared = self._upload is None and self._pilot.run.clear()
             self._acknowledge(
                 sender, mavlink.MAV_MISSION_ACCEPTED if cleared else mavlink.MAV_MISSION_ERROR
             )
@@ -300,7 +258,7 @@ class MissionServer:
             sender.component,
         ):
             self._acknowledge(sender, mavlink.MAV_MISSION_DENIED)
-        elif count > MAX_ITEMS:
+        elif count > _MAX_ITEMS:
             self._upload = None
             self._acknowledge(sender, mavlink.MAV_MISSION_NO_SPACE)
         elif count == 0:
@@ -320,7 +278,7 @@ class MissionServer:
         if message.seq != len(upload.items):
             self._acknowledge(sender, mavlink.MAV_MISSION_INVALID_SEQUENCE)
             return
-        item = item_from_message(message, gives_way=self._behaviour.gives_way)
+        item = _item_from_message(message, gives_way=self._behaviour.gives_way)
         if not isinstance(item, StoredMissionItem):
             self._upload = None
             self._acknowledge(sender, item)
@@ -335,9 +293,9 @@ class MissionServer:
     def _commit(self, upload: _Upload, now_s: float) -> None:
         self._upload = None
         old = self._store.items
-        self._store.replace(tuple(upload.items))
+        self._store.items = tuple(upload.items)
         self._acknowledge(upload.sender, mavlink.MAV_MISSION_ACCEPTED)
-        self._uploaded(old, now_s)
+        self._pilot.mission_uploaded(old, now_s)
 
     def _request_next(self, upload: _Upload, now_s: float) -> None:
         upload.resend_s = now_s + _RESEND_S
@@ -351,7 +309,7 @@ class MissionServer:
 
     def _count(self) -> int:
         # Home is an item of its own, also where no mission stands on the vehicle.
-        return max(len(self._store.items), 0 if self._home_item is None else 1)
+        return max(len(self._store.items), self._behaviour.first_item)
 
     def _send_count(self, sender: Sender) -> None:
         self._outbox.reply(
@@ -361,8 +319,8 @@ class MissionServer:
 
     def _send_item(self, seq: int, sender: Sender, *, as_int: bool) -> None:
         item = self._store.item(seq)
-        if seq == 0 and self._home_item is not None:
-            item = self._home_item()
+        if seq < self._behaviour.first_item:
+            item = home_item(self._pilot.config.origin, self._pilot.flight.home_enu_m)
         if item is None:
             # Tell the ground station how many there are, and that it asked for too many.
             self._send_count(sender)
@@ -382,7 +340,7 @@ class MissionServer:
                 seq,
                 self._frame(item, as_int=as_int),
                 item.command,
-                int(self._behaviour.marks_current and seq == self._current()),
+                int(self._behaviour.marks_current and seq == self._pilot.run.told),
                 item.autocontinue,
                 *item.params,
                 item.lat_e7 * scale,
@@ -395,7 +353,7 @@ class MissionServer:
         """The one it is given back in: ArduCopter keeps none of an item without a place."""
         if not self._behaviour.int_frames:
             return item.frame if item.is_place else int(mavlink.MAV_FRAME_GLOBAL)
-        return int_frame(item.frame) if as_int else item.frame
+        return _INT_FRAMES.get(item.frame, item.frame) if as_int else item.frame
 
     def _acknowledge(self, to: Sender, result: int, mission_type: int = 0) -> None:
         self._outbox.reply(

@@ -58,11 +58,11 @@ _DEFAULTS_SI = {
 class ParameterBehaviour:
     """How a firmware speaks of its parameters."""
 
-    reports_errors: bool
+    reports_errors: bool = False
     """Whether an unknown parameter is answered by PARAM_ERROR; otherwise by nothing."""
-    integers_bytewise: bool
+    integers_bytewise: bool = False
     """Whether the bytes of an integer travel in the float field, instead of its value."""
-    index_by_name: bool
+    index_by_name: bool = False
     """Whether an answer to a request by name tells the index."""
     tells_changes: bool = False
     """Whether a value that was changed is told once more than the answer does."""

@@ -18,7 +18,7 @@ from sim.autopilot.firmware.model import FirmwareModel
 from sim.autopilot.flight import FlightMode, FlightStateMachine, Milestone, MotionPhase
 from sim.autopilot.mission_flight import MissionFlight
 from sim.autopilot.mission_run import MissionRun, MissionRunState
-from sim.autopilot.mission_store import MissionStore, StoredMissionItem, home_item
+from sim.autopilot.mission_store import MissionStore, StoredMissionItem
 from sim.autopilot.parameters import ParameterRole, ParameterServer, ParameterTable
 from sim.autopilot.positions import home_position, origin_position
 from sim.autopilot.readiness import PowerUpStage, Readiness
@@ -61,17 +61,14 @@ class Pilot:
         self.config = config
         self.flavour = flavour
         self.outbox = outbox
+        self.battery = battery
         self.parameters = parameters
-        self.parameter_server = ParameterServer(
-            self.parameters,
-            outbox,
-            flavour.parameter_habits,
-        )
+        self.parameter_server = ParameterServer(parameters, outbox, flavour.parameter_habits)
         self.narrator = Narrator(outbox, flavour.texts, flavour.own_commands, config.system_id)
         self.readiness = Readiness(config.delays, boot_s)
         self.flight = FlightStateMachine(config, self.parameters, config.motion())
         self.store = store
-        self._mission = MissionFlight(self, config, flavour, self.flight, self.parameters)
+        self._mission = MissionFlight(self)
         self.run = MissionRun(self.store, self._mission, outbox, self.narrator, flavour.missions)
         self.mode = flavour.modes.at_boot
         self.armed = False
@@ -90,8 +87,7 @@ class Pilot:
         self._mission_checked_s = boot_s
         """From when on the mission on the vehicle can be begun [s]."""
         self._prearm_text_s = boot_s + _PREARM_TEXT_S
-        self.battery = battery
-        self.failsafes = FailsafeMonitor(self, battery)
+        self.failsafes = FailsafeMonitor(self)
 
     # --- Time -------------------------------------------------------------------
 
@@ -114,8 +110,8 @@ class Pilot:
         for deadline_s, happen in (
             (self.readiness.deadline_s(), self._pass_stage),
             (self.flight.deadline_s(), self._advance_flight),
-            (self.run.deadline_s(), self.run.advance),
-            (self.run.repeat_deadline_s(), self.run.repeat),
+            (self.run.hold_until_s, self.run.end_hold),
+            (self.run.repeat_s, self.run.repeat),
             (self._disarm_s, self._disarm_by_itself),
             (self.failsafes.deadline_s(), self.failsafes.advance),
         ):
@@ -486,10 +482,6 @@ class Pilot:
                 if restarted
                 else FirmwareEvent.MISSION_REPLACED_IN_VAIN
             )
-
-    def home_item(self) -> StoredMissionItem:
-        """Home as item 0 of a mission."""
-        return home_item(self.config.origin, self.flight.home_enu_m)
 
     def _boot_us(self, now_s: float) -> int:
         return round((now_s - self.readiness.boot_s) * 1e6)

@@ -287,7 +287,7 @@ class TelemetryReporter:
         del now_s
         pilot = self._pilot
         run = pilot.run
-        view = MissionProgress(
+        progress = MissionProgress(
             mode=pilot.mode,
             current=run.current,
             items=max(0, len(pilot.store.items) - pilot.flavour.missions.first_item),
@@ -297,12 +297,8 @@ class TelemetryReporter:
             over=run.state is MissionRunState.COMPLETE,
             task_done=pilot.task_done,
         )
-        return mavlink.MAVLink_mission_current_message(
-            run.told,
-            pilot.flavour.mission_total(view),
-            pilot.flavour.mission_state(view),
-            pilot.flavour.mission_mode(view),
-        )
+        told = pilot.flavour.mission_told(progress)
+        return mavlink.MAVLink_mission_current_message(run.told, *told)
 
     def _version(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s

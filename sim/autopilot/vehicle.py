@@ -1,17 +1,13 @@
 """One simulated vehicle: MAVLink messages in, MAVLink messages out, no I/O.
 
 `SimulatedAutopilot.step` takes an event and the time and returns what is to be sent, in
-order; `SimulatedAutopilot.next_deadline_s` says when to call again with `TimeAdvanced`. Messages
-understood: HEARTBEAT, COMMAND_LONG, COMMAND_INT, SET_MODE,
-SET_POSITION_TARGET_GLOBAL_INT, REQUEST_DATA_STREAM, the PARAM and MISSION families,
-TIMESYNC, PING. Leaves out: bytes (sim.autopilot.codec), sockets
-(sim.autopilot.server), velocity and attitude targets, RC override.
+order; `SimulatedAutopilot.next_deadline_s` says when to call again with `TimeAdvanced`. Velocity
+and attitude targets and RC override are not understood.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -50,7 +46,18 @@ _POSITION_IGNORED = 0b111
 """Bits of a position target's type mask that say that no position is meant."""
 _NANO = 1e9
 
-_Handler = Callable[[mavlink.MAVLink_message, Sender, float], None]
+_MISSION_PROTOCOL = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_MISSION_COUNT,
+        mavlink.MAVLINK_MSG_ID_MISSION_ITEM,
+        mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+        mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+        mavlink.MAVLINK_MSG_ID_MISSION_REQUEST,
+        mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+        mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+        mavlink.MAVLINK_MSG_ID_MISSION_ACK,
+    }
+)
 
 
 class SimulatedAutopilot:
@@ -90,43 +97,8 @@ class SimulatedAutopilot:
         )
         self._telemetry = TelemetryReporter(self._pilot)
         self._commands = CommandExecutor(self._pilot, self._telemetry, self._streams, self._outbox)
-        self._transfer = MissionServer(
-            self._store,
-            self._outbox,
-            behaviour=self._flavour.missions,
-            current=lambda: self._pilot.run.told,
-            home_item=self._pilot.home_item if self._flavour.missions.first_item > 0 else None,
-            uploaded=self._pilot.mission_uploaded,
-            clear=self._pilot.run.clear,
-        )
+        self._transfer = MissionServer(self._pilot)
         self._heartbeat_s = now_s
-        self._handlers: dict[int, _Handler] = {
-            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat,
-            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._on_command,
-            mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._on_command,
-            mavlink.MAVLINK_MSG_ID_SET_MODE: self._on_set_mode,
-            mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._on_position_target,
-            mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._on_data_stream,
-            mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._on_param_read,
-            mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._on_param_list,
-            mavlink.MAVLINK_MSG_ID_PARAM_SET: self._on_param_set,
-            mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._on_mission_set_current,
-            mavlink.MAVLINK_MSG_ID_TIMESYNC: self._on_timesync,
-            mavlink.MAVLINK_MSG_ID_PING: self._on_ping,
-            **dict.fromkeys(
-                (
-                    mavlink.MAVLINK_MSG_ID_MISSION_COUNT,
-                    mavlink.MAVLINK_MSG_ID_MISSION_ITEM,
-                    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT,
-                    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
-                    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST,
-                    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-                    mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
-                    mavlink.MAVLINK_MSG_ID_MISSION_ACK,
-                ),
-                self._transfer.handle,
-            ),
-        }
 
     @property
     def pilot(self) -> Pilot:
@@ -216,31 +188,51 @@ class SimulatedAutopilot:
         ) not in (0, COMPONENT_ID):
             self.foreign += 1
             return
-        handler = self._handlers.get(message.get_msgId())
-        if handler is None:
-            self.unknown += 1
-            return
         sender = Sender(channel, message.get_srcSystem(), message.get_srcComponent())
-        handler(message, sender, now_s)
+        self._obey(message, sender, now_s)
         if self._commands.reboot_asked:
             said = self._outbox.take()
             self._reboot(now_s)
             self._outbox.put(said)
 
-    def _on_heartbeat(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
-        if message.type == mavlink.MAV_TYPE_GCS:
-            self._pilot.failsafes.hear_ground(sender.system, now_s)
+    def _obey(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+                if message.type == mavlink.MAV_TYPE_GCS:
+                    self._pilot.failsafes.hear_ground(sender.system, now_s)
+            case mavlink.MAVLINK_MSG_ID_COMMAND_LONG | mavlink.MAVLINK_MSG_ID_COMMAND_INT:
+                self._commands.handle(command_from_message(message), sender, now_s)
+            case mavlink.MAVLINK_MSG_ID_SET_MODE:
+                mode = message.base_mode, message.custom_mode
+                self._commands.handle_set_mode(*mode, sender, now_s)
+            case mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT:
+                self._fly_to(message, now_s)
+            case mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM:
+                self._set_data_streams(message, sender, now_s)
+            case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ:
+                self._pilot.parameter_server.read(message, sender)
+            case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
+                self._pilot.parameter_server.list_all(sender)
+            case mavlink.MAVLINK_MSG_ID_PARAM_SET:
+                self._pilot.parameter_server.write(message, sender)
+            case mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT:
+                self._commands.set_mission_current(message.seq, sender, now_s)
+            case number if number in _MISSION_PROTOCOL:
+                self._transfer.handle(message, sender, now_s)
+            case mavlink.MAVLINK_MSG_ID_TIMESYNC:
+                if message.tc1 == 0:
+                    boot_ns = round((now_s - self._pilot.readiness.boot_s) * _NANO)
+                    answer = mavlink.MAVLink_timesync_message(boot_ns, message.ts1)
+                    self._outbox.reply(sender, answer)
+            case mavlink.MAVLINK_MSG_ID_PING:
+                if message.target_system == 0 and message.target_component == 0:
+                    asked = message.time_usec, message.seq
+                    answer = mavlink.MAVLink_ping_message(*asked, sender.system, sender.component)
+                    self._outbox.reply(sender, answer)
+            case _:
+                self.unknown += 1
 
-    def _on_command(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
-        self._commands.handle(command_from_message(message), sender, now_s)
-
-    def _on_set_mode(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
-        self._commands.handle_set_mode(message.base_mode, message.custom_mode, sender, now_s)
-
-    def _on_position_target(
-        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
-    ) -> None:
-        del sender
+    def _fly_to(self, message: mavlink.MAVLink_message, now_s: float) -> None:
         if self._pilot.mode is not FlightMode.GUIDED or message.type_mask & _POSITION_IGNORED:
             return
         target_enu_m = place_enu_m(
@@ -254,7 +246,7 @@ class SimulatedAutopilot:
         if target_enu_m is not None:
             self._pilot.fly_guided(target_enu_m, now_s)
 
-    def _on_data_stream(
+    def _set_data_streams(
         self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
     ) -> None:
         everything = message.req_stream_id == mavlink.MAV_DATA_STREAM_ALL
@@ -264,39 +256,3 @@ class SimulatedAutopilot:
             if everything or stream == message.req_stream_id:
                 for message_id in message_ids:
                     self._streams.set_interval(sender.channel, message_id, interval_s, now_s)
-
-    def _on_param_read(
-        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
-    ) -> None:
-        del now_s
-        self._pilot.parameter_server.read(message, sender)
-
-    def _on_param_list(
-        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
-    ) -> None:
-        del message, now_s
-        self._pilot.parameter_server.list_all(sender)
-
-    def _on_param_set(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
-        del now_s
-        self._pilot.parameter_server.write(message, sender)
-
-    def _on_mission_set_current(
-        self, message: mavlink.MAVLink_message, sender: Sender, now_s: float
-    ) -> None:
-        self._commands.set_mission_current(message.seq, sender, now_s)
-
-    def _on_timesync(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
-        if message.tc1 == 0:
-            boot_ns = round((now_s - self._pilot.readiness.boot_s) * _NANO)
-            self._outbox.reply(sender, mavlink.MAVLink_timesync_message(boot_ns, message.ts1))
-
-    def _on_ping(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
-        del now_s
-        if message.target_system == 0 and message.target_component == 0:
-            self._outbox.reply(
-                sender,
-                mavlink.MAVLink_ping_message(
-                    message.time_usec, message.seq, sender.system, sender.component
-                ),
-            )

@@ -34,7 +34,6 @@ def soak(
             min=1,
             metavar="N",
             help="Processes that play them. Default: one for each processor.",
-            show_default=False,
         ),
     ] = None,
     faults: Annotated[
@@ -49,7 +48,6 @@ def soak(
             "--replay",
             metavar="FILE",
             help="Play this one case instead, as a failing soak writes it.",
-            show_default=False,
         ),
     ] = None,
     out: Annotated[

@@ -74,7 +74,6 @@ def run(
             metavar="PATH",
             help="With ardupilot: the arducopter binary; default: SWARM_SITL_ARDUCOPTER. With "
             "px4: a build folder such as build/px4_sitl_default; default: SWARM_SITL_PX4.",
-            show_default=False,
         ),
     ] = None,
     command: Annotated[
@@ -83,7 +82,6 @@ def run(
             "--command",
             metavar="STYLE|UAV=STYLE,…",
             help="How vehicles are commanded: reposition or mission, for all or by UAV.",
-            show_default=False,
         ),
     ] = None,
     forward: Annotated[
@@ -93,7 +91,6 @@ def run(
             metavar="udp:HOST:PORT",
             help="Show every vehicle to a ground station there, which cannot command them; may "
             "be repeated.",
-            show_default=False,
         ),
     ] = None,
     signing_key: Annotated[
@@ -103,7 +100,6 @@ def run(
             metavar="PATH",
             help="Sign what is said to the vehicles, and believe nothing that is not; see swarm "
             "agent. Of a folder made by swarm keys, each vehicle has its UAV's own.",
-            show_default=False,
         ),
     ] = None,
     battery_reserve: Annotated[
@@ -115,7 +111,6 @@ def run(
             metavar="FRAC",
             help="Charge below which a UAV goes home; 0 leaves the battery to the autopilot. See "
             "swarm agent.",
-            show_default=False,
         ),
     ] = None,
     keep_jerk: Annotated[
@@ -134,7 +129,6 @@ def run(
             metavar="M",
             help="Distance from the mission's origin beyond which no UAV is sent, and from where "
             "it goes home. Default: 1.2 times that of the farthest start or task, and 200 m.",
-            show_default=False,
         ),
     ] = None,
     fence_height_m: Annotated[
@@ -146,7 +140,6 @@ def run(
             metavar="M",
             help="The same for the height above the origin, or below it. Default: 50 m above the "
             "highest layer over the highest start or task.",
-            show_default=False,
         ),
     ] = None,
     accept_no_failsafe: Annotated[
@@ -166,7 +159,6 @@ def run(
             metavar="S",
             help="UAVs go home when their link to the bus has been down for so many wall "
             "seconds; see swarm agent.",
-            show_default=False,
         ),
     ] = None,
     fault: Annotated[
@@ -176,7 +168,6 @@ def run(
             metavar="UAV:KIND@T+DURATION",
             help="Something that befalls a simulated autopilot; may be repeated. See swarm "
             "autopilot.",
-            show_default=False,
         ),
     ] = None,
     position_rate_hz: Annotated[
@@ -188,7 +179,6 @@ def run(
             metavar="HZ",
             help="Position reports of each autopilot per wall second. Default: 100 of simulated "
             "ones, less for more than 20 UAVs; 50 of firmware, less for more than 10; else 10.",
-            show_default=False,
         ),
     ] = None,
     acceptance_radius_m: Annotated[
@@ -200,7 +190,6 @@ def run(
             metavar="M",
             help="Within this distance of a task, and stopped, a UAV has arrived. Default: 0.5 "
             "for simulated autopilots, else 2.",
-            show_default=False,
         ),
     ] = None,
     start_timeout_s: Annotated[
@@ -212,7 +201,6 @@ def run(
             help="UAVs that are not airborne by then are given up; mission seconds, or wall "
             "seconds where the mission runs faster. Default: 120 for simulated autopilots, "
             "else 300.",
-            show_default=False,
         ),
     ] = None,
     dashboard: Annotated[
@@ -222,7 +210,6 @@ def run(
             metavar="[ADDRESS:]PORT",
             help="Also show the run in a browser, and let an operator step in there, until it "
             "ends; 0: any port that is free. See swarm dashboard.",
-            show_default=False,
         ),
     ] = None,
     secure: Annotated[
@@ -239,7 +226,6 @@ def run(
             "--keys",
             metavar="DIR",
             help="The same with keys made before: the folder in which swarm keys init made them.",
-            show_default=False,
         ),
     ] = None,
     report: ReportOption = None,
@@ -250,7 +236,6 @@ def run(
             "--logs",
             metavar="DIR",
             help="Keep what every process logs: a file of JSON lines each, in that folder.",
-            show_default=False,
         ),
     ] = None,
     json: JsonOption = False,

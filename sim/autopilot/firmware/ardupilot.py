@@ -1,28 +1,30 @@
-"""ArduCopterModel: 4.8 as recorded, or with the older parameter names up to 4.6.
+"""ArduCopter: 4.8 as recorded, or with the older parameter names up to 4.6.
 
-Sources: recordings of ArduCopterModel 4.8.0-dev, https://ardupilot.org/copter/docs/parameters.html.
-Leaves out: parameters that neither change the simulated vehicle nor are asked for
-by common ground stations.
+Sources: recordings of ArduCopter 4.8.0-dev, https://ardupilot.org/copter/docs/parameters.html.
+Of parameters it has those that change the simulated vehicle or are asked for by common ground
+stations.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
+from sim.autopilot.events import FirmwareEvent, TextTemplate
 from sim.autopilot.firmware.model import (
     FailsafeBehaviour,
+    FirmwareModel,
     GcsFailsafe,
     MissionBehaviour,
     MissionProgress,
     ModeBehaviour,
     RefusalCodes,
     SensorBits,
+    texts_of,
 )
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.parameters import (
@@ -56,7 +58,6 @@ _MODES = {
     16: FlightMode.POSHOLD,
     17: FlightMode.BRAKE,
 }
-_NUMBERS = {mode: number for number, mode in _MODES.items()}
 
 _ALWAYS_SET = (
     mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -79,17 +80,59 @@ _INFO = mavlink.MAV_SEVERITY_INFO
 _WARNING = mavlink.MAV_SEVERITY_WARNING
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 
+_TEXTS = {
+    _INFO: {
+        FirmwareEvent.ARMED: "Arming motors",
+        FirmwareEvent.DISARMED: "Disarming motors",
+        FirmwareEvent.DISARMED_UNUSED: "Disarming motors",
+        FirmwareEvent.DISARMED_LANDED: "Disarming motors",
+        FirmwareEvent.MISSION_RECEIVED: "Flight plan received",
+        FirmwareEvent.ITEM_BEGUN: "Mission: {seq} {name}",
+        FirmwareEvent.WAYPOINT_REACHED: "Reached command #{seq}",
+    },
+    _WARNING: {
+        FirmwareEvent.NO_SUCH_MODE: "No such mode {number}",
+        FirmwareEvent.MODE_REFUSED: "Mode change to {mode} failed: {reason}",
+    },
+    _CRITICAL: {
+        FirmwareEvent.ARMING_REFUSED: "Arm: {obstacle}",
+        FirmwareEvent.NOT_READY: "PreArm: {obstacle}",
+        FirmwareEvent.MISSION_REPLACED: "Auto mission changed, restarted command",
+        FirmwareEvent.MISSION_REPLACED_IN_VAIN: (
+            "Auto mission changed but failed to restart command"
+        ),
+        FirmwareEvent.MISSION_WITHOUT_TAKE_OFF: "Auto: Missing Takeoff Cmd",
+    },
+}
 
-class ArduCopterModel:
-    """Numbers, names and habits of ArduCopterModel.
+_CM = 0.01
+_OLD_NAMES = {
+    "MAV_SYSID": ("SYSID_THISMAV", _INT16, 1.0),
+    "MAV_GCS_SYSID": ("SYSID_MYGCS", _INT16, 1.0),
+    "ARMING_SKIPCHK": ("ARMING_CHECK", _INT32, 1.0),
+    "WP_SPD": ("WPNAV_SPEED", _REAL, _CM),
+    "WP_SPD_UP": ("WPNAV_SPEED_UP", _REAL, _CM),
+    "WP_ACC": ("WPNAV_ACCEL", _REAL, _CM),
+    "WP_JERK": ("WPNAV_JERK", _REAL, 1.0),
+    "WP_RADIUS_M": ("WPNAV_RADIUS", _REAL, _CM),
+    "LAND_SPD_MS": ("LAND_SPEED", _INT16, _CM),
+    "RTL_ALT_M": ("RTL_ALT", _INT32, _CM),
+    "MAV1_POSITION": ("SR0_POSITION", _INT16, 1.0),
+}
+"""Up to 4.6: name, type and unit, in that of the newer one."""
+_NOT_OLD = frozenset({"MAV_GCS_SYSID_HI"})
+
+
+class ArduCopterModel(FirmwareModel):
+    """Numbers, names and habits of ArduCopter.
 
     Args:
         old_names: speak with the parameter names and units of releases up to 4.6,
             which answer nothing to a question for an unknown parameter.
     """
 
-    autopilot: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
-    capabilities: int = (
+    autopilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    capabilities = (
         mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
         | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
         | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -97,35 +140,18 @@ class ArduCopterModel:
         | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
         | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
     )
-    vtol_state: int = mavlink.MAV_VTOL_STATE_MC
-    modes: ModeBehaviour = ModeBehaviour(
+    vtol_state = mavlink.MAV_VTOL_STATE_MC
+    modes = ModeBehaviour(
         at_boot=FlightMode.STABILIZE,
         for_reposition=FlightMode.GUIDED,
-        for_take_off=None,
-        after_flight=None,
         unarmable=frozenset({FlightMode.AUTO, FlightMode.RTL, FlightMode.LAND, FlightMode.BRAKE}),
         change_speed=frozenset({FlightMode.GUIDED, FlightMode.AUTO, FlightMode.RTL}),
-        reposition_needs_flag=False,
         told_at_once=True,
-        flies_when_armed=False,
-        acknowledgements=1,
         set_mode_acknowledged_as=mavlink.MAVLINK_MSG_ID_SET_MODE,
     )
-    missions: MissionBehaviour = MissionBehaviour(
-        asks_for_int=False,
-        int_frames=False,
-        marks_current=False,
-        first_item=1,
-        check_s=0.0,
-        restarts=True,
-        upload_rewinds=False,
-        climbs_first=False,
-        repeats_reached=0,
-        keeps_number=False,
-        gives_way=True,
-        forgets_mode=False,
-    )
-    refusals: RefusalCodes = RefusalCodes(
+    mode_names = MappingProxyType({number: (mode, mode.value) for number, mode in _MODES.items()})
+    missions = MissionBehaviour(first_item=1, restarts=True, gives_way=True)
+    refusals = RefusalCodes(
         not_now=mavlink.MAV_RESULT_FAILED,
         no_such_mode=mavlink.MAV_RESULT_FAILED,
         reposition_without_flag=mavlink.MAV_RESULT_DENIED,
@@ -133,7 +159,7 @@ class ArduCopterModel:
         no_such_message=mavlink.MAV_RESULT_FAILED,
         outside_fence=mavlink.MAV_RESULT_FAILED,
     )
-    failsafe_behaviour: FailsafeBehaviour = FailsafeBehaviour(
+    failsafe_behaviour = FailsafeBehaviour(
         hold_s=0.0,
         words=(),
         hold_words=(),
@@ -149,74 +175,56 @@ class ArduCopterModel:
         critical_when_disarmed=True,
         deaf_after_s=math.inf,
     )
+    disarm_delay_after_landing = ParameterRole.DISARM_DELAY_S
+    disarms_at_once = frozenset({FlightMode.RTL, FlightMode.LAND})
 
-    take_off_above_home: bool = True
-    reads_frames: bool = True
-    forgets_speed: bool = True
+    take_off_above_home = True
+    reads_frames = True
+    forgets_speed = True
     """Its position controller starts with the speed parameter at the first target."""
-    obeys_leg_speed: bool = False
-    pauses_anywhere: bool = False
-    tells_origin_when_armed: bool = True
-    constant_position_at_rest: bool = False
-    coasting_s: float = 7.0
+    tells_origin_when_armed = True
+    coasting_s = 7.0
 
-    unasked_streams: Mapping[int, float] = MappingProxyType({})
-    fixed_streams: frozenset[int] = frozenset()
-    missing_messages: frozenset[int] = frozenset({mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS})
+    missing_messages = frozenset({mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS})
 
-    stage_texts: Mapping[PowerUpStage, TextTemplate] = MappingProxyType(
+    stage_texts = MappingProxyType(
         {
             PowerUpStage.BOOTED: TextTemplate(_INFO, "ArduPilot Ready"),
             PowerUpStage.ORIGIN: TextTemplate(_INFO, "EKF3 IMU0 origin set"),
             PowerUpStage.POSITION: TextTemplate(_INFO, "EKF3 IMU0 is using GPS"),
         }
     )
-    texts: Mapping[FirmwareEvent, TextTemplate] = MappingProxyType(
-        {
-            FirmwareEvent.ARMED: TextTemplate(_INFO, "Arming motors"),
-            FirmwareEvent.ARMING_REFUSED: TextTemplate(_CRITICAL, "Arm: {obstacle}"),
-            FirmwareEvent.NOT_READY: TextTemplate(_CRITICAL, "PreArm: {obstacle}"),
-            FirmwareEvent.DISARMED: TextTemplate(_INFO, "Disarming motors"),
-            FirmwareEvent.DISARMED_UNUSED: TextTemplate(_INFO, "Disarming motors"),
-            FirmwareEvent.DISARMED_LANDED: TextTemplate(_INFO, "Disarming motors"),
-            FirmwareEvent.NO_SUCH_MODE: TextTemplate(_WARNING, "No such mode {number}"),
-            FirmwareEvent.MODE_REFUSED: TextTemplate(
-                _WARNING, "Mode change to {mode} failed: {reason}"
-            ),
-            FirmwareEvent.MISSION_RECEIVED: TextTemplate(_INFO, "Flight plan received"),
-            FirmwareEvent.MISSION_REPLACED: TextTemplate(
-                _CRITICAL, "Auto mission changed, restarted command"
-            ),
-            FirmwareEvent.MISSION_REPLACED_IN_VAIN: TextTemplate(
-                _CRITICAL, "Auto mission changed but failed to restart command"
-            ),
-            FirmwareEvent.MISSION_WITHOUT_TAKE_OFF: TextTemplate(
-                _CRITICAL, "Auto: Missing Takeoff Cmd"
-            ),
-            FirmwareEvent.ITEM_BEGUN: TextTemplate(_INFO, "Mission: {seq} {name}"),
-            FirmwareEvent.WAYPOINT_REACHED: TextTemplate(_INFO, "Reached command #{seq}"),
-        }
-    )
-    own_commands: Mapping[FirmwareEvent, OwnCommand] = MappingProxyType({})
-    numbers_texts: bool = False
+    texts = texts_of(_TEXTS)
 
     def __init__(self, *, old_names: bool = False) -> None:
         self._old_names = old_names
-        self.parameter_habits: ParameterBehaviour = ParameterBehaviour(
+        self.parameter_habits = ParameterBehaviour(
             reports_errors=not old_names,
-            integers_bytewise=False,
-            index_by_name=False,
             # As recorded: the old name of a renamed parameter got neither value nor error.
             unanswered=frozenset({"SYSID_THISMAV"}),
         )
         minor = 6 if old_names else 8
-        self.version: int = 4 << 24 | minor << 16
+        self.version = 4 << 24 | minor << 16
 
     def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
         """The parameter table at power-up."""
-        own = self._old(config) if self._old_names else self._new(config)
-        return (
-            *own,
+        newest = (
+            ParameterEntry("MAV_SYSID", float(config.system_id), _INT16, read_only=True),
+            ParameterEntry("MAV_GCS_SYSID", 255.0, _INT16, least=1.0),
+            ParameterEntry("MAV_GCS_SYSID_HI", 0.0, _INT16, least=0.0),
+            ParameterEntry("ARMING_SKIPCHK", float(self._old_names), _INT32),
+            ParameterEntry("WP_SPD", config.cruise_m_s, _REAL, ParameterRole.CRUISE_M_S, least=0.1),
+            ParameterEntry(
+                "WP_SPD_UP", config.climb_m_s, _REAL, ParameterRole.CLIMB_M_S, least=0.1
+            ),
+            ParameterEntry("WP_ACC", 2.5, _REAL, least=0.5),
+            ParameterEntry("WP_JERK", 1.0, _REAL, least=1.0),
+            ParameterEntry("WP_RADIUS_M", 2.0, _REAL, least=0.05),
+            ParameterEntry(
+                "LAND_SPD_MS", config.land_m_s, _REAL, ParameterRole.LAND_M_S, least=0.1
+            ),
+            ParameterEntry("RTL_ALT_M", 15.0, _REAL, ParameterRole.RETURN_HEIGHT_M, least=0.0),
+            ParameterEntry("MAV1_POSITION", 0.0, _INT16, least=0.0),
             ParameterEntry("DISARM_DELAY", 10.0, _INT8, ParameterRole.DISARM_DELAY_S, least=0.0),
             ParameterEntry(
                 "RTL_LOIT_TIME", 5000.0, _INT32, ParameterRole.RETURN_WAIT_S, 1e-3, least=0.0
@@ -233,58 +241,9 @@ class ArduCopterModel:
             ParameterEntry("MIS_TOTAL", 0.0, _INT16, read_only=True),
             ParameterEntry("MIS_RESTART", 0.0, _INT8),
         )
-
-    def _new(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
-        return (
-            ParameterEntry("MAV_SYSID", float(config.system_id), _INT16, read_only=True),
-            ParameterEntry("MAV_GCS_SYSID", 255.0, _INT16, least=1.0),
-            ParameterEntry("MAV_GCS_SYSID_HI", 0.0, _INT16, least=0.0),
-            ParameterEntry("ARMING_SKIPCHK", 0.0, _INT32),
-            ParameterEntry("WP_SPD", config.cruise_m_s, _REAL, ParameterRole.CRUISE_M_S, least=0.1),
-            ParameterEntry(
-                "WP_SPD_UP", config.climb_m_s, _REAL, ParameterRole.CLIMB_M_S, least=0.1
-            ),
-            ParameterEntry("WP_ACC", 2.5, _REAL, least=0.5),
-            ParameterEntry("WP_JERK", 1.0, _REAL, least=1.0),
-            ParameterEntry("WP_RADIUS_M", 2.0, _REAL, least=0.05),
-            ParameterEntry(
-                "LAND_SPD_MS", config.land_m_s, _REAL, ParameterRole.LAND_M_S, least=0.1
-            ),
-            ParameterEntry("RTL_ALT_M", 15.0, _REAL, ParameterRole.RETURN_HEIGHT_M, least=0.0),
-            ParameterEntry("MAV1_POSITION", 0.0, _INT16, least=0.0),
-        )
-
-    def _old(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
-        cm = 0.01
-        return (
-            ParameterEntry("SYSID_THISMAV", float(config.system_id), _INT16, read_only=True),
-            ParameterEntry("SYSID_MYGCS", 255.0, _INT16, least=1.0),
-            ParameterEntry("ARMING_CHECK", 1.0, _INT32),
-            ParameterEntry(
-                "WPNAV_SPEED",
-                config.cruise_m_s / cm,
-                _REAL,
-                ParameterRole.CRUISE_M_S,
-                cm,
-                least=10.0,
-            ),
-            ParameterEntry(
-                "WPNAV_SPEED_UP",
-                config.climb_m_s / cm,
-                _REAL,
-                ParameterRole.CLIMB_M_S,
-                cm,
-                least=10.0,
-            ),
-            ParameterEntry("WPNAV_ACCEL", 250.0, _REAL, least=50.0),
-            ParameterEntry("WPNAV_JERK", 1.0, _REAL, least=1.0),
-            ParameterEntry("WPNAV_RADIUS", 200.0, _REAL, least=5.0),
-            ParameterEntry(
-                "LAND_SPEED", config.land_m_s / cm, _INT16, ParameterRole.LAND_M_S, cm, least=10.0
-            ),
-            ParameterEntry("RTL_ALT", 1500.0, _INT32, ParameterRole.RETURN_HEIGHT_M, cm, least=0.0),
-            ParameterEntry("SR0_POSITION", 0.0, _INT16, least=0.0),
-        )
+        if not self._old_names:
+            return newest
+        return tuple(_old(entry) for entry in newest if entry.name not in _NOT_OLD)
 
     def ground_lost(self, parameters: ParameterTable) -> GcsFailsafe | None:
         """Returns, or lands; it listens to one system id, or to some next to each other."""
@@ -302,22 +261,6 @@ class ArduCopterModel:
         on = parameters.value("FENCE_ENABLE") and circle
         return parameters.value("FENCE_RADIUS") if on else 0.0
 
-    def disarm_delay(self, mode: FlightMode) -> ParameterRole | None:
-        """At once where the mode was to land; otherwise as after arming."""
-        return None if mode in (FlightMode.RTL, FlightMode.LAND) else ParameterRole.DISARM_DELAY_S
-
-    def custom_mode(self, mode: FlightMode) -> int:
-        """Number of the mode in a heartbeat."""
-        return _NUMBERS[mode]
-
-    def mode_name(self, mode: FlightMode) -> str:
-        """What the firmware calls the mode."""
-        return mode.value
-
-    def mode_of(self, custom_mode: int) -> FlightMode | None:
-        """The mode of that number, if the simulated vehicle has it."""
-        return _MODES.get(custom_mode)
-
     def mode_commanded(self, main: float, sub: float) -> int | None:
         """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE; the third says nothing here."""
         del sub
@@ -326,7 +269,7 @@ class ArduCopterModel:
     def base_mode(self, mode: FlightMode, *, armed: bool, on_ground: bool, booted: bool) -> int:
         """MAV_MODE_FLAG bits of a heartbeat.
 
-        ArduCopterModel sets GUIDED_ENABLED while its position controller runs: so also
+        It sets GUIDED_ENABLED while its position controller runs: so also
         while booting, and no longer once it has returned and landed.
         """
         bits = int(_ALWAYS_SET)
@@ -356,22 +299,29 @@ class ArduCopterModel:
             health=_HEALTHY | seen | running | (_PREARM if can_arm else 0),
         )
 
-    def mission_state(self, view: MissionProgress) -> int:
-        """MISSION_STATE of MISSION_CURRENT."""
-        if not view.present:
-            return int(mavlink.MISSION_STATE_NO_MISSION)
-        if view.over:
-            return int(mavlink.MISSION_STATE_COMPLETE)
-        if view.running:
-            return int(mavlink.MISSION_STATE_ACTIVE)
-        return int(
-            mavlink.MISSION_STATE_PAUSED if view.stopped else mavlink.MISSION_STATE_NOT_STARTED
-        )
+    def mission_told(self, progress: MissionProgress) -> tuple[int, int, int]:
+        """Home doesn't count; the mode is 1 in the mission mode, 0 (not told) otherwise."""
+        if not progress.present:
+            state = mavlink.MISSION_STATE_NO_MISSION
+        elif progress.over:
+            state = mavlink.MISSION_STATE_COMPLETE
+        elif progress.running:
+            state = mavlink.MISSION_STATE_ACTIVE
+        elif progress.stopped:
+            state = mavlink.MISSION_STATE_PAUSED
+        else:
+            state = mavlink.MISSION_STATE_NOT_STARTED
+        return progress.items, state, int(progress.mode is FlightMode.AUTO)
 
-    def mission_mode(self, view: MissionProgress) -> int:
-        """1 while the mission mode is on, 0 (not told) otherwise."""
-        return 1 if view.mode is FlightMode.AUTO else 0
 
-    def mission_total(self, view: MissionProgress) -> int:
-        """Home doesn't count."""
-        return view.items
+def _old(entry: ParameterEntry) -> ParameterEntry:
+    """A parameter as releases up to 4.6 have it."""
+    name, kind, unit = _OLD_NAMES.get(entry.name, (entry.name, entry.type, 1.0))
+    return replace(
+        entry,
+        name=name,
+        value=entry.value / unit,
+        type=kind,
+        unit_si=entry.unit_si * unit,
+        least=entry.least / unit,
+    )

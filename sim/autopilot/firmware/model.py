@@ -1,13 +1,10 @@
-"""What a firmware decides for the simulated vehicle; everything else is common.
-
-Leaves out: any firmware in particular.
-"""
+"""What a firmware decides for the simulated vehicle; everything else is common."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from types import MappingProxyType
 
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
@@ -29,6 +26,7 @@ __all__ = [
     "ModeBehaviour",
     "RefusalCodes",
     "SensorBits",
+    "texts_of",
 ]
 
 
@@ -56,53 +54,53 @@ class ModeBehaviour:
     at_boot: FlightMode
     for_reposition: FlightMode
     """Mode in which DO_REPOSITION is flown."""
-    for_take_off: FlightMode | None
-    """Mode that NAV_TAKEOFF enters, until the vehicle is up; None: it must be guided already."""
-    after_flight: FlightMode | None
-    """Mode entered by itself when the motors stop after an automatic flight."""
     unarmable: frozenset[FlightMode]
     """Modes in which a ground station can't arm."""
     change_speed: frozenset[FlightMode]
     """Modes in which DO_CHANGE_SPEED is obeyed."""
-    reposition_needs_flag: bool
-    """Whether DO_REPOSITION needs its flag also in the mode it is flown in."""
-    told_at_once: bool
-    """Whether a change of mode is followed by a heartbeat at once."""
-    flies_when_armed: bool
-    """Whether take-off and mission modes begin to fly as soon as the motors run."""
-    acknowledgements: int
-    """How often DO_SET_MODE is acknowledged."""
     set_mode_acknowledged_as: int
     """The command in the acknowledgement of the older message SET_MODE."""
+    for_take_off: FlightMode | None = None
+    """Mode that NAV_TAKEOFF enters, until the vehicle is up; None: it must be guided already."""
+    after_flight: FlightMode | None = None
+    """Mode entered by itself when the motors stop after an automatic flight."""
+    reposition_needs_flag: bool = False
+    """Whether DO_REPOSITION needs its flag also in the mode it is flown in."""
+    told_at_once: bool = False
+    """Whether a change of mode is followed by a heartbeat at once."""
+    flies_when_armed: bool = False
+    """Whether take-off and mission modes begin to fly as soon as the motors run."""
+    acknowledgements: int = 1
+    """How often DO_SET_MODE is acknowledged."""
 
 
 @dataclass(frozen=True, slots=True)
 class MissionBehaviour:
     """How missions are taken, flown and ended."""
 
-    asks_for_int: bool
+    asks_for_int: bool = False
     """Whether items are asked for by MISSION_REQUEST_INT."""
-    int_frames: bool
+    int_frames: bool = False
     """Whether items are given back in the ``_INT`` variant of their frame."""
-    marks_current: bool
+    marks_current: bool = False
     """Whether the current item says so when it is given back."""
-    first_item: int
+    first_item: int = 0
     """Number of the first item that is flown: 1 where item 0 is home."""
-    check_s: float
+    check_s: float = 0.0
     """Time after an upload [s] in which the mission mode is acknowledged but not entered."""
-    restarts: bool
+    restarts: bool = False
     """Whether a mission that is over begins again when its mode is entered again."""
-    upload_rewinds: bool
+    upload_rewinds: bool = False
     """Whether another mission is begun from its first item, and not from the current number."""
-    climbs_first: bool
+    climbs_first: bool = False
     """Whether the vehicle rises straight up before its first item, from the ground too."""
-    repeats_reached: int
+    repeats_reached: int = 0
     """How many times more MISSION_ITEM_REACHED is sent, once a second."""
-    keeps_number: bool
+    keeps_number: bool = False
     """Whether MISSION_CURRENT goes on telling the last item after the motors stopped."""
-    gives_way: bool
+    gives_way: bool = False
     """Whether an item may let targets be told for a time."""
-    forgets_mode: bool
+    forgets_mode: bool = False
     """Whether the mode becomes another one at the end, or at an item that returns home."""
 
 
@@ -167,7 +165,20 @@ class GcsFailsafe:
     """Modes in which it does nothing."""
 
 
-class FirmwareModel(Protocol):
+def texts_of(
+    by_severity: Mapping[int, Mapping[FirmwareEvent, str]],
+) -> Mapping[FirmwareEvent, TextTemplate]:
+    """The texts of a firmware, given by their MAV_SEVERITY."""
+    return MappingProxyType(
+        {
+            occasion: TextTemplate(severity, text)
+            for severity, texts in by_severity.items()
+            for occasion, text in texts.items()
+        }
+    )
+
+
+class FirmwareModel:
     """Numbers, names and habits of one firmware."""
 
     autopilot: int
@@ -179,76 +190,89 @@ class FirmwareModel(Protocol):
     version: int
     """``flight_sw_version`` of AUTOPILOT_VERSION."""
     modes: ModeBehaviour
+    mode_names: Mapping[int, tuple[FlightMode, str]]
+    """By ``custom_mode``: the mode, and what the firmware calls it when it talks to people."""
+    custom_mode_bits: int = -1
+    """Those of ``custom_mode`` that say the mode; -1: all."""
     missions: MissionBehaviour
     refusals: RefusalCodes
     failsafe_behaviour: FailsafeBehaviour
     parameter_habits: ParameterBehaviour
+    disarm_delay_after_landing: ParameterRole
+    """What says how long after landing the motors stop..."""
+    disarms_at_once: frozenset[FlightMode] = frozenset()
+    """...but in modes in which they stop at once."""
 
-    take_off_above_home: bool
+    take_off_above_home: bool = False
     """Whether NAV_TAKEOFF by command gives its height above home, rather than above the sea."""
-    reads_frames: bool
+    reads_frames: bool = False
     """Whether commands are read in their frame, rather than always above the sea."""
-    forgets_speed: bool
+    forgets_speed: bool = False
     """Whether a speed ordered before the first target, after the commanded mode was entered
     or after a take-off, is lost."""
-    obeys_leg_speed: bool
+    obeys_leg_speed: bool = False
     """Whether DO_REPOSITION may give the speed of its leg."""
-    pauses_anywhere: bool
+    pauses_anywhere: bool = False
     """Whether DO_REPOSITION without a place, height and heading stops the vehicle."""
-    tells_origin_when_armed: bool
-    constant_position_at_rest: bool
+    tells_origin_when_armed: bool = False
+    constant_position_at_rest: bool = False
     """Whether the estimator says EKF_CONST_POS_MODE wherever the vehicle stands still, rather
     than only where it has no position."""
     coasting_s: float
     """How long after a loss the estimator goes on without calling its position constant [s]."""
 
-    unasked_streams: Mapping[int, float]
+    unasked_streams: Mapping[int, float] = MappingProxyType({})
     """Messages and intervals [s] streamed on a new channel; heartbeats go without saying."""
-    fixed_streams: frozenset[int]
+    fixed_streams: frozenset[int] = frozenset()
     """Messages whose interval can't be changed."""
     missing_messages: frozenset[int]
     """Messages the firmware doesn't know."""
 
-    stage_texts: Mapping[PowerUpStage, TextTemplate]
+    stage_texts: Mapping[PowerUpStage, TextTemplate] = MappingProxyType({})
     """What is said to people when something has become ready."""
     texts: Mapping[FirmwareEvent, TextTemplate]
     """What is said to people otherwise."""
-    own_commands: Mapping[FirmwareEvent, OwnCommand]
+    own_commands: Mapping[FirmwareEvent, OwnCommand] = MappingProxyType({})
     """Commands it sends to other components, which ground stations hear too."""
-    numbers_texts: bool
+    numbers_texts: bool = False
     """Whether texts end in a tab, are numbered, and are sent in pieces if they are long."""
-
-    def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
-        """The parameter table at power-up; it has every `ParameterRole` that has no default."""
-        ...
-
-    def ground_lost(self, parameters: ParameterTable) -> GcsFailsafe | None:
-        """What it does when its ground station falls silent; None if it flies on."""
-        ...
-
-    def disarm_delay(self, mode: FlightMode) -> ParameterRole | None:
-        """What says how long after landing the motors stop; None where that is at once."""
-        ...
 
     def custom_mode(self, mode: FlightMode) -> int:
         """Number of the mode in a heartbeat."""
-        ...
+        return next(number for number, (each, _) in self.mode_names.items() if each is mode)
 
     def mode_name(self, mode: FlightMode) -> str:
         """What the firmware calls the mode when it talks to people."""
-        ...
+        return self.mode_names[self.custom_mode(mode)][1]
 
     def mode_of(self, custom_mode: int) -> FlightMode | None:
         """The mode of that number; None where the firmware, or its simulation, has none."""
-        ...
+        mode, _ = self.mode_names.get(custom_mode & self.custom_mode_bits, (None, ""))
+        return mode
+
+    def disarm_delay(self, mode: FlightMode) -> ParameterRole | None:
+        """What says how long after landing the motors stop; None where that is at once."""
+        return None if mode in self.disarms_at_once else self.disarm_delay_after_landing
+
+    def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
+        """The parameter table at power-up; it has every `ParameterRole` that has no default."""
+        raise NotImplementedError
+
+    def ground_lost(self, parameters: ParameterTable) -> GcsFailsafe | None:
+        """What it does when its ground station falls silent; None if it flies on."""
+        raise NotImplementedError
+
+    def fence_radius_m(self, parameters: ParameterTable) -> float:
+        """Radius of the vehicle's own fence around home [m]; 0: it has none."""
+        raise NotImplementedError
 
     def mode_commanded(self, main: float, sub: float) -> int | None:
         """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE; None if they make no sense."""
-        ...
+        raise NotImplementedError
 
     def base_mode(self, mode: FlightMode, *, armed: bool, on_ground: bool, booted: bool) -> int:
         """MAV_MODE_FLAG bits of a heartbeat."""
-        ...
+        raise NotImplementedError
 
     def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
         """MAV_STATE of a heartbeat while no failsafe acts.
@@ -259,24 +283,12 @@ class FirmwareModel(Protocol):
             booted: the autopilot is initialised.
             ready: nothing keeps it from arming.
         """
-        ...
-
-    def fence_radius_m(self, parameters: ParameterTable) -> float:
-        """Radius of the vehicle's own fence around home [m]; 0: it has none."""
-        ...
+        raise NotImplementedError
 
     def sensors(self, mode: FlightMode, *, has_origin: bool, can_arm: bool) -> SensorBits:
         """Bits of SYS_STATUS."""
-        ...
+        raise NotImplementedError
 
-    def mission_state(self, view: MissionProgress) -> int:
-        """MISSION_STATE of MISSION_CURRENT."""
-        ...
-
-    def mission_mode(self, view: MissionProgress) -> int:
-        """``mission_mode`` of MISSION_CURRENT."""
-        ...
-
-    def mission_total(self, view: MissionProgress) -> int:
-        """``total`` of MISSION_CURRENT."""
-        ...
+    def mission_told(self, progress: MissionProgress) -> tuple[int, int, int]:
+        """``total``, ``mission_state`` (MISSION_STATE) and ``mission_mode`` of MISSION_CURRENT."""
+        raise NotImplementedError

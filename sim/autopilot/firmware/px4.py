@@ -2,16 +2,14 @@
 
 Sources: recordings of PX4 1.17 (SIH quadrotor), https://docs.px4.io/main/en/flight_modes_mc/,
 https://docs.px4.io/main/en/advanced_config/parameter_reference.html, and the behaviour of
-its modules `commander`, `navigator` and `mavlink`. Leaves out: OFFBOARD and ACRO, the
-cone in which it returns at a lower height, events (its newer way to give reasons),
-parameters that neither change the simulated vehicle nor are asked for by common
-ground stations.
+its modules `commander`, `navigator` and `mavlink`. Left out are OFFBOARD and ACRO, the cone in
+which it returns at a lower height, events (its newer way to give reasons), and parameters that
+neither change the simulated vehicle nor are asked for by common ground stations.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from types import MappingProxyType
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -20,12 +18,14 @@ from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
 from sim.autopilot.firmware.model import (
     FailsafeBehaviour,
+    FirmwareModel,
     GcsFailsafe,
     MissionBehaviour,
     MissionProgress,
     ModeBehaviour,
     RefusalCodes,
     SensorBits,
+    texts_of,
 )
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.parameters import (
@@ -34,7 +34,6 @@ from sim.autopilot.parameters import (
     ParameterRole,
     ParameterTable,
 )
-from sim.autopilot.readiness import PowerUpStage
 
 __all__ = ["Px4Model"]
 
@@ -54,8 +53,6 @@ _MODES = {
     (7, 0): (FlightMode.STABILIZE, "Stabilized"),
 }
 """Main and sub mode -> the mode and what people read."""
-_NUMBERS = {mode: main << 16 | sub << 24 for (main, sub), (mode, _) in _MODES.items()}
-_NAMES = dict(_MODES.values())
 _AUTOMATIC = frozenset(
     {FlightMode.TAKEOFF, FlightMode.LOITER, FlightMode.AUTO, FlightMode.RTL, FlightMode.LAND}
 )
@@ -84,21 +81,57 @@ _MISSION_MODE_SUSPENDED = 2
 _INFO = mavlink.MAV_SEVERITY_INFO
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 
+_TEXTS = {
+    _INFO: {
+        FirmwareEvent.ARMED: "Armed by external command",
+        FirmwareEvent.DISARMED: "Disarmed by external command",
+        FirmwareEvent.DISARMED_UNUSED: "Disarmed by auto preflight disarming",
+        FirmwareEvent.DISARMED_LANDED: "Disarmed by landing",
+        FirmwareEvent.LIFTED_OFF: "Takeoff detected",
+        FirmwareEvent.LANDED: "Landing detected",
+        FirmwareEvent.MISSION_BEGUN: "Executing Mission",
+        FirmwareEvent.MISSION_CLIMB: "Climb to {height_m:.1f} meters above home",
+        FirmwareEvent.MISSION_OVER: "Mission finished, loitering",
+        FirmwareEvent.MISSION_OVER_ON_GROUND: "Mission finished, landed",
+        FirmwareEvent.RETURN_ORDERED: "Returning to launch",
+        FirmwareEvent.RETURN_BEGUN: (
+            "RTL: start return at {altitude_m:.0f} m ({above_home_m:.0f} m above destination)"
+        ),
+        FirmwareEvent.RETURN_LANDING: "RTL: land at destination",
+    },
+    _CRITICAL: {
+        FirmwareEvent.ARMING_REFUSED: "Arming denied: Resolve system health failures first",
+        FirmwareEvent.DISARMING_REFUSED: "Disarming denied: not landed",
+        FirmwareEvent.TAKE_OFF_RAISED: "Using minimum takeoff altitude: {height_m:.2f} m",
+        FirmwareEvent.NO_SUCH_MODE: "Unsupported auto mode",
+        FirmwareEvent.MODE_REFUSED: "Switching to mode '{mode}' is currently not available",
+        FirmwareEvent.TARGET_OUTSIDE_FENCE: "Reposition is outside geofence",
+        FirmwareEvent.MISSION_UNAVAILABLE: "No valid mission available, loitering",
+        FirmwareEvent.MISSION_UNAVAILABLE_ON_GROUND: (
+            "No valid mission available, refusing takeoff"
+        ),
+    },
+}
 
-class Px4Model:
+
+def _custom_mode(main: int, sub: int) -> int:
+    return main << 16 | sub << 24
+
+
+class Px4Model(FirmwareModel):
     """Numbers, names and habits of PX4."""
 
-    autopilot: int = mavlink.MAV_AUTOPILOT_PX4
-    capabilities: int = (
+    autopilot = mavlink.MAV_AUTOPILOT_PX4
+    capabilities = (
         mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
         | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
         | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
         | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
         | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
     )
-    vtol_state: int = mavlink.MAV_VTOL_STATE_UNDEFINED
-    version: int = 1 << 24 | 17 << 16 | 255
-    modes: ModeBehaviour = ModeBehaviour(
+    vtol_state = mavlink.MAV_VTOL_STATE_UNDEFINED
+    version = 1 << 24 | 17 << 16 | 255
+    modes = ModeBehaviour(
         at_boot=FlightMode.LOITER,
         for_reposition=FlightMode.LOITER,
         for_take_off=FlightMode.TAKEOFF,
@@ -106,26 +139,26 @@ class Px4Model:
         unarmable=frozenset({FlightMode.RTL, FlightMode.LAND}),
         change_speed=frozenset(FlightMode),
         reposition_needs_flag=True,
-        told_at_once=False,
         flies_when_armed=True,
         acknowledgements=2,
         set_mode_acknowledged_as=mavlink.MAV_CMD_DO_SET_MODE,
     )
-    missions: MissionBehaviour = MissionBehaviour(
+    mode_names = MappingProxyType(
+        {_custom_mode(main, sub): named for (main, sub), named in _MODES.items()}
+    )
+    custom_mode_bits = 0xFFFF0000
+    missions = MissionBehaviour(
         asks_for_int=True,
         int_frames=True,
         marks_current=True,
-        first_item=0,
         check_s=1.9,
-        restarts=False,
         upload_rewinds=True,
         climbs_first=True,
         repeats_reached=10,
         keeps_number=True,
-        gives_way=False,
         forgets_mode=True,
     )
-    refusals: RefusalCodes = RefusalCodes(
+    refusals = RefusalCodes(
         not_now=mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
         no_such_mode=mavlink.MAV_RESULT_DENIED,
         reposition_without_flag=mavlink.MAV_RESULT_UNSUPPORTED,
@@ -133,7 +166,8 @@ class Px4Model:
         no_such_message=mavlink.MAV_RESULT_DENIED,
         outside_fence=mavlink.MAV_RESULT_ACCEPTED,
     )
-    failsafe_behaviour: FailsafeBehaviour = FailsafeBehaviour(
+    disarm_delay_after_landing = ParameterRole.DISARM_LANDED_S
+    failsafe_behaviour = FailsafeBehaviour(
         hold_s=_FAILSAFE_HOLD_S,
         words=(TextTemplate(_CRITICAL, "Failsafe activated"),),
         hold_words=(
@@ -147,8 +181,7 @@ class Px4Model:
         critical_when_disarmed=False,
         deaf_after_s=_HEARTBEAT_MISSED_S + _TEXTS_KEPT_S,
     )
-    parameter_habits: ParameterBehaviour = ParameterBehaviour(
-        reports_errors=False,
+    parameter_habits = ParameterBehaviour(
         integers_bytewise=True,
         index_by_name=True,
         tells_changes=True,
@@ -161,16 +194,12 @@ class Px4Model:
         ),
     )
 
-    take_off_above_home: bool = False
-    reads_frames: bool = False
-    forgets_speed: bool = False
-    obeys_leg_speed: bool = True
-    pauses_anywhere: bool = True
-    tells_origin_when_armed: bool = False
-    constant_position_at_rest: bool = True
-    coasting_s: float = math.inf
+    obeys_leg_speed = True
+    pauses_anywhere = True
+    constant_position_at_rest = True
+    coasting_s = math.inf
 
-    unasked_streams: Mapping[int, float] = MappingProxyType(
+    unasked_streams = MappingProxyType(
         {
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0,
@@ -185,57 +214,11 @@ class Px4Model:
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
         }
     )
-    fixed_streams: frozenset[int] = frozenset({mavlink.MAVLINK_MSG_ID_MISSION_CURRENT})
-    missing_messages: frozenset[int] = frozenset({mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT})
+    fixed_streams = frozenset({mavlink.MAVLINK_MSG_ID_MISSION_CURRENT})
+    missing_messages = frozenset({mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT})
 
-    stage_texts: Mapping[PowerUpStage, TextTemplate] = MappingProxyType({})
-    texts: Mapping[FirmwareEvent, TextTemplate] = MappingProxyType(
-        {
-            FirmwareEvent.ARMED: TextTemplate(_INFO, "Armed by external command"),
-            FirmwareEvent.ARMING_REFUSED: TextTemplate(
-                _CRITICAL, "Arming denied: Resolve system health failures first"
-            ),
-            FirmwareEvent.DISARMED: TextTemplate(_INFO, "Disarmed by external command"),
-            FirmwareEvent.DISARMED_UNUSED: TextTemplate(
-                _INFO, "Disarmed by auto preflight disarming"
-            ),
-            FirmwareEvent.DISARMED_LANDED: TextTemplate(_INFO, "Disarmed by landing"),
-            FirmwareEvent.DISARMING_REFUSED: TextTemplate(
-                _CRITICAL, "Disarming denied: not landed"
-            ),
-            FirmwareEvent.LIFTED_OFF: TextTemplate(_INFO, "Takeoff detected"),
-            FirmwareEvent.LANDED: TextTemplate(_INFO, "Landing detected"),
-            FirmwareEvent.TAKE_OFF_RAISED: TextTemplate(
-                _CRITICAL, "Using minimum takeoff altitude: {height_m:.2f} m"
-            ),
-            FirmwareEvent.NO_SUCH_MODE: TextTemplate(_CRITICAL, "Unsupported auto mode"),
-            FirmwareEvent.MODE_REFUSED: TextTemplate(
-                _CRITICAL, "Switching to mode '{mode}' is currently not available"
-            ),
-            FirmwareEvent.TARGET_OUTSIDE_FENCE: TextTemplate(
-                _CRITICAL, "Reposition is outside geofence"
-            ),
-            FirmwareEvent.MISSION_BEGUN: TextTemplate(_INFO, "Executing Mission"),
-            FirmwareEvent.MISSION_CLIMB: TextTemplate(
-                _INFO, "Climb to {height_m:.1f} meters above home"
-            ),
-            FirmwareEvent.MISSION_UNAVAILABLE: TextTemplate(
-                _CRITICAL, "No valid mission available, loitering"
-            ),
-            FirmwareEvent.MISSION_UNAVAILABLE_ON_GROUND: TextTemplate(
-                _CRITICAL, "No valid mission available, refusing takeoff"
-            ),
-            FirmwareEvent.MISSION_OVER: TextTemplate(_INFO, "Mission finished, loitering"),
-            FirmwareEvent.MISSION_OVER_ON_GROUND: TextTemplate(_INFO, "Mission finished, landed"),
-            FirmwareEvent.RETURN_ORDERED: TextTemplate(_INFO, "Returning to launch"),
-            FirmwareEvent.RETURN_BEGUN: TextTemplate(
-                _INFO,
-                "RTL: start return at {altitude_m:.0f} m ({above_home_m:.0f} m above destination)",
-            ),
-            FirmwareEvent.RETURN_LANDING: TextTemplate(_INFO, "RTL: land at destination"),
-        }
-    )
-    own_commands: Mapping[FirmwareEvent, OwnCommand] = MappingProxyType(
+    texts = texts_of(_TEXTS)
+    own_commands = MappingProxyType(
         {
             FirmwareEvent.MISSION_OVER: OwnCommand(
                 mavlink.MAV_CMD_DO_TRIGGER_CONTROL, (-1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
@@ -248,7 +231,7 @@ class Px4Model:
         }
     )
     """The mission triggers cameras and the return takes over gimbals; number 0 is recorded so."""
-    numbers_texts: bool = True
+    numbers_texts = True
 
     def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
         """The parameter table at power-up, by name as PX4 sorts it."""
@@ -304,29 +287,11 @@ class Px4Model:
         """A circle, unless it is 0."""
         return parameters.value("GF_MAX_HOR_DIST")
 
-    def disarm_delay(self, mode: FlightMode) -> ParameterRole | None:
-        """The same after every landing."""
-        del mode
-        return ParameterRole.DISARM_LANDED_S
-
-    def custom_mode(self, mode: FlightMode) -> int:
-        """Number of the mode in a heartbeat."""
-        return _NUMBERS[mode]
-
-    def mode_name(self, mode: FlightMode) -> str:
-        """What people read."""
-        return _NAMES[mode]
-
-    def mode_of(self, custom_mode: int) -> FlightMode | None:
-        """The mode of that number, if the simulated vehicle has it."""
-        known = _MODES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
-        return None if known is None else known[0]
-
     def mode_commanded(self, main: float, sub: float) -> int | None:
         """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE."""
         if not (0.0 <= main <= 255.0 and 0.0 <= sub <= 255.0):
             return None
-        return int(main) << 16 | int(sub) << 24
+        return _custom_mode(int(main), int(sub))
 
     def base_mode(self, mode: FlightMode, *, armed: bool, on_ground: bool, booted: bool) -> int:
         """MAV_MODE_FLAG bits of a heartbeat."""
@@ -366,25 +331,20 @@ class Px4Model:
             present=_PRESENT, enabled=_ENABLED, health=_HEALTHY | (_PREARM if can_arm else 0)
         )
 
-    def mission_state(self, view: MissionProgress) -> int:
-        """MISSION_STATE of MISSION_CURRENT.
+    def mission_told(self, progress: MissionProgress) -> tuple[int, int, int]:
+        """``total``, ``mission_state`` and ``mission_mode`` of MISSION_CURRENT.
 
-        It speaks of the mode more than of the mission: a take-off or a landing that is
+        The state speaks of the mode more than of the mission: a take-off or a landing that is
         done completes it too, and one that was left half-way stays active.
         """
-        if not view.present:
-            return int(mavlink.MISSION_STATE_NO_MISSION)
-        if view.task_done:
-            return int(mavlink.MISSION_STATE_COMPLETE)
-        if self.mission_mode(view) == _MISSION_MODE_ACTIVE or view.current:
-            return int(mavlink.MISSION_STATE_ACTIVE)
-        return int(mavlink.MISSION_STATE_NOT_STARTED)
-
-    def mission_mode(self, view: MissionProgress) -> int:
-        """Taking off and landing count as a mission."""
-        active = view.mode in (FlightMode.AUTO, FlightMode.TAKEOFF, FlightMode.LAND)
-        return _MISSION_MODE_ACTIVE if active else _MISSION_MODE_SUSPENDED
-
-    def mission_total(self, view: MissionProgress) -> int:
-        """Unknown where there is none."""
-        return view.items if view.items > 0 else _UNKNOWN_TOTAL
+        flown = progress.mode in (FlightMode.AUTO, FlightMode.TAKEOFF, FlightMode.LAND)
+        if not progress.present:
+            state = mavlink.MISSION_STATE_NO_MISSION
+        elif progress.task_done:
+            state = mavlink.MISSION_STATE_COMPLETE
+        elif flown or progress.current:
+            state = mavlink.MISSION_STATE_ACTIVE
+        else:
+            state = mavlink.MISSION_STATE_NOT_STARTED
+        mode = _MISSION_MODE_ACTIVE if flown else _MISSION_MODE_SUSPENDED
+        return progress.items or _UNKNOWN_TOTAL, state, mode

@@ -35,12 +35,7 @@ def doctor(
     scenario: OptionalScenarioArgument = None,
     mission: Annotated[
         str | None,
-        typer.Option(
-            "--mission",
-            metavar="NAME",
-            help="Mission that should be there on the bus.",
-            show_default=False,
-        ),
+        typer.Option("--mission", metavar="NAME", help="Mission that should be there on the bus."),
     ] = None,
     seat: ConnectionOptions = DEFAULT_CONNECTION,
     mavlink: Annotated[
@@ -50,25 +45,16 @@ def doctor(
             metavar="URL[#SYSID]",
             help="Autopilot to listen to, as for swarm agent, such as udpin:0.0.0.0:14550#1; may "
             "be repeated. It is asked for messages and never commanded.",
-            show_default=False,
         ),
     ] = None,
     signing_key: Annotated[
         Path | None,
-        typer.Option(
-            "--signing-key",
-            metavar="FILE",
-            help="Key that the autopilots sign with.",
-            show_default=False,
-        ),
+        typer.Option("--signing-key", metavar="FILE", help="Key that the autopilots sign with."),
     ] = None,
     state: Annotated[
         Path | None,
         typer.Option(
-            "--state",
-            metavar="DIR",
-            help="Folder in which processes shall keep what they know.",
-            show_default=False,
+            "--state", metavar="DIR", help="Folder in which processes shall keep what they know."
         ),
     ] = None,
     port: Annotated[
@@ -80,7 +66,6 @@ def doctor(
             metavar="P",
             help="TCP port that must be free, such as a dashboard's or a router's; may be "
             "repeated.",
-            show_default=False,
         ),
     ] = None,
     timeout_s: Annotated[
