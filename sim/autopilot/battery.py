@@ -1,9 +1,9 @@
 """The battery of a vehicle: a charge that armed time drains, and what is measured of it.
 
-The current is the same as long as the motors run, so charge, current, consumption and
-remaining share agree with each other at every instant; the voltage falls in proportion to
-the charge. Leaves out: sag under load, temperature, several batteries, what climbing or wind
-costs; a battery without an endurance gives its current and stays full.
+The current is the same as long as the motors run, so charge, current, consumption and remaining
+share agree with each other at every instant; the voltage falls in proportion to the charge. Left
+out are sag under load, temperature, several batteries, what climbing or wind costs; a battery
+without an endurance gives its current and stays full.
 """
 
 from __future__ import annotations
@@ -39,15 +39,12 @@ class BatteryModel:
 
     def __init__(self, endurance_s: float | None, failsafe: BatteryFailsafe | None) -> None:
         self._endurance_s = endurance_s
-        self._steps = (
-            ()
-            if failsafe is None
-            else (
-                (failsafe.low_frac, ChargeLevel.LOW),
-                (failsafe.critical_frac, ChargeLevel.CRITICAL),
-            )
-        )
-        self._level = ChargeLevel.FINE
+        self._steps: tuple[tuple[float, ChargeLevel], ...] = ()
+        if failsafe is not None:
+            low, critical = failsafe.low_frac, failsafe.critical_frac
+            self._steps = (low, ChargeLevel.LOW), (critical, ChargeLevel.CRITICAL)
+        self.level = ChargeLevel.FINE
+        """How worried the firmware is."""
         self._charge_frac = 1.0
         """Charge at the instant from which the motors run, or now while they stand."""
         self._running_since_s: float | None = None
@@ -75,11 +72,6 @@ class BatteryModel:
         return max(0.0, self._charge_frac - (now_s - self._running_since_s) / self._endurance_s)
 
     @property
-    def level(self) -> ChargeLevel:
-        """How worried the firmware is."""
-        return self._level
-
-    @property
     def current_a(self) -> float:
         """Current drawn [A]."""
         return 0.0 if self._running_since_s is None else _FLIGHT_A
@@ -103,22 +95,19 @@ class BatteryModel:
     def advance(self, at_s: float) -> ChargeLevel:
         """Take the worst of the levels that are due by ``at_s``."""
         due = [level for step_s, level in self._steps_s() if step_s <= at_s]
-        self._level = max([self._level, *due])
-        return self._level
+        self.level = max([self.level, *due])
+        return self.level
 
     def _steps_s(self) -> list[tuple[float, ChargeLevel]]:
         """When each worse level is reached."""
         since_s = self._running_since_s
-        if since_s is None or not self._steps:
+        if since_s is None:
             return []
         steps_s = []
         for step_frac, level in self._steps:
-            if level <= self._level:
-                continue
-            if self._charge_frac <= step_frac:
+            if level > self.level and self._charge_frac <= step_frac:
                 steps_s.append((since_s, level))
-            elif self._endurance_s is not None:
-                steps_s.append(
-                    (since_s + (self._charge_frac - step_frac) * self._endurance_s, level)
-                )
+            elif level > self.level and self._endurance_s is not None:
+                lasts_s = (self._charge_frac - step_frac) * self._endurance_s
+                steps_s.append((since_s + lasts_s, level))
         return steps_s

@@ -1,7 +1,4 @@
-"""The command `swarm autopilot`.
-
-Leaves out: everything but options and output.
-"""
+"""The command `swarm autopilot`."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Bytes <-> MAVLink 2 messages, on one channel.
 
-Anything malformed is dropped and counted, and with a signing key so is what is not signed
-with it; every channel remembers for itself what it has heard. Signatures are pymavlink's
-own, so that the bridge's are checked by another implementation. Leaves out: sockets.
+Anything malformed is dropped and counted, and with a signing key so is what is not signed with it;
+every channel remembers for itself what it has heard. Signatures are pymavlink's own, so that the
+bridge's are checked by another implementation.
 """
 
 from __future__ import annotations
@@ -75,9 +75,7 @@ class ChannelCodec:
     def encode(self, message: mavlink.MAVLink_message, system_id: int | None = None) -> bytes:
         """The frame of ``message``, with this channel's next sequence number.
 
-        Args:
-            message: what is said.
-            system_id: whom it is said to come from, where that is not this end.
+        It is said to come from ``system_id``, where that is not this end.
         """
         own_id = self._mav.srcSystem
         if system_id is not None:

@@ -20,6 +20,7 @@ __all__ = ["BatteryFailsafe", "Delays", "FleetMember", "Physics", "VehicleConfig
 
 
 _AIRSPEED_PER_CRUISE = 1.5
+_MAX_SYSTEM_ID = 254
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,9 +139,6 @@ class VehicleConfig:
         if self.wind is not None:
             motion = WindyMotion(motion, self.wind, self.airspeed_m_s, self.start_enu_m[2])
         return motion
-
-
-_MAX_SYSTEM_ID = 254
 
 
 @dataclass(frozen=True, slots=True)

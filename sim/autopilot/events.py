@@ -1,7 +1,4 @@
-"""What a simulated vehicle hears, what its firmware says unasked, and how it collects all it says.
-
-Leaves out: which firmware says what (sim.autopilot.firmware).
-"""
+"""What a simulated vehicle hears, what its firmware says unasked, and all it says, collected."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
 """What goes wrong with a simulated vehicle on request, and when.
 
-A fault is written ``KIND@T`` or ``KIND@T+DURATION``, in the vehicle's own seconds. ``T`` 0
-is power-up; every other ``T`` counts from the first time the vehicle is armed, so that a
-fault meets a flight at the same place however long preparations took. Without a duration it
-lasts. Leaves out: carrying faults out (sim.autopilot.faulty_vehicle).
+A fault is written ``KIND@T`` or ``KIND@T+DURATION``, in the vehicle's own seconds. ``T`` 0 is
+power-up; every other ``T`` counts from the first time the vehicle is armed, so that a fault meets
+a flight at the same place however long preparations took. Without a duration it lasts.
 """
 
 from __future__ import annotations

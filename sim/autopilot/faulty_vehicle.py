@@ -1,7 +1,6 @@
 """A simulated vehicle to which faults happen, each at its own instant.
 
-It takes the place of a `SimulatedAutopilot` and is driven in the same way. Leaves out: what the
-faults mean in words (sim.autopilot.faults).
+It takes the place of a `SimulatedAutopilot` and is driven in the same way.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""The vehicle in the air: its flight mode, what it is doing, and what comes after by itself.
-
-Leaves out: the numbers of modes (sim.autopilot.firmware), what flying in them means and who may
-choose them (sim.autopilot.pilot), missions (sim.autopilot.mission_run) and motion itself
-(sim.world.motion).
-"""
+"""The vehicle in the air: its flight mode, what it is doing, and what comes after by itself."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Which messages each ground station gets how often.
 
-Messages are due on a grid of their own; a vehicle that is called too late skips what was
-missed instead of sending it in a burst, and keeps the grid. Leaves out: what the messages say
-(sim.autopilot.telemetry).
+Messages are due on a grid of their own; a vehicle that is called too late skips what was missed
+instead of sending it in a burst, and keeps the grid.
 """
 
 from __future__ import annotations
@@ -10,10 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-__all__ = ["LEAST_INTERVAL_S", "MessageRates"]
+__all__ = ["MessageRates"]
 
 
-LEAST_INTERVAL_S = 0.001
+_LEAST_INTERVAL_S = 0.001
 """Shorter intervals are taken as this one [s]."""
 
 
@@ -50,7 +49,7 @@ class MessageRates:
         if interval_s is None:
             streams.pop(message_id, None)
         else:
-            streams[message_id] = [max(LEAST_INTERVAL_S, interval_s), now_s]
+            streams[message_id] = [max(_LEAST_INTERVAL_S, interval_s), now_s]
         self._deadline_s = None
 
     def interval_s(self, channel: int, message_id: int) -> float | None:

@@ -186,6 +186,11 @@ class _Upload:
     expires_s: float
     items: list[StoredMissionItem] = field(default_factory=list)
 
+    def is_of(self, sender: Sender) -> bool:
+        """Whether it is that ground station's, on whatever channel."""
+        own = self.sender
+        return (own.system, own.component) == (sender.system, sender.component)
+
 
 class MissionServer:
     """One upload at a time, and any number of downloads."""
@@ -222,41 +227,30 @@ class MissionServer:
 
     def handle(self, message: mavlink.MAVLink_message, sender: Sender, now_s: float) -> None:
         """Serve one message of the mission protocol; others are left alone."""
-        kind = message.get_msgId()
         mission_type = getattr(message, "mission_type", mavlink.MAV_MISSION_TYPE_MISSION)
-        if kind == mavlink.MAVLINK_MSG_ID_MISSION_ACK:
-            if self._upload is not None and self._upload.sender == sender:
-                self._upload = None  # the ground station gave up
-        elif mission_type != mavlink.MAV_MISSION_TYPE_MISSION:
-            self._acknowledge(sender, mavlink.MAV_MISSION_UNSUPPORTED, mission_type)
-        elif kind == mavlink.MAVLINK_MSG_ID_MISSION_COUNT:
-            self._begin_upload(message.count, sender, now_s)
-        elif kind in (
-            mavlink.MAVLINK_MSG_ID_MISSION_ITEM,
-            mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT,
-        ):
-            self._take_item(message, sender, now_s)
-        elif kind == mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST:
-            self._send_count(sender)
-        elif kind in (
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST,
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-        ):
-            self._send_item(
-                message.seq, sender, as_int=kind == mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT
-            )
-        elif kind == mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL:
-            cleared = self._upload is None and self._pilot.run.clear()
-            self._acknowledge(
-                sender, mavlink.MAV_MISSION_ACCEPTED if cleared else mavlink.MAV_MISSION_ERROR
-            )
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_MISSION_ACK:
+                if self._upload is not None and self._upload.sender == sender:
+                    self._upload = None  # the ground station gave up
+            case _ if mission_type != mavlink.MAV_MISSION_TYPE_MISSION:
+                self._acknowledge(sender, mavlink.MAV_MISSION_UNSUPPORTED, mission_type)
+            case mavlink.MAVLINK_MSG_ID_MISSION_COUNT:
+                self._begin_upload(message.count, sender, now_s)
+            case mavlink.MAVLINK_MSG_ID_MISSION_ITEM | mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT:
+                self._take_item(message, sender, now_s)
+            case mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST:
+                self._send_count(sender)
+            case mavlink.MAVLINK_MSG_ID_MISSION_REQUEST:
+                self._send_item(message.seq, sender, as_int=False)
+            case mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT:
+                self._send_item(message.seq, sender, as_int=True)
+            case mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL:
+                cleared = self._upload is None and self._pilot.run.clear()
+                result = mavlink.MAV_MISSION_ACCEPTED if cleared else mavlink.MAV_MISSION_ERROR
+                self._acknowledge(sender, result)
 
     def _begin_upload(self, count: int, sender: Sender, now_s: float) -> None:
-        running = self._upload
-        if running is not None and (running.sender.system, running.sender.component) != (
-            sender.system,
-            sender.component,
-        ):
+        if self._upload is not None and not self._upload.is_of(sender):
             self._acknowledge(sender, mavlink.MAV_MISSION_DENIED)
         elif count > _MAX_ITEMS:
             self._upload = None
@@ -272,7 +266,7 @@ class MissionServer:
         if upload is None:
             self._acknowledge(sender, mavlink.MAV_MISSION_ERROR)
             return
-        if (upload.sender.system, upload.sender.component) != (sender.system, sender.component):
+        if not upload.is_of(sender):
             self._acknowledge(sender, mavlink.MAV_MISSION_DENIED)
             return
         if message.seq != len(upload.items):
@@ -307,14 +301,11 @@ class MissionServer:
         sender = upload.sender
         self._outbox.reply(sender, request(sender.system, sender.component, len(upload.items)))
 
-    def _count(self) -> int:
-        # Home is an item of its own, also where no mission stands on the vehicle.
-        return max(len(self._store.items), self._behaviour.first_item)
-
     def _send_count(self, sender: Sender) -> None:
+        # Home is an item of its own, also where no mission stands on the vehicle.
+        count = max(len(self._store.items), self._behaviour.first_item)
         self._outbox.reply(
-            sender,
-            mavlink.MAVLink_mission_count_message(sender.system, sender.component, self._count()),
+            sender, mavlink.MAVLink_mission_count_message(sender.system, sender.component, count)
         )
 
     def _send_item(self, seq: int, sender: Sender, *, as_int: bool) -> None:

@@ -1,7 +1,4 @@
-"""Reads what is said to `swarm autopilot` about addresses, physics and faults.
-
-Leaves out: the options themselves (sim.autopilot.cli).
-"""
+"""Reads what is said to `swarm autopilot` about addresses, physics and faults."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
 """The parameters of a vehicle: a table ground stations read and write.
 
-A firmware names the parameters; the few that change behaviour carry a `ParameterRole`,
-through which the rest of the vehicle reads them in SI units. Source of the
-protocol: https://mavlink.io/en/services/parameter.html. Leaves out: persistence,
-extended parameters.
+A firmware names the parameters; the few that change behaviour carry a `ParameterRole`, through
+which the rest of the vehicle reads them in SI units. Source of the protocol:
+https://mavlink.io/en/services/parameter.html. Persistence and extended parameters are left out.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """What the autopilot allows and does: modes, arming, targets, home, mission.
 
-Everything that happens by itself happens at its own instant, however late the
-next `step` comes, so flights do not depend on how often the vehicle is called.
-Leaves out: decoding of commands (sim.autopilot.commands) and telemetry.
+Everything that happens by itself happens at its own instant, however late the next `step` comes,
+so flights do not depend on how often the vehicle is called.
 """
 
 from __future__ import annotations
@@ -104,20 +103,16 @@ class Pilot:
             happen(deadline_s)
 
     def _deadlines(self) -> list[tuple[float, Callable[[float], None]]]:
-        due: list[tuple[float, Callable[[float], None]]] = [
-            (self._prearm_text_s, self._say_obstacle)
-        ]
-        for deadline_s, happen in (
+        foreseen: list[tuple[float | None, Callable[[float], None]]] = [
+            (self._prearm_text_s, self._say_obstacle),
             (self.readiness.deadline_s(), self._pass_stage),
             (self.flight.deadline_s(), self._advance_flight),
             (self.run.hold_until_s, self.run.end_hold),
             (self.run.repeat_s, self.run.repeat),
-            (self._disarm_s, self._disarm_by_itself),
+            (self._disarm_s, lambda at_s: self._disarm(at_s, self._disarm_occasion)),
             (self.failsafes.deadline_s(), self.failsafes.advance),
-        ):
-            if deadline_s is not None:
-                due.append((deadline_s, happen))
-        return due
+        ]
+        return [(due_s, happen) for due_s, happen in foreseen if due_s is not None]
 
     def _pass_stage(self, at_s: float) -> None:
         stage = self.readiness.advance()
@@ -133,8 +128,7 @@ class Pilot:
                 self.parameter_server.announce("MIS_TOTAL", float(max(1, len(self.store.items))))
             case PowerUpStage.SENSORS | PowerUpStage.POSITION:
                 pass
-        text = self.flavour.stage_texts.get(stage)
-        if text is not None:
+        if (text := self.flavour.stage_texts.get(stage)) is not None:
             self.outbox.text(text.severity, text.template)
 
     def _say_obstacle(self, at_s: float) -> None:
@@ -147,11 +141,8 @@ class Pilot:
         milestone = self.flight.advance(at_s)
         if stood and not self.flight.on_ground:
             self.narrator.tell(FirmwareEvent.LIFTED_OFF)
-        if (
-            self.mode is FlightMode.RTL
-            and not landing
-            and self.flight.activity is MotionPhase.LANDING
-        ):
+        lands = self.flight.activity is MotionPhase.LANDING and not landing
+        if lands and self.mode is FlightMode.RTL:
             self.narrator.tell(FirmwareEvent.RETURN_LANDING)
         if milestone is Milestone.LANDED:
             self._landed(at_s)
@@ -226,15 +217,13 @@ class Pilot:
             return None
         if self.armed and mode.needs_position and not self.readiness.has_position:
             return "requires position"
-        if mode is FlightMode.AUTO:
-            if not self.run.present:
-                return "init failed"
-            grounded = self.armed and self.flight.on_ground
-            rises = self.flavour.missions.climbs_first or self.run.starts_with_take_off
-            if grounded and not rises:
-                self.narrator.tell(FirmwareEvent.MISSION_WITHOUT_TAKE_OFF)
-                return "init failed"
-        return None
+        if mode is not FlightMode.AUTO:
+            return None
+        rises = self.flavour.missions.climbs_first or self.run.starts_with_take_off
+        grounded = self.armed and self.flight.on_ground and not rises
+        if self.run.present and grounded:
+            self.narrator.tell(FirmwareEvent.MISSION_WITHOUT_TAKE_OFF)
+        return "init failed" if grounded or not self.run.present else None
 
     def enter(self, mode: FlightMode, now_s: float) -> None:
         """Be in a mode from now on, and begin to do what it is for."""
@@ -286,9 +275,8 @@ class Pilot:
         if self.armed:
             return True
         obstacles = self._arming_obstacles(forced=forced)
-        if obstacles and self.flavour.numbers_texts:
-            obstacles = obstacles[:1]  # its text names none
-        for obstacle in obstacles:
+        # A text that names no obstacle is said once.
+        for obstacle in obstacles[:1] if self.flavour.numbers_texts else obstacles:
             self.narrator.tell(FirmwareEvent.ARMING_REFUSED, obstacle=obstacle)
         if obstacles:
             return False
@@ -301,10 +289,8 @@ class Pilot:
         if not self._home_locked and self.flight.home_enu_m != here_enu_m:
             self.set_home(here_enu_m, now_s, lock=False)
         self.narrator.tell(FirmwareEvent.ARMED)
-        if self.flavour.modes.flies_when_armed and self.mode in (
-            FlightMode.TAKEOFF,
-            FlightMode.AUTO,
-        ):
+        begins = self.mode in (FlightMode.TAKEOFF, FlightMode.AUTO)
+        if begins and self.flavour.modes.flies_when_armed:
             self._fly(self.mode, now_s)
         return True
 
@@ -332,9 +318,6 @@ class Pilot:
             return False
         self._disarm(now_s, FirmwareEvent.DISARMED)
         return True
-
-    def _disarm_by_itself(self, at_s: float) -> None:
-        self._disarm(at_s, self._disarm_occasion)
 
     def _disarm(self, now_s: float, occasion: FirmwareEvent) -> None:
         self._disarm_s = None
@@ -476,12 +459,9 @@ class Pilot:
         if self.flavour.missions.upload_rewinds and old != self.store.items:
             self.task_done = False
         if self.run.mission_changed(old, now_s):
-            restarted = self.run.state is MissionRunState.RUNNING
-            self.narrator.tell(
-                FirmwareEvent.MISSION_REPLACED
-                if restarted
-                else FirmwareEvent.MISSION_REPLACED_IN_VAIN
-            )
+            runs = self.run.state is MissionRunState.RUNNING
+            taken, in_vain = FirmwareEvent.MISSION_REPLACED, FirmwareEvent.MISSION_REPLACED_IN_VAIN
+            self.narrator.tell(taken if runs else in_vain)
 
     def _boot_us(self, now_s: float) -> int:
         return round((now_s - self.readiness.boot_s) * 1e6)

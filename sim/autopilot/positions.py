@@ -1,8 +1,7 @@
 """Places as MAVLink says them <-> the local frame, and the messages that tell home and origin.
 
-MAVLink counts latitude and longitude in 1e-7 degrees and heights above mean sea
-level or above home. Leaves out: heights above terrain, and periodic telemetry
-(sim.autopilot.telemetry).
+MAVLink counts latitude and longitude in 1e-7 degrees and heights above mean sea level or above
+home. Heights above terrain are not understood.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""What a vehicle still lacks before it may fly, as a function of the time since boot.
-
-Leaves out: saying it (sim.autopilot.pilot, sim.autopilot.telemetry).
-"""
+"""What a vehicle still lacks before it may fly, as a function of the time since boot."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Puts one simulated vehicle on a TCP or UDP port of an asyncio loop.
 
-The vehicle runs in the time of a clock that may be faster than the wall's; it is
-called when something arrives and when it asked to be called, never in between.
-Leaves out: what is said (sim.autopilot.vehicle), serial lines.
+The vehicle runs in the time of a clock that may be faster than the wall's; it is called when
+something arrives and when it asked to be called, never in between.
 """
 
 from __future__ import annotations
@@ -85,12 +84,8 @@ class VehicleServer:
         self._timer_s = 0.0
         self._tcp: asyncio.Server | None = None
         self._udp: _UdpSocket | None = None
-        self._url = ""
-
-    @property
-    def url(self) -> str:
-        """What a ground station is to connect to."""
-        return self._url
+        self.url = ""
+        """What a ground station is to connect to, once it is started."""
 
     @property
     def garbage(self) -> int:
@@ -104,22 +99,24 @@ class VehicleServer:
             OSError: the port is taken, or the host is none of this machine's.
         """
         loop = asyncio.get_running_loop()
-        host, port = self._endpoint.host, self._endpoint.port
-        if self._endpoint.transport is Transport.TCP:
-            self._tcp = await loop.create_server(lambda: _TcpChannel(self), host, port)
-            host, port = self._tcp.sockets[0].getsockname()[:2]
-            self._url = f"tcp:{_bracketed(host)}:{port}"
-        elif self._endpoint.transport is Transport.UDP_IN:
-            _, self._udp = await loop.create_datagram_endpoint(
-                lambda: _UdpSocket(self, fixed=False), local_addr=(host, port)
-            )
-            host, port = self._udp.own_address()[:2]
-            self._url = f"udpout:{_bracketed(host)}:{port}"
-        else:
-            _, self._udp = await loop.create_datagram_endpoint(
-                lambda: _UdpSocket(self, fixed=True), remote_addr=(host, port)
-            )
-            self._url = f"udpin:{_bracketed(host)}:{port}"
+        host, port = address = self._endpoint.host, self._endpoint.port
+        match self._endpoint.transport:
+            case Transport.TCP:
+                self._tcp = await loop.create_server(lambda: _TcpChannel(self), host, port)
+                host, port = self._tcp.sockets[0].getsockname()[:2]
+                kind = "tcp"
+            case Transport.UDP_IN:
+                _, self._udp = await loop.create_datagram_endpoint(
+                    lambda: _UdpSocket(self, fixed=False), local_addr=address
+                )
+                host, port = self._udp.own_address()[:2]
+                kind = "udpout"
+            case Transport.UDP_OUT:
+                _, self._udp = await loop.create_datagram_endpoint(
+                    lambda: _UdpSocket(self, fixed=True), remote_addr=address
+                )
+                kind = "udpin"
+        self.url = f"{kind}:[{host}]:{port}" if ":" in host else f"{kind}:{host}:{port}"
         self.handle(TimeAdvanced())
 
     async def close(self) -> None:
@@ -328,7 +325,3 @@ class _UdpSocket(asyncio.DatagramProtocol):
             silent_s = self._server.wall_age_s(self._peers[key].heard_s)
             if place < crowded or silent_s > _PEER_SILENCE_WALL_S:
                 self._server.close_channel(self._peers.pop(key).number)
-
-
-def _bracketed(host: str) -> str:
-    return f"[{host}]" if ":" in host else host

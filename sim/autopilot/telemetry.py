@@ -1,8 +1,7 @@
 """What a vehicle reports about itself, message by message.
 
-Source: https://mavlink.io/en/messages/common.html. Leaves out: what firmwares say
-differently (sim.autopilot.firmware), attitude other than heading, raw sensors,
-RC channels.
+Source: https://mavlink.io/en/messages/common.html. Attitude other than heading, raw sensors and RC
+channels are not told.
 """
 
 from __future__ import annotations
@@ -45,6 +44,15 @@ _FENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 _UTC_AT_BOOT_US = 1_735_689_600_000_000
 """Simulated GPS time at boot: 2025-01-01 UTC. The core knows no wall clock."""
 _INT16_MAX = 32767
+_UNKNOWN_MV = 65535
+_LANDED_STATES = {
+    MotionPhase.GROUNDED: mavlink.MAV_LANDED_STATE_ON_GROUND,
+    MotionPhase.SPOOLING_UP: mavlink.MAV_LANDED_STATE_ON_GROUND,
+    MotionPhase.TAKING_OFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
+    MotionPhase.LANDING: mavlink.MAV_LANDED_STATE_LANDING,
+    MotionPhase.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
+}
+"""All else is in the air."""
 
 DATA_STREAMS: dict[int, tuple[int, ...]] = {
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
@@ -115,6 +123,9 @@ class TelemetryReporter:
     def _boot_s(self, now_s: float) -> float:
         return max(0.0, now_s - self._pilot.readiness.boot_s)
 
+    def _boot_us(self, now_s: float) -> int:
+        return int(self._boot_s(now_s) * 1e6)
+
     def _boot_ms(self, now_s: float) -> int:
         return int(self._boot_s(now_s) * 1e3) & 0xFFFFFFFF
 
@@ -134,13 +145,14 @@ class TelemetryReporter:
     def _heartbeat(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s
         pilot = self._pilot
-        on_ground = pilot.flight.on_ground
-        booted = pilot.readiness.booted
         return mavlink.MAVLink_heartbeat_message(
             mavlink.MAV_TYPE_QUADROTOR,
             pilot.flavour.autopilot,
             pilot.flavour.base_mode(
-                pilot.mode, armed=pilot.armed, on_ground=on_ground, booted=booted
+                pilot.mode,
+                armed=pilot.armed,
+                on_ground=pilot.flight.on_ground,
+                booted=pilot.readiness.booted,
             ),
             pilot.flavour.custom_mode(pilot.mode),
             self._state(),
@@ -162,47 +174,42 @@ class TelemetryReporter:
             sensors.enabled | fenced,
             sensors.health & ~lost,
             0,
-            self._battery_mv(now_s),
-            self._current_ca(),
-            self._battery_percent(now_s),
+            *self._measured(now_s),
             *(0, 0, 0, 0, 0, 0),
         )
 
-    def _current_ca(self) -> int:
-        return round(self._pilot.battery.current_a * 100.0)
-
-    def _battery_mv(self, now_s: float) -> int:
-        return round(self._pilot.battery.voltage_v(now_s) * 1e3)
-
-    def _battery_percent(self, now_s: float) -> int:
-        return math.ceil(self._pilot.battery.remaining_frac(now_s) * 100.0)
+    def _measured(self, now_s: float) -> tuple[int, int, int]:
+        """Voltage [mV], current [0.01 A] and remaining charge [%] of the battery."""
+        battery = self._pilot.battery
+        voltage_mv = round(battery.voltage_v(now_s) * 1e3)
+        remaining_percent = math.ceil(battery.remaining_frac(now_s) * 100.0)
+        return voltage_mv, round(battery.current_a * 100.0), remaining_percent
 
     def _battery(self, now_s: float) -> mavlink.MAVLink_message:
-        unknown_mv = [65535] * 9
+        voltage_mv, current_ca, remaining_percent = self._measured(now_s)
         consumed_mah = self._pilot.battery.consumed_mah(now_s)
         return mavlink.MAVLink_battery_status_message(
             0,
             mavlink.MAV_BATTERY_FUNCTION_ALL,
             mavlink.MAV_BATTERY_TYPE_LIPO,
             _INT16_MAX,
-            [self._battery_mv(now_s), *unknown_mv],
-            self._current_ca(),
+            [voltage_mv, *[_UNKNOWN_MV] * 9],
+            current_ca,
             -1 if consumed_mah is None else round(consumed_mah),
             -1,
-            self._battery_percent(now_s),
+            remaining_percent,
         )
 
     def _system_time(self, now_s: float) -> mavlink.MAVLink_message:
-        utc_us = 0
-        if self._pilot.readiness.has_origin:
-            utc_us = _UTC_AT_BOOT_US + int(self._boot_s(now_s) * 1e6)
+        fixed = self._pilot.readiness.has_origin
+        utc_us = _UTC_AT_BOOT_US + self._boot_us(now_s) if fixed else 0
         return mavlink.MAVLink_system_time_message(utc_us, self._boot_ms(now_s))
 
     def _gps_raw(self, now_s: float) -> mavlink.MAVLink_message:
         fixed = self._pilot.readiness.has_origin and not self._pilot.readiness.gps_lost
         lat_e7, lon_e7, alt_mm = self._place(now_s)
         return mavlink.MAVLink_gps_raw_int_message(
-            int(self._boot_s(now_s) * 1e6),
+            self._boot_us(now_s),
             mavlink.GPS_FIX_TYPE_RTK_FIXED if fixed else mavlink.GPS_FIX_TYPE_NO_FIX,
             *(lat_e7, lon_e7, alt_mm),
             *(100, 100) if fixed else (65535, 65535),
@@ -318,7 +325,7 @@ class TelemetryReporter:
     def _estimator_status(self, now_s: float) -> mavlink.MAVLink_message:
         ratios_and_accuracies = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0)
         flags = self._estimator_flags(now_s) & ~mavlink.EKF_UNINITIALIZED
-        boot_us = int(self._boot_s(now_s) * 1e6)
+        boot_us = self._boot_us(now_s)
         return mavlink.MAVLink_estimator_status_message(boot_us, flags, *ratios_and_accuracies)
 
     def _estimator_flags(self, now_s: float) -> int:
@@ -336,24 +343,14 @@ class TelemetryReporter:
 
     def _extended_state(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s
-        landed = {
-            MotionPhase.GROUNDED: mavlink.MAV_LANDED_STATE_ON_GROUND,
-            MotionPhase.SPOOLING_UP: mavlink.MAV_LANDED_STATE_ON_GROUND,
-            MotionPhase.TAKING_OFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
-            MotionPhase.LANDING: mavlink.MAV_LANDED_STATE_LANDING,
-            MotionPhase.TOUCHED_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
-        }
         return mavlink.MAVLink_extended_sys_state_message(
             self._pilot.flavour.vtol_state,
-            landed.get(self._pilot.flight.activity, mavlink.MAV_LANDED_STATE_IN_AIR),
+            _LANDED_STATES.get(self._pilot.flight.activity, mavlink.MAV_LANDED_STATE_IN_AIR),
         )
 
     def _origin(self, now_s: float) -> mavlink.MAVLink_message:
-        return origin_position(self._pilot.config.origin, int(self._boot_s(now_s) * 1e6))
+        return origin_position(self._pilot.config.origin, self._boot_us(now_s))
 
     def _home(self, now_s: float) -> mavlink.MAVLink_message:
-        return home_position(
-            self._pilot.config.origin,
-            self._pilot.flight.home_enu_m,
-            int(self._boot_s(now_s) * 1e6),
-        )
+        home_enu_m = self._pilot.flight.home_enu_m
+        return home_position(self._pilot.config.origin, home_enu_m, self._boot_us(now_s))

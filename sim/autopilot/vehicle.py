@@ -85,7 +85,7 @@ class SimulatedAutopilot:
         self._power_up(config, start_s)
 
     def _power_up(self, config: VehicleConfig, now_s: float) -> None:
-        self._pilot = Pilot(
+        self.pilot = Pilot(
             config,
             self._flavour,
             self._parameters,
@@ -95,15 +95,11 @@ class SimulatedAutopilot:
             now_s,
             mode_changed=self._on_mode_changed,
         )
-        self._telemetry = TelemetryReporter(self._pilot)
-        self._commands = CommandExecutor(self._pilot, self._telemetry, self._streams, self._outbox)
-        self._transfer = MissionServer(self._pilot)
+        """The autopilot inside."""
+        self._telemetry = TelemetryReporter(self.pilot)
+        self._commands = CommandExecutor(self.pilot, self._telemetry, self._streams, self._outbox)
+        self._transfer = MissionServer(self.pilot)
         self._heartbeat_s = now_s
-
-    @property
-    def pilot(self) -> Pilot:
-        """The autopilot inside, to look at."""
-        return self._pilot
 
     def step(self, event: VehicleEvent, now_s: float) -> list[OutgoingMessage]:
         """Take an event at ``now_s``; time going back is taken as standing still.
@@ -134,16 +130,16 @@ class SimulatedAutopilot:
 
     def next_deadline_s(self) -> float:
         """When `step` should be called at the latest [s]."""
-        deadline_s = min(self._heartbeat_s, self._pilot.deadline_s(), self._streams.deadline_s())
+        deadline_s = min(self._heartbeat_s, self.pilot.deadline_s(), self._streams.deadline_s())
         transfer_s = self._transfer.deadline_s()
         return deadline_s if transfer_s is None else min(deadline_s, transfer_s)
 
     def _advance(self, now_s: float) -> None:
         """Let everything happen that is due, each at its own instant."""
         while (due_s := self._transfer.deadline_s()) is not None and due_s <= now_s:
-            self._pilot.advance(due_s)
+            self.pilot.advance(due_s)
             self._transfer.advance(due_s)
-        self._pilot.advance(now_s)
+        self.pilot.advance(now_s)
 
     def _report(self, now_s: float) -> None:
         """Send the telemetry that is due, as of now."""
@@ -172,7 +168,7 @@ class SimulatedAutopilot:
 
         In the air the vehicle drops to the ground at once: nothing flies it.
         """
-        east_m, north_m, _ = self._pilot.position_enu_m(now_s)
+        east_m, north_m, _ = self.pilot.position_enu_m(now_s)
         ground_up_m = self.config.start_enu_m[2]
         here = dataclasses.replace(self.config, start_enu_m=(east_m, north_m, ground_up_m))
         for channel in self._streams.channels:
@@ -199,7 +195,7 @@ class SimulatedAutopilot:
         match message.get_msgId():
             case mavlink.MAVLINK_MSG_ID_HEARTBEAT:
                 if message.type == mavlink.MAV_TYPE_GCS:
-                    self._pilot.failsafes.hear_ground(sender.system, now_s)
+                    self.pilot.failsafes.hear_ground(sender.system, now_s)
             case mavlink.MAVLINK_MSG_ID_COMMAND_LONG | mavlink.MAVLINK_MSG_ID_COMMAND_INT:
                 self._commands.handle(command_from_message(message), sender, now_s)
             case mavlink.MAVLINK_MSG_ID_SET_MODE:
@@ -210,18 +206,18 @@ class SimulatedAutopilot:
             case mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM:
                 self._set_data_streams(message, sender, now_s)
             case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ:
-                self._pilot.parameter_server.read(message, sender)
+                self.pilot.parameter_server.read(message, sender)
             case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
-                self._pilot.parameter_server.list_all(sender)
+                self.pilot.parameter_server.list_all(sender)
             case mavlink.MAVLINK_MSG_ID_PARAM_SET:
-                self._pilot.parameter_server.write(message, sender)
+                self.pilot.parameter_server.write(message, sender)
             case mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT:
                 self._commands.set_mission_current(message.seq, sender, now_s)
             case number if number in _MISSION_PROTOCOL:
                 self._transfer.handle(message, sender, now_s)
             case mavlink.MAVLINK_MSG_ID_TIMESYNC:
                 if message.tc1 == 0:
-                    boot_ns = round((now_s - self._pilot.readiness.boot_s) * _NANO)
+                    boot_ns = round((now_s - self.pilot.readiness.boot_s) * _NANO)
                     answer = mavlink.MAVLink_timesync_message(boot_ns, message.ts1)
                     self._outbox.reply(sender, answer)
             case mavlink.MAVLINK_MSG_ID_PING:
@@ -233,7 +229,7 @@ class SimulatedAutopilot:
                 self.unknown += 1
 
     def _fly_to(self, message: mavlink.MAVLink_message, now_s: float) -> None:
-        if self._pilot.mode is not FlightMode.GUIDED or message.type_mask & _POSITION_IGNORED:
+        if self.pilot.mode is not FlightMode.GUIDED or message.type_mask & _POSITION_IGNORED:
             return
         target_enu_m = place_enu_m(
             self.config.origin,
@@ -241,10 +237,10 @@ class SimulatedAutopilot:
             message.lat_int,
             message.lon_int,
             message.alt,
-            self._pilot.flight.home_enu_m[2],
+            self.pilot.flight.home_enu_m[2],
         )
         if target_enu_m is not None:
-            self._pilot.fly_guided(target_enu_m, now_s)
+            self.pilot.fly_guided(target_enu_m, now_s)
 
     def _set_data_streams(
         self, message: mavlink.MAVLink_message, sender: Sender, now_s: float

@@ -1,8 +1,4 @@
-"""One flight with faults: a fleet drawn from a seed or a scenario, and a schedule; played.
-
-Leaves out: how schedules are made up (sim.faults.generator) and made smaller
-(sim.faults.soak).
-"""
+"""One flight with faults: a fleet drawn from a seed or a scenario, and a schedule; played."""
 
 from __future__ import annotations
 

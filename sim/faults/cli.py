@@ -1,7 +1,4 @@
-"""The command `swarm soak`.
-
-Leaves out: what it does (sim.faults.soak).
-"""
+"""The command `swarm soak`."""
 
 from __future__ import annotations
 

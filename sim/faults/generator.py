@@ -1,8 +1,4 @@
-"""Cases made up from a seed, and scenarios flown with faults that are drawn or read from a file.
-
-Leaves out: the mission of a made-up case, which it draws from its seed (sim.faults.case), what
-faults do (sim.faults.injector), and how the flight is shown (sim.world.cli).
-"""
+"""Cases made up from a seed, and scenarios flown with faults that are drawn or read from a file."""
 
 from __future__ import annotations
 

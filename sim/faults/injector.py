@@ -1,7 +1,4 @@
-"""Lets a schedule come true in a world, and knows when the world is calm again.
-
-Leaves out: what must hold meanwhile and afterwards (sim.faults.message_log, sim.faults.invariants).
-"""
+"""Lets a schedule come true in a world, and knows when the world is calm again."""
 
 from __future__ import annotations
 

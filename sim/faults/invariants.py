@@ -20,9 +20,8 @@ Beside the invariants of the messages (sim.faults.message_log):
 - *miscounted*: the observer knows the visits of every UAV that left in calm, invents none, and
   counts as duplicates all that it knows of, and no more than there were.
 
-UAVs that were cut off or died may have done what nobody could hear of, and one that forgot
-it cannot tell of it later; nothing is claimed about the counting of that. Leaves out: how
-faults come about (sim.faults.injector).
+UAVs that were cut off or died may have done what nobody could hear of, and one that forgot it
+cannot tell of it later; nothing is claimed about the counting of that.
 """
 
 from __future__ import annotations

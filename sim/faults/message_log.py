@@ -10,8 +10,7 @@
   operator has said so, or the mission has ended for it; or, once for each task that appears and
   each loss it learns of, in flight for something better; so never because of re-planning.
 
-It knows no process from within, so recordings of real ones can be told as well. Leaves out:
-what takes a view into the processes (sim.faults.invariants).
+It knows no process from within, so recordings of real ones can be told as well.
 """
 
 from __future__ import annotations

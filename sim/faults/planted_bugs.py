@@ -1,7 +1,6 @@
 """Protocol bugs put in on purpose, to see that the invariants find them.
 
-Each is a context manager that patches the runtime while it lasts; none is ever active by
-itself. Leaves out: the tests that count how many seeds it takes.
+Each is a context manager that patches the runtime while it lasts; none is ever active by itself.
 """
 
 from __future__ import annotations

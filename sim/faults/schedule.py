@@ -1,8 +1,8 @@
 """What goes wrong and when, as lines a person can read, edit and play again.
 
-One line is one fault: ``TIME KIND NAME… by AMOUNT for SECONDS with MEMORY``, such as
-``12.5 crash u1 for 3.2 with disk``; without ``for`` it stays. Times are virtual seconds since
-all processes began. Leaves out: what a fault does (sim.faults.injector).
+One line is one fault: ``TIME KIND NAME… by AMOUNT for SECONDS with MEMORY``, such as ``12.5 crash
+u1 for 3.2 with disk``; without ``for`` it stays. Times are virtual seconds since all processes
+began.
 """
 
 from __future__ import annotations

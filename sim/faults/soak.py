@@ -2,7 +2,7 @@
 
 The smallest case that breaks the same invariant is found so: first faults are left out (delta
 debugging), then tasks and UAVs, then what is left is made rounder, shorter and milder; over and
-over, until nothing more goes. Leaves out: how it is shown (sim.faults.cli).
+over, until nothing more goes.
 """
 
 from __future__ import annotations

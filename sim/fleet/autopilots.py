@@ -1,7 +1,4 @@
-"""Which autopilots a run flies with: simulated ones, real firmware, or vehicles that run.
-
-Leaves out: how firmware is started (sim.fleet.firmware), and starting anything.
-"""
+"""Which autopilots a run flies with: simulated ones, real firmware, or vehicles that run."""
 
 from __future__ import annotations
 

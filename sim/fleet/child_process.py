@@ -1,9 +1,8 @@
 """One child process: started with a lifeline, watched, and always ended.
 
-A child runs in a session of its own, so that Ctrl-C reaches only its parent, which
-then ends it in order. Its standard input is a pipe that nobody writes to: however
-the parent dies, the child sees the end of it and leaves. Leaves out: which
-children there are (sim.fleet.layout), and what forks them (sim.fleet.fork_server).
+A child runs in a session of its own, so that Ctrl-C reaches only its parent, which then ends it in
+order. Its standard input is a pipe that nobody writes to: however the parent dies, the child sees
+the end of it and leaves.
 """
 
 from __future__ import annotations

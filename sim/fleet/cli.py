@@ -1,7 +1,4 @@
-"""The command `swarm run`.
-
-Leaves out: what it does (sim.fleet) and how it is shown (coordinator.terminal).
-"""
+"""The command `swarm run`."""
 
 from __future__ import annotations
 

@@ -1,18 +1,16 @@
 """How real firmware is started in software-in-the-loop: a pure description, one process a UAV.
 
-ArduCopter is one binary: its options name model, instance, home place, speed-up and system
-id, its parameters come from a file, and instance n waits for its agent at TCP port
-5760 + 10 n; a ground station may connect to the port two above. It goes on booting once the
-agent is there (ArduPilot, ``libraries/AP_HAL_SITL/SITL_cmdline.cpp`` and
-``Tools/autotest/default_params/copter.parm``;
-https://ardupilot.org/dev/docs/sitl-serial-mapping.html).
-PX4 is a build folder with ``bin/px4`` and ``etc``: everything but the instance is said by
-environment variables, the vehicle is the quadrotor of its own simulator, which needs no
-other program, instance n has system id n + 1 and speaks to UDP port 14540 + n; a ground
-station is spoken to at 14550 (PX4-Autopilot, ``Tools/simulation/sitl_multiple_run.sh``,
+ArduCopter is one binary: its options name model, instance, home place, speed-up and system id, its
+parameters come from a file, and instance n waits for its agent at TCP port 5760 + 10 n; a ground
+station may connect to the port two above. It goes on booting once the agent is there (ArduPilot,
+``libraries/AP_HAL_SITL/SITL_cmdline.cpp`` and ``Tools/autotest/default_params/copter.parm``;
+https://ardupilot.org/dev/docs/sitl-serial-mapping.html). PX4 is a build folder with ``bin/px4``
+and ``etc``: everything but the instance is said by environment variables, the vehicle is the
+quadrotor of its own simulator, which needs no other program, instance n has system id n + 1 and
+speaks to UDP port 14540 + n; a ground station is spoken to at 14550 (PX4-Autopilot,
+``Tools/simulation/sitl_multiple_run.sh``,
 ``ROMFS/px4fmu_common/init.d-posix/{rcS,px4-rc.mavlink,px4-rc.simulator}`` and
-``src/modules/simulation/simulator_sih/sih.cpp``;
-https://docs.px4.io/main/en/sim_sih/). Leaves out: starting it (sim.fleet.launcher).
+``src/modules/simulation/simulator_sih/sih.cpp``; https://docs.px4.io/main/en/sim_sih/).
 
 They work below a folder of their own, in whatever shell scripts they bring along: PX4's startup
 script names files below its working folder without quotes, and looks some up along PATH, so a

@@ -7,7 +7,6 @@ of the process that asked for it: its exit status is read, and it is killed, lik
 The server runs one thread only, starts nothing else and ends with whoever has opened it.
 
 On Linux only. Elsewhere, and when the server is gone, processes are started as ever, by exec.
-Leaves out: what becomes of the processes (sim.fleet.child_process).
 """
 
 from __future__ import annotations

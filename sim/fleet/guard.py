@@ -1,9 +1,9 @@
 """Runs a program that knows no lifeline, and ends it when its own standard input ends.
 
 Run this file with the program's command line as arguments. What the program prints goes to
-standard error; its exit status becomes this process's. SIGTERM and the end of standard
-input end the program, and nobody who kills this process leaves it behind. Imports nothing
-of this project, so that a guard costs little. Leaves out: everything but its life.
+standard error; its exit status becomes this process's. SIGTERM and the end of standard input end
+the program, and nobody who kills this process leaves it behind. Imports nothing of this project,
+so that a guard costs little.
 """
 
 from __future__ import annotations

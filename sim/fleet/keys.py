@@ -2,8 +2,7 @@
 
 They are those of a mission as `swarm keys` makes them: the authority's folder with one for each
 identity below it. A run takes a folder that is there, or has a new one made for itself, which is
-gone when the run is over. Leaves out: making keys and what is in a folder (swarm.identity), and
-what they protect (swarm.bus, swarm.protocol).
+gone when the run is over.
 """
 
 from __future__ import annotations

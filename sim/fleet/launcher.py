@@ -1,8 +1,4 @@
-"""The processes of one run, by name: started, killed, paused, resumed and restarted.
-
-Leaves out: which processes there are and with which arguments (sim.fleet.layout),
-one process (sim.fleet.child_process), and the mission they fly (sim.fleet.run).
-"""
+"""The processes of one run, by name: started, killed, paused, resumed and restarted."""
 
 from __future__ import annotations
 

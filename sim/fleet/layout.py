@@ -1,7 +1,4 @@
-"""Which processes fly a mission on one machine, and with which arguments.
-
-Leaves out: starting and ending them (sim.fleet.run).
-"""
+"""Which processes fly a mission on one machine, and with which arguments."""
 
 from __future__ import annotations
 

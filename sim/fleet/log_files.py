@@ -1,7 +1,4 @@
-"""Keeps what the processes of a run log: one file of JSON lines each.
-
-Leaves out: what they log (swarm.runtime.log), and showing it.
-"""
+"""Keeps what the processes of a run log: one file of JSON lines each."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Fly one mission with real processes on this machine, and tell how it went.
 
-Starts the processes, watches the bus as an observer, starts a router or a dashboard that
-dies anew, and ends every process whatever happens. Leaves out: what the processes do, single
-processes (sim.fleet.launcher), and how the run is shown (coordinator.terminal).
+Starts the processes, watches the bus as an observer, starts a router or a dashboard that dies
+anew, and ends every process whatever happens.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""How a run is protected, as its command line says, and what of it can be told afterwards.
-
-Leaves out: the keys themselves (sim.fleet.keys).
-"""
+"""How a run is protected, as its command line says, and what of it can be told afterwards."""
 
 from __future__ import annotations
 

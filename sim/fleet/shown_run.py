@@ -1,7 +1,4 @@
-"""Fly one run in front of a person: its picture, log lines, recording and report.
-
-Leaves out: the flight itself (sim.fleet.run) and the options (sim.fleet.cli).
-"""
+"""Fly one run in front of a person: its picture, log lines, recording and report."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What differs between autopilot firmwares, as models of them, and their choice by name.
-
-Leaves out: what is common to them (the rest of sim.autopilot).
-"""
+"""What differs between autopilot firmwares, as models of them, and their choice by name."""
 
 from __future__ import annotations
 

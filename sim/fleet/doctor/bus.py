@@ -1,7 +1,6 @@
 """Whether the bus can be reached, who is there, and how fast they answer.
 
-Looks on and asks; shows no token, and nobody flies any differently for it. Leaves out:
-what is said (coordinator).
+Looks on and asks; shows no token, and nobody flies any differently for it.
 """
 
 from __future__ import annotations

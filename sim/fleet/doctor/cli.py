@@ -1,7 +1,4 @@
-"""The command `swarm doctor`.
-
-Leaves out: every check (the modules beside this one).
-"""
+"""The command `swarm doctor`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What a check has found: fine, doubtful or broken, and what to do about it.
-
-Leaves out: the checks.
-"""
+"""What a check has found: fine, doubtful or broken, and what to do about it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Listens on the link to an autopilot for a while.
-
-Leaves out: what is made of what comes (sim.fleet.doctor.vehicle).
-"""
+"""Listens on the link to an autopilot for a while."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Reads what the checks judge: clocks, limits, sockets, files of this machine.
-
-Leaves out: every judgement (sim.fleet.doctor.host).
-"""
+"""Reads what the checks judge: clocks, limits, sockets, files of this machine."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Whether an autopilot is heard, which one it is, and what it says of itself.
 
-It is listened to and asked for messages, and never told to do anything. What it says is
-read as the bridge reads it. Leaves out: sockets (sim.fleet.doctor.link).
+It is listened to and asked for messages, and never told to do anything. What it says is read as
+the bridge reads it.
 """
 
 from __future__ import annotations

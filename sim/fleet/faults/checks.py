@@ -1,8 +1,7 @@
 """What must hold of everything said on a bus, whatever happened to the processes.
 
-Looks at a recording from outside, with the view of one who hears all sides: at agreement
-and visits here, at single statements as `sim.faults.message_log` does. Leaves out: how it
-was recorded (sim.fleet.faults.recorder).
+Looks at a recording from outside, with the view of one who hears all sides: at agreement and
+visits here, at single statements as `sim.faults.message_log` does.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """A mission flown by real processes while faults are done to them, and the verdict on it.
 
-Puts together a run (sim.fleet.run), relays on its links (sim.fleet.faults.relay), a
-recorder (sim.fleet.faults.recorder) and the checks of its recording (sim.fleet.faults.checks).
-Leaves out: which faults, and when (tests/process, tests.chaos.kills).
+Puts together a run (sim.fleet.run), relays on its links (sim.fleet.faults.relay), a recorder
+(sim.fleet.faults.recorder) and the checks of its recording (sim.fleet.faults.checks).
 """
 
 from __future__ import annotations

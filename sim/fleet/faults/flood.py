@@ -1,8 +1,7 @@
 """A mission of real processes while a hostile peer floods its bus with malformed messages.
 
-The mission is the paper's, drawn out so that it lasts: a larger map and a longer horizon
-make the same decisions, none of which is nearly a tie. Leaves out: what is said
-(sim.fleet.faults.forgery) and how the result is shown (sim.bench.security).
+The mission is the paper's, drawn out so that it lasts: a larger map and a longer horizon make the
+same decisions, none of which is nearly a tie.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What a hostile peer says: one malformed message of every kind, on the keys everyone reads.
 
-Everything here is to be dropped and counted by whoever hears it. Leaves out: well-formed
-lies, against which only access control helps, and sending (sim.fleet.faults.flood).
+Everything here is to be dropped and counted by whoever hears it. Well-formed lies, against which
+only access control helps, are not among it.
 """
 
 from __future__ import annotations

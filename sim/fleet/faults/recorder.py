@@ -1,9 +1,8 @@
 """Everything that is said on the bus of a run, with the time at which it arrived.
 
-The recorder has seats of its own, none behind a relay: one at each router, so that it
-hears both sides when they are parted, or one in the mesh, linked to every peer. It
-says nothing and answers nothing. Leaves out: what follows from a recording
-(sim.fleet.faults.checks).
+The recorder has seats of its own, none behind a relay: one at each router, so that it hears both
+sides when they are parted, or one in the mesh, linked to every peer. It says nothing and answers
+nothing.
 """
 
 from __future__ import annotations

@@ -17,8 +17,6 @@ How it imitates what TCP makes of a network's faults, in each direction by itsel
   connection goes on at its next retransmission, which by then is up to as long away as the
   cut was, at most a minute. One that was begun during the cut is closed then, as by now
   nobody waits for it; whoever dialed it dials again.
-
-Leaves out: processes (sim.fleet), and packets of other protocols (sim.fleet.faults.tun).
 """
 
 from __future__ import annotations

@@ -6,8 +6,7 @@
 
 A third of it are its own claims, genuinely signed, and repeated for ever; a third the same with
 signatures that are none, each of which costs whoever looks at it a check; a third claims of
-others. Every second it tells how much it has sent, as a line of JSON. Leaves out: what is
-malformed (sim.fleet.faults.forgery) and lies that are well made (tests.chaos.insider).
+others. Every second it tells how much it has sent, as a line of JSON.
 """
 
 from __future__ import annotations

@@ -6,8 +6,6 @@ sent to `THERE` is read from it, lost or kept for a while, and comes back with s
 destination exchanged. So a connection dialed to `THERE` ends at whoever listens on
 `HERE`, and both ways of it are bad, while one dialed to `HERE` is not. Exchanging the two
 leaves every checksum right.
-
-Leaves out: relaying without any rights (sim.fleet.faults.relay).
 """
 
 from __future__ import annotations
