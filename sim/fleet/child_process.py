@@ -62,7 +62,7 @@ class ProgramEnvironment:
 
 
 class _Forked:
-    """A process that the fork server has made for us, as asyncio shows those it has started."""
+    """A process that the fork server has made for us, shown as asyncio shows those it starts."""
 
     def __init__(self, pid: int, stdin: int) -> None:
         self.pid = pid
@@ -77,11 +77,6 @@ class _Forked:
     async def start(
         cls, server: ForkServer, arguments: Sequence[str], environment: Mapping[str, str]
     ) -> _Forked:
-        """Have one made.
-
-        Raises:
-            ForkServerLostError: that cannot be.
-        """
         (stdin, near_in), (near_out, stdout), (near_err, stderr) = (os.pipe() for _ in range(3))
         try:
             with server.fork(arguments, (stdin, stdout, stderr), environment=environment) as answer:
@@ -121,13 +116,11 @@ class _Forked:
         self._ended.set()
 
     async def wait(self) -> int:
-        """Wait for its end; its exit status, negative for a signal."""
         await self._ended.wait()
         assert self.returncode is not None  # noqa: S101 - set together with the event
         return self.returncode
 
     def send_signal(self, number: signal.Signals) -> None:
-        """Send it a signal, unless it has ended."""
         if self.returncode is None:
             os.kill(self.pid, number)
 
@@ -146,7 +139,7 @@ class ChildProcess:
         arguments: of the `swarm` command; ``--lifeline`` is added. Of another program
             its whole command line.
         on_line: called with every JSON object the child prints on standard output.
-        on_log: called with every line of its standard error.
+        on_log: called with its name and every line of its standard error.
         setting: of another program than `swarm`.
         returns: it has a real vehicle to send home before it leaves.
         server: forks a `swarm` command, as long as it can.
@@ -294,10 +287,9 @@ class ChildProcess:
         if self.returncode is None:
             self.stopped = True
             self._signal(signal.SIGTERM)
+            limit_s = RETURN_TIMEOUT_S if self._returns else TERMINATE_TIMEOUT_S
             try:
-                async with asyncio.timeout(
-                    RETURN_TIMEOUT_S if self._returns else TERMINATE_TIMEOUT_S
-                ):
+                async with asyncio.timeout(limit_s):
                     await self._process.wait()
             except TimeoutError:
                 self._signal(signal.SIGKILL)

@@ -34,10 +34,10 @@ class Launcher:
     …``, and by the id of their UAV. Use from one asyncio loop; `stop` in ``finally`` ends
     whatever is left::
 
-        launch = Launch(mission, options)
+        launch = Launcher(mission, options)
         try:
             await launch.start()
-            await launch.kill("uav03")
+            await launch.child("uav03").kill()
             await launch.restart("uav03")
         finally:
             await launch.stop()
@@ -82,12 +82,13 @@ class Launcher:
         Raises:
             ChildFailedError: a router, the dashboard or an autopilot did not come up.
         """
-        layout = self.layout
+        layout, autopilots = self.layout, self.options.autopilots
         more = () if self.options.keys is None else PRELOADED_FOR_KEYS
         self._server = ForkServer.open((*PRELOADED, *more))
         # A process's memory is for its next life in this run, and for nobody after that.
+        below = autopilots.workplace if isinstance(autopilots, SitlFirmware) else None
         self._folder = tempfile.TemporaryDirectory(
-            prefix="peckorder-", dir=self._place(), ignore_cleanup_errors=True
+            prefix="peckorder-", dir=below, ignore_cleanup_errors=True
         )
         layout.state = Path(self._folder.name)
         if self._through is not None:
@@ -100,7 +101,7 @@ class Launcher:
             arguments = layout.dashboard(self.options.dashboard, layout.state)
             await self._start(DASHBOARD, arguments)
             await self.child(DASHBOARD).ready()
-        match self.options.autopilots:
+        match autopilots:
             case SimulatedAutopilots():
                 vehicles = await self._start_simulated()
             case SitlFirmware() as firmware:
@@ -111,11 +112,6 @@ class Launcher:
         async for place in vehicles:
             arguments = layout.agent(place.uav, place.url, place.system_id)
             await self._start(place.uav, arguments)
-
-    def _place(self) -> Path | None:
-        """Where the run has its folder; None: where temporary files go."""
-        autopilots = self.options.autopilots
-        return autopilots.workplace if isinstance(autopilots, SitlFirmware) else None
 
     async def _start_simulated(self) -> AsyncIterator[VehiclePlace]:
         """Start simulated autopilots; the vehicles come as they are ready."""
@@ -189,18 +185,6 @@ class Launcher:
         """Whether there is a process of that name, paused ones included."""
         return name in self._current and self._current[name].returncode is None
 
-    async def kill(self, name: str) -> None:
-        """End a process at once, by SIGKILL; returns when it is gone."""
-        await self.child(name).kill()
-
-    def pause(self, name: str) -> None:
-        """Stop a process in its tracks, by SIGSTOP: it hangs, and its connections stay open."""
-        self.child(name).pause()
-
-    def resume(self, name: str) -> None:
-        """Let a paused process go on, by SIGCONT."""
-        self.child(name).resume()
-
     async def restart(self, name: str) -> ChildProcess:
         """Start a process anew with its arguments and endpoints; kills it first if it runs.
 
@@ -223,11 +207,10 @@ class Launcher:
     async def _start(
         self, name: str, arguments: list[str], setting: ProgramEnvironment | None = None
     ) -> ChildProcess:
-        on_line = self._on_plan if name == COORDINATOR else None
         child = ChildProcess(
             name,
             arguments,
-            on_line=on_line,
+            on_line=self._on_plan if name == COORDINATOR else None,
             on_log=self._on_log,
             setting=setting,
             returns=arguments[0] == "agent"

@@ -198,17 +198,25 @@ class Layout:
         listen = ["--listen", self._endpoints[name]]
         file = self._options.router_file
         trust = self._trust(name) if file is None else ["--config", str(file)]
-        return ["router", "--json", *listen, *dialed, *trust, *self._link(), *self._log()]
+        return [
+            "router",
+            "--json",
+            *listen,
+            *dialed,
+            *trust,
+            "--link",
+            self._options.link,
+            *self._log(),
+        ]
 
     def autopilot(self, uavs: Sequence[str]) -> list[str]:
         """Arguments of the process that simulates the autopilots of ``uavs``."""
-        chosen = _repeated("--uav", uavs)
-        options = self._options
+        options, vehicles = self._options, self._options.autopilots
         return [
             *("autopilot", str(options.scenario)),
-            *chosen,
+            *_repeated("--uav", uavs),
             *("--listen", "tcp:127.0.0.1:0"),
-            *self._flavour(),
+            *(["--flavour", vehicles.flavour] if isinstance(vehicles, SimulatedAutopilots) else []),
             *options.passthrough.to_autopilot(uavs),
             *self._log(),
             *self._speed(),
@@ -255,12 +263,6 @@ class Layout:
             *self.seat_arguments(uav),
         ]
 
-    def _flavour(self) -> list[str]:
-        autopilots = self._options.autopilots
-        return (
-            ["--flavour", autopilots.flavour] if isinstance(autopilots, SimulatedAutopilots) else []
-        )
-
     def _log(self) -> list[str]:
         form = self._options.log_format
         return [] if form is LogFormat.AUTO else ["--log-format", form]
@@ -277,12 +279,10 @@ class Layout:
         clear = [*self._endpoints.values(), *self._diverted.values()]
         return self._options.keys is None and not all(map(is_loopback, clear))
 
-    def _link(self) -> list[str]:
-        return ["--link", self._options.link]
-
     def seat_arguments(self, name: str) -> list[str]:
         """Arguments with which a process, or an observer by that name, finds the bus."""
-        rest = [*_repeated("--connect", self._dialed(name)), *self._trust(name), *self._link()]
+        rest = [*_repeated("--connect", self._dialed(name)), *self._trust(name)]
+        rest += ["--link", self._options.link]
         if self.routers:
             return ["--bus", "router", *rest]
         return ["--bus", "mesh", "--listen", self._endpoints[name], *rest]

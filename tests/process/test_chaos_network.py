@@ -55,11 +55,10 @@ def test_parted_halves_of_a_mesh_agree_after_healing_and_lose_nothing(tmp_path: 
 def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Path) -> None:
     async def script(flight: ChaosFlight) -> None:
         await flight.until_done(5)
-        relays = flight.network.relays
         served = {
             link.dialer
-            for link in flight.network.links_of("router 2")
-            if link.listener == "router 2" and relays[link].n_connection
+            for link, relay in flight.network.relays.items()
+            if link.listener == "router 2" and relay.connections
         }
         assert len(served) == 3
         await part_until_both_go_on(flight, served | {"router 2"})

@@ -75,7 +75,7 @@ async def relayed(quality: RelayQuality | None = None) -> AsyncIterator[tuple[Re
             yield relay, far
         finally:
             await relay.close()
-            assert relay.n_connection == 0
+            assert not relay.connections
 
 
 class Dialed:
@@ -132,7 +132,7 @@ def test_the_end_of_a_connection_is_passed_on_after_its_last_bytes() -> None:
             await until(lambda: far.ends == 1)
             assert far.arrived == b"last words"
             assert await reader.read() == b""
-            await until(lambda: relay.n_connection == 0)
+            await until(lambda: not relay.connections)
 
     play(scenario)
 
@@ -258,7 +258,7 @@ def test_a_connection_begun_during_a_cut_hangs_and_is_closed_afterwards() -> Non
             relay.cut()
             reader, writer = await dial(relay)
             writer.write(b"hello?")
-            await until(lambda: relay.n_connection == 1)
+            await until(lambda: len(relay.connections) == 1)
             await asyncio.sleep(0.2)
             assert not far.writers
             relay.heal()
@@ -278,7 +278,6 @@ def test_a_network_diverts_links_and_cuts_those_of_a_group() -> None:
             endpoint = f"tcp/127.0.0.1:{far.port}"
             diverted = [await network.through(link, endpoint) for link in links]
             assert len({endpoint, *diverted}) == 4
-            assert network.links_of("u1") == links[:1]
 
             network.isolate({"u1", "u2"})
             assert [network.relays[link].is_cut for link in links] == [True, True, False]
@@ -286,8 +285,6 @@ def test_a_network_diverts_links_and_cuts_those_of_a_group() -> None:
             assert not any(relay.is_cut for relay in network.relays.values())
 
             bad = RelayQuality(delay_s=0.1)
-            network.degrade(bad, links[:1])
-            assert [network.relays[link].quality == bad for link in links] == [True, False, False]
             network.degrade(bad)
             assert all(relay.quality == bad for relay in network.relays.values())
 

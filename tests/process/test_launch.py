@@ -42,7 +42,7 @@ def test_processes_are_killed_restarted_and_ended_by_name(tmp_path: Path) -> Non
             assert folder.is_dir()
 
             former = launch.child("router 1")
-            await launch.kill("router 1")
+            await launch.child("router 1").kill()
             assert not launch.runs("router 1")
             assert not alive(former.pid)
             again = await launch.restart("router 1")
@@ -54,7 +54,7 @@ def test_processes_are_killed_restarted_and_ended_by_name(tmp_path: Path) -> Non
                 launch.child("uav09")
             with pytest.raises(ValueError, match="back at the start"):
                 await launch.restart("autopilot of uav01")
-            launch.pause("uav01")
+            launch.child("uav01").pause()
         finally:
             await launch.stop()
         assert not any(alive(child.pid) for child in launch.lives)

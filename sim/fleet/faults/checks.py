@@ -78,10 +78,9 @@ def message_logs(entries: Iterable[BusEntry]) -> list[MessageLog]:
     """What was said at each seat, with the rules it breaks."""
     found: dict[int, MessageLog] = {}
     for entry in entries:
-        if isinstance(entry.what, Message):
-            message_log = found.setdefault(entry.seat, MessageLog())
-            message = entry.what
-            message_log.said(entry.at_s, message.writer, message.stamp.incarnation, message)
+        message = entry.what
+        log = found.setdefault(entry.seat, MessageLog())
+        log.said(entry.at_s, message.writer, message.stamp.incarnation, message)
     return list(found.values())
 
 
@@ -162,12 +161,11 @@ def _claims(
                 claims.pop(writer, None)
             case BusEntry(what=Message(body=Status() | Choice())):
                 continue
-            case BusEntry(what=Message(writer=writer, body=body) as message):
+            case BusEntry(what=message):
                 news = replica.join(message)
+                body = message.body
                 if isinstance(body, Claim) and (news or replica.known(message) == message):
-                    claims[writer] = body
-            case _:
-                continue
+                    claims[message.writer] = body
         by_task: dict[str, list[str]] = {}
         for uav, claim in claims.items():
             if claim.task is not None and board.states.get(claim.task) is TaskState.OPEN:

@@ -10,7 +10,6 @@ import contextlib
 import re
 from collections.abc import AsyncIterator, Callable, Collection
 from dataclasses import dataclass
-from pathlib import Path
 
 from sim.faults.message_log import MessageLog
 from sim.fleet.faults.checks import (
@@ -100,7 +99,7 @@ class ChaosFlight:
     async def kill(self, name: str) -> None:
         """End a process at once."""
         self._heard_all &= name not in self.run.launch.layout.routers
-        await self.run.launch.kill(name)
+        await self.run.launch.child(name).kill()
         self._silence(name)
 
     async def restart(self, name: str) -> None:
@@ -111,12 +110,12 @@ class ChaosFlight:
     def pause(self, name: str) -> None:
         """Let a process hang."""
         self._heard_all = False
-        self.run.launch.pause(name)
+        self.run.launch.child(name).pause()
         self._silence(name)
 
     def resume(self, name: str) -> None:
         """Let it go on."""
-        self.run.launch.resume(name)
+        self.run.launch.child(name).resume()
         self._end_trouble(name)
 
     def isolate(self, group: Collection[str]) -> None:
@@ -195,7 +194,6 @@ async def open_chaos_flight(
     *,
     relayed: bool = False,
     seed: int = 0,
-    record: Path | None = None,
 ) -> AsyncIterator[ChaosFlight]:
     """Start to fly ``mission``; do faults to it, then `ChaosFlight.run` ``.finish()``.
 
@@ -204,7 +202,6 @@ async def open_chaos_flight(
         options: how to fly it.
         relayed: put a relay on every link, so that links can be degraded and cut.
         seed: of the relays' chance.
-        record: also write the recording there.
     """
     lines: list[tuple[str, str]] = []
     async with contextlib.AsyncExitStack() as stack:
@@ -219,6 +216,6 @@ async def open_chaos_flight(
             )
         )
         recorder = await stack.enter_async_context(
-            BusRecorder(mission.name, recorder_seats(run.launch.layout), SystemClock(), file=record)
+            BusRecorder(mission.name, recorder_seats(run.launch.layout), SystemClock())
         )
         yield ChaosFlight(run, network, recorder, lines)

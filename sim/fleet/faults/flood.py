@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from coordinator.mission_view.results import MissionResult
+from sim.fleet.child_process import ChildProcess
 from sim.fleet.faults.forgery import REASONS, Malformation, MessageForger
 from sim.fleet.layout import BusKind, LaunchOptions, default_position_rate_hz
 from sim.fleet.run import Run, open_run
@@ -146,18 +147,19 @@ def hold_back(run: Run) -> None:
 
     However slowly others that take part start, they find the mission at its beginning.
     """
-    for name in _autopilots(run):
-        run.launch.pause(name)
+    for autopilot in _autopilots(run):
+        autopilot.pause()
 
 
 def let_go(run: Run) -> None:
     """Let the mission begin after `hold_back`."""
-    for name in _autopilots(run):
-        run.launch.resume(name)
+    for autopilot in _autopilots(run):
+        autopilot.resume()
 
 
-def _autopilots(run: Run) -> list[str]:
-    return [name for name in run.launch.names if name.startswith("autopilot of ")]
+def _autopilots(run: Run) -> list[ChildProcess]:
+    names = [name for name in run.launch.names if name.startswith("autopilot of ")]
+    return [run.launch.child(name) for name in names]
 
 
 def times_for(flood_s: float) -> float:

@@ -9,23 +9,20 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import dataclasses
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Self, TextIO
+from typing import Self
 
 from sim.fleet.layout import Layout
 from swarm.bus.config import BusConfig, ClientTopology
-from swarm.bus.port import Bus, BusEvent, LinkDown, LinkUp, Sample, TokenGone, TokenSeen
+from swarm.bus.port import Bus, BusEvent, Sample
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.protocol.codec import Codec
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message
 from swarm.runtime.clock import Clock
 
-__all__ = ["RECORDER", "BusEntry", "BusRecorder", "Presence", "recorder_seats"]
+__all__ = ["RECORDER", "BusEntry", "BusRecorder", "recorder_seats"]
 
 
 RECORDER = "recorder"
@@ -33,23 +30,15 @@ RECORDER = "recorder"
 
 
 @dataclass(frozen=True, slots=True)
-class Presence:
-    """A liveliness token came or went."""
-
-    writer: str
-    there: bool
-
-
-@dataclass(frozen=True, slots=True)
 class BusEntry:
-    """Something heard at one seat."""
+    """A message heard at one seat."""
 
     at_s: float
     """When, on the recorder's clock [s]."""
     seat: int
-    what: Message | Presence
+    what: Message
     size_bytes: int
-    """Of the payload; 0 for a token."""
+    """Of the payload."""
 
 
 def recorder_seats(layout: Layout) -> tuple[BusConfig, ...]:
@@ -71,21 +60,15 @@ class BusRecorder:
         mission: mission name.
         seats: where to listen; a message heard at two is recorded twice.
         clock: gives the times of arrival.
-        file: also write every entry there, as one JSON object per line.
     """
 
-    def __init__(
-        self, mission: str, seats: Sequence[BusConfig], clock: Clock, *, file: Path | None = None
-    ) -> None:
+    def __init__(self, mission: str, seats: Sequence[BusConfig], clock: Clock) -> None:
         self.entries: list[BusEntry] = []
         """All that was heard, in order of arrival."""
         self._mission = mission
         self._seats = tuple(seats)
         self._clock = clock
         self._codec = Codec(mission)
-        self._keys = KeySpace(mission)
-        self._path = file
-        self._file: TextIO | None = None
         self._buses: list[Bus] = []
         self._readers: list[asyncio.Task[None]] = []
 
@@ -96,52 +79,30 @@ class BusRecorder:
         except BaseException:
             await self._close()
             raise
-        if self._path is not None:
-            self._file = self._path.open("w")
         return self
 
     async def __aexit__(self, *_: object) -> None:
         await self._close()
 
-    @property
-    def dropped(self) -> dict[str, int]:
-        """Messages nobody could read, by reason, and those that came too fast."""
-        full = sum(bus.inbox.dropped for bus in self._buses)
-        return dict(self._codec.dropped) | ({"inbox full": full} if full else {})
-
     def messages(self, seat: int = 0) -> list[Message]:
         """What was said, as heard at one seat."""
-        here = (entry.what for entry in self.entries if entry.seat == seat)
-        return [what for what in here if isinstance(what, Message)]
+        return [entry.what for entry in self.entries if entry.seat == seat]
 
     def take(self, seat: int, event: BusEvent) -> None:
-        """Record what happened at a seat, if it is of interest."""
-        what: Message | Presence | None = None
-        size_bytes = 0
-        match event:
-            case Sample(key, payload):
-                what, size_bytes = self._codec.decode(key, payload), len(payload)
-            case TokenSeen(key) | TokenGone(key):
-                writer = self._keys.writer_of_token(key)
-                there = isinstance(event, TokenSeen)
-                what = None if writer is None else Presence(writer, there)
-            case LinkUp() | LinkDown():
-                pass
-        if what is not None:
-            entry = BusEntry(self._clock.now_s(), seat, what, size_bytes)
-            self.entries.append(entry)
-            if self._file is not None:
-                self._file.write(json.dumps(_plain(entry)) + "\n")
+        """Record what was said at a seat, if it can be read."""
+        if isinstance(event, Sample):
+            what = self._codec.decode(event.key, event.payload)
+            if what is not None:
+                entry = BusEntry(self._clock.now_s(), seat, what, len(event.payload))
+                self.entries.append(entry)
 
     def _sit(self, bus: Bus) -> None:
         seat = len(self._buses)
         if bus.seal is not None:
             self._codec = Codec(self._mission, bus.seal)
         self._buses.append(bus)
-        bus.subscribe(f"{self._keys.root}/**")
-        bus.watch_tokens(self._keys.alive("*"))
-        reader = asyncio.get_running_loop().create_task(self._read(seat, bus))
-        self._readers.append(reader)
+        bus.subscribe(f"{KeySpace(self._mission).root}/**")
+        self._readers.append(asyncio.get_running_loop().create_task(self._read(seat, bus)))
 
     async def _read(self, seat: int, bus: Bus) -> None:
         while True:
@@ -157,15 +118,3 @@ class BusRecorder:
                 await reader
         for bus in self._buses:
             bus.close()
-        if self._file is not None:
-            self._file.close()
-
-
-def _plain(entry: BusEntry) -> dict[str, object]:
-    """As JSON has it: without bytes."""
-    return dataclasses.asdict(
-        entry,
-        dict_factory=lambda pairs: {
-            name: value for name, value in pairs if not isinstance(value, bytes)
-        },
-    )

@@ -26,7 +26,7 @@ import contextlib
 import math
 import re
 from collections import deque
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Self
 
@@ -38,17 +38,12 @@ __all__ = ["Relay", "RelayNetwork", "RelayQuality", "stall_s"]
 
 
 SEGMENT_BYTES = 1448
-
 SHORTEST_TIMEOUT_S = 0.2
 """Linux waits at least this long, and a round trip, before it sends a segment again."""
-
 LONGEST_TIMEOUT_S = 60.0
-
 CHUNK_BYTES = 64 * 1024
-
 WINDOW_BYTES = 256 * 1024
 """Bytes on the way in one direction; then the sender has to wait."""
-
 DIAL_TIMEOUT_S = 5.0
 
 
@@ -98,7 +93,7 @@ class Relay:
     """One link, of any number of connections; may be changed at any time.
 
     Args:
-        host: where the real endpoint is.
+        host: of the real endpoint.
         port: of the real endpoint.
         rng: draws jitter and losses.
     """
@@ -109,12 +104,12 @@ class Relay:
         self.relayed_bytes = 0
         """Bytes delivered so far, both ways."""
         self.rng = rng
-        """Draws jitter and losses."""
         self._host, self._port = host, port
         self._server: asyncio.Server | None = None
         self._open = asyncio.Event()
         self._open.set()
-        self._connections: set[asyncio.Task[None]] = set()
+        self.connections: set[asyncio.Task[None]] = set()
+        """Being relayed, those that a cut keeps waiting included."""
 
     async def start(self) -> None:
         """Begin to listen, on a free port of the loopback interface."""
@@ -132,11 +127,6 @@ class Relay:
         """Whether nothing gets through."""
         return not self._open.is_set()
 
-    @property
-    def n_connection(self) -> int:
-        """Connections being relayed, those that a cut keeps waiting included."""
-        return len(self._connections)
-
     def cut(self) -> None:
         """Swallow everything from now on, and say nothing."""
         self._open.clear()
@@ -153,21 +143,21 @@ class Relay:
         """Close the port and every connection."""
         if self._server is not None:
             self._server.close()
-        for connection in self._connections:
+        for connection in self.connections:
             connection.cancel()
-        await asyncio.gather(*self._connections, return_exceptions=True)
+        await asyncio.gather(*self.connections, return_exceptions=True)
 
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         connection = asyncio.current_task()
         assert connection is not None  # noqa: S101 - asyncio calls this in a task
-        self._connections.add(connection)
+        self.connections.add(connection)
         try:
             with contextlib.suppress(OSError, TimeoutError):
                 await self._relay(reader, writer)
         except asyncio.CancelledError:
             pass  # closing; asyncio's streams would report the cancellation as a fault
         finally:
-            self._connections.discard(connection)
+            self.connections.discard(connection)
             writer.transport.abort()
 
     async def _relay(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -286,7 +276,7 @@ class RelayNetwork:
     Give `through` to `sim.fleet.run.open_run`::
 
         async with RelayNetwork(seed=1) as network, open_run(…, through=network.through) as run:
-            network.degrade(Quality(delay_s=0.03, loss_frac=0.05))
+            network.degrade(RelayQuality(delay_s=0.03, loss_frac=0.05))
             network.isolate({"uav01", "uav02"})
             network.heal()
 
@@ -317,32 +307,20 @@ class RelayNetwork:
         self.relays[link] = relay
         return f"tcp/127.0.0.1:{relay.port}"
 
-    def degrade(self, quality: RelayQuality, links: Iterable[DialedLink] | None = None) -> None:
-        """Make all links, or these, as good as ``quality`` says."""
-        if links is None:
-            self._quality = quality
-        for link in self.relays if links is None else links:
-            self.relays[link].quality = quality
-
-    def links_of(self, name: str) -> list[DialedLink]:
-        """Links at one of whose ends that process is."""
-        return [link for link in self.relays if name in (link.dialer, link.listener)]
-
-    def links_between(self, group: Collection[str]) -> list[DialedLink]:
-        """Links of which one end is in ``group`` and the other is not."""
-        return [link for link in self.relays if (link.dialer in group) != (link.listener in group)]
-
-    def cut(self, links: Iterable[DialedLink]) -> None:
-        """Let nothing pass on these."""
-        for link in links:
-            self.relays[link].cut()
+    def degrade(self, quality: RelayQuality) -> None:
+        """Make all links as good as ``quality`` says."""
+        self._quality = quality
+        for relay in self.relays.values():
+            relay.quality = quality
 
     def isolate(self, group: Collection[str]) -> None:
         """Cut ``group`` off from all others.
 
         Of clients, each is alone then, unless a router they can reach is in the group too.
         """
-        self.cut(self.links_between(group))
+        for link, relay in self.relays.items():
+            if (link.dialer in group) != (link.listener in group):
+                relay.cut()
 
     def heal(self) -> None:
         """End all cuts."""
