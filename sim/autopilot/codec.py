@@ -31,13 +31,10 @@ class ChannelSigning:
 
 
 class ChannelCodec:
-    """One end of a MAVLink conversation.
+    """One end of a MAVLink conversation, that of a system id and a component id.
 
-    Args:
-        system_id: whom our messages come from.
-        component_id: whom our messages come from.
-        datagrams: frames never reach from one piece of input into the next.
-        signing: key and first timestamp, if the conversation is signed.
+    In ``datagrams`` no frame reaches from one piece of input into the next. With ``signing`` the
+    conversation is signed.
     """
 
     def __init__(
@@ -73,10 +70,7 @@ class ChannelCodec:
         return messages
 
     def encode(self, message: mavlink.MAVLink_message, system_id: int | None = None) -> bytes:
-        """The frame of ``message``, with this channel's next sequence number.
-
-        It is said to come from ``system_id``, where that is not this end.
-        """
+        """The frame of ``message``, numbered next, as from ``system_id`` if not from this end."""
         own_id = self._mav.srcSystem
         if system_id is not None:
             self._mav.srcSystem = system_id

@@ -37,13 +37,7 @@ _NEEDS_POSITION = frozenset({MotionPhase.NAVIGATING, MotionPhase.RETURNING})
 
 
 class FaultyAutopilot:
-    """A vehicle and its faults.
-
-    Args:
-        vehicle: the machine, not yet used.
-        faults: what happens to it, in any order.
-        start_s: when it is powered up [s].
-    """
+    """A vehicle not yet used, powered up at ``start_s``, and its faults in any order."""
 
     def __init__(
         self, vehicle: SimulatedAutopilot, faults: tuple[VehicleFault, ...], start_s: float
@@ -76,11 +70,7 @@ class FaultyAutopilot:
         return min(deadline_s, self._ahead[0][0]) if self._ahead else deadline_s
 
     def step(self, event: VehicleEvent, now_s: float) -> list[OutgoingMessage]:
-        """Take an event at ``now_s``, after the faults that are due by then.
-
-        Returns:
-            What is to be sent, in order.
-        """
+        """Take an event at ``now_s``, after faults due by then; what is to be sent, in order."""
         said: list[OutgoingMessage] = []
         while self._ahead and self._ahead[0][0] <= now_s:
             at_s, begins, fault = self._ahead.pop(0)

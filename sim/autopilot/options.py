@@ -110,14 +110,10 @@ def parse_wind(text: str | None) -> tuple[float, float]:
 
 
 def check_wind(wind_m_s: float, still: Sequence[FleetMember]) -> None:
-    """Refuse a wind that carries some vehicle away.
-
-    Args:
-        wind_m_s: its speed [m/s].
-        still: the vehicles as they are in still air.
+    """Refuse a wind of that speed if it carries some vehicle away.
 
     Raises:
-        InputError: it is at least as fast as they are through the air.
+        InputError: it is at least as fast as one of them is through ``still`` air.
     """
     faults = [
         Fault(

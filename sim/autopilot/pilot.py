@@ -33,17 +33,10 @@ _TASKS = frozenset({FlightMode.TAKEOFF, FlightMode.AUTO, FlightMode.LAND})
 
 
 class Pilot:
-    """The autopilot of one vehicle, from power-up on.
+    """The autopilot of one vehicle, from power-up at ``boot_s`` on.
 
-    Args:
-        config: the vehicle it flies.
-        flavour: whose firmware it is.
-        parameters: what the ground set; outlasts a reboot.
-        store: the mission on the vehicle; outlasts a reboot.
-        outbox: takes what it says.
-        battery: what it flies on; outlasts a reboot.
-        boot_s: when it is powered up [s].
-        mode_changed: called with the time [s] as soon as the mode is another one.
+    Parameters, mission and battery outlast a reboot. ``mode_changed`` is called with the time [s]
+    as soon as the mode is another one.
     """
 
     def __init__(

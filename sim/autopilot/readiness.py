@@ -95,11 +95,7 @@ class Readiness:
         return self._ahead[0][0]
 
     def advance(self) -> PowerUpStage:
-        """Pass the next stage.
-
-        Raises:
-            ValueError: all stages are passed.
-        """
+        """Pass the next stage, of which there must be one."""
         if not self._ahead:
             raise ValueError("no stage is left to pass")
         _, stage = self._ahead.pop(0)

@@ -59,11 +59,7 @@ class ServedVehicle(Protocol):
 class VehicleServer:
     """One vehicle and its ground stations.
 
-    Args:
-        vehicle: the machine.
-        endpoint: where to offer it.
-        clock: the vehicle's time.
-        signing_secret: signs what the vehicle says, and what is not signed so is not heard.
+    With a ``signing_secret`` what the vehicle says is signed, and what is not signed so not heard.
     """
 
     def __init__(

@@ -61,13 +61,7 @@ _MISSION_PROTOCOL = frozenset(
 
 
 class SimulatedAutopilot:
-    """The machine of one vehicle.
-
-    Args:
-        config: what it is.
-        flavour: whose firmware it runs.
-        start_s: when it is powered up [s].
-    """
+    """The machine of one vehicle, powered up at ``start_s``."""
 
     def __init__(self, config: VehicleConfig, flavour: FirmwareModel, start_s: float) -> None:
         self.config = config
@@ -102,11 +96,7 @@ class SimulatedAutopilot:
         self._heartbeat_s = now_s
 
     def step(self, event: VehicleEvent, now_s: float) -> list[OutgoingMessage]:
-        """Take an event at ``now_s``; time going back is taken as standing still.
-
-        Returns:
-            What is to be sent, in order.
-        """
+        """Take an event; what is to be sent, in order. Time never goes back: it stands still."""
         now_s = self._now_s = max(now_s, self._now_s)
         self._advance(now_s)
         match event:

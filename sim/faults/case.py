@@ -135,13 +135,7 @@ def play(
     make_plan: Planner = quick_plan,
     join: Callable[[EventQueue, NetworkConditions, int], RoughNetwork] = RoughNetwork,
 ) -> CaseResult:
-    """Fly ``case`` to its end, or until an invariant breaks.
-
-    Args:
-        case: the fleet and what goes wrong.
-        make_plan: plans.
-        join: makes the network, given conditions and seed.
-    """
+    """Fly ``case`` to its end, or until an invariant breaks; ``join`` makes its network."""
     network: list[RoughNetwork] = []
 
     def make_network(queue: EventQueue) -> RoughNetwork:

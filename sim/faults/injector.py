@@ -21,13 +21,7 @@ __all__ = ["FaultInjector"]
 
 
 class FaultInjector:
-    """Plays one schedule.
-
-    Args:
-        world: not yet begun.
-        network: of that world.
-        schedule: what goes wrong.
-    """
+    """Plays one schedule in a world that has not begun."""
 
     def __init__(
         self, world: World, network: RoughNetwork, schedule: Iterable[Disturbance]

@@ -60,10 +60,7 @@ _IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
 
 
 class InvariantChecker:
-    """Watches one world; see `sim.world.settings.WorldListener`.
-
-    The first breach ends the run.
-    """
+    """Watches one world (`sim.world.settings.WorldListener`); the first breach ends the run."""
 
     def __init__(self) -> None:
         self.message_log = MessageLog()

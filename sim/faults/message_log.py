@@ -124,12 +124,8 @@ class MessageLog:
     ) -> None:
         """A process has said something.
 
-        Args:
-            at_s: when.
-            process: name; two processes may speak for one writer, one after the other.
-            life: another number in every life of the process.
-            message: what it said.
-            unheard: whether nobody was there to hear it.
+        Two processes may speak for one writer, one after the other; ``life`` is another number in
+        every life of a process. ``unheard``: nobody was there to hear it.
         """
         if isinstance(message.body, Status):
             return

@@ -184,11 +184,7 @@ def parse_schedule(
 ) -> tuple[Disturbance, ...]:
     """The schedule that `format_schedule` wrote, or a person; blank lines and ``#`` aside.
 
-    Args:
-        lines: of the text.
-        source: where they come from, for error messages.
-        processes: names there may be.
-        tasks: ids there may be.
+    ``source`` is named in error messages; ``processes`` and ``tasks`` are names that there may be.
 
     Raises:
         InputError: a line cannot be understood.

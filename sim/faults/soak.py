@@ -56,7 +56,7 @@ def soak(
     bug: str = "",
     progress: Callable[[int], None] = lambda _: None,
 ) -> Breach | None:
-    """Play that many random cases, up to the first one that breaks an invariant.
+    """Play that many random cases in ``jobs`` processes, up to the first that breaks an invariant.
 
     Args:
         first: the first seed.
@@ -114,16 +114,7 @@ def shrunk(breach: Breach) -> Breach:
 
 
 def shrink(case: Case, still_breaks: Callable[[Case], bool], most_plays: int = 600) -> Case:
-    """Make ``case`` smaller as long as it still breaks.
-
-    Args:
-        case: that breaks.
-        still_breaks: plays a case; whether it breaks as the first one did.
-        most_plays: stop the search after so many.
-
-    Returns:
-        The smallest case found.
-    """
+    """The smallest case found, in at most so many plays, that ``still_breaks`` as ``case`` does."""
     plays = 0
 
     def smaller(found: Case, candidates: Iterator[Case]) -> Case | None:

@@ -61,14 +61,9 @@ def parse_autopilots(
 ) -> Autopilots:
     """What ``--autopilot`` asks for.
 
-    URLs stand for the UAVs in the order of the scenario, or for one by name (``uav2=URL``).
-    The system id is the UAV's place in the scenario, unless the URL ends in ``#ID``.
-
-    Args:
-        text: of the option.
-        uavs: of the scenario, in its order.
-        firmware: value of ``--firmware``.
-        environment: environment variables, which may say where firmware is.
+    URLs stand for the UAVs in the order of the scenario, or for one by name (``uav2=URL``). The
+    system id is the UAV's place in the scenario, unless the URL ends in ``#ID``. ``firmware`` is
+    the value of ``--firmware``; ``environment`` may say where firmware is, too.
 
     Raises:
         InputError: it makes no sense, or what it names is not there.

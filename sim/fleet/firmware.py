@@ -204,13 +204,10 @@ class SitlFirmware:
 def find_firmware(
     kind: FirmwareKind, n_uav: int, path: Path | None, environment: Mapping[str, str]
 ) -> SitlFirmware:
-    """The firmware of that kind on this machine.
+    """The firmware of that kind on this machine, for ``n_uav`` instances.
 
-    Args:
-        kind: which.
-        n_uav: how many instances are needed.
-        path: ArduCopter's binary, or a build folder of PX4; None: where the variable says.
-        environment: environment variables.
+    ``path`` is that of ArduCopter's binary, or of a build folder of PX4; without one a variable of
+    ``environment`` says where it is.
 
     Raises:
         InputError: it is not there, cannot serve so many, or has no place to work in.
@@ -253,8 +250,7 @@ _COMMON: Final = (Path("/tmp"), Path("/var/tmp"))  # noqa: S108 - files go into 
 def firmware_workplace(folders: Sequence[Path] | None = None) -> Path:
     """The first folder whose name a shell takes as it is, and in which files can be made.
 
-    Args:
-        folders: candidates; None: where temporary files go, then where they usually go.
+    By default it is looked for where temporary files go, then where they usually go.
 
     Raises:
         InputError: there is none.

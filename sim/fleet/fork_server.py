@@ -81,9 +81,7 @@ class ForkServerLostError(Exception):
 class ForkServer:
     """A server in a process of its own, from `open`; it ends at `close`, or with this process.
 
-    Args:
-        requests: the socket that it listens to.
-        process: how it was started; None if it is another's to end.
+    Without ``process`` it is another's to end.
     """
 
     shared: ClassVar[Self | None] = None
@@ -97,10 +95,9 @@ class ForkServer:
 
     @classmethod
     def open(cls, preloaded: Sequence[str] = PRELOADED) -> Self | None:
-        """Start a server, which imports meanwhile; None where that cannot be.
+        """Start a server, which imports ``preloaded`` meanwhile; None where that cannot be.
 
-        Args:
-            preloaded: modules that it imports; one that cannot be is left to whoever needs it.
+        A module that cannot be imported is left to whoever needs it.
         """
         if not _adopts():
             return None

@@ -66,12 +66,8 @@ def fresh_keys(
 ) -> Iterator[RunKeys]:
     """New keys for one run of ``mission``, in a private folder that is gone at the end.
 
-    Args:
-        mission: the scenario.
-        routers: how many routers get an identity of their own.
-        mesh: whether all processes are dialled, not only routers.
-        strangers: observers that get the identity of a UAV that the mission does not have, of
-            the same name.
+    In a ``mesh`` all processes are dialled, not only routers. ``strangers`` are observers that get
+    the identity of a UAV that the mission does not have, of the same name.
 
     Raises:
         InputError: an id of the scenario is no name for keys.
@@ -92,12 +88,7 @@ def fresh_keys(
 
 
 def keys_in(folder: Path, mission: Mission, *, mesh: bool) -> RunKeys:
-    """Keys that `swarm keys init` has made before.
-
-    Args:
-        folder: the authority's.
-        mission: the scenario to fly.
-        mesh: whether processes are to reach each other without routers.
+    """Keys that `swarm keys init` has made in ``folder`` before; for a ``mesh``, without routers.
 
     Raises:
         InputError: something is missing, expired, not of this mission or not for a mesh.

@@ -30,9 +30,9 @@ Through = Callable[[DialedLink, str], Awaitable[str]]
 class Launcher:
     """The processes of one run.
 
-    They are called ``router 1`` and so on, ``the dashboard``, ``coordinator``, ``autopilot of
-    …``, and by the id of their UAV. Use from one asyncio loop; `stop` in ``finally`` ends
-    whatever is left::
+    They are called ``router 1`` and so on, ``the dashboard``, ``coordinator``, ``autopilot of …``,
+    and by the id of their UAV. Use from one asyncio loop; `stop` in ``finally`` ends whatever is
+    left::
 
         launch = Launcher(mission, options)
         try:

@@ -113,15 +113,10 @@ class DialedLink:
 class Layout:
     """Endpoints and arguments of all processes of one run.
 
-    Processes are called ``coordinator``, by the id of their UAV, or ``router 1`` and so
-    on. Of every two that are linked, one dials. All endpoints are chosen beforehand and
-    stay, so that a process can be started again with the same arguments.
-
-    Args:
-        options: of the run.
-        mission: the scenario.
-        rng: chooses free ports.
-        observers: who else has a place in a mesh, besides the launcher.
+    Processes are called ``coordinator``, by the id of their UAV, or ``router 1`` and so on;
+    ``observers`` have places in a mesh, too. Of every two that are linked, one dials. All
+    endpoints are chosen beforehand and stay, so that a process can be started again with the same
+    arguments.
     """
 
     def __init__(

@@ -15,14 +15,10 @@ __all__ = ["LogFiles"]
 
 
 class LogFiles:
-    """The files of one run, in a folder; use it as a context manager.
+    """The files of one run, in a folder that is made if need be; use it as a context manager.
 
-    What was there before stays, and lines are added to it. A disk that is full costs the
-    logs and not the flight.
-
-    Args:
-        folder: made if it is not there.
-        complain: told once when nothing more can be written.
+    What was there before stays, and lines are added to it. A disk that is full costs the logs and
+    not the flight: ``complain`` is told once.
 
     Raises:
         InputError: no file can be written there.

@@ -175,11 +175,7 @@ class Run:
             self.fates.append(f"{child.name}: {child.fate}{words}")
 
     async def _mend_routers(self) -> str | None:
-        """Start routers anew that have died: they are the launcher's own infrastructure.
-
-        Returns:
-            Why that has no use any more; None while it has.
-        """
+        """Start routers anew that have died; why that has no use any more, None while it has."""
         for name in self.launch.layout.routers:
             child = self.launch.child(name)
             if child.returncode is None or child.stopped:
@@ -299,11 +295,7 @@ async def fly(
     recorder: FlightRecorder | None = None,
     on_private: Callable[[str], object] | None = None,
 ) -> RunResult:
-    """Fly ``mission`` to its end; see `open_run`.
-
-    Returns:
-        What came of it; processes are gone by then.
-    """
+    """Fly ``mission`` to its end, see `open_run`; processes are gone when it returns."""
     async with open_run(
         mission,
         options,

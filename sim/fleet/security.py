@@ -63,10 +63,7 @@ def security_of(
 ) -> ProtectionSummary | None:
     """What protected a flight; None if it had no keys.
 
-    Args:
-        options: how it was flown.
-        mission: the scenario of ``options``.
-        dropped: messages and frames dropped, by reason, of each process that tells.
+    ``dropped`` is what each process that tells has dropped, by reason.
     """
     if options.keys is None:
         return None

@@ -275,14 +275,7 @@ class FirmwareModel:
         raise NotImplementedError
 
     def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
-        """MAV_STATE of a heartbeat while no failsafe acts.
-
-        Args:
-            armed: the motors run.
-            on_ground: it stands.
-            booted: the autopilot is initialised.
-            ready: nothing keeps it from arming.
-        """
+        """MAV_STATE while no failsafe acts; ``ready``: nothing keeps it from arming."""
         raise NotImplementedError
 
     def sensors(self, mode: FlightMode, *, has_origin: bool, can_arm: bool) -> SensorBits:

@@ -123,10 +123,8 @@ async def check_bus(
 ) -> list[CheckFinding]:
     """Whether the bus of that seat can be reached, and who is there.
 
-    Args:
-        config: of the seat.
-        mission: that should be flown there; None for whatever there is.
-        asked_for: whether somebody has named that place; else it need not be there.
+    ``mission`` should be flown there; None for whatever there is. Unless it was ``asked_for``, the
+    bus need not be there.
     """
     findings = []
     topology = config.topology
@@ -156,12 +154,7 @@ async def check_bus(
 
 
 def judge_dial(reached: DialResult, *, enough: bool) -> CheckFinding:
-    """Whether an endpoint accepts connections.
-
-    Args:
-        reached: what came of it.
-        enough: others do, and one is all that is needed.
-    """
+    """Whether an endpoint accepts connections; where others do that may be ``enough``."""
     what = f"bus {reached.endpoint}"
     if reached.problem is None:
         return fine(what, f"accepts connections, after {_ms(reached.took_s)}")

@@ -126,13 +126,9 @@ def check_limits(limits: ResourceLimits, uavs: int) -> list[CheckFinding]:
 
 
 def check_port(what: str, place: str, problem: str | None, holder: str | None) -> CheckFinding:
-    """Whether a process could listen at ``place``.
+    """Whether a process, ``what``, could listen at ``place``.
 
-    Args:
-        what: is going to listen.
-        place: address and port.
-        problem: why nobody can; None if one can.
-        holder: who listens there, as far as that can be told.
+    ``problem`` is why nobody can, ``holder`` who listens there; None where there is none.
     """
     if problem is None:
         return fine(what, f"{place} is free")
@@ -165,13 +161,7 @@ def check_state(folder: StateFolder) -> CheckFinding:
 
 
 def check_key(path: Path, problem: str | None, mode: int) -> CheckFinding:
-    """Whether a signing key can be used, and nobody else reads it.
-
-    Args:
-        path: of its file.
-        problem: what keeps it from being used; None if nothing does.
-        mode: permissions of the file.
-    """
+    """Whether a signing key can be used, and by its file's ``mode`` nobody else reads it."""
     if problem is not None:
         what, _, remedy = problem.partition("; ")
         return fails("signing key", what, remedy or "give a signing key's file")
@@ -203,9 +193,7 @@ def check_packages(
 ) -> CheckFinding:
     """Whether every package that is needed is there and new enough.
 
-    Args:
-        requirements: as the package's metadata names them, extras among them.
-        version_of: the installed version; None if there is none.
+    ``requirements`` are as the package's metadata names them, extras among them.
     """
     missing, old, told = [], [], []
     for text in requirements:
@@ -240,11 +228,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def check_kernels(plan: Callable[[], Mapping[str, float]]) -> CheckFinding:
-    """Whether the compiled kernels load, and compute what they should.
-
-    Args:
-        plan: objectives of table-1 by method.
-    """
+    """Whether the compiled kernels load, and by J of table-1 by method compute what they should."""
     try:
         found = plan()
     except Exception as fault:  # noqa: BLE001 - whatever is wrong with what was compiled

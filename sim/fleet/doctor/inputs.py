@@ -49,13 +49,7 @@ _OPEN_TO_OTHERS = 0o077
 def read_keys(
     folder: Path, mission: str | None, now_s: float
 ) -> tuple[Identity | None, list[CheckFinding]]:
-    """The identity in a folder, if it can be flown with, and what there is to say of it.
-
-    Args:
-        folder: that `swarm keys` made.
-        mission: that it has to be for; None for any.
-        now_s: wall time [unix s].
-    """
+    """The identity in a folder, if it can be flown with, and what there is to say of it."""
     try:
         identity = load_identity(folder, mission=mission, now_s=now_s)
     except InputError as error:
@@ -88,13 +82,7 @@ def check_folder(folder: Path, mode: int) -> CheckFinding:
 
 
 def check_roster(identity: Identity, uavs: Sequence[str], now_s: float) -> CheckFinding:
-    """Who belongs to the mission, by the newest roster in the folder.
-
-    Args:
-        identity: whose folder it is.
-        uavs: of the scenario; empty without one.
-        now_s: wall time [unix s].
-    """
+    """Who belongs to the mission, by the newest roster in the folder; ``uavs`` are to."""
     entries = identity.roster.entries
     counts = {role: sum(entry.role is role for entry in entries) for role in Role}
     told = ", ".join(f"{count} {role}" for role, count in counts.items() if count)

@@ -36,9 +36,7 @@ class VehicleAddress:
 
 
 def parse_vehicle(text: str) -> VehicleAddress:
-    """The vehicle of ``URL`` or ``URL#SYSID``; without an id it is 1, as for `swarm agent`.
-
-    ``URL=SYSID`` will do, too.
+    """The vehicle of ``URL``, ``URL#SYSID`` or ``URL=SYSID``; without an id it is 1.
 
     Raises:
         InputError: it is neither.
@@ -55,11 +53,8 @@ async def check_vehicle(
 ) -> list[CheckFinding]:
     """Listen to a vehicle and tell what it says of itself.
 
-    Args:
-        vehicle: which.
-        key: that its frames are signed with; None if they are not.
-        wait_s: how long to wait for its heartbeat, and again for it to be ready: who asks has
-            often just switched it on [wall s].
+    It is waited for ``wait_s`` [wall s] for its heartbeat, and again for it to be ready: who asks
+    has often just switched it on. Without ``key`` its frames need not be signed.
     """
     name = str(vehicle.address)
     obstacle = await _obstacle(vehicle.address)

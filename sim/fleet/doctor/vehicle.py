@@ -75,9 +75,7 @@ class _Sequence:
 class VehicleListener:
     """What one vehicle says on a link; a core without sockets.
 
-    Args:
-        system_id: of the vehicle.
-        signing: with its key; None to believe what is not signed.
+    Without ``signing`` what is not signed is believed.
     """
 
     def __init__(self, system_id: int, signing: Signing | None = None) -> None:
@@ -128,13 +126,9 @@ class VehicleListener:
     def receive(
         self, data: bytes, now_s: float, unix_s: float, source: Hashable | None = None
     ) -> None:
-        """Take in what came.
+        """Take in what came, at a time of any clock.
 
-        Args:
-            data: from the link.
-            now_s: time of any clock [s].
-            unix_s: wall time here.
-            source: who sent it, on a link to which anybody can send.
+        ``source`` sent it, on a link to which anybody can send.
         """
         self._bytes += len(data)
         self._now_s = now_s
@@ -178,11 +172,7 @@ class VehicleListener:
             self._ahead_s = message.time_unix_usec / 1e6 - unix_s
 
     def findings(self, name: str) -> list[CheckFinding]:
-        """What is to be said of the vehicle, and of the link to it.
-
-        Args:
-            name: of the link.
-        """
+        """What is to be said of the vehicle, and of the link to it, which is called ``name``."""
         heartbeat = self._state.heartbeat
         if heartbeat is None:
             return [self._not_heard(name)]

@@ -197,11 +197,8 @@ async def open_chaos_flight(
 ) -> AsyncIterator[ChaosFlight]:
     """Start to fly ``mission``; do faults to it, then `ChaosFlight.run` ``.finish()``.
 
-    Args:
-        mission: the scenario of ``options``.
-        options: how to fly it.
-        relayed: put a relay on every link, so that links can be degraded and cut.
-        seed: of the relays' chance.
+    With ``relayed`` there is a relay on every link, so that links can be degraded and cut;
+    ``seed`` is of their chance.
     """
     lines: list[tuple[str, str]] = []
     async with contextlib.AsyncExitStack() as stack:

@@ -82,14 +82,7 @@ class Forgery:
 
 
 class MessageForger:
-    """Forges messages of one mission.
-
-    Args:
-        mission: mission name.
-        uavs: whose registers are forged.
-        tasks: that are claimed and ended in them.
-        rng: of everything random.
-    """
+    """Forges messages of one mission: of its UAVs, about its tasks."""
 
     def __init__(
         self, mission: str, uavs: Sequence[str], tasks: Sequence[str], rng: np.random.Generator

@@ -56,10 +56,7 @@ def recorder_seats(layout: Layout) -> tuple[BusConfig, ...]:
 class BusRecorder:
     """Records one mission from when its context is entered until it is left.
 
-    Args:
-        mission: mission name.
-        seats: where to listen; a message heard at two is recorded twice.
-        clock: gives the times of arrival.
+    A message that is heard at two seats is recorded twice.
     """
 
     def __init__(self, mission: str, seats: Sequence[BusConfig], clock: Clock) -> None:

@@ -90,13 +90,7 @@ def stall_s(quality: RelayQuality, n_segment: int, rng: np.random.Generator) -> 
 
 
 class Relay:
-    """One link, of any number of connections; may be changed at any time.
-
-    Args:
-        host: of the real endpoint.
-        port: of the real endpoint.
-        rng: draws jitter and losses.
-    """
+    """One link to a real endpoint, of any number of connections; may be changed at any time."""
 
     def __init__(self, host: str, port: int, rng: np.random.Generator) -> None:
         self.quality = RelayQuality()
@@ -199,11 +193,7 @@ class _Way:
         self._due_s = 0.0
 
     async def run(self) -> None:
-        """Pass on what comes until the sender closes, and that it has closed.
-
-        Raises:
-            OSError: the receiver takes no more.
-        """
+        """Pass on what comes until the sender closes, and that it has closed."""
         reading = asyncio.get_running_loop().create_task(self._read())
         try:
             await self._write()

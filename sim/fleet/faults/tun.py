@@ -71,9 +71,7 @@ def enter_own_network() -> None:
 class TunPath:
     """The path between `HERE` and `THERE`; use as a context manager in a loop's thread.
 
-    Args:
-        quality: delay, jitter and loss in each direction; bandwidth is not limited.
-        rng: draws jitter and losses.
+    Of its quality, bandwidth does not count.
     """
 
     def __init__(self, quality: RelayQuality, rng: np.random.Generator) -> None:
