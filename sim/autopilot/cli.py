@@ -229,11 +229,10 @@ async def _serve(
     try:
         for place, member in enumerate(fleet):
             start_s = clock.now_s()
-            sound = SimulatedAutopilot(member.config, firmware_model(flavour), start_s)
-            own_faults = faults.get(member.uav)
-            vehicle: ServedVehicle = (
-                FaultyAutopilot(sound, own_faults, start_s) if own_faults else sound
-            )
+            vehicle: ServedVehicle
+            vehicle = sound = SimulatedAutopilot(member.config, firmware_model(flavour), start_s)
+            if own_faults := faults.get(member.uav):
+                vehicle = FaultyAutopilot(sound, own_faults, start_s)
             own = endpoint.shifted(place)
             key = keys.get(member.uav)
             secret = None if key is None else key.secret

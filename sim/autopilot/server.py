@@ -10,20 +10,19 @@ import asyncio
 import contextlib
 import itertools
 import socket
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 from sim.autopilot.codec import ChannelCodec, ChannelSigning
-from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import (
     Connected,
     Disconnected,
     MavlinkReceived,
-    OutgoingMessage,
     TimeAdvanced,
     VehicleEvent,
 )
+from sim.autopilot.faulty_vehicle import FaultyAutopilot
 from sim.autopilot.options import Endpoint, Transport
-from sim.autopilot.vehicle import COMPONENT_ID
+from sim.autopilot.vehicle import COMPONENT_ID, SimulatedAutopilot
 from swarm.runtime.clock import Clock, unix_s
 
 __all__ = ["ServedVehicle", "VehicleServer"]
@@ -39,21 +38,7 @@ _MAX_UNSENT_BYTES = 1 << 20
 _LEAST_SLEEP_WALL_S = 0.001
 
 
-class ServedVehicle(Protocol):
-    """A vehicle, whether faults happen to it or not."""
-
-    @property
-    def config(self) -> VehicleConfig:
-        """What it is."""
-        ...
-
-    def step(self, event: VehicleEvent, now_s: float) -> list[OutgoingMessage]:
-        """Take an event; what is to be sent, in order."""
-        ...
-
-    def next_deadline_s(self) -> float:
-        """When `step` should be called at the latest [s]."""
-        ...
+ServedVehicle = SimulatedAutopilot | FaultyAutopilot
 
 
 class VehicleServer:

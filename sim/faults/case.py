@@ -25,8 +25,7 @@ from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.timing import Timing
-from swarm.runtime.errors import Fault as InputFault
-from swarm.runtime.errors import InputError
+from swarm.runtime.errors import Fault, InputError
 
 __all__ = [
     "MOST_TASKS",
@@ -214,7 +213,7 @@ def parse_case(lines: Iterable[str], source: str) -> Case:
     first = next((n for n, line in enumerate(text) if line.partition("#")[0].strip()), 0)
     found = _HEADER.fullmatch(text[first].strip()) if text else None
     if found is None:
-        raise InputError(InputFault(source, f"line {first + 1}", "no fleet", remedy))
+        raise InputError(Fault(source, f"line {first + 1}", "no fleet", remedy))
     words = dict(word.split("=", 1) for word in found[1].split())
     try:
         case = Case(
@@ -230,7 +229,7 @@ def parse_case(lines: Iterable[str], source: str) -> Case:
         if words:
             raise ValueError(f"unknown: {', '.join(words)}")
     except ValueError as fault:
-        raise InputError(InputFault(source, f"line {first + 1}", str(fault), remedy)) from None
+        raise InputError(Fault(source, f"line {first + 1}", str(fault), remedy)) from None
     text[first] = ""
     tasks = [task.id for task in case.flown().tasks]
     return replace(case, schedule=parse_schedule(text, source, case.processes(), tasks))

@@ -20,7 +20,6 @@ from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
-from swarm.runtime.errors import Fault as InputFault
 
 __all__ = ["fly_with_faults", "kinds_of", "random_case", "random_schedule", "read_lines"]
 
@@ -41,7 +40,7 @@ def kinds_of(text: str, source: str) -> tuple[DisturbanceKind, ...]:
     for word in text.split(","):
         if word not in list(DisturbanceKind):
             remedy = remedy_for_name(word, DisturbanceKind, "write all, a file, or some of")
-            raise InputError(InputFault(source, word, "no kind of fault", remedy))
+            raise InputError(Fault(source, word, "no kind of fault", remedy))
         kinds.append(DisturbanceKind(word))
     return tuple(kinds)
 

@@ -62,11 +62,12 @@ _IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
 class InvariantChecker:
     """Watches one world (`sim.world.settings.WorldListener`); the first breach ends the run."""
 
+    _world: World
+    _network: RoughNetwork
+    _injector: FaultInjector
+
     def __init__(self) -> None:
         self.message_log = MessageLog()
-        self._world: World | None = None
-        self._network: RoughNetwork | None = None
-        self._injector: FaultInjector | None = None
         self._lives: dict[Process, int] = {}
         self._changed_s: dict[str, float] = {}
         self._steps = 0
@@ -95,7 +96,7 @@ class InvariantChecker:
         now_s, message_log = self._now_s, self.message_log
         life = self._lives.setdefault(process, len(self._lives))
         self._changed_s[process.name] = now_s
-        alone = self._network is not None and self._network.is_alone(process)
+        alone = self._network.is_alone(process)
         message_log.said(now_s, process.name, life, message, unheard=alone)
         self._note_what_is_left(process, message)
         self._stop_if_broken()
@@ -133,7 +134,7 @@ class InvariantChecker:
 
     def refused(self, process: Process, order: GoTo) -> None:
         """The vehicle of ``process`` will not obey."""
-        for task in self._there.mission.tasks:
+        for task in self._world.mission.tasks:
             if task.position_enu_m[:2] == order.position_enu_m[:2]:
                 self.message_log.refused(process.name, task.id)
 
@@ -151,8 +152,8 @@ class InvariantChecker:
             self._break("suspects without link", text)
 
     def _look(self) -> None:
-        if self._there.alive:
-            self._there.queue.after(LOOK_EVERY_S, self._look)
+        if self._world.alive:
+            self._world.queue.after(LOOK_EVERY_S, self._look)
         agents = [(p, core) for p, core in self._living() if isinstance(core, AgentCore)]
         self._look_for_disobedience(agents)
         self._look_for_shared_tasks(agents)
@@ -175,7 +176,7 @@ class InvariantChecker:
         for (one, core), (other, rival) in itertools.combinations(agents, 2):
             task = core.claim.task if core.claim is not None else None
             same = rival.claim is not None and rival.claim.task == task
-            if task is not None and same and self._joined(one, other):
+            if task is not None and same and self._network.joined(one, other):
                 shared.add((one, other, task))
         for key in shared:
             since_s = self._shared_since_s.setdefault(key, now_s)
@@ -199,7 +200,7 @@ class InvariantChecker:
         settled_s = self._now_s - SETTLED_S
         for (one, core), (other, peer) in itertools.permutations(agents, 2):
             quiet = self._changed_s.get(other.name, 0.0) < settled_s
-            if quiet and self._joined(one, other):
+            if quiet and self._network.joined(one, other):
                 known = core.replica.claims.get(other.name)
                 if known != peer.replica.claims.get(other.name):
                     self._break("disagree", f"{one.name} takes {other.name} to claim {known}")
@@ -207,7 +208,7 @@ class InvariantChecker:
     def _look_for_two_coordinators(self) -> None:
         at_work = [process for process, core in self._living() if _coordinates(core)]
         for one, other in itertools.combinations(at_work, 2):
-            if self._joined(one, other):
+            if self._network.joined(one, other):
                 self._break("two coordinators", f"{one.name} and {other.name} both coordinate")
 
     # -- in the end -------------------------------------------------------------------
@@ -229,7 +230,7 @@ class InvariantChecker:
             self._break("not home", f"{', '.join(left)} still there")
 
     def _look_for_lost_tasks(self) -> None:
-        message_log, world = self.message_log, self._there
+        message_log, world = self.message_log, self._world
         settled = message_log.done | message_log.failed | message_log.withdrawn
         home = [
             uav
@@ -265,7 +266,7 @@ class InvariantChecker:
                 self._break("task lost", text)
 
     def _look_at_the_count(self) -> None:
-        mission_state, true = self._there.mission_state, self.message_log.visits
+        mission_state, true = self._world.mission_state, self.message_log.visits
         outcomes = mission_state.replica.outcomes.items()
         known = {k: o.completed_s for k, o in outcomes if o.result is AttemptResult.DONE}
         for key, completed_s in known.items():
@@ -281,7 +282,7 @@ class InvariantChecker:
 
     def _is_forgotten(self, uav: str, task: str) -> bool:
         """Whether an earlier life did ``task``, nobody heard of it, and the last does not know."""
-        last_life = self._lives.get(self._there.processes[uav])
+        last_life = self._lives.get(self._world.processes[uav])
         return self.message_log.unheard.get((uav, task), last_life) != last_life
 
     # -- pieces -----------------------------------------------------------------------
@@ -290,34 +291,19 @@ class InvariantChecker:
         self,
     ) -> Iterator[tuple[Process, AgentCore | CoordinatorCore | StandbyCore | MissionState]]:
         """Processes that run, or will go on, with their cores."""
-        for process in self._there.processes.values():
-            if not process.over and process not in self._directed.held_for_good:
+        for process in self._world.processes.values():
+            if not process.over and process not in self._injector.held_for_good:
                 core = process.core
                 if isinstance(core, AgentCore | CoordinatorCore | StandbyCore | MissionState):
                     yield process, core
 
-    def _joined(self, one: Process, other: Process) -> bool:
-        return self._network is not None and self._network.joined(one, other)
-
-    @property
-    def _there(self) -> World:
-        if self._world is None:
-            raise ValueError("a judge must attend a world first")
-        return self._world
-
-    @property
-    def _directed(self) -> FaultInjector:
-        if self._injector is None:
-            raise ValueError("a judge must attend a world first")
-        return self._injector
-
     @property
     def _calm_for_s(self) -> float:
-        return self._directed.calm_for_s
+        return self._injector.calm_for_s
 
     @property
     def _now_s(self) -> float:
-        return self._there.queue.now_s()
+        return self._world.queue.now_s()
 
     def _break(self, invariant: str, text: str) -> None:
         self.message_log.broken.append(Violation(self._now_s, invariant, text))
@@ -325,7 +311,7 @@ class InvariantChecker:
 
     def _stop_if_broken(self) -> None:
         if self.broken is not None:
-            self._there.queue.stop()
+            self._world.queue.stop()
 
 
 def _task_states(core: AgentCore) -> dict[str, TaskState]:

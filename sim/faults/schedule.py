@@ -14,8 +14,7 @@ from enum import StrEnum
 from typing import Final, TypeVar
 
 from sim.world.settings import RestartMemory
-from swarm.runtime.errors import Fault as InputFault
-from swarm.runtime.errors import InputError
+from swarm.runtime.errors import Fault, InputError
 
 __all__ = [
     "Disturbance",
@@ -199,7 +198,7 @@ def parse_schedule(
             _check_names(disturbance, processes, tasks)
         except ValueError as fault:
             remedy = "write TIME KIND NAME… by AMOUNT for SECONDS with MEMORY"
-            raise InputError(InputFault(source, f"line {number}", str(fault), remedy)) from None
+            raise InputError(Fault(source, f"line {number}", str(fault), remedy)) from None
         schedule.append(disturbance)
     return tuple(sorted(schedule, key=lambda each: each.at_s))
 

@@ -60,27 +60,17 @@ ARDUCOPTER_PARAMETERS: Final = {
     "FRAME_CLASS": 1,
     "FRAME_TYPE": 0,
     # What calibration of sensors and radio would have left; arming is refused without.
-    "INS_ACCOFFS_X": 0.001,
-    "INS_ACCOFFS_Y": 0.001,
-    "INS_ACCOFFS_Z": 0.001,
-    "INS_ACCSCAL_X": 1.001,
-    "INS_ACCSCAL_Y": 1.001,
-    "INS_ACCSCAL_Z": 1.001,
-    "INS_ACC2OFFS_X": 0.001,
-    "INS_ACC2OFFS_Y": 0.001,
-    "INS_ACC2OFFS_Z": 0.001,
-    "INS_ACC2SCAL_X": 1.001,
-    "INS_ACC2SCAL_Y": 1.001,
-    "INS_ACC2SCAL_Z": 1.001,
-    "COMPASS_OFS_X": 5,
-    "COMPASS_OFS_Y": 13,
-    "COMPASS_OFS_Z": -18,
-    "COMPASS_OFS2_X": 5,
-    "COMPASS_OFS2_Y": 13,
-    "COMPASS_OFS2_Z": -18,
-    "COMPASS_OFS3_X": 5,
-    "COMPASS_OFS3_Y": 13,
-    "COMPASS_OFS3_Z": -18,
+    **{
+        f"INS_{sensor}{kind}_{axis}": value
+        for sensor in ("ACC", "ACC2")
+        for kind, value in (("OFFS", 0.001), ("SCAL", 1.001))
+        for axis in "XYZ"
+    },
+    **{
+        f"COMPASS_OFS{compass}_{axis}": value
+        for compass in ("", "2", "3")
+        for axis, value in (("X", 5), ("Y", 13), ("Z", -18))
+    },
     **{f"RC{channel}_MIN": 1000 for channel in range(1, 9)},
     **{f"RC{channel}_MAX": 2000 for channel in range(1, 9)},
     **{f"RC{channel}_TRIM": 1500 for channel in range(1, 9)},

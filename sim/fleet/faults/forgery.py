@@ -56,17 +56,13 @@ class Malformation(StrEnum):
     OLD = "counters going back"
 
 
-REASONS: dict[Malformation, str] = {
-    Malformation.RANDOM: "malformed",
-    Malformation.TRUNCATED: "malformed",
-    Malformation.WRONG_TYPES: "malformed",
+REASONS: dict[Malformation, str] = dict.fromkeys(Malformation, "malformed") | {
     Malformation.LONG: "too large",
     Malformation.HUGE: "too large",
     Malformation.VERSION: "unknown version",
     Malformation.MISSION: "another mission",
     Malformation.UNKNOWN: "unknown kind",
     Malformation.KEY: "said on another's key",
-    Malformation.NAN: "malformed",
     Malformation.OLD: "stale",
 }
 """Under which reason each is counted."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.fleet.log_files import LogFiles
+from sim.fleet.shown_run import LogFiles
 from swarm.runtime.errors import InputError
 
 
