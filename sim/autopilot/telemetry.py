@@ -12,9 +12,7 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.battery import ChargeLevel
-from sim.autopilot.firmware.model import MissionProgress
 from sim.autopilot.flight import MotionPhase
-from sim.autopilot.mission_run import MissionRunState
 from sim.autopilot.pilot import Pilot
 from sim.autopilot.positions import home_position, origin_position, place_wgs84_e7
 
@@ -132,15 +130,9 @@ class TelemetryReporter:
     def _state(self) -> int:
         """MAV_STATE."""
         pilot = self._pilot
-        booted = pilot.readiness.booted
-        if booted and pilot.failsafes.acts:
+        if pilot.readiness.booted and pilot.failsafes.acts:
             return int(mavlink.MAV_STATE_CRITICAL)
-        return pilot.flavour.system_status(
-            armed=pilot.armed,
-            on_ground=pilot.flight.on_ground,
-            booted=booted,
-            ready=not pilot.obstacles,
-        )
+        return pilot.flavour.system_status(pilot)
 
     def _heartbeat(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s
@@ -148,12 +140,7 @@ class TelemetryReporter:
         return mavlink.MAVLink_heartbeat_message(
             mavlink.MAV_TYPE_QUADROTOR,
             pilot.flavour.autopilot,
-            pilot.flavour.base_mode(
-                pilot.mode,
-                armed=pilot.armed,
-                on_ground=pilot.flight.on_ground,
-                booted=pilot.readiness.booted,
-            ),
+            pilot.flavour.base_mode(pilot),
             pilot.flavour.custom_mode(pilot.mode),
             self._state(),
             3,
@@ -161,19 +148,12 @@ class TelemetryReporter:
 
     def _sys_status(self, now_s: float) -> mavlink.MAVLink_message:
         pilot = self._pilot
-        sensors = pilot.flavour.sensors(
-            pilot.mode,
-            has_origin=pilot.readiness.has_origin,
-            can_arm=not pilot.obstacles,
-        )
+        present, enabled, healthy = pilot.flavour.sensors(pilot)
         lost = _GPS if pilot.readiness.gps_lost else 0
         lost |= _BATTERY if pilot.battery.level > ChargeLevel.FINE else 0
         fenced = _FENCE if pilot.parameters.value("FENCE_ENABLE") else 0
         return mavlink.MAVLink_sys_status_message(
-            sensors.present,
-            sensors.enabled | fenced,
-            sensors.health & ~lost,
-            0,
+            *(present, enabled | fenced, healthy & ~lost, 0),
             *self._measured(now_s),
             *(0, 0, 0, 0, 0, 0),
         )
@@ -293,19 +273,8 @@ class TelemetryReporter:
     def _mission_current(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s
         pilot = self._pilot
-        run = pilot.run
-        progress = MissionProgress(
-            mode=pilot.mode,
-            current=run.current,
-            items=max(0, len(pilot.store.items) - pilot.flavour.missions.first_item),
-            present=run.present,
-            running=run.state is MissionRunState.RUNNING,
-            stopped=run.state is MissionRunState.STOPPED and run.begun,
-            over=run.state is MissionRunState.COMPLETE,
-            task_done=pilot.task_done,
-        )
-        told = pilot.flavour.mission_told(progress)
-        return mavlink.MAVLink_mission_current_message(run.told, *told)
+        told = pilot.flavour.mission_told(pilot)
+        return mavlink.MAVLink_mission_current_message(pilot.run.told, *told)
 
     def _version(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s

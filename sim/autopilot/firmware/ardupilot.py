@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -20,13 +21,12 @@ from sim.autopilot.firmware.model import (
     FirmwareModel,
     GcsFailsafe,
     MissionBehaviour,
-    MissionProgress,
     ModeBehaviour,
     RefusalCodes,
-    SensorBits,
     texts_of,
 )
 from sim.autopilot.flight import FlightMode
+from sim.autopilot.mission_run import MissionRunState
 from sim.autopilot.parameters import (
     ParameterBehaviour,
     ParameterEntry,
@@ -34,6 +34,9 @@ from sim.autopilot.parameters import (
     ParameterTable,
 )
 from sim.autopilot.readiness import PowerUpStage
+
+if TYPE_CHECKING:
+    from sim.autopilot.pilot import Pilot
 
 __all__ = ["ArduCopterModel"]
 
@@ -266,52 +269,51 @@ class ArduCopterModel(FirmwareModel):
         del sub
         return int(main) if math.isfinite(main) else None
 
-    def base_mode(self, mode: FlightMode, *, armed: bool, on_ground: bool, booted: bool) -> int:
+    def base_mode(self, pilot: Pilot) -> int:
         """MAV_MODE_FLAG bits of a heartbeat.
 
         It sets GUIDED_ENABLED while its position controller runs: so also
         while booting, and no longer once it has returned and landed.
         """
         bits = int(_ALWAYS_SET)
-        returned = mode is FlightMode.RTL and on_ground and not armed
-        if not booted or (mode.controls_position and not returned):
+        landed = pilot.flight.on_ground and not pilot.armed
+        returned = pilot.mode is FlightMode.RTL and landed
+        if not pilot.readiness.booted or (pilot.mode.controls_position and not returned):
             bits |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
-        if armed:
+        if pilot.armed:
             bits |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
         return bits
 
-    def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
+    def system_status(self, pilot: Pilot) -> int:
         """MAV_STATE of a heartbeat: active in the air only."""
-        del armed, ready
-        if not booted:
+        if not pilot.readiness.booted:
             return int(mavlink.MAV_STATE_BOOT)
+        on_ground = pilot.flight.on_ground
         return int(mavlink.MAV_STATE_STANDBY if on_ground else mavlink.MAV_STATE_ACTIVE)
 
-    def sensors(self, mode: FlightMode, *, has_origin: bool, can_arm: bool) -> SensorBits:
+    def sensors(self, pilot: Pilot) -> tuple[int, int, int]:
         """Bits of SYS_STATUS, as recorded."""
-        seen = _GPS if has_origin else 0
-        running = _AHRS if has_origin else 0
-        if mode.controls_position:
+        seen, running = (_GPS, _AHRS) if pilot.readiness.has_origin else (0, 0)
+        if pilot.mode.controls_position:
             running |= _POSITION_CONTROL
-        return SensorBits(
-            present=_PRESENT | seen,
-            enabled=_ENABLED | seen | running,
-            health=_HEALTHY | seen | running | (_PREARM if can_arm else 0),
-        )
+        checked = 0 if pilot.obstacles else _PREARM
+        on = seen | running
+        return _PRESENT | seen, _ENABLED | on, _HEALTHY | on | checked
 
-    def mission_told(self, progress: MissionProgress) -> tuple[int, int, int]:
+    def mission_told(self, pilot: Pilot) -> tuple[int, int, int]:
         """Home doesn't count; the mode is 1 in the mission mode, 0 (not told) otherwise."""
-        if not progress.present:
+        run = pilot.run
+        if not run.present:
             state = mavlink.MISSION_STATE_NO_MISSION
-        elif progress.over:
+        elif run.state is MissionRunState.COMPLETE:
             state = mavlink.MISSION_STATE_COMPLETE
-        elif progress.running:
+        elif run.state is MissionRunState.RUNNING:
             state = mavlink.MISSION_STATE_ACTIVE
-        elif progress.stopped:
+        elif run.state is MissionRunState.STOPPED and run.begun:
             state = mavlink.MISSION_STATE_PAUSED
         else:
             state = mavlink.MISSION_STATE_NOT_STARTED
-        return progress.items, state, int(progress.mode is FlightMode.AUTO)
+        return max(0, len(pilot.store.items) - 1), state, int(pilot.mode is FlightMode.AUTO)
 
 
 def _old(entry: ParameterEntry) -> ParameterEntry:

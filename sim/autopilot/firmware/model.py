@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
@@ -17,15 +18,16 @@ from sim.autopilot.parameters import (
 )
 from sim.autopilot.readiness import PowerUpStage
 
+if TYPE_CHECKING:
+    from sim.autopilot.pilot import Pilot
+
 __all__ = [
     "FailsafeBehaviour",
     "FirmwareModel",
     "GcsFailsafe",
     "MissionBehaviour",
-    "MissionProgress",
     "ModeBehaviour",
     "RefusalCodes",
-    "SensorBits",
     "texts_of",
 ]
 
@@ -102,31 +104,6 @@ class MissionBehaviour:
     """Whether an item may let targets be told for a time."""
     forgets_mode: bool = False
     """Whether the mode becomes another one at the end, or at an item that returns home."""
-
-
-@dataclass(frozen=True, slots=True)
-class MissionProgress:
-    """What MISSION_CURRENT is made from."""
-
-    mode: FlightMode
-    current: int | None
-    items: int
-    """Number of items that are flown."""
-    present: bool
-    running: bool
-    stopped: bool
-    over: bool
-    task_done: bool
-    """What the mode was entered for (a take-off, a mission, a landing) is done."""
-
-
-@dataclass(frozen=True, slots=True)
-class SensorBits:
-    """Bits of SYS_STATUS."""
-
-    present: int
-    enabled: int
-    health: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,18 +247,18 @@ class FirmwareModel:
         """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE; None if they make no sense."""
         raise NotImplementedError
 
-    def base_mode(self, mode: FlightMode, *, armed: bool, on_ground: bool, booted: bool) -> int:
+    def base_mode(self, pilot: Pilot) -> int:
         """MAV_MODE_FLAG bits of a heartbeat."""
         raise NotImplementedError
 
-    def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
-        """MAV_STATE while no failsafe acts; ``ready``: nothing keeps it from arming."""
+    def system_status(self, pilot: Pilot) -> int:
+        """MAV_STATE of a heartbeat while no failsafe acts."""
         raise NotImplementedError
 
-    def sensors(self, mode: FlightMode, *, has_origin: bool, can_arm: bool) -> SensorBits:
-        """Bits of SYS_STATUS."""
+    def sensors(self, pilot: Pilot) -> tuple[int, int, int]:
+        """Bits of SYS_STATUS: what is present, enabled and healthy."""
         raise NotImplementedError
 
-    def mission_told(self, progress: MissionProgress) -> tuple[int, int, int]:
+    def mission_told(self, pilot: Pilot) -> tuple[int, int, int]:
         """``total``, ``mission_state`` (MISSION_STATE) and ``mission_mode`` of MISSION_CURRENT."""
         raise NotImplementedError

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -21,10 +22,8 @@ from sim.autopilot.firmware.model import (
     FirmwareModel,
     GcsFailsafe,
     MissionBehaviour,
-    MissionProgress,
     ModeBehaviour,
     RefusalCodes,
-    SensorBits,
     texts_of,
 )
 from sim.autopilot.flight import FlightMode
@@ -34,6 +33,9 @@ from sim.autopilot.parameters import (
     ParameterRole,
     ParameterTable,
 )
+
+if TYPE_CHECKING:
+    from sim.autopilot.pilot import Pilot
 
 __all__ = ["Px4Model"]
 
@@ -293,11 +295,10 @@ class Px4Model(FirmwareModel):
             return None
         return _custom_mode(int(main), int(sub))
 
-    def base_mode(self, mode: FlightMode, *, armed: bool, on_ground: bool, booted: bool) -> int:
+    def base_mode(self, pilot: Pilot) -> int:
         """MAV_MODE_FLAG bits of a heartbeat."""
-        del on_ground, booted
         bits: int = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        if mode in _AUTOMATIC:
+        if pilot.mode in _AUTOMATIC:
             bits |= (
                 mavlink.MAV_MODE_FLAG_AUTO_ENABLED
                 | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
@@ -305,46 +306,42 @@ class Px4Model(FirmwareModel):
             )
         else:
             bits |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
-            if mode is not FlightMode.MANUAL:
+            if pilot.mode is not FlightMode.MANUAL:
                 bits |= mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
-        if armed:
+        if pilot.armed:
             bits |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
         return bits
 
-    def system_status(self, *, armed: bool, on_ground: bool, booted: bool, ready: bool) -> int:
+    def system_status(self, pilot: Pilot) -> int:
         """MAV_STATE of a heartbeat: active once the motors run, uninitialised before they may.
 
         What it checks before it arms it takes for part of its initialisation.
         """
-        del on_ground
-        if armed:
+        if pilot.armed:
             return int(mavlink.MAV_STATE_ACTIVE)
-        ready = ready and booted
+        ready = pilot.readiness.booted and not pilot.obstacles
         return int(mavlink.MAV_STATE_STANDBY if ready else mavlink.MAV_STATE_UNINIT)
 
-    def sensors(self, mode: FlightMode, *, has_origin: bool, can_arm: bool) -> SensorBits:
+    def sensors(self, pilot: Pilot) -> tuple[int, int, int]:
         """Bits of SYS_STATUS, as recorded."""
-        del mode
-        if not has_origin:
-            return SensorBits(present=0, enabled=0, health=_HEALTH_AT_BOOT)
-        return SensorBits(
-            present=_PRESENT, enabled=_ENABLED, health=_HEALTHY | (_PREARM if can_arm else 0)
-        )
+        if not pilot.readiness.has_origin:
+            return 0, 0, _HEALTH_AT_BOOT
+        return _PRESENT, _ENABLED, _HEALTHY | (0 if pilot.obstacles else _PREARM)
 
-    def mission_told(self, progress: MissionProgress) -> tuple[int, int, int]:
+    def mission_told(self, pilot: Pilot) -> tuple[int, int, int]:
         """``total``, ``mission_state`` and ``mission_mode`` of MISSION_CURRENT.
 
         The state speaks of the mode more than of the mission: a take-off or a landing that is
         done completes it too, and one that was left half-way stays active.
         """
-        flown = progress.mode in (FlightMode.AUTO, FlightMode.TAKEOFF, FlightMode.LAND)
-        if not progress.present:
+        flown = pilot.mode in (FlightMode.AUTO, FlightMode.TAKEOFF, FlightMode.LAND)
+        if not pilot.run.present:
             state = mavlink.MISSION_STATE_NO_MISSION
-        elif progress.task_done:
+        elif pilot.task_done:
             state = mavlink.MISSION_STATE_COMPLETE
-        elif flown or progress.current:
+        elif flown or pilot.run.current:
             state = mavlink.MISSION_STATE_ACTIVE
         else:
             state = mavlink.MISSION_STATE_NOT_STARTED
         mode = _MISSION_MODE_ACTIVE if flown else _MISSION_MODE_SUSPENDED
-        return progress.items or _UNKNOWN_TOTAL, state, mode
+        return len(pilot.store.items) or _UNKNOWN_TOTAL, state, mode
