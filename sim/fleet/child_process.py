@@ -169,7 +169,8 @@ class ChildProcess:
         self._on_log = on_log
         self._process: asyncio.subprocess.Process | _Forked | None = None
         self._readers: list[asyncio.Task[None]] = []
-        self._lines: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        self._lines: asyncio.Queue[dict[str, Any] | None] = asyncio.Queue()
+        """What it prints; None when it prints no more."""
 
     @property
     def pid(self) -> int:
@@ -236,18 +237,18 @@ class ChildProcess:
             ChildFailedError: it ended or said nothing in time.
         """
         said: list[dict[str, Any]] = []
-        ended = asyncio.get_running_loop().create_task(self.ended())
         try:
             async with asyncio.timeout(READY_TIMEOUT_S):
                 while len(said) < count:
-                    said.append(await self._next_line(ended))
+                    if (line := await self._lines.get()) is None:
+                        self._lines.put_nowait(None)
+                        await self.ended()
+                        raise self._failure()
+                    said.append(line)
         except TimeoutError:
             raise ChildFailedError(
                 f"{self.name} was not ready within {READY_TIMEOUT_S:g} s: {self.last_words()}"
             ) from None
-        finally:
-            ended.cancel()
-            await asyncio.gather(ended, return_exceptions=True)
         return said
 
     async def settled(self) -> None:
@@ -260,18 +261,10 @@ class ChildProcess:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(SETTLE_S):
                 await self.ended()
-                raise ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
+                raise self._failure()
 
-    async def _next_line(self, ended: asyncio.Task[int]) -> dict[str, Any]:
-        line = asyncio.get_running_loop().create_task(self._lines.get())
-        try:
-            await asyncio.wait((line, ended), return_when=asyncio.FIRST_COMPLETED)
-            if line.done():
-                return line.result()
-            raise ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
-        finally:
-            line.cancel()
-            await asyncio.gather(line, return_exceptions=True)
+    def _failure(self) -> ChildFailedError:
+        return ChildFailedError(f"{self.name} {self.fate}: {self.last_words()}")
 
     async def ended(self) -> int:
         """Wait for its end and for all it had to say; its exit status."""
@@ -348,15 +341,18 @@ class ChildProcess:
 
     async def _read_out(self) -> None:
         stream = self._started.stdout
-        while stream is not None and (line := await stream.readline()):
-            try:
-                said = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(said, dict):
-                self._lines.put_nowait(said)
-                if self._on_line is not None:
-                    self._on_line(said)
+        try:
+            while stream is not None and (line := await stream.readline()):
+                try:
+                    said = json.loads(line)
+                except ValueError:
+                    continue
+                if isinstance(said, dict):
+                    self._lines.put_nowait(said)
+                    if self._on_line is not None:
+                        self._on_line(said)
+        finally:
+            self._lines.put_nowait(None)
 
     async def _read_err(self) -> None:
         stream = self._started.stderr

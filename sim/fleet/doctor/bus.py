@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
-from sim.fleet.doctor.host import check_port
-from sim.fleet.doctor.probes import listen_problem, port_holder
+from sim.fleet.doctor.probes import look_at_port
 from swarm.bus.config import (
     BusConfig,
     ClientTopology,
@@ -264,9 +263,7 @@ def _check_listen(endpoint: str) -> CheckFinding:
     if match is None:
         return fine("bus", f"listens at {endpoint}")
     host, port, datagrams = match[2].strip("[]"), int(match[3]), match[1] == "quic"
-    problem = listen_problem(host, port, datagrams=datagrams)
-    holder = None if problem is None else port_holder(port, datagrams=datagrams)
-    return check_port("bus", endpoint, problem, holder)
+    return look_at_port("bus", endpoint, host, port, datagrams=datagrams)
 
 
 def _ms(duration_s: float) -> str:

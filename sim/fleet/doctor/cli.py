@@ -119,7 +119,7 @@ def doctor(
     console = Console(highlight=False)
 
     async def work() -> int:
-        async for finding in _checks(
+        async for findings in _checks(
             scenario,
             mission,
             config,
@@ -131,9 +131,9 @@ def doctor(
             timeout_s,
             asked_for=seat.is_named,
         ):
-            found.append(finding)
+            found.extend(findings)
             if not json:
-                print_findings([finding], console)
+                print_findings(findings, console)
         if json:
             print(dumps(as_json(found)))
         return 1 if any(each.state is CheckState.FAILS for each in found) else 0
@@ -153,55 +153,41 @@ async def _checks(
     wait_s: float,
     *,
     asked_for: bool,
-) -> AsyncIterator[CheckFinding]:
-    """Every finding as it comes, from the ground up."""
+) -> AsyncIterator[Sequence[CheckFinding]]:
+    """All findings as they come, from the ground up."""
     import asyncio
 
     from sim.fleet.doctor.bus import check_bus, check_zenoh
-    from sim.fleet.doctor.host import check_clock, check_limits, check_port, check_state
+    from sim.fleet.doctor.host import check_clock, check_limits, check_state
     from sim.fleet.doctor.inputs import check_roster, check_scenario
     from sim.fleet.doctor.link import check_vehicle
-    from sim.fleet.doctor.probes import (
-        listen_problem,
-        port_holder,
-        read_clock,
-        read_folder,
-        read_limits,
-    )
+    from sim.fleet.doctor.probes import look_at_port, read_clock, read_folder, read_limits
     from swarm.runtime.clock import unix_s
 
-    for finding in _software():
-        yield finding
-    yield check_clock(read_clock())
+    yield _software()
+    yield [check_clock(read_clock())]
     flown = None
     if scenario is not None:
         flown, findings = check_scenario(scenario)
-        for finding in findings:
-            yield finding
-    for finding in check_limits(read_limits(), len(flown.uavs) if flown else _DEFAULT_UAVS):
-        yield finding
+        yield findings
+    yield check_limits(read_limits(), len(flown.uavs) if flown else _DEFAULT_UAVS)
     if state is not None:
-        yield check_state(read_folder(state))
+        yield [check_state(read_folder(state))]
     for each in ports:
-        problem = listen_problem("0.0.0.0", each, datagrams=False)  # noqa: S104 - tried, not kept
-        holder = None if problem is None else port_holder(each, datagrams=False)
-        yield check_port("port", str(each), problem, holder)
-    yield await check_zenoh()
-    for finding in keyed:
-        yield finding
+        yield [look_at_port("port", str(each), "0.0.0.0", each)]  # noqa: S104 - tried, not kept
+    yield [await check_zenoh()]
+    yield keyed
     if config is not None:  # else the keys say what is wrong
         if config.identity is not None:
             uavs = [uav.id for uav in flown.uavs] if flown else []
-            yield check_roster(config.identity, uavs, unix_s())
-        for finding in await check_bus(config, mission, asked_for=asked_for):
-            yield finding
+            yield [check_roster(config.identity, uavs, unix_s())]
+        yield await check_bus(config, mission, asked_for=asked_for)
     key = None
     if key_file is not None:
         key, finding = _key(key_file)
-        yield finding
-    for findings in await asyncio.gather(*(check_vehicle(each, key, wait_s) for each in vehicles)):
-        for finding in findings:
-            yield finding
+        yield [finding]
+    for heard in await asyncio.gather(*(check_vehicle(each, key, wait_s) for each in vehicles)):
+        yield heard
 
 
 def _software() -> list[CheckFinding]:

@@ -12,9 +12,8 @@ from agent.links.link import open_link
 from agent.vehicle.config import LinkAddress, SerialAddress, TcpAddress, UdpInAddress, parse_link
 from agent.vehicle.signing import Signing, SigningKey
 from sim.fleet.doctor.bus import dial
-from sim.fleet.doctor.finding import CheckFinding, fails
-from sim.fleet.doctor.host import check_port
-from sim.fleet.doctor.probes import listen_problem, port_holder
+from sim.fleet.doctor.finding import CheckFinding, CheckState, fails
+from sim.fleet.doctor.probes import look_at_port
 from sim.fleet.doctor.vehicle import ASK_AGAIN_S, VehicleListener
 from swarm.runtime.clock import SystemClock, unix_s
 from swarm.runtime.errors import Fault, InputError
@@ -103,9 +102,8 @@ async def _obstacle(address: LinkAddress) -> CheckFinding | None:
     name = str(address)
     match address:
         case UdpInAddress(host, port):
-            problem = listen_problem(host, port, datagrams=True)
-            if problem is not None:
-                return check_port(name, f"port {port}", problem, port_holder(port, datagrams=True))
+            found = look_at_port(name, f"port {port}", host, port, datagrams=True)
+            return None if found.state is CheckState.OK else found
         case TcpAddress(host, port):
             reached = await dial(f"tcp/[{host}]:{port}" if ":" in host else f"tcp/{host}:{port}")
             if reached.problem is not None:

@@ -14,10 +14,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import swarm
-from sim.fleet.doctor.host import ClockReading, ResourceLimits, StateFolder
+from sim.fleet.doctor.finding import CheckFinding
+from sim.fleet.doctor.host import ClockReading, ResourceLimits, StateFolder, check_port
 from swarm.runtime.clock import SystemClock, unix_s
 
-__all__ = ["file_mode", "listen_problem", "port_holder", "read_clock", "read_folder", "read_limits"]
+__all__ = ["file_mode", "look_at_port", "read_clock", "read_folder", "read_limits"]
 
 
 _SLEPT_S = 0.02
@@ -111,7 +112,16 @@ def file_mode(path: Path) -> int:
         return 0
 
 
-def listen_problem(host: str, port: int, *, datagrams: bool) -> str | None:
+def look_at_port(
+    what: str, place: str, host: str, port: int, *, datagrams: bool = False
+) -> CheckFinding:
+    """Whether a process, ``what``, could listen at ``place``, and who does if it could not."""
+    problem = _listen_problem(host, port, datagrams=datagrams)
+    holder = None if problem is None else _port_holder(port, datagrams=datagrams)
+    return check_port(what, place, problem, holder)
+
+
+def _listen_problem(host: str, port: int, *, datagrams: bool) -> str | None:
     """Why nobody can listen there; None if one can."""
     kind = socket.SOCK_DGRAM if datagrams else socket.SOCK_STREAM
     try:
@@ -129,7 +139,7 @@ def listen_problem(host: str, port: int, *, datagrams: bool) -> str | None:
     return None
 
 
-def port_holder(port: int, *, datagrams: bool) -> str | None:
+def _port_holder(port: int, *, datagrams: bool) -> str | None:
     """Which program listens at that port, in words; None if none is seen."""
     kind = "udp" if datagrams else "tcp"
     inodes = {
