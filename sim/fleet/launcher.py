@@ -158,7 +158,9 @@ class Launcher:
         for child in self._current.values():
             if child.returncode is None:
                 child.resume()
-        agents = [child for child in self.lives if _is_agent(child)]
+        agents = [
+            child for child in self.lives if child.setting is None and child.arguments[0] == "agent"
+        ]
         await asyncio.gather(*(child.stop() for child in agents))
         await asyncio.gather(*(child.stop() for child in self.lives))
         if self._server is not None:
@@ -221,10 +223,6 @@ class Launcher:
         self.lives.append(child)
         self._current[name] = child
         return child
-
-
-def _is_agent(child: ChildProcess) -> bool:
-    return child.setting is None and child.arguments[0] == "agent"
 
 
 async def _there(places: Sequence[VehiclePlace]) -> AsyncIterator[VehiclePlace]:

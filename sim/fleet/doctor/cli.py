@@ -15,8 +15,6 @@ from swarm.runtime.options import JsonOption, OptionalScenarioArgument
 if TYPE_CHECKING:
     from agent.vehicle.signing import SigningKey
     from sim.fleet.doctor.finding import CheckFinding
-    from sim.fleet.doctor.link import VehicleAddress
-    from swarm.bus.config import BusConfig
     from swarm.identity import Identity
 
 __all__ = ["doctor"]
@@ -98,8 +96,12 @@ def doctor(
     from rich.console import Console
 
     from coordinator.joining import check_mission
+    from sim.fleet.doctor.bus import check_bus, check_zenoh
     from sim.fleet.doctor.finding import CheckState, as_json, print_findings
-    from sim.fleet.doctor.link import parse_vehicle
+    from sim.fleet.doctor.host import check_clock, check_limits, check_state
+    from sim.fleet.doctor.inputs import check_roster, check_scenario, read_keys
+    from sim.fleet.doctor.link import check_vehicle, parse_vehicle
+    from sim.fleet.doctor.probes import look_at_port, read_clock, read_folder, read_limits
     from swarm.runtime.clock import unix_s
     from swarm.runtime.log import LogLevel, configure_logging
     from swarm.runtime.process import run_until_stopped
@@ -109,8 +111,6 @@ def doctor(
     identity: Identity | None = None
     keyed: list[CheckFinding] = []
     if seat.keys is not None:
-        from sim.fleet.doctor.inputs import read_keys
-
         identity, keyed = read_keys(seat.keys, mission, unix_s())
     usable = seat.keys is None or identity is not None
     config = seat.config(mission=mission) if usable else None
@@ -118,19 +118,36 @@ def doctor(
     found: list[CheckFinding] = []
     console = Console(highlight=False)
 
-    async def work() -> int:
-        async for findings in _checks(
-            scenario,
-            mission,
-            config,
-            keyed,
-            vehicles,
-            signing_key,
-            state,
-            port or (),
-            timeout_s,
-            asked_for=seat.is_named,
+    async def checks() -> AsyncIterator[Sequence[CheckFinding]]:
+        yield _software()
+        yield [check_clock(read_clock())]
+        flown = None
+        if scenario is not None:
+            flown, findings = check_scenario(scenario)
+            yield findings
+        yield check_limits(read_limits(), len(flown.uavs) if flown else _DEFAULT_UAVS)
+        if state is not None:
+            yield [check_state(read_folder(state))]
+        for each in port or ():
+            yield [look_at_port("port", str(each), "0.0.0.0", each)]  # noqa: S104 - tried, not kept
+        yield [await check_zenoh()]
+        yield keyed
+        if config is not None:  # else the keys say what is wrong
+            if config.identity is not None:
+                uavs = [uav.id for uav in flown.uavs] if flown else []
+                yield [check_roster(config.identity, uavs, unix_s())]
+            yield await check_bus(config, mission, asked_for=seat.is_named)
+        key = None
+        if signing_key is not None:
+            key, finding = _key(signing_key)
+            yield [finding]
+        for heard in await asyncio.gather(
+            *(check_vehicle(each, key, timeout_s) for each in vehicles)
         ):
+            yield heard
+
+    async def work() -> int:
+        async for findings in checks():
             found.extend(findings)
             if not json:
                 print_findings(findings, console)
@@ -139,55 +156,6 @@ def doctor(
         return 1 if any(each.state is CheckState.FAILS for each in found) else 0
 
     return asyncio.run(run_until_stopped(work()))
-
-
-async def _checks(
-    scenario: Path | None,
-    mission: str | None,
-    config: BusConfig | None,
-    keyed: Sequence[CheckFinding],
-    vehicles: list[VehicleAddress],
-    key_file: Path | None,
-    state: Path | None,
-    ports: tuple[int, ...] | list[int],
-    wait_s: float,
-    *,
-    asked_for: bool,
-) -> AsyncIterator[Sequence[CheckFinding]]:
-    """All findings as they come, from the ground up."""
-    import asyncio
-
-    from sim.fleet.doctor.bus import check_bus, check_zenoh
-    from sim.fleet.doctor.host import check_clock, check_limits, check_state
-    from sim.fleet.doctor.inputs import check_roster, check_scenario
-    from sim.fleet.doctor.link import check_vehicle
-    from sim.fleet.doctor.probes import look_at_port, read_clock, read_folder, read_limits
-    from swarm.runtime.clock import unix_s
-
-    yield _software()
-    yield [check_clock(read_clock())]
-    flown = None
-    if scenario is not None:
-        flown, findings = check_scenario(scenario)
-        yield findings
-    yield check_limits(read_limits(), len(flown.uavs) if flown else _DEFAULT_UAVS)
-    if state is not None:
-        yield [check_state(read_folder(state))]
-    for each in ports:
-        yield [look_at_port("port", str(each), "0.0.0.0", each)]  # noqa: S104 - tried, not kept
-    yield [await check_zenoh()]
-    yield keyed
-    if config is not None:  # else the keys say what is wrong
-        if config.identity is not None:
-            uavs = [uav.id for uav in flown.uavs] if flown else []
-            yield [check_roster(config.identity, uavs, unix_s())]
-        yield await check_bus(config, mission, asked_for=asked_for)
-    key = None
-    if key_file is not None:
-        key, finding = _key(key_file)
-        yield [finding]
-    for heard in await asyncio.gather(*(check_vehicle(each, key, wait_s) for each in vehicles)):
-        yield heard
 
 
 def _software() -> list[CheckFinding]:

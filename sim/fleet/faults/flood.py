@@ -99,7 +99,10 @@ class Flood:
     @property
     def counted(self) -> Mapping[str, Mapping[str, int]]:
         """What each UAV says it has dropped since the flood began, by reason."""
-        return {uav: _since(self.before[uav], dropped) for uav, dropped in self.after.items()}
+        return {
+            uav: {why: count - self.before[uav].get(why, 0) for why, count in dropped.items()}
+            for uav, dropped in self.after.items()
+        }
 
     @property
     def ok(self) -> bool:
@@ -115,10 +118,6 @@ class Flood:
     def decisions_kept(self) -> bool:
         """Whether every list flown is the one planned."""
         return self.result.executed_routes == self.planned
-
-
-def _since(before: Mapping[str, int], after: Mapping[str, int]) -> Mapping[str, int]:
-    return {reason: count - before.get(reason, 0) for reason, count in after.items()}
 
 
 def _dropped(run: Run) -> dict[str, Mapping[str, int]]:
