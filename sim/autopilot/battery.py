@@ -32,9 +32,8 @@ class ChargeLevel(IntEnum):
 class BatteryModel:
     """One battery, full at first.
 
-    Args:
-        endurance_s: armed time that empties it [s]; None: it stays full.
-        failsafe: charges at which the firmware acts; None: it never does.
+    Without an ``endurance_s`` of armed time [s] it stays full; without a ``failsafe`` the firmware
+    never acts.
     """
 
     def __init__(self, endurance_s: float | None, failsafe: BatteryFailsafe | None) -> None:

@@ -59,7 +59,7 @@ class VehicleServer:
         self._signing_secret = signing_secret
         self._endpoint = endpoint
         self._clock = clock
-        self._channels: dict[int, _Channel] = {}
+        self._channels: dict[int, _TcpChannel | _UdpPeer] = {}
         self._numbers = itertools.count()
         self._timer: asyncio.TimerHandle | None = None
         self._timer_s = 0.0
@@ -115,7 +115,7 @@ class VehicleServer:
         if self._tcp is not None:
             await self._tcp.wait_closed()
 
-    def open_channel(self, channel: _Channel) -> int:
+    def open_channel(self, channel: _TcpChannel | _UdpPeer) -> int:
         """Take up a ground station; the number of its channel."""
         number = next(self._numbers)
         self._channels[number] = channel
@@ -183,19 +183,7 @@ class VehicleServer:
         self.handle(TimeAdvanced())
 
 
-class _Channel:
-    """What a vehicle needs of a ground station."""
-
-    codec: ChannelCodec
-
-    def send(self, frames: list[bytes]) -> None:
-        raise NotImplementedError
-
-    def hang_up(self) -> None:
-        raise NotImplementedError
-
-
-class _TcpChannel(_Channel, asyncio.Protocol):
+class _TcpChannel(asyncio.Protocol):
     """One connected client."""
 
     def __init__(self, server: VehicleServer) -> None:
@@ -232,7 +220,7 @@ class _TcpChannel(_Channel, asyncio.Protocol):
             self._transport.abort()
 
 
-class _UdpPeer(_Channel):
+class _UdpPeer:
     """One address datagrams come from."""
 
     def __init__(self, server: VehicleServer, sock: _UdpSocket, address: _Address | None) -> None:

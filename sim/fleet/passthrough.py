@@ -54,11 +54,8 @@ def fence_around(
 ) -> Fence:
     """A fence with room for every start and every task, pop-ups included.
 
-    Args:
-        mission: the scenario, flown in the height layers of a coordinator.
-        radius_m: where it is to be instead; None: a fifth and 200 m beyond the farthest place.
-        height_m: the same; None: 50 m beyond the highest layer above the highest place, or
-            beyond the lowest place.
+    Unless given, its radius is a fifth and 200 m beyond the farthest place; its height is 50 m
+    beyond the highest layer above the highest place, or beyond the lowest place.
     """
     places = [uav.position_enu_m for uav in mission.uavs]
     places += [task.position_enu_m for task in mission.tasks]

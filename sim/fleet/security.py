@@ -31,13 +31,8 @@ def protected(
     """``options`` with keys, if any are asked for; new ones are gone when the context ends.
 
     Simulated autopilots get each the key of its UAV, too, unless a signing key is given.
-
-    Args:
-        mission: the scenario of ``options``.
-        options: without keys.
-        secure: make new keys where there are none.
-        keys: the folder of keys made before.
-        strangers: see `fresh_keys`.
+    ``secure`` makes new keys where there are none in a folder ``keys``, those of ``strangers``
+    too, see `fresh_keys`.
 
     Raises:
         InputError: the keys do not fit, or cannot be made.

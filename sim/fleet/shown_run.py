@@ -49,15 +49,7 @@ class Outputs:
 
 
 class ShownRun:
-    """One run on this machine, and the screen.
-
-    Args:
-        mission: what is flown.
-        scenario: its file or shipped name.
-        speedup: mission seconds per wall second.
-        timing: timers of the run, in mission seconds.
-        outputs: where what is told goes.
-    """
+    """One run on this machine, and the screen; timers are in mission seconds."""
 
     def __init__(
         self, mission: Mission, scenario: Path, speedup: float, timing: Timing, outputs: Outputs

@@ -163,9 +163,6 @@ class ArduCopterModel(FirmwareModel):
         outside_fence=mavlink.MAV_RESULT_FAILED,
     )
     failsafe_behaviour = FailsafeBehaviour(
-        hold_s=0.0,
-        words=(),
-        hold_words=(),
         battery_words=(
             TextTemplate(_WARNING, "Battery 1 is {level} {volts:.2f}V used {used_mah:.0f} mAh"),
             TextTemplate(_WARNING, "Battery Failsafe"),
@@ -176,7 +173,6 @@ class ArduCopterModel(FirmwareModel):
         ),
         ground_regained=TextTemplate(_WARNING, "GCS Failsafe Cleared"),
         critical_when_disarmed=True,
-        deaf_after_s=math.inf,
     )
     disarm_delay_after_landing = ParameterRole.DISARM_DELAY_S
     disarms_at_once = frozenset({FlightMode.RTL, FlightMode.LAND})

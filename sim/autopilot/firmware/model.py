@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -110,22 +111,22 @@ class MissionBehaviour:
 class FailsafeBehaviour:
     """How failsafes act, and what is said of them."""
 
-    hold_s: float
-    """It warns for so long, holding its place, before it returns [s]."""
-    words: tuple[TextTemplate, ...]
-    """Said whatever the cause, just before the mode changes; none: each cause has its own."""
-    hold_words: tuple[TextTemplate, ...]
-    """Said when it begins to hold."""
     battery_words: tuple[TextTemplate, ...]
     """Said of a low battery [level, volts, used_mah]."""
-    position_words: tuple[TextTemplate, ...]
-    """Said of a lost position."""
     ground_regained: TextTemplate
     """Said when a ground station is heard again."""
-    critical_when_disarmed: bool
+    hold_s: float = 0.0
+    """It warns for so long, holding its place, before it returns [s]."""
+    words: tuple[TextTemplate, ...] = ()
+    """Said whatever the cause, just before the mode changes; none: each cause has its own."""
+    hold_words: tuple[TextTemplate, ...] = ()
+    """Said when it begins to hold."""
+    position_words: tuple[TextTemplate, ...] = ()
+    """Said of a lost position."""
+    critical_when_disarmed: bool = False
     """Whether the heartbeat says CRITICAL as long as there is a cause, motors or not; otherwise
     from then until the motors stand, cause or not."""
-    deaf_after_s: float
+    deaf_after_s: float = math.inf
     """To who has not been heard for so long it says no texts any more [s]."""
 
 

@@ -178,9 +178,7 @@ class Px4Model(FirmwareModel):
             ),
         ),
         battery_words=(TextTemplate(_CRITICAL, "Critical battery"),),
-        position_words=(),
         ground_regained=TextTemplate(_INFO, "GCS connection regained"),
-        critical_when_disarmed=False,
         deaf_after_s=_HEARTBEAT_MISSED_S + _TEXTS_KEPT_S,
     )
     parameter_habits = ParameterBehaviour(

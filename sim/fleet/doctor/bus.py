@@ -78,10 +78,10 @@ async def check_zenoh() -> CheckFinding:
     key = "swarm/doctor/state/self"
     try:
         one = await open_zenoh_bus(bus_config("mesh", endpoint, ()), timeout_s=DIAL_S)
-        try:
+        with contextlib.closing(one):
             (own,) = free_loopback_endpoints(1, np.random.default_rng())
             other = await open_zenoh_bus(bus_config("mesh", own, (endpoint,)), timeout_s=DIAL_S)
-            try:
+            with contextlib.closing(other):
                 one.serve(key)
                 answering = loop.create_task(_answer(one))
                 await _linked(other, DIAL_S)
@@ -89,10 +89,6 @@ async def check_zenoh() -> CheckFinding:
                 # The news that somebody serves the key may be on its way still.
                 answers = await _until_answered(other, key)
                 answering.cancel()
-            finally:
-                other.close()
-        finally:
-            one.close()
     except (OSError, SwarmError) as fault:
         return fails("zenoh", f"no session on loopback: {fault}", "let the firewall pass loopback")
     if not answers:
@@ -145,10 +141,8 @@ async def check_bus(
     except SwarmError as fault:
         remedy = "see that a router runs there, and lets this machine and its keys in"
         return [*findings, fails("session", str(fault), remedy)]
-    try:
+    with contextlib.closing(bus):
         found = await _look(bus, mission, config.mission)
-    finally:
-        bus.close()
     return [*findings, *check_session(found, mission)]
 
 

@@ -173,16 +173,10 @@ async def fly_flooded(
     bus: BusKind = BusKind.ROUTER,
     on_progress: Callable[[str], None] | None = None,
 ) -> Flood:
-    """Fly a mission of some ``3 times`` seconds under a flood that lasts almost to its end.
+    """Fly a mission of some ``3 times`` seconds (`long_mission`) under a flood almost to its end.
 
-    The flood begins when all agents are there, before they take off, and ends when all
-    tasks but the last two are done, so that `swarm status` can still tell of it.
-
-    Args:
-        times: how long the mission is; see `long_mission`.
-        seed: of what the hostile peer says.
-        bus: how the processes reach each other; `BusKind.ROUTER` or `BusKind.MESH`.
-        on_progress: told what is being done.
+    The flood begins when all agents are there, before they take off, and ends when all tasks but
+    the last two are done, so that `swarm status` can still tell of it.
 
     Raises:
         SwarmError: something did not start, or `swarm status` failed.
@@ -304,7 +298,7 @@ class _Peer:
 @contextlib.asynccontextmanager
 async def _hostile(run: Run, mission: Mission, rng: np.random.Generator) -> AsyncIterator[_Peer]:
     bus = await open_zenoh_bus(run.launch.layout.observer_seat(HOSTILE))
-    try:
+    with contextlib.closing(bus):
         peer = _Peer(bus, mission, SystemClock(), rng)
         listening = asyncio.get_running_loop().create_task(peer.listen())
         try:
@@ -313,8 +307,6 @@ async def _hostile(run: Run, mission: Mission, rng: np.random.Generator) -> Asyn
             listening.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await listening
-    finally:
-        bus.close()
 
 
 class Watched:
