@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.events import FirmwareEvent, Outbox, Sender
+from sim.autopilot.events import FirmwareEvent, Sender
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.message_rates import MessageRates
 from sim.autopilot.pilot import Pilot
@@ -79,13 +79,11 @@ def _e7(degrees: float) -> int | None:
 class CommandExecutor:
     """The commands one vehicle knows."""
 
-    def __init__(
-        self, pilot: Pilot, telemetry: TelemetryReporter, streams: MessageRates, outbox: Outbox
-    ) -> None:
+    def __init__(self, pilot: Pilot, telemetry: TelemetryReporter, streams: MessageRates) -> None:
         self._pilot = pilot
         self._telemetry = telemetry
         self._streams = streams
-        self._outbox = outbox
+        self._outbox = pilot.outbox
         self.reboot_asked = False
         """Set by a reboot command, for the vehicle to carry out after the answer."""
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+if TYPE_CHECKING:
+    from sim.autopilot.firmware.model import FirmwareModel
 
 __all__ = [
     "Connected",
@@ -206,24 +209,17 @@ class OwnCommand:
 class Narrator:
     """Says what the firmware says on an occasion; mostly nothing."""
 
-    def __init__(
-        self,
-        outbox: Outbox,
-        texts: Mapping[FirmwareEvent, TextTemplate],
-        own_commands: Mapping[FirmwareEvent, OwnCommand],
-        system_id: int,
-    ) -> None:
+    def __init__(self, outbox: Outbox, flavour: FirmwareModel, system_id: int) -> None:
         self._outbox = outbox
-        self._texts = texts
-        self._own_commands = own_commands
+        self._flavour = flavour
         self._system_id = system_id
 
     def tell(self, occasion: FirmwareEvent, **fields: object) -> None:
         """Speak of an occasion, with the fields that its text may name."""
-        text = self._texts.get(occasion)
+        text = self._flavour.texts.get(occasion)
         if text is not None:
             self._outbox.text(text.severity, text.template.format(**fields))
-        own = self._own_commands.get(occasion)
+        own = self._flavour.own_commands.get(occasion)
         if own is not None:
             self._outbox.broadcast(
                 mavlink.MAVLink_command_long_message(

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.events import FirmwareEvent, Narrator, Outbox
-from sim.autopilot.firmware.model import MissionBehaviour
+from sim.autopilot.events import FirmwareEvent
 from sim.autopilot.flight import Milestone
 from sim.autopilot.mission_flight import MissionFlight
-from sim.autopilot.mission_store import MissionStore, StoredMissionItem
+from sim.autopilot.mission_store import StoredMissionItem
+
+if TYPE_CHECKING:
+    from sim.autopilot.pilot import Pilot
 
 __all__ = ["MissionRun", "MissionRunState"]
 
@@ -32,25 +35,17 @@ class MissionRunState(Enum):
 class MissionRun:
     """Where in the mission the vehicle is."""
 
-    def __init__(
-        self,
-        store: MissionStore,
-        flight: MissionFlight,
-        outbox: Outbox,
-        narrator: Narrator,
-        behaviour: MissionBehaviour,
-    ) -> None:
+    def __init__(self, pilot: Pilot) -> None:
         self.state = MissionRunState.NOT_STARTED
         self.current: int | None = None
         """Number of the item being flown, or to be flown on resuming."""
         self.told = 0
         """The number that is told as the current one."""
-        self._store = store
-        self._flight = flight
-        self._outbox = outbox
-        self._narrator = narrator
-        self._behaviour = behaviour
-        self._first_seq = behaviour.first_item
+        self.flight = MissionFlight(pilot)
+        self._pilot = pilot
+        self._store = pilot.store
+        self._behaviour = pilot.flavour.missions
+        self._first_seq = self._behaviour.first_item
         self.repeat_s: float | None = None
         """When the last item reached is told again [s]."""
         self._repeats_left = 0
@@ -161,7 +156,9 @@ class MissionRun:
 
     def repeat(self, at_s: float) -> None:
         """Tell the last item reached again."""
-        self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(self._reached_seq))
+        self._pilot.outbox.broadcast(
+            mavlink.MAVLink_mission_item_reached_message(self._reached_seq)
+        )
         self._repeats_left -= 1
         self.repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
 
@@ -208,13 +205,13 @@ class MissionRun:
         self.begun = True
         done: list[int] = []
         while (item := self._store.item(seq)) is not None:
-            self._narrator.tell(FirmwareEvent.ITEM_BEGUN, seq=seq, name=item.name)
+            self._pilot.narrator.tell(FirmwareEvent.ITEM_BEGUN, seq=seq, name=item.name)
             if item.is_navigation:
                 break
             if item.command == mavlink.MAV_CMD_DO_GUIDED_LIMITS:
                 self._limit_s = item.params[0]
             elif item.params[1] > 0.0:
-                self._flight.change_speed(item.params[1], now_s)
+                self.flight.change_speed(item.params[1], now_s)
             done.append(seq)
             seq += 1
         # Told once the next item that takes time is begun.
@@ -226,25 +223,25 @@ class MissionRun:
             return
         self.state = MissionRunState.COMPLETE
         self.repeat_s = None
-        self._flight.finish(now_s)
+        self.flight.finish(now_s)
 
     def _begin(self, item: StoredMissionItem, now_s: float) -> None:
         match item.command:
             case mavlink.MAV_CMD_NAV_TAKEOFF:
-                self._flight.take_off(item, now_s)
+                self.flight.take_off(item, now_s)
             case mavlink.MAV_CMD_NAV_GUIDED_ENABLE if item.params[0] == 0.0:
                 self._complete_current(now_s)
             case mavlink.MAV_CMD_NAV_GUIDED_ENABLE:
-                self._flight.give_way(now_s)
+                self.flight.give_way(now_s)
                 self.hold_until_s = now_s + self._limit_s if self._limit_s > 0.0 else None
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH if self._behaviour.forgets_mode:
                 self._leave_by_returning(now_s)
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-                self._flight.return_home(now_s)
+                self.flight.return_home(now_s)
             case mavlink.MAV_CMD_NAV_LAND if item.lat_e7 == 0 and item.lon_e7 == 0:
                 self._land(now_s)
             case _:
-                self._flight.navigate(item, now_s)
+                self.flight.navigate(item, now_s)
 
     def _leave_by_returning(self, now_s: float) -> None:
         """Call the item done and leave the mission, for the mode that returns home."""
@@ -255,7 +252,7 @@ class MissionRun:
         else:
             self._reached(seq, now_s)
             self._go_to(following)
-        self._flight.return_home(now_s)
+        self.flight.return_home(now_s)
 
     def _go_to(self, seq: int) -> None:
         self.current = self.told = seq
@@ -268,14 +265,14 @@ class MissionRun:
         self.repeat_s = None
 
     def _reached(self, seq: int, at_s: float) -> None:
-        self._outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
+        self._pilot.outbox.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
         self._reached_seq = seq
         self._repeats_left = self._behaviour.repeats_reached
         self.repeat_s = at_s + _REPEAT_S if self._repeats_left > 0 else None
 
     def _land(self, now_s: float) -> None:
         self._landing = True
-        self._flight.land(now_s)
+        self.flight.land(now_s)
 
     def _hold(self, duration_s: float, now_s: float) -> None:
         if duration_s > 0.0:
@@ -296,5 +293,5 @@ class MissionRun:
         ):
             self._reached(seq, at_s)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
-            self._narrator.tell(FirmwareEvent.WAYPOINT_REACHED, seq=seq)
+            self._pilot.narrator.tell(FirmwareEvent.WAYPOINT_REACHED, seq=seq)
         self._begin_from(seq + 1, at_s)

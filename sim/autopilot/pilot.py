@@ -15,7 +15,6 @@ from sim.autopilot.events import FirmwareEvent, Narrator, Outbox
 from sim.autopilot.failsafes import FailsafeMonitor
 from sim.autopilot.firmware.model import FirmwareModel
 from sim.autopilot.flight import FlightMode, FlightStateMachine, Milestone, MotionPhase
-from sim.autopilot.mission_flight import MissionFlight
 from sim.autopilot.mission_run import MissionRun, MissionRunState
 from sim.autopilot.mission_store import MissionStore, StoredMissionItem
 from sim.autopilot.parameters import ParameterRole, ParameterServer, ParameterTable
@@ -56,12 +55,11 @@ class Pilot:
         self.battery = battery
         self.parameters = parameters
         self.parameter_server = ParameterServer(parameters, outbox, flavour.parameter_habits)
-        self.narrator = Narrator(outbox, flavour.texts, flavour.own_commands, config.system_id)
+        self.narrator = Narrator(outbox, flavour, config.system_id)
         self.readiness = Readiness(config.delays, boot_s)
         self.flight = FlightStateMachine(config, self.parameters, config.motion())
         self.store = store
-        self._mission = MissionFlight(self)
-        self.run = MissionRun(self.store, self._mission, outbox, self.narrator, flavour.missions)
+        self.run = MissionRun(self)
         self.mode = flavour.modes.at_boot
         self.armed = False
         self.task_done = False
@@ -141,7 +139,7 @@ class Pilot:
             self._landed(at_s)
         elif milestone is Milestone.TAKEN_OFF and self.mode is self.flavour.modes.for_take_off:
             self._taken_off(at_s)
-        elif self.mode is FlightMode.AUTO and self._mission.continues(milestone, at_s):
+        elif self.mode is FlightMode.AUTO and self.run.flight.continues(milestone, at_s):
             return
         if self.mode is FlightMode.AUTO:
             self.run.on_milestone(milestone, at_s)
@@ -229,7 +227,7 @@ class Pilot:
             self._take_off_up_m = None
         self._mode_changed(now_s)
         self._position_control = False
-        self._mission.begin()
+        self.run.flight.begin()
         self.flight.override_cruise(None, now_s)
         if self.armed:
             self._fly(mode, now_s)
@@ -237,7 +235,7 @@ class Pilot:
     def _fly(self, mode: FlightMode, now_s: float) -> None:
         """Begin to do what a mode is for."""
         if mode is FlightMode.AUTO:
-            if self._auto_armed or not self.flight.on_ground or self._mission.climb_due:
+            if self._auto_armed or not self.flight.on_ground or self.run.flight.climb_due:
                 self.narrator.tell(FirmwareEvent.MISSION_BEGUN)
                 self.run.start_or_resume(now_s)
         elif mode is FlightMode.TAKEOFF:

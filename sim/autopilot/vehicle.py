@@ -91,7 +91,7 @@ class SimulatedAutopilot:
         )
         """The autopilot inside."""
         self._telemetry = TelemetryReporter(self.pilot)
-        self._commands = CommandExecutor(self.pilot, self._telemetry, self._streams, self._outbox)
+        self._commands = CommandExecutor(self.pilot, self._telemetry, self._streams)
         self._transfer = MissionServer(self.pilot)
         self._heartbeat_s = now_s
 
