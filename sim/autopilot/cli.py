@@ -171,9 +171,8 @@ def autopilot(
     try:
         endpoint = parse_endpoint(listen)
     except ValueError as error:
-        raise InputError(Fault("--listen", "", str(error).partition(";")[0], ENDPOINT_RULE)) from (
-            error
-        )
+        problem = str(error).partition(";")[0]
+        raise InputError(Fault("--listen", "", problem, ENDPOINT_RULE)) from error
     wanted = [UavId(name) for name in dict.fromkeys(uav)] if uav else None
     require_finite(
         acceleration_m_s2=acceleration_m_s2,

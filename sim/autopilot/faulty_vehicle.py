@@ -10,7 +10,6 @@ from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import (
     MavlinkReceived,
     OutgoingMessage,
@@ -28,9 +27,6 @@ __all__ = ["FaultyAutopilot"]
 
 _DEFECT = "Compass not healthy"
 _SYSTEM_IDS = 254
-_PILOT_MODE = {mavlink.MAV_AUTOPILOT_PX4: 3 << 16}
-"""Number of the mode a pilot flies in: POSCTL on PX4, LOITER on ArduCopter."""
-_LOITER = 5
 
 _NAVIGATION = frozenset({MotionPhase.NAVIGATING})
 _NEEDS_POSITION = frozenset({MotionPhase.NAVIGATING, MotionPhase.RETURNING})
@@ -53,11 +49,6 @@ class FaultyAutopilot:
         self._mode_before: FlightMode | None = None
         """What the vehicle flew in when the pilot took over."""
         self._schedule([fault for fault in faults if fault.at_s == 0.0], start_s)
-
-    @property
-    def config(self) -> VehicleConfig:
-        """What the vehicle is."""
-        return self._vehicle.config
 
     @property
     def pilot(self) -> Pilot:
@@ -107,7 +98,7 @@ class FaultyAutopilot:
                 pilot.failsafes.lose_radio(at_s)
             case FaultKind.PILOT:
                 self._mode_before = pilot.mode
-                self._fly_by_hand(pilot, at_s)
+                pilot.set_mode(pilot.flavour.modes.by_hand, at_s)
                 self._active.append(fault)
             case _:
                 self._active.append(fault)
@@ -135,17 +126,11 @@ class FaultyAutopilot:
             pilot.failsafes.regain_gps(now_s)
         pilot.flight.hinder(hindered, now_s)
 
-    def _fly_by_hand(self, pilot: Pilot, now_s: float) -> None:
-        mode = pilot.flavour.mode_of(_PILOT_MODE.get(pilot.flavour.autopilot, _LOITER))
-        if mode is None:
-            raise ValueError("the firmware has no mode for pilots")
-        pilot.set_mode(mode, now_s)
-
     def _receive(self, event: MavlinkReceived, now_s: float) -> list[OutgoingMessage]:
         """Hear a message the way a vehicle with faults does."""
         message = event.message
         target = getattr(message, "target_system", 0)
-        own_id = self.config.system_id
+        own_id = self._vehicle.config.system_id
         if self._is(FaultKind.SILENT):
             return self._take(TimeAdvanced(), now_s)
         if self._is(FaultKind.WRONG_ID) and target == own_id:
@@ -179,6 +164,6 @@ class FaultyAutopilot:
         if self._is(FaultKind.SILENT):
             return []
         if self._is(FaultKind.WRONG_ID):
-            other_id = self.config.system_id % _SYSTEM_IDS + 1
+            other_id = self._vehicle.config.system_id % _SYSTEM_IDS + 1
             return [replace(send, system_id=other_id) for send in said]
         return said

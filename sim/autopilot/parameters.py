@@ -46,10 +46,7 @@ class ParameterRole(Enum):
 
 _FOLLOWED = {ParameterRole.TAKE_OFF_M_S: ParameterRole.CLIMB_M_S}
 """Settings that go by another one where the firmware has no parameter for them."""
-_DEFAULTS_SI = {
-    ParameterRole.DISARM_LANDED_S: 0.0,
-    ParameterRole.TAKE_OFF_HEIGHT_M: 0.0,
-}
+_DEFAULTS_SI = {ParameterRole.DISARM_LANDED_S: 0.0, ParameterRole.TAKE_OFF_HEIGHT_M: 0.0}
 """Values of settings where the firmware has no parameter for them."""
 
 
@@ -94,11 +91,7 @@ class ParameterTable:
         self._table = {parameter.name: parameter for parameter in parameters}
         if len(self._table) != len(parameters):
             raise ValueError("parameter names must differ")
-        self._by_setting = {
-            parameter.setting: parameter.name
-            for parameter in parameters
-            if parameter.setting is not None
-        }
+        self._by_setting = {each.setting: each.name for each in parameters if each.setting}
 
     def __len__(self) -> int:
         return len(self._table)
@@ -121,9 +114,8 @@ class ParameterTable:
 
     def value_si(self, setting: ParameterRole) -> float:
         """What the vehicle goes by, in SI units."""
-        name = self._by_setting.get(setting) or self._by_setting.get(
-            _FOLLOWED.get(setting, setting)
-        )
+        followed = _FOLLOWED.get(setting, setting)
+        name = self._by_setting.get(setting) or self._by_setting.get(followed)
         if name is None:
             return _DEFAULTS_SI[setting]
         parameter = self._table[name]
@@ -145,10 +137,7 @@ class ParameterServer:
     """Answers what ground stations ask of the table."""
 
     def __init__(
-        self,
-        table: ParameterTable,
-        outbox: Outbox,
-        behaviour: ParameterBehaviour,
+        self, table: ParameterTable, outbox: Outbox, behaviour: ParameterBehaviour
     ) -> None:
         self._table = table
         self._outbox = outbox

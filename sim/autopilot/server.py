@@ -152,7 +152,7 @@ class VehicleServer:
         """What a new channel speaks with."""
         secret = self._signing_secret
         return ChannelCodec(
-            self.vehicle.config.system_id,
+            self.vehicle.pilot.config.system_id,
             COMPONENT_ID,
             datagrams=datagrams,
             signing=None if secret is None else ChannelSigning(secret, unix_s()),

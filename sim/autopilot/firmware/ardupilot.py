@@ -147,6 +147,7 @@ class ArduCopterModel(FirmwareModel):
     modes = ModeBehaviour(
         at_boot=FlightMode.STABILIZE,
         for_reposition=FlightMode.GUIDED,
+        by_hand=FlightMode.LOITER,
         unarmable=frozenset({FlightMode.AUTO, FlightMode.RTL, FlightMode.LAND, FlightMode.BRAKE}),
         change_speed=frozenset({FlightMode.GUIDED, FlightMode.AUTO, FlightMode.RTL}),
         told_at_once=True,

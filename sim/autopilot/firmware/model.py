@@ -57,6 +57,8 @@ class ModeBehaviour:
     at_boot: FlightMode
     for_reposition: FlightMode
     """Mode in which DO_REPOSITION is flown."""
+    by_hand: FlightMode
+    """Mode in which a pilot flies who takes over."""
     unarmable: frozenset[FlightMode]
     """Modes in which a ground station can't arm."""
     change_speed: frozenset[FlightMode]

@@ -136,6 +136,7 @@ class Px4Model(FirmwareModel):
     modes = ModeBehaviour(
         at_boot=FlightMode.LOITER,
         for_reposition=FlightMode.LOITER,
+        by_hand=FlightMode.POSHOLD,
         for_take_off=FlightMode.TAKEOFF,
         after_flight=FlightMode.LOITER,
         unarmable=frozenset({FlightMode.RTL, FlightMode.LAND}),
