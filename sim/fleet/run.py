@@ -12,7 +12,7 @@ import math
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import MissionResult
@@ -33,7 +33,7 @@ from swarm.runtime.shell import Shell, join_mission
 if TYPE_CHECKING:
     from coordinator.recording.flight_recorder import FlightRecorder
 
-__all__ = ["OnFrame", "Run", "RunResult", "fly", "open_run"]
+__all__ = ["OnFrame", "Run", "RunHooks", "RunResult", "fly", "open_run"]
 
 
 FRAME_S = 0.2
@@ -49,6 +49,21 @@ CONDITION_S = 0.02
 
 OnFrame = Callable[[MissionState, float], None]
 """Called with what the observer knows, and its time."""
+
+
+class RunHooks(TypedDict, total=False):
+    """Who takes part in a run besides its processes."""
+
+    on_frame: OnFrame
+    """Called a few times a second."""
+    on_log: OnLog | None
+    """Called with process name and line for everything the processes log."""
+    through: Through | None
+    """See `Launcher`."""
+    observers: Sequence[str]
+    """See `Launcher`."""
+    recorder: FlightRecorder | None
+    """Writes down what the observer hears; closed by whoever made it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,25 +85,16 @@ class RunResult:
 class Run:
     """A mission being flown, made by `open_run`: its processes, and what an observer knows."""
 
-    def __init__(
-        self,
-        mission: Mission,
-        options: LaunchOptions,
-        *,
-        on_frame: OnFrame | None,
-        on_log: OnLog | None,
-        through: Through | None,
-        observers: Sequence[str],
-        recorder: FlightRecorder | None,
-    ) -> None:
-        self.recorder = recorder
+    def __init__(self, mission: Mission, options: LaunchOptions, **hooks: Unpack[RunHooks]) -> None:
+        self.recorder = hooks.get("recorder")
+        self._on_log = hooks.get("on_log")
         self.launch = Launcher(
             mission,
             options,
-            on_log=on_log if recorder is None else self._recorded(on_log, recorder),
+            on_log=self._on_log if self.recorder is None else self._hear_log,
             on_plan=self._hear_plan,
-            through=through,
-            observers=observers,
+            through=hooks.get("through"),
+            observers=hooks.get("observers", ()),
         )
         self.clock = ScaledClock(options.speedup)
         timing = preset(options.link).timing
@@ -97,7 +103,7 @@ class Run:
         """How processes ended that should not have, in words."""
         self.dropped: Mapping[str, int] = {}
         """What the observer itself has dropped so far, by reason."""
-        self._on_frame = on_frame or (lambda _mission_state, _now_s: None)
+        self._on_frame = hooks.get("on_frame")
         self._zero_s: float | None = None
         self._told: set[ChildProcess] = set()
         self._deaths: Counter[str] = Counter()
@@ -108,7 +114,8 @@ class Run:
         self._note_fates()
         if self._zero_s is None and (mission_s := self.mission_state.mission_s(now_s)) is not None:
             self._zero_s = now_s - mission_s
-        self._on_frame(self.mission_state, now_s)
+        if self._on_frame is not None:
+            self._on_frame(self.mission_state, now_s)
 
     async def until(self, condition: Callable[[], bool], *, limit_s: float, what: str) -> None:
         """Wait until ``condition`` holds.
@@ -155,15 +162,12 @@ class Run:
         if self.mission_state.phase is MissionPhase.PREPARING:
             self.mission_state.plan = plan_from_json(said)
 
-    def _recorded(self, on_log: OnLog | None, recorder: FlightRecorder) -> OnLog:
+    def _hear_log(self, name: str, line: str) -> None:
         """Write down what the processes log, besides."""
-
-        def hear(name: str, line: str) -> None:
-            recorder.log(name, line, self.clock.now_s())
-            if on_log is not None:
-                on_log(name, line)
-
-        return hear
+        if self.recorder is not None:
+            self.recorder.log(name, line, self.clock.now_s())
+        if self._on_log is not None:
+            self._on_log(name, line)
 
     def _note_fates(self) -> None:
         """Remember who ended against our will."""
@@ -237,12 +241,8 @@ async def open_run(
     mission: Mission,
     options: LaunchOptions,
     *,
-    on_frame: OnFrame | None = None,
-    on_log: OnLog | None = None,
-    through: Through | None = None,
-    observers: Sequence[str] = (),
-    recorder: FlightRecorder | None = None,
     on_private: Callable[[str], object] | None = None,
+    **hooks: Unpack[RunHooks],
 ) -> AsyncIterator[Run]:
     """Start to fly ``mission``; all processes are gone when the context ends.
 
@@ -251,27 +251,15 @@ async def open_run(
     Args:
         mission: the scenario of ``options``.
         options: how to fly it.
-        on_frame: called a few times a second with what the observer knows, and its time.
-        on_log: called with process name and line for everything the processes log.
-        through: see `Launcher`.
-        observers: see `Launcher`.
-        recorder: writes down what the observer hears; closed by whoever made it.
         on_private: commands on this machine shall find the run by themselves; called with the
             reason if they cannot. None to keep it to itself.
+        hooks: see `RunHooks`.
 
     Raises:
         ChildFailedError: a process could not be started.
         BusError: the bus could not be opened.
     """
-    run = Run(
-        mission,
-        options,
-        on_frame=on_frame,
-        on_log=on_log,
-        through=through,
-        observers=observers,
-        recorder=recorder,
-    )
+    run = Run(mission, options, **hooks)
     launch = run.launch
     run.frame()
     told = contextlib.nullcontext() if on_private is None else announced(launch.layout.local_run)
@@ -290,20 +278,11 @@ async def fly(
     mission: Mission,
     options: LaunchOptions,
     *,
-    on_frame: OnFrame,
-    on_log: OnLog | None = None,
-    recorder: FlightRecorder | None = None,
     on_private: Callable[[str], object] | None = None,
+    **hooks: Unpack[RunHooks],
 ) -> RunResult:
     """Fly ``mission`` to its end, see `open_run`; processes are gone when it returns."""
-    async with open_run(
-        mission,
-        options,
-        on_frame=on_frame,
-        on_log=on_log,
-        recorder=recorder,
-        on_private=on_private,
-    ) as run:
+    async with open_run(mission, options, on_private=on_private, **hooks) as run:
         await run.finish()
     return run.flight()
 
