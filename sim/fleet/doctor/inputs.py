@@ -57,10 +57,7 @@ def read_keys(
             fails("keys", f"{fault.source}: {fault.problem}", fault.remedy)
             for fault in error.faults
         ]
-    return identity, [
-        check_identity(identity, now_s),
-        check_folder(folder, folder.stat().st_mode),
-    ]
+    return identity, [check_identity(identity, now_s), check_folder(folder, folder.stat().st_mode)]
 
 
 def check_identity(identity: Identity, now_s: float) -> CheckFinding:

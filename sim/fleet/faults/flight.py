@@ -66,11 +66,7 @@ class ChaosFlight:
     """A flight to which faults are done; made by `open_chaos_flight`."""
 
     def __init__(
-        self,
-        run: Run,
-        network: RelayNetwork,
-        recorder: BusRecorder,
-        lines: list[tuple[str, str]],
+        self, run: Run, network: RelayNetwork, recorder: BusRecorder, lines: list[tuple[str, str]]
     ) -> None:
         self.run = run
         self.network = network
@@ -189,11 +185,7 @@ class ChaosFlight:
 
 @contextlib.asynccontextmanager
 async def open_chaos_flight(
-    mission: Mission,
-    options: LaunchOptions,
-    *,
-    relayed: bool = False,
-    seed: int = 0,
+    mission: Mission, options: LaunchOptions, *, relayed: bool = False, seed: int = 0
 ) -> AsyncIterator[ChaosFlight]:
     """Start to fly ``mission``; do faults to it, then `ChaosFlight.run` ``.finish()``.
 
