@@ -13,7 +13,4 @@ __all__ = ["firmware_of"]
 def firmware_of(heartbeat: Heartbeat) -> Firmware | None:
     """The firmware that flies the vehicle of that heartbeat; None if it is none of ours."""
     firmwares: tuple[Firmware, ...] = (ArduCopter(), Px4Copter())
-    for firmware in firmwares:
-        if firmware.flies(heartbeat):
-            return firmware
-    return None
+    return next((firmware for firmware in firmwares if firmware.flies(heartbeat)), None)

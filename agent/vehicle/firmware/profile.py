@@ -1,4 +1,4 @@
-"""What the bridge asks of a firmware, and what multicopters of every firmware are told alike.
+"""What the bridge must know of a multicopter's firmware; one subclass for each.
 
 Leaves out: when to do what, which is the same for every firmware (agent.vehicle.bridge).
 
@@ -7,16 +7,43 @@ Commands: https://mavlink.io/en/messages/common.html
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar
 
+from agent.vehicle.commands import result_text
 from agent.vehicle.firmware.failsafes import Failsafes
-from agent.vehicle.messages import CommandInt, CommandLong, Heartbeat, Inbound, ParameterValue
+from agent.vehicle.messages import (
+    AltitudeFrame,
+    CommandInt,
+    CommandLong,
+    Heartbeat,
+    Inbound,
+    ParameterValue,
+)
 from agent.vehicle.parameter_override import OverrideSpec
 from agent.vehicle.state import VehicleState
 
-__all__ = ["COPTER_TYPES", "UNCHANGED", "Copter", "Firmware", "SpeedParameter", "set_mode"]
+__all__ = ["UNCHANGED", "Firmware", "Mode", "SpeedParameter"]
+
+
+Mode = tuple[int, ...]
+"""A mode by the numbers that the firmware has for it."""
+
+UNCHANGED = -1.0
+"""What leaves a speed or throttle as it is."""
+
+_COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
+"""MAV_TYPE of quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca- and decacopter."""
+_STATE_STANDBY = 3
+_CMD_DO_SET_MODE = 176
+_CMD_DO_CHANGE_SPEED = 178
+_CMD_DO_REPOSITION = 192
+_CMD_COMPONENT_ARM_DISARM = 400
+_CUSTOM_MODE_ENABLED = 1.0
+_GROUND_SPEED = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,196 +55,134 @@ class SpeedParameter:
     """Value of the parameter at 1 m/s."""
 
 
-class Firmware(Protocol):
+class Firmware(ABC):
     """Modes, readiness, commands and parameter names of one firmware."""
 
-    @property
-    def speed_parameters(self) -> tuple[SpeedParameter, ...]:
-        """Every name that the cruise speed has had."""
-        ...
+    autopilot: ClassVar[int]
+    """MAV_AUTOPILOT."""
+    mode_names: ClassVar[Mapping[Mode, str]]
+    """For people."""
+    commanded_mode: ClassVar[Mode]
+    """In which the vehicle takes our targets."""
+    commanded_mode_name: ClassVar[str]
+    """That mode, for people."""
+    commanded_by_choice: ClassVar[bool]
+    """The vehicle is never in that mode unless somebody put it there."""
+    pilots_stop_it_there: ClassVar[bool]
+    """A pilot stops the vehicle in that mode."""
+    takeoff_mode: ClassVar[Mode | None] = None
+    """Which the vehicle enters by itself to take off on our order; None without one."""
+    mission_mode: ClassVar[Mode]
+    """In which the vehicle flies the mission that stands on it."""
+    return_mode: ClassVar[Mode]
+    """In which it climbs, returns, lands and disarms."""
+    returning_modes: ClassVar[frozenset[Mode]]
+    """In which it returns or lands by itself."""
+    speed_parameters: ClassVar[tuple[SpeedParameter, ...]]
+    """Every name that the cruise speed has had."""
+    override_spec: ClassVar[OverrideSpec | None] = None
+    """The parameter without which legs take longer than they need to; None without one."""
+    failsafe_names: ClassVar[tuple[tuple[str, ...], ...]]
+    """Parameters that say what it does without us, each by all its names."""
+    streams: ClassVar[tuple[tuple[int, type[Inbound]], ...]]
+    """Message ids to ask for beside the position, and what each becomes."""
+    mission_vehicle_items: ClassVar[int]
+    """Leading items of a mission that belong to the vehicle and cannot be chosen."""
+    missions_give_way: ClassVar[bool]
+    """A mission may let targets be told for a time, and that is faster."""
+    acknowledged_twice: ClassVar[frozenset[int]] = frozenset()
+    """Numbers of the commands that the firmware acknowledges twice."""
 
-    @property
-    def override_spec(self) -> OverrideSpec | None:
-        """The parameter without which legs take longer than they need to; None without one."""
-        ...
-
-    @property
-    def failsafe_names(self) -> tuple[tuple[str, ...], ...]:
-        """Parameters that say what it does without us, each by all its names."""
-        ...
-
-    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
-        """What the vehicle does without us, as far as these parameters say."""
-        ...
-
-    def value_of(self, parameter: ParameterValue) -> float:
-        """What the firmware means by a parameter's value on the wire."""
-        ...
-
-    @property
-    def streams(self) -> tuple[tuple[int, type[Inbound]], ...]:
-        """Message ids to ask for beside the position, and what each becomes."""
-        ...
-
-    @property
-    def mission_vehicle_items(self) -> int:
-        """Leading items of a mission that belong to the vehicle and cannot be chosen."""
-        ...
-
-    @property
-    def missions_give_way(self) -> bool:
-        """Whether a mission may let targets be told for a time, and whether that is faster."""
-        ...
-
-    @property
-    def acknowledged_twice(self) -> frozenset[int]:
-        """Numbers of the commands that the firmware acknowledges twice."""
-        ...
-
-    @property
-    def pilots_stop_it_there(self) -> bool:
-        """Whether a pilot stops the vehicle in the mode that takes our targets."""
-        ...
-
-    @property
-    def commanded_mode_name(self) -> str:
-        """The mode in which the vehicle takes our targets, for people."""
-        ...
-
-    @property
-    def commanded_by_choice(self) -> bool:
-        """Whether the vehicle is never in that mode unless somebody put it there."""
-        ...
+    # What it says.
 
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether this firmware is the one of that vehicle."""
-        ...
+        return heartbeat.autopilot == self.autopilot and heartbeat.vehicle_type in _COPTER_TYPES
+
+    def mode(self, custom_mode: int) -> Mode:
+        """The mode that a heartbeat tells."""
+        return (custom_mode,)
 
     def mode_name(self, custom_mode: int) -> str:
         """The mode's name, for people."""
-        ...
+        mode = self.mode(custom_mode)
+        return self.mode_names.get(mode, f"mode {'.'.join(map(str, mode))}")
 
     def is_commanded(self, custom_mode: int) -> bool:
         """Whether the vehicle takes our targets in that mode."""
-        ...
+        return self.mode(custom_mode) == self.commanded_mode
 
     def is_taking_off(self, custom_mode: int) -> bool:
         """Whether the mode is one that the vehicle enters by itself to take off on our order."""
-        ...
+        return self.mode(custom_mode) == self.takeoff_mode
 
     def is_mission(self, custom_mode: int) -> bool:
         """Whether the vehicle flies the mission that stands on it in that mode."""
-        ...
+        return self.mode(custom_mode) == self.mission_mode
 
     def is_returning(self, custom_mode: int) -> bool:
         """Whether the vehicle returns or lands by itself in that mode."""
-        ...
+        return self.mode(custom_mode) in self.returning_modes
 
     def has_booted(self, heartbeat: Heartbeat) -> bool:
         """Whether the autopilot is past booting and calibrating."""
-        ...
+        return heartbeat.system_status >= _STATE_STANDBY
 
+    @abstractmethod
     def has_rebooted(self, before: Heartbeat, heartbeat: Heartbeat) -> bool:
         """Whether the autopilot began anew between two heartbeats, as far as they tell."""
-        ...
 
+    @abstractmethod
     def airborne(self, vehicle: VehicleState) -> bool | None:
         """Whether the vehicle is off the ground; None if it has not told yet."""
-        ...
 
     def position_fault(self, vehicle: VehicleState) -> str | None:
-        """Why the autopilot does not trust the position that it tells; None if it does."""
-        ...
+        """Why the autopilot does not trust the position that it tells; None if it does.
 
+        By the estimator's flags: ArduPilot tells a lost position on, from dead reckoning;
+        versions of PX4 differ in that.
+        """
+        return "the position estimate is lost" if vehicle.estimate_lost else None
+
+    @abstractmethod
     def alarmed(self, heartbeat: Heartbeat) -> bool:
         """Whether a failsafe acts, or is about to, that the mode does not show."""
-        ...
+
+    @abstractmethod
+    def unready(self, vehicle: VehicleState) -> str | None:
+        """What keeps the vehicle from being armed, in words; None if nothing does."""
 
     def place_refusal(self, vehicle: VehicleState, result: int | None) -> str:
         """Why a target or a takeoff was refused, in words, from its MAV_RESULT."""
-        ...
+        del vehicle
+        return result_text(result)
 
     def ignores_target(self, text: str) -> bool:
         """Whether the text says that a target was acknowledged and is not flown to."""
-        ...
+        del text
+        return False
 
-    def unready(self, vehicle: VehicleState) -> str | None:
-        """What keeps the vehicle from being armed, in words; None if nothing does."""
-        ...
+    def value_of(self, parameter: ParameterValue) -> float:
+        """What the firmware means by a parameter's value on the wire."""
+        return parameter.value
+
+    @abstractmethod
+    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
+        """What the vehicle does without us, as far as these parameters say."""
+
+    # What it is told.
 
     def set_commanded_mode(self) -> CommandLong:
         """Switch to the mode that takes our targets."""
-        ...
+        return _set_mode(*self.commanded_mode)
 
     def set_mission_mode(self) -> CommandLong:
         """Fly the mission that stands on the vehicle."""
-        ...
+        return _set_mode(*self.mission_mode)
 
     def set_return_mode(self) -> CommandLong:
         """Return to launch and land."""
-        ...
-
-    def arm(self) -> CommandLong:
-        """Start the motors, with all checks."""
-        ...
-
-    def disarm(self) -> CommandLong:
-        """Stop the motors; refused in the air."""
-        ...
-
-    def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
-        """Climb straight up to ``alt_m``; both heights are above mean sea level [m]."""
-        ...
-
-    def reposition(
-        self, lat_deg: float, lon_deg: float, alt_m: float, speed_m_s: float
-    ) -> CommandInt:
-        """Fly to a place at once.
-
-        Args:
-            lat_deg: WGS84 latitude.
-            lon_deg: WGS84 longitude.
-            alt_m: height above mean sea level.
-            speed_m_s: cruise ground speed, for firmwares that take it with every target.
-        """
-        ...
-
-    def pause(self) -> CommandLong | None:
-        """Stop in the mode that takes our targets, wherever that is.
-
-        None if the firmware cannot be told so without a place.
-        """
-        ...
-
-    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
-        """Parameters of a mission's waypoint at which to wait so long, heading as it comes."""
-        ...
-
-    def change_speed(self, speed_m_s: float) -> CommandLong:
-        """Set the ground speed from now on."""
-        ...
-
-
-COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
-"""MAV_TYPE of quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca- and decacopter."""
-
-UNCHANGED = -1.0
-"""What leaves a speed or throttle as it is."""
-
-
-_CMD_DO_SET_MODE = 176
-
-_CMD_DO_CHANGE_SPEED = 178
-
-_CMD_COMPONENT_ARM_DISARM = 400
-
-_CUSTOM_MODE_ENABLED = 1.0
-
-_GROUND_SPEED = 1.0
-
-
-class Copter:
-    """The part that firmwares of multicopters share."""
+        return _set_mode(*self.return_mode)
 
     def arm(self) -> CommandLong:
         """Start the motors, with all checks."""
@@ -227,9 +192,40 @@ class Copter:
         """Stop the motors; refused in the air."""
         return CommandLong(_CMD_COMPONENT_ARM_DISARM, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
-    def value_of(self, parameter: ParameterValue) -> float:
-        """Whole numbers are told as such, in the float."""
-        return parameter.value
+    @abstractmethod
+    def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
+        """Climb straight up to ``alt_m``; both heights are above mean sea level [m]."""
+
+    def reposition(
+        self, lat_deg: float, lon_deg: float, alt_m: float, speed_m_s: float
+    ) -> CommandInt:
+        """Fly to a place at once.
+
+        Args:
+            lat_deg: WGS84 latitude.
+            lon_deg: WGS84 longitude.
+            alt_m: height above mean sea level, as the mission's own, so that home's height
+                does not matter.
+            speed_m_s: cruise ground speed, for firmwares that take it with every target.
+        """
+        speed, flags = self.reposition_params(speed_m_s)
+        params, place = (speed, flags, 0.0, math.nan), (lat_deg, lon_deg, alt_m)
+        return CommandInt(_CMD_DO_REPOSITION, AltitudeFrame.MEAN_SEA_LEVEL, params, *place)
+
+    @abstractmethod
+    def reposition_params(self, speed_m_s: float) -> tuple[float, float]:
+        """Speed and MAV_DO_REPOSITION_FLAGS of such a command."""
+
+    def pause(self) -> CommandLong | None:
+        """Stop in the mode that takes our targets, wherever that is.
+
+        None if the firmware cannot be told so without a place.
+        """
+        return None
+
+    @abstractmethod
+    def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
+        """Parameters of a mission's waypoint at which to wait so long, heading as it comes."""
 
     def change_speed(self, speed_m_s: float) -> CommandLong:
         """Ground speed from now on.
@@ -241,7 +237,6 @@ class Copter:
         return CommandLong(_CMD_DO_CHANGE_SPEED, params)
 
 
-def set_mode(main: int, sub: int = 0) -> CommandLong:
-    """Switch to a mode by the numbers of the firmware."""
+def _set_mode(main: int, sub: int = 0) -> CommandLong:
     params = (_CUSTOM_MODE_ENABLED, float(main), float(sub), 0.0, 0.0, 0.0, 0.0)
     return CommandLong(_CMD_DO_SET_MODE, params)

@@ -12,17 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from agent.vehicle.commands import result_text
 from agent.vehicle.firmware.failsafes import PX4_NAMES, Failsafes, px4_failsafes
-from agent.vehicle.firmware.profile import COPTER_TYPES, UNCHANGED, Copter, SpeedParameter, set_mode
+from agent.vehicle.firmware.profile import UNCHANGED, Firmware, Mode, SpeedParameter
 from agent.vehicle.messages import (
-    AltitudeFrame,
-    CommandInt,
     CommandLong,
     EkfStatus,
     ExtendedState,
     Heartbeat,
-    Inbound,
     Landed,
     ParameterValue,
     SystemStatus,
@@ -33,42 +29,11 @@ from agent.vehicle.state import VehicleState
 __all__ = ["Px4Copter"]
 
 
-_AUTOPILOT_PX4 = 12
-
 _AUTO = 4
-_TAKEOFF = (_AUTO, 2)
-_LOITER = (_AUTO, 3)
-_MISSION = (_AUTO, 4)
-_RTL = (_AUTO, 5)
-_LAND = (_AUTO, 6)
-_PRECLAND = (_AUTO, 9)
-_MODE_NAMES = {
-    (1, 0): "MANUAL",
-    (2, 0): "ALTCTL",
-    (3, 0): "POSCTL",
-    (3, 1): "POSCTL.ORBIT",
-    (3, 2): "POSCTL.SLOW",
-    (_AUTO, 1): "AUTO.READY",
-    _TAKEOFF: "AUTO.TAKEOFF",
-    _LOITER: "AUTO.LOITER",
-    _MISSION: "AUTO.MISSION",
-    _RTL: "AUTO.RTL",
-    _LAND: "AUTO.LAND",
-    (_AUTO, 8): "AUTO.FOLLOW",
-    _PRECLAND: "AUTO.PRECLAND",
-    (5, 0): "ACRO",
-    (6, 0): "OFFBOARD",
-    (7, 0): "STABILIZED",
-    (8, 0): "RATTITUDE",
-    (10, 0): "TERMINATION",
-}
+_TAKEOFF, _LOITER, _MISSION = (_AUTO, 2), (_AUTO, 3), (_AUTO, 4)
+_RTL, _LAND, _PRECLAND = (_AUTO, 5), (_AUTO, 6), (_AUTO, 9)
 
-_JERK = OverrideSpec(("MPC_JERK_AUTO",), 20.0)
-"""[m/s³] PX4 brakes so early that the jerk, 4 by default, costs ever more time the nearer the
-target is: speed is at most (√(b² + 8·a·d) - b)/2 at a distance d from it, with b = 4·a²/jerk
-(computeMaxSpeedFromDistance of its TrajMath.hpp)."""
-
-_STATE_STANDBY, _STATE_CRITICAL, _STATE_EMERGENCY = 3, 5, 6
+_STATE_CRITICAL, _STATE_EMERGENCY = 5, 6
 _OUTSIDE_FENCE = "outside geofence"
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_SET_MODE = 176
@@ -79,105 +44,65 @@ _WAYPOINT_RADIUS_M = 2.0
 """As ArduCopter's, within which a vehicle is as good as at its waypoint."""
 
 
-class Px4Copter(Copter):
+class Px4Copter(Firmware):
     """The firmware of PX4's multicopters."""
 
-    @property
-    def speed_parameters(self) -> tuple[SpeedParameter, ...]:
-        """MPC_XY_CRUISE [m/s], which also survives a restart of the vehicle."""
-        return (SpeedParameter("MPC_XY_CRUISE", 1.0),)
+    autopilot = 12
+    mode_names = {  # noqa: RUF012 - never written
+        (1, 0): "MANUAL",
+        (2, 0): "ALTCTL",
+        (3, 0): "POSCTL",
+        (3, 1): "POSCTL.ORBIT",
+        (3, 2): "POSCTL.SLOW",
+        (_AUTO, 1): "AUTO.READY",
+        _TAKEOFF: "AUTO.TAKEOFF",
+        _LOITER: "AUTO.LOITER",
+        _MISSION: "AUTO.MISSION",
+        _RTL: "AUTO.RTL",
+        _LAND: "AUTO.LAND",
+        (_AUTO, 8): "AUTO.FOLLOW",
+        _PRECLAND: "AUTO.PRECLAND",
+        (5, 0): "ACRO",
+        (6, 0): "OFFBOARD",
+        (7, 0): "STABILIZED",
+        (8, 0): "RATTITUDE",
+        (10, 0): "TERMINATION",
+    }
+    commanded_mode = _LOITER
+    commanded_mode_name = "AUTO.LOITER (Hold)"
+    """Called Hold by ground stations."""
+    commanded_by_choice = False
+    """PX4 boots into Hold and ends takeoffs, missions and landings there; people hover in it. So
+    it does not tell that anybody gave the vehicle to us, and a pilot who chooses Hold is not
+    seen to have taken it over."""
+    pilots_stop_it_there = True
+    """A ground station pauses it in Hold."""
+    takeoff_mode = _TAKEOFF
+    """Until the height is reached."""
+    mission_mode = _MISSION
+    """Acknowledged even if there is no mission to fly."""
+    return_mode = _RTL
+    returning_modes = frozenset({_RTL, _LAND, _PRECLAND})
+    speed_parameters = (SpeedParameter("MPC_XY_CRUISE", 1.0),)
+    """[m/s]; it also survives a restart of the vehicle."""
+    override_spec = OverrideSpec(("MPC_JERK_AUTO",), 20.0)
+    """[m/s³] PX4 brakes so early that the jerk, 4 by default, costs ever more time the nearer the
+    target is: speed is at most (√(b² + 8·a·d) - b)/2 at a distance d from it, with b = 4·a²/jerk
+    (computeMaxSpeedFromDistance of its TrajMath.hpp)."""
+    failsafe_names = PX4_NAMES
+    streams = ((1, SystemStatus), (230, EkfStatus), (245, ExtendedState))
+    """What comes too seldom unasked. EKF_STATUS_REPORT does not exist, and MISSION_CURRENT streams
+    by itself: asked for either, PX4 answers "failed"."""
+    mission_vehicle_items = 0
+    """Item 0 is flown like any other."""
+    missions_give_way = False
+    """It knows no such item."""
+    acknowledged_twice = frozenset({_CMD_DO_SET_MODE})
+    """Within a few milliseconds."""
 
-    @property
-    def override_spec(self) -> OverrideSpec | None:
-        """The jerk of every flight to a target, however told."""
-        return _JERK
-
-    @property
-    def failsafe_names(self) -> tuple[tuple[str, ...], ...]:
-        """Data link and battery failsafes."""
-        return PX4_NAMES
-
-    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
-        """It listens to the heartbeats of every ground station, so ours are enough."""
-        del own_system_id
-        return px4_failsafes(values)
-
-    def value_of(self, parameter: ParameterValue) -> float:
-        """The bytes of whole numbers travel in the float."""
-        return parameter.value if parameter.integer is None else float(parameter.integer)
-
-    @property
-    def streams(self) -> tuple[tuple[int, type[Inbound]], ...]:
-        """What comes too seldom unasked.
-
-        EKF_STATUS_REPORT does not exist, and MISSION_CURRENT streams by itself: asked for
-        either, PX4 answers "failed".
-        """
-        return ((1, SystemStatus), (230, EkfStatus), (245, ExtendedState))
-
-    @property
-    def mission_vehicle_items(self) -> int:
-        """None: item 0 is flown like any other."""
-        return 0
-
-    @property
-    def missions_give_way(self) -> bool:
-        """No: it knows no such item."""
-        return False
-
-    @property
-    def acknowledged_twice(self) -> frozenset[int]:
-        """DO_SET_MODE, within a few milliseconds."""
-        return frozenset({_CMD_DO_SET_MODE})
-
-    @property
-    def pilots_stop_it_there(self) -> bool:
-        """A ground station pauses it in AUTO.LOITER."""
-        return True
-
-    @property
-    def commanded_mode_name(self) -> str:
-        """Called Hold by ground stations."""
-        return "AUTO.LOITER (Hold)"
-
-    @property
-    def commanded_by_choice(self) -> bool:
-        """No: it boots into Hold and ends takeoffs and missions there; people hover in it."""
-        return False
-
-    def flies(self, heartbeat: Heartbeat) -> bool:
-        """Whether it is a PX4 multicopter."""
-        return heartbeat.autopilot == _AUTOPILOT_PX4 and heartbeat.vehicle_type in COPTER_TYPES
-
-    def mode_name(self, custom_mode: int) -> str:
-        """The mode's name, for people."""
-        main, sub = _main_and_sub(custom_mode)
-        return _MODE_NAMES.get((main, sub), f"mode {main}.{sub}")
-
-    def is_commanded(self, custom_mode: int) -> bool:
-        """AUTO.LOITER takes our targets.
-
-        It is the mode PX4 boots into and comes back to after a takeoff, a mission and a
-        landing; so it does not tell that anybody gave the vehicle to us, and a pilot who
-        chooses Hold is not seen to have taken it over.
-        """
-        return _main_and_sub(custom_mode) == _LOITER
-
-    def is_taking_off(self, custom_mode: int) -> bool:
-        """AUTO.TAKEOFF, until the height is reached."""
-        return _main_and_sub(custom_mode) == _TAKEOFF
-
-    def is_mission(self, custom_mode: int) -> bool:
-        """AUTO.MISSION."""
-        return _main_and_sub(custom_mode) == _MISSION
-
-    def is_returning(self, custom_mode: int) -> bool:
-        """AUTO.RTL and both kinds of landing."""
-        return _main_and_sub(custom_mode) in (_RTL, _LAND, _PRECLAND)
-
-    def has_booted(self, heartbeat: Heartbeat) -> bool:
-        """STANDBY or beyond; before, the state is "uninitialised"."""
-        return heartbeat.system_status >= _STATE_STANDBY
+    def mode(self, custom_mode: int) -> Mode:
+        """Main and sub mode."""
+        return custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
 
     def has_rebooted(self, before: Heartbeat, heartbeat: Heartbeat) -> bool:
         """It flew, and is "uninitialised": disarmed, it is so whenever its checks fail.
@@ -192,22 +117,9 @@ class Px4Copter(Copter):
             return None if vehicle.armed else False
         return vehicle.landed is not Landed.ON_GROUND
 
-    def position_fault(self, vehicle: VehicleState) -> str | None:
-        """By the estimator's flags; versions differ in whether such a position is still told."""
-        return "the position estimate is lost" if vehicle.estimate_lost else None
-
     def alarmed(self, heartbeat: Heartbeat) -> bool:
         """CRITICAL or EMERGENCY: PX4 warns, or holds for some seconds before it acts."""
         return heartbeat.system_status in (_STATE_CRITICAL, _STATE_EMERGENCY)
-
-    def place_refusal(self, vehicle: VehicleState, result: int | None) -> str:
-        """By the result alone: what it minds it says in words."""
-        del vehicle
-        return result_text(result)
-
-    def ignores_target(self, text: str) -> bool:
-        """One beyond its own fence: its commander acknowledges, its navigator then minds."""
-        return _OUTSIDE_FENCE in text.lower()
 
     def unready(self, vehicle: VehicleState) -> str | None:
         """Pre-arm checks, whose bit PX4 sets in the health of SYS_STATUS alone, then a position.
@@ -220,21 +132,20 @@ class Px4Copter(Copter):
             return "pre-arm checks do not pass"
         if vehicle.estimate_lost:
             return "no position estimate yet"
-        if vehicle.position is None:
-            return "waiting for a position"
-        return None
+        return "waiting for a position" if vehicle.position is None else None
 
-    def set_commanded_mode(self) -> CommandLong:
-        """AUTO.LOITER."""
-        return set_mode(*_LOITER)
+    def ignores_target(self, text: str) -> bool:
+        """One beyond its own fence: its commander acknowledges, its navigator then minds."""
+        return _OUTSIDE_FENCE in text.lower()
 
-    def set_mission_mode(self) -> CommandLong:
-        """AUTO.MISSION; acknowledged even if there is no mission to fly."""
-        return set_mode(*_MISSION)
+    def value_of(self, parameter: ParameterValue) -> float:
+        """The bytes of whole numbers travel in the float."""
+        return parameter.value if parameter.integer is None else float(parameter.integer)
 
-    def set_return_mode(self) -> CommandLong:
-        """AUTO.RTL, which climbs, returns, lands and disarms."""
-        return set_mode(*_RTL)
+    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
+        """It listens to the heartbeats of every ground station, so ours are enough."""
+        del own_system_id
+        return px4_failsafes(values)
 
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
         """PX4 reads the height as above sea level; NaN is its own yaw and place."""
@@ -242,24 +153,15 @@ class Px4Copter(Copter):
         params = (0.0, 0.0, 0.0, math.nan, math.nan, math.nan, alt_m)
         return CommandLong(_CMD_NAV_TAKEOFF, params)
 
-    def reposition(
-        self, lat_deg: float, lon_deg: float, alt_m: float, speed_m_s: float
-    ) -> CommandInt:
-        """Fly there at once, at that speed.
+    def reposition_params(self, speed_m_s: float) -> tuple[float, float]:
+        """At that speed.
 
         PX4 does not take the command without the flag that lets it change the mode, not
         even in AUTO.LOITER. So a target can pull the vehicle back from a pilot who took
         over less than a heartbeat ago, until he moves the sticks again. Commanding by
         missions avoids that: no upload changes the mode.
         """
-        return CommandInt(
-            _CMD_DO_REPOSITION,
-            AltitudeFrame.MEAN_SEA_LEVEL,
-            (speed_m_s, _CHANGE_MODE, 0.0, math.nan),
-            lat_deg,
-            lon_deg,
-            alt_m,
-        )
+        return speed_m_s, _CHANGE_MODE
 
     def pause(self) -> CommandLong:
         """A target without a place, height and heading: PX4 brakes and stops, as in its code.
@@ -273,7 +175,3 @@ class Px4Copter(Copter):
     def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
         """The hold begins within a radius of 10 m (NAV_ACC_RAD) unless told another."""
         return (hold_s, _WAYPOINT_RADIUS_M, 0.0, math.nan)
-
-
-def _main_and_sub(custom_mode: int) -> tuple[int, int]:
-    return custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
