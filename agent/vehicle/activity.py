@@ -96,11 +96,7 @@ class Idle(Activity):
     """Nothing: the vehicle stands, or is not ours."""
 
     phase = FlightPhase.IDLE
-
-    @property
-    def in_our_hands(self) -> bool:
-        """No."""
-        return False
+    in_our_hands = False
 
 
 class Hovering(Activity):

@@ -16,11 +16,9 @@ from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.messages import ExtendedState, Heartbeat, Inbound, Landed
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.supervision import intervention
+from swarm.protocol.fields import Point
 
 __all__ = ["HandOver", "HandOverReason", "LinkLoss", "hand_over"]
-
-
-Point = tuple[float, float, float]
 
 
 _WORDS_LATE_S = 0.5
@@ -53,6 +51,7 @@ class HandOver(Activity):
     """
 
     phase = FlightPhase.HANDED_OVER
+    in_our_hands = False
 
     def __init__(
         self,
@@ -65,11 +64,6 @@ class HandOver(Activity):
         self._loss = loss
         self.taken_back = False
         """It is heard again, and obeys as it did before it was lost."""
-
-    @property
-    def in_our_hands(self) -> bool:
-        """No."""
-        return False
 
     def on_message(self, message: Inbound) -> None:
         """Note what is heard of a vehicle that was lost."""

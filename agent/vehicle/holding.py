@@ -29,9 +29,6 @@ from swarm.model.frames import wgs84_from_enu
 __all__ = ["Holding", "modes_to_leave"]
 
 
-Point = tuple[float, float, float]
-
-
 class Holding(Activity):
     """Stops the vehicle: carries out one `Hold`.
 
@@ -67,11 +64,10 @@ class Holding(Activity):
         self._firmware = firmware
         self._leaves = leaves
         self._motors_asked = motors_asked
-        config, commands = session.config, session.commands
-        waits_s = (config.effect_timeout_s, config.retry_delay_s)
-        self._mode = RepeatedCommand("hold mode", commands, config.mode_tries, *waits_s)
-        self._disarm = RepeatedCommand("disarm", commands, config.mode_tries, *waits_s)
-        self._stop = RepeatedCommand(TARGET_TAG, commands, config.mode_tries, *waits_s)
+        tries = session.config.mode_tries
+        self._mode = session.repeated("hold mode", tries)
+        self._disarm = session.repeated("disarm", tries)
+        self._stop = session.repeated(TARGET_TAG, tries)
         self._stop_message: VehicleCommand | None = None
         """What stops it in the guided mode, once known."""
         self._lost_since_s: float | None = None

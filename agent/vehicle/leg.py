@@ -9,73 +9,25 @@ it says that it reached the item and is near.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
 from enum import Enum, auto
-from typing import Protocol
 
 from agent.core.interface import Arrived, GoTo, HandedOver, Refused
 from agent.vehicle.activity import Activity, FlightPhase
-from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue
+from agent.vehicle.commands import CommandEnded, CommandOutcome
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
-from agent.vehicle.messages import CommandInt, Inbound, Outbound, Position, StatusText
+from agent.vehicle.messages import Inbound, Position, StatusText
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import wgs84_from_enu
+from swarm.protocol.fields import Point
 
-__all__ = [
-    "TARGET_TAG",
-    "ArrivalDetector",
-    "ArrivalState",
-    "Flying",
-    "Leg",
-    "MissionLeg",
-    "RepositionLeg",
-]
+__all__ = ["TARGET_TAG", "ArrivalDetector", "ArrivalState", "Flying", "RepositionLeg"]
 
 
 TARGET_TAG = "target"
 """Tag of the command that carries a target: a new one supersedes the last."""
-
-
-Point = tuple[float, float, float]
-
-
-class Leg(Protocol):
-    """A target in force, or on its way to be."""
-
-    @property
-    def arrived(self) -> bool:
-        """The vehicle was seen to stop at the target; stays once true."""
-        ...
-
-    @property
-    def failure(self) -> str | None:
-        """Why the target could not be put in force or reached; None while it may."""
-        ...
-
-    @property
-    def stopped(self) -> str | None:
-        """Why somebody else seems to have stopped the vehicle; None if nobody has."""
-        ...
-
-    def start(self, now_s: float) -> Sequence[Outbound]:
-        """Tell the vehicle, in place of whatever it was told before."""
-        ...
-
-    def on_ended(self, ended: CommandEnded) -> None:
-        """Take the outcome of a command."""
-        ...
-
-    def ignored(self, text: str) -> None:
-        """The vehicle says that it does not fly to the target, whatever it acknowledged."""
-        ...
-
-    def on_position(
-        self, position_enu_m: Point, velocity_enu_m_s: Point, now_s: float
-    ) -> Sequence[Outbound]:
-        """Judge arrival."""
-        ...
 
 
 class ArrivalState(Enum):
@@ -130,109 +82,138 @@ class ArrivalDetector:
         return f"the vehicle stands still {self.distance_m:.1f} m from the target"
 
 
-class RepositionLeg:
+class _Leg(ABC):
+    """A target in force, or on its way to be.
+
+    Args:
+        session: with the vehicle.
+        target_enu_m: where to stop [m; mission origin].
+    """
+
+    def __init__(self, session: VehicleSession, target_enu_m: Point) -> None:
+        self._session = session
+        self._target_enu_m = target_enu_m
+        self._arrival = ArrivalDetector(target_enu_m, session.config)
+        self._arrived = False
+        self._failure: str | None = None
+        self.stopped: str | None = None
+        """Why somebody else seems to have stopped the vehicle; None if nobody has."""
+
+    @property
+    def arrived(self) -> bool:
+        """The vehicle was seen to stop at the target; stays once true."""
+        return self._arrived
+
+    @property
+    def failure(self) -> str | None:
+        """Why the target could not be put in force or reached; None while it may."""
+        return self._failure
+
+    @property
+    @abstractmethod
+    def accepted(self) -> bool:
+        """Whether the target is in force."""
+
+    @abstractmethod
+    def start(self) -> None:
+        """Tell the vehicle, in place of whatever it was told before."""
+
+    @abstractmethod
+    def _on_stalled(self) -> None:
+        """The vehicle stands still elsewhere."""
+
+    def on_position(self, position: Position) -> None:
+        """Judge arrival."""
+        session = self._session
+        if self.arrived or not self.accepted:
+            return
+        match self._arrival.judge(session.place_enu_m, position.velocity_enu_m_s, session.now_s):
+            case ArrivalState.ARRIVED:
+                self._arrived = True
+            case ArrivalState.STALLED:
+                self._on_stalled()
+            case ArrivalState.GIVEN_UP:
+                self._failure = self._arrival.complaint
+            case ArrivalState.UNDERWAY:
+                pass
+
+
+class RepositionLeg(_Leg):
     """A target told by one command, and told again if the vehicle stands still elsewhere.
 
     Args:
+        session: with the vehicle.
+        firmware: what flies it.
         target_enu_m: where to stop [m; mission origin].
-        message: the command that says so in the autopilot's terms.
-        config: radius, speed and patience.
-        commands: carries it.
-        why: the words for the result of a refusal.
+        speed_m_s: cruise ground speed.
         insists: the target is told again if the vehicle stands still elsewhere. If not, one
             that stopped on its way is taken to be somebody else's.
     """
 
     def __init__(
         self,
+        session: VehicleSession,
+        firmware: Firmware,
         target_enu_m: Point,
-        message: CommandInt,
-        config: BridgeConfig,
-        commands: CommandQueue,
-        why: Callable[[int | None], str],
+        speed_m_s: float,
         *,
         insists: bool = True,
     ) -> None:
+        super().__init__(session, target_enu_m)
         self._insists = insists
-        self._why = why
-        self._message = message
-        self._commands = commands
-        self._arrival = ArrivalDetector(target_enu_m, config)
-        self.accepted = False
-        """The vehicle acknowledged the target."""
-        self.arrived = False
-        self.failure: str | None = None
-        self.stopped: str | None = None
+        self._firmware = firmware
+        place = wgs84_from_enu(session.config.origin, target_enu_m)
+        self._message = firmware.reposition(*place, speed_m_s)
+        self._accepted = False
 
-    def start(self, now_s: float) -> Sequence[Outbound]:
+    @property
+    def accepted(self) -> bool:
+        """The vehicle acknowledged the target."""
+        return self._accepted
+
+    def start(self) -> None:
         """Tell the vehicle, in place of whatever it was told before."""
-        return self._commands.send(TARGET_TAG, self._message, now_s)
+        session = self._session
+        session.say(*session.commands.send(TARGET_TAG, self._message, session.now_s))
 
     def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of the command."""
         if ended.tag != TARGET_TAG:
             return
         if ended.ending is CommandOutcome.ACCEPTED:
-            self.accepted = True
+            self._accepted = True
         else:
-            self.failure = f"the autopilot did not take the target ({self._why(ended.result)})"
+            why = self._firmware.place_refusal(self._session.vehicle, ended.result)
+            self._failure = f"the autopilot did not take the target ({why})"
 
-    def ignored(self, text: str) -> None:
-        """The vehicle says that it does not fly to the target, whatever it acknowledged."""
-        if not self.arrived:
-            self.failure = f"the autopilot did not take the target: {text}"
+    def on_message(self, message: Inbound) -> None:
+        """The vehicle may say that it does not fly to the target, whatever it acknowledged."""
+        ignored = isinstance(message, StatusText) and self._firmware.ignores_target(message.text)
+        if isinstance(message, StatusText) and ignored and not self.arrived:
+            self._failure = f"the autopilot did not take the target: {message.text}"
 
-    def on_position(
-        self, position_enu_m: Point, velocity_enu_m_s: Point, now_s: float
-    ) -> Sequence[Outbound]:
-        """Judge arrival; the flag `arrived` stays once set."""
-        if not self.accepted or self.arrived:
-            return []
-        match self._arrival.judge(position_enu_m, velocity_enu_m_s, now_s):
-            case ArrivalState.ARRIVED:
-                self.arrived = True
-            case ArrivalState.STALLED if self._insists:
-                return self._commands.send(TARGET_TAG, self._message, now_s)
-            case ArrivalState.STALLED if self._arrival.moved:
-                short_m = self._arrival.distance_m
-                self.stopped = (
-                    f"it stopped {short_m:.0f} m short of its target: paused by a ground station?"
-                )
-            case ArrivalState.STALLED:
-                self.failure = self._arrival.complaint
-            case ArrivalState.GIVEN_UP:
-                self.failure = self._arrival.complaint
-            case ArrivalState.UNDERWAY:
-                pass
-        return []
+    def _on_stalled(self) -> None:
+        if self._insists:
+            self.start()
+        elif self._arrival.moved:
+            short_m = self._arrival.distance_m
+            self.stopped = (
+                f"it stopped {short_m:.0f} m short of its target: paused by a ground station?"
+            )
+        else:
+            self._failure = self._arrival.complaint
 
 
-class MissionLeg:
-    """A target that stands on the vehicle, or is on its way there.
+class _MissionLeg(_Leg):
+    """A target that stands on the vehicle, or is on its way there; see `OnboardMission`.
 
-    Args:
-        target_enu_m: where to stop [m; mission origin].
-        stay_s: how long the UAV is going to stay there [s].
-        speed_m_s: cruise ground speed.
-        config: radius, speed and patience.
-        mission: the vehicle's.
+    Who stops a vehicle that flies it changes its mode.
     """
 
-    def __init__(
-        self,
-        target_enu_m: Point,
-        stay_s: float,
-        speed_m_s: float,
-        config: BridgeConfig,
-        mission: OnboardMission,
-    ) -> None:
-        self._target_enu_m = target_enu_m
-        self._stay_s = stay_s
-        self._speed_m_s = speed_m_s
+    def __init__(self, session: VehicleSession, order: GoTo, mission: OnboardMission) -> None:
+        super().__init__(session, order.position_enu_m)
+        self._stay_s = order.stay_s
         self._mission = mission
-        self._arrival = ArrivalDetector(target_enu_m, config)
-        self._given_up: str | None = None
-        self._arrived = False
 
     @property
     def arrived(self) -> bool:
@@ -242,39 +223,21 @@ class MissionLeg:
     @property
     def failure(self) -> str | None:
         """Why the target could not be put in force or reached; None while it may."""
-        return self._given_up or self._mission.failure
+        return self._failure or self._mission.failure
 
     @property
-    def stopped(self) -> str | None:
-        """None: who stops a vehicle changes its mode."""
-        return None
+    def accepted(self) -> bool:
+        """Whether the vehicle flies to it."""
+        return self._mission.is_flown
 
-    def start(self, now_s: float) -> Sequence[Outbound]:
+    def start(self) -> None:
         """Put the target in force, in place of whatever stands on the vehicle."""
-        return self._mission.fly_to(self._target_enu_m, self._stay_s, self._speed_m_s, now_s)
+        session = self._session
+        target = (self._target_enu_m, self._stay_s, session.cruise_speed_m_s)
+        session.say(*self._mission.fly_to(*target, session.now_s))
 
-    def on_ended(self, ended: CommandEnded) -> None:
-        """Nothing: the mission takes the outcomes of its commands itself."""
-
-    def ignored(self, text: str) -> None:
-        """Nothing: a mission is taken as a whole, or not."""
-
-    def on_position(
-        self, position_enu_m: Point, velocity_enu_m_s: Point, now_s: float
-    ) -> Sequence[Outbound]:
-        """Judge arrival."""
-        if self.arrived or not self._mission.is_flown:
-            return []
-        match self._arrival.judge(position_enu_m, velocity_enu_m_s, now_s):
-            case ArrivalState.ARRIVED:
-                self._arrived = True
-            case ArrivalState.STALLED:
-                self._mission.restart(now_s)
-            case ArrivalState.GIVEN_UP:
-                self._given_up = self._arrival.complaint
-            case ArrivalState.UNDERWAY:
-                pass
-        return []
+    def _on_stalled(self) -> None:
+        self._mission.restart(self._session.now_s)
 
 
 class Flying(Activity):
@@ -291,29 +254,35 @@ class Flying(Activity):
     def __init__(self, session: VehicleSession, firmware: Firmware, order: GoTo) -> None:
         super().__init__(session)
         self._order = order
-        self._firmware = firmware
-        self._leg = _leg_to(order, session, firmware)
+        self._leg: RepositionLeg | _MissionLeg
+        if session.mission is not None:
+            self._leg = _MissionLeg(session, order, session.mission)
+        else:
+            place = (order.position_enu_m, session.cruise_speed_m_s)
+            insists = not firmware.pilots_stop_it_there
+            self._leg = RepositionLeg(session, firmware, *place, insists=insists)
 
     def start(self) -> None:
         """Tell the vehicle, in place of whatever it was told before."""
-        self._session.say(*self._leg.start(self._session.now_s))
+        self._leg.start()
 
     def on_ended(self, ended: CommandEnded) -> None:
-        """Take the outcome of a command."""
-        self._leg.on_ended(ended)
+        """Take the outcome of a command; the mission takes those of its own itself."""
+        if isinstance(self._leg, RepositionLeg):
+            self._leg.on_ended(ended)
 
     def on_message(self, message: Inbound) -> None:
-        """Take what the vehicle says of the target."""
-        if isinstance(message, StatusText) and self._firmware.ignores_target(message.text):
-            self._leg.ignored(message.text)
+        """Take what the vehicle says of the target; a mission is taken as a whole, or not."""
+        if isinstance(self._leg, RepositionLeg):
+            self._leg.on_message(message)
 
     def on_position(self, position: Position) -> None:
         """Judge speed and arrival."""
-        session, velocity_enu_m_s = self._session, position.velocity_enu_m_s
-        told_m_s = session.cruise_speed_m_s
+        session, told_m_s = self._session, self._session.cruise_speed_m_s
+        velocity_enu_m_s = position.velocity_enu_m_s
         if remark := session.cruise_watch.judge(velocity_enu_m_s, told_m_s, session.now_s):
             session.tell_caution(remark)
-        session.say(*self._leg.on_position(session.place_enu_m, velocity_enu_m_s, session.now_s))
+        self._leg.on_position(position)
 
     def outcome(self) -> Arrived | HandedOver | Refused | None:
         """How the leg ended; None while it is under way."""
@@ -325,21 +294,3 @@ class Flying(Activity):
         if failure is None:
             return None
         return Refused(self._order, self._session.in_its_words(failure))
-
-
-def _leg_to(order: GoTo, session: VehicleSession, firmware: Firmware) -> Leg:
-    target_enu_m, config = order.position_enu_m, session.config
-    speed_m_s = session.cruise_speed_m_s
-    if session.mission is not None:
-        return MissionLeg(target_enu_m, order.stay_s, speed_m_s, config, session.mission)
-    place = wgs84_from_enu(config.origin, target_enu_m)
-    message = firmware.reposition(*place, speed_m_s)
-    insists = not firmware.pilots_stop_it_there
-    return RepositionLeg(
-        target_enu_m,
-        message,
-        config,
-        session.commands,
-        lambda result: firmware.place_refusal(session.vehicle, result),
-        insists=insists,
-    )

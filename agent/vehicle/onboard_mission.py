@@ -38,11 +38,10 @@ from agent.vehicle.mission_transfer import (
     MissionTransfer,
 )
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
+from swarm.protocol.fields import Point
 
 __all__ = ["OnboardMission"]
 
-
-Point = tuple[float, float, float]
 
 _RENEWAL_FRAC = 0.5
 """The wait is renewed when that share of the patience is left."""

@@ -11,19 +11,19 @@ from __future__ import annotations
 import math
 
 from agent.core.interface import Prepare
-from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue
+from agent.vehicle.commands import CommandEnded, CommandOutcome
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.firmware.failsafes import Failsafes
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import (
     Inbound,
-    Outbound,
     ParameterMissing,
     ParameterRead,
     ParameterSet,
     ParameterValue,
     Position,
 )
+from agent.vehicle.session import VehicleSession
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
 
 __all__ = [
@@ -110,15 +110,16 @@ class FailsafeCheck:
 
     Args:
         firmware: what flies it.
-        config: patience, and whether it may be flown whatever they are.
+        session: with the vehicle.
     """
 
-    def __init__(self, firmware: Firmware, config: BridgeConfig) -> None:
+    def __init__(self, firmware: Firmware, session: VehicleSession) -> None:
+        self._session = session
+        self._config = config = session.config
         accepted = config.accept_no_failsafe
         self._reading = FailsafeReading(
             firmware, config.ground_system_id, may_be_simulated=not accepted
         )
-        self._config = config
         self._tries = 0
         self._next_s = 0.0
         self._settled = False
@@ -127,20 +128,21 @@ class FailsafeCheck:
         """Take a parameter's value, or that there is none."""
         self._reading.on_message(message)
 
-    def ask(self, now_s: float) -> list[Outbound]:
-        """What to read now."""
-        names = self._reading.unread
+    def ask(self) -> None:
+        """Read what is due."""
+        names, now_s = self._reading.unread, self._session.now_s
         self._settled |= not names
         if now_s < self._next_s:
-            return []
+            return
         self._settled |= self._tries >= _TRIES
         self._tries += 1
-        if not self._settled:
-            self._next_s = now_s + _PAUSE_TIMEOUTS * self._config.commands.ack_timeout_s
-            return [ParameterRead(name) for name in names]
-        # What keeps the vehicle on the ground may still come, or be set meanwhile.
-        self._next_s = now_s + self._config.retry_delay_s
-        return [ParameterRead(name) for name in self._reading.names] if self.objection else []
+        pause_s = _PAUSE_TIMEOUTS * self._config.commands.ack_timeout_s
+        if self._settled:
+            # What keeps the vehicle on the ground may still come, or be set meanwhile.
+            pause_s = self._config.retry_delay_s
+            names = self._reading.names if self.objection else ()
+        self._next_s = now_s + pause_s
+        self._session.say(*map(ParameterRead, names))
 
     @property
     def objection(self) -> str | None:
@@ -184,10 +186,10 @@ _TOLERANCE_FRAC = 0.01
 class CruiseSpeedSetting:
     """One cruise speed on its way into one vehicle."""
 
-    def __init__(self, speed_m_s: float, firmware: Firmware, config: BridgeConfig) -> None:
+    def __init__(self, speed_m_s: float, firmware: Firmware, session: VehicleSession) -> None:
+        self._session = session
         self._command = firmware.change_speed(speed_m_s)
         self._values = {p.name: speed_m_s * p.units_per_m_s for p in firmware.speed_parameters}
-        self._config = config
         self._name: str | None = None
         self._asking_parameters = False
         self._tries = 0
@@ -197,52 +199,53 @@ class CruiseSpeedSetting:
         """The vehicle took the speed."""
         self.failure: str | None = None
 
-    def start(self, commands: CommandQueue, now_s: float) -> list[Outbound]:
+    def start(self) -> None:
         """Tell the vehicle."""
-        self.begun = True
-        return [*commands.send(_SPEED_TAG, self._command, now_s)]
+        session, self.begun = self._session, True
+        session.say(*session.commands.send(_SPEED_TAG, self._command, session.now_s))
 
-    def on_ended(self, ended: CommandEnded, now_s: float) -> list[Outbound]:
+    def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of the command; refused, turn to the parameter."""
         if ended.tag != _SPEED_TAG or self.done:
-            return []
+            return
         if ended.ending is CommandOutcome.ACCEPTED:
             self.done = True
-            return []
-        self._asking_parameters = True
-        return self._ask(now_s)
+        else:
+            self._asking_parameters = True
+            self._ask()
 
-    def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
+    def on_message(self, message: Inbound) -> None:
         """A parameter's value: set it, or see that it is set."""
         if not self._asking_parameters or self.done or not isinstance(message, ParameterValue):
-            return []
+            return
         wanted = self._values.get(message.name)
         if wanted is None:
-            return []
+            return
         if abs(message.value - wanted) <= _TOLERANCE_FRAC * wanted:
             self.done = True
-            return []
-        if self._name is not None:
-            return []  # asked to change it already: the repetition is timed
-        self._name = message.name
-        return self._ask(now_s)
+        elif self._name is None:  # else asked to change it already: the repetition is timed
+            self._name = message.name
+            self._ask()
 
-    def on_time(self, now_s: float) -> list[Outbound]:
+    def on_time(self) -> None:
         """Ask again, or give up."""
-        if not self._asking_parameters or self.done or self.failure or now_s < self._deadline_s:
-            return []
-        if self._tries >= self._config.commands.tries:
+        asking = self._asking_parameters and not self.done and self.failure is None
+        if not asking or self._session.now_s < self._deadline_s:
+            return
+        if self._tries < self._session.config.commands.tries:
+            self._ask()
+        else:
             names = " or ".join(self._values)
             self.failure = f"the cruise speed cannot be set, neither by command nor by {names}"
-            return []
-        return self._ask(now_s)
 
-    def _ask(self, now_s: float) -> list[Outbound]:
+    def _ask(self) -> None:
+        session = self._session
         self._tries += 1
-        self._deadline_s = now_s + self._config.commands.ack_timeout_s
+        self._deadline_s = session.now_s + session.config.commands.ack_timeout_s
         if self._name is None:
-            return [ParameterRead(name) for name in self._values]
-        return [ParameterSet(self._name, self._values[self._name])]
+            session.say(*map(ParameterRead, self._values))
+        else:
+            session.say(ParameterSet(self._name, self._values[self._name]))
 
 
 _NULL_ISLAND = ", near 0° N 0° E: a PX4 before 1.16 starts its own simulator there"

@@ -17,26 +17,18 @@ import math
 from dataclasses import dataclass
 
 from agent.core.interface import Prepare
-from agent.vehicle.commands import (
-    CommandEnded,
-    RepeatedCommand,
-    VehicleCommand,
-    result_text,
-)
+from agent.vehicle.commands import CommandEnded, RepeatedCommand, VehicleCommand, result_text
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.leg import RepositionLeg
-from agent.vehicle.messages import Heartbeat, Inbound, Landed, Outbound, Position, StatusText
+from agent.vehicle.messages import Heartbeat, Inbound, Landed, Outbound, Position
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.preflight import CruiseSpeedSetting, FailsafeCheck, home_alt_m, start_fault
 from agent.vehicle.session import VehicleSession
-from agent.vehicle.state import VehicleState
 from agent.vehicle.supervision import PilotConsent
 from swarm.model.frames import wgs84_from_enu
 
 __all__ = ["Preparation"]
 
-
-Point = tuple[float, float, float]
 
 _CLIMB_PROGRESS_M = 0.2
 _CLIMB_TOLERANCE_FRAC = 0.05
@@ -76,26 +68,20 @@ class Preparation:
     def __init__(
         self, session: VehicleSession, firmware: Firmware, order: Prepare, *, ours: bool
     ) -> None:
-        config, commands = session.config, session.commands
+        config = session.config
         self._order = order
+        self._session = session
         self._mission = session.mission
         self._config = config
-        self._commands = commands
         self._firmware = firmware
-        self._safety = session.safety
         _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
-        wait_s, delay_s = config.effect_timeout_s, config.retry_delay_s
         self._mode = _Step(
-            f"setting {firmware.commanded_mode_name}",
-            RepeatedCommand("mode", commands, config.mode_tries, wait_s, delay_s),
+            f"setting {firmware.commanded_mode_name}", session.repeated("mode", config.mode_tries)
         )
-        self._arm = _Step(
-            "arming", RepeatedCommand("arm", commands, config.arm_tries, wait_s, delay_s)
-        )
+        self._arm = _Step("arming", session.repeated("arm", config.arm_tries))
         # ArduCopter spools up for 3 to 4 s before it leaves the ground.
         self._takeoff = _Step(
-            "takeoff",
-            RepeatedCommand("takeoff", commands, config.takeoff_tries, 2.0 * wait_s, delay_s),
+            "takeoff", session.repeated("takeoff", config.takeoff_tries, patience=2.0)
         )
         self._highest_m = -math.inf
         self._climbed_at_s = math.inf
@@ -109,8 +95,8 @@ class Preparation:
         self._mission_begun = False
         self._consent = PilotConsent(firmware, ours=ours or order.resume)
         self._leg: RepositionLeg | None = None
-        self._speed = CruiseSpeedSetting(order.speed_m_s, firmware, config)
-        self._failsafes = FailsafeCheck(firmware, config)
+        self._speed = CruiseSpeedSetting(order.speed_m_s, firmware, session)
+        self._failsafes = FailsafeCheck(firmware, session)
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
         self.done = False
@@ -133,96 +119,120 @@ class Preparation:
         """Whether takeoff was asked for."""
         return self._takeoff.command.given > 0
 
-    def on_ended(self, ended: CommandEnded, now_s: float) -> list[Outbound]:
+    def on_ended(self, ended: CommandEnded) -> None:
         """Take a command's outcome."""
         for step in (self._mode, self._arm, self._takeoff):
-            step.command.on_ended(ended, now_s)
+            step.command.on_ended(ended, self._session.now_s)
         if self._leg is not None:
             self._leg.on_ended(ended)
-        return self._speed.on_ended(ended, now_s)
+        self._speed.on_ended(ended)
 
-    def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
+    def on_message(self, message: Inbound) -> None:
         """Take what matters of a message beside the vehicle's state."""
         self._failsafes.on_message(message)
-        leg, ignores = self._leg, self._firmware.ignores_target
-        if leg is not None and isinstance(message, StatusText) and ignores(message.text):
-            leg.ignored(message.text)
-        return self._speed.on_message(message, now_s)
+        if self._leg is not None:
+            self._leg.on_message(message)
+        self._speed.on_message(message)
 
-    def on_position(self, position: Position, place_enu_m: Point, now_s: float) -> list[Outbound]:
+    def on_position(self, position: Position) -> None:
         """Take a fresh position: climb and arrival show in it."""
         if position.alt_m > self._highest_m + _CLIMB_PROGRESS_M:
             self._highest_m = position.alt_m
-            self._climbed_at_s = now_s
-        if self._leg is None:
-            return []
-        return [*self._leg.on_position(place_enu_m, position.velocity_enu_m_s, now_s)]
+            self._climbed_at_s = self._session.now_s
+        if self._leg is not None:
+            self._leg.on_position(position)
 
-    def advance(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
+    def advance(self, heartbeat: Heartbeat) -> None:
         """Do what the state seen asks for next."""
-        firmware = self._firmware
+        firmware, vehicle = self._firmware, self._session.vehicle
         if self.done or self.failure is not None:
-            return []
+            return
         if not firmware.has_booted(heartbeat):
-            return self._wait(self._booting(vehicle, heartbeat, now_s))
+            self.waiting_for = self._booting(heartbeat)
+            return
         self._consent.on_heartbeat(heartbeat)
         if self._mission is not None and self._mission_begun:
-            return self._follow_mission(self._mission, heartbeat)
-        if heartbeat.armed and firmware.is_taking_off(heartbeat.custom_mode):
-            return self._follow_takeoff(now_s)
-        if not firmware.is_commanded(heartbeat.custom_mode):
-            if self._may_fly_our_mission(vehicle, heartbeat):
-                return self._take_on_mission(now_s)
-            if heartbeat.armed:
-                self._flown_by_pilot = True
-                mode = firmware.mode_name(heartbeat.custom_mode)
-                return self._wait(
-                    f"armed in {mode} by its pilot: land it, "
-                    f"or switch it to {firmware.commanded_mode_name}"
-                )
-            if reason := self._left_by_others():
-                return self._fail(reason)
-            return self._ask(self._mode, firmware.set_commanded_mode(), vehicle, now_s)
-        if not heartbeat.armed:
-            if reason := self._left_by_others():
-                return self._fail(reason)
-            started = self._start_motors(vehicle, now_s)
-            return started if self.failure else [*self._failsafes.ask(now_s), *started]
-        position = vehicle.position
-        if position is None:
-            return self._wait("waiting for a position")
-        airborne = firmware.airborne(vehicle)
-        if airborne is None:
-            return self._wait("waiting to hear whether it flies (EXTENDED_SYS_STATE)")
-        if objection := self._consent.objection(airborne=airborne):
+            self._follow_mission(self._mission, heartbeat)
+        elif heartbeat.armed and firmware.is_taking_off(heartbeat.custom_mode):
+            self._follow_takeoff()
+        elif not firmware.is_commanded(heartbeat.custom_mode):
+            self._get_commanded(heartbeat)
+        elif not heartbeat.armed:
+            self.failure = self._left_by_others()
+            if self.failure is None:
+                started = self._start_motors()
+                if self.failure is None:
+                    self._failsafes.ask()
+                self._session.say(*started)
+        elif vehicle.position is None:
+            self.waiting_for = "waiting for a position"
+        elif (airborne := firmware.airborne(vehicle)) is None:
+            self.waiting_for = "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
+        elif objection := self._consent.objection(airborne=airborne):
             self._flown_by_pilot |= airborne
             self._armed_by_others = True
-            return self._wait(objection)
-        if not airborne:
-            return self._take_off(position, vehicle, now_s)
-        self._flew = True
-        # Repeated now, it would interrupt what follows.
-        out: list[Outbound] = [*self._takeoff.command.cancel(now_s)]
-        if self._arm.command.given:  # what it does without us may not have been read to the end
-            out += self._failsafes.ask(now_s)
-        if self._climbing and not self._high_enough(position, now_s):
-            return out
-        self._climbing = False
-        return out + self._settle(vehicle, now_s)
+            self.waiting_for = objection
+        elif airborne:
+            self._go_on_in_the_air(vehicle.position)
+        else:
+            self._session.say(*self._take_off(vehicle.position))
 
-    def _booting(self, vehicle: VehicleState, heartbeat: Heartbeat, now_s: float) -> str:
+    def _booting(self, heartbeat: Heartbeat) -> str:
         """Why it is not ready to be told anything.
 
         PX4 is "uninitialised" whenever its checks fail while it is disarmed, and they say why.
         """
+        vehicle = self._session.vehicle
         unready = self._firmware.unready(vehicle)
         if heartbeat.system_status != _STATE_UNINIT or not vehicle.prearm_heard or unready is None:
             return "the autopilot is booting"
-        return self._with_warning(unready, vehicle, now_s)
+        return self._with_warning(unready)
 
-    def _with_warning(self, reason: str, vehicle: VehicleState, now_s: float) -> str:
-        text = vehicle.recent_warning(now_s, _PREARM_TEXT_AGE_S)
+    def _with_warning(self, reason: str) -> str:
+        text = self._session.vehicle.recent_warning(self._session.now_s, _PREARM_TEXT_AGE_S)
         return f"{reason} ({text})" if text else reason
+
+    def _get_commanded(self, heartbeat: Heartbeat) -> None:
+        """It is in a mode that does not take our targets."""
+        firmware, mission = self._firmware, self._mission
+        if mission is not None and self._may_fly(mission, heartbeat):
+            # Find out whether it is one of ours; the vehicle flies on meanwhile.
+            if mission.is_ours:
+                self._flew = self.done = True
+            else:
+                self.waiting_for = "reading the mission that the vehicle flies"
+                self._session.say(*mission.look(self._session.now_s))
+        elif heartbeat.armed:
+            self._flown_by_pilot = True
+            mode = firmware.mode_name(heartbeat.custom_mode)
+            self.waiting_for = (
+                f"armed in {mode} by its pilot: land it, "
+                f"or switch it to {firmware.commanded_mode_name}"
+            )
+        elif reason := self._left_by_others():
+            self.failure = reason
+        else:
+            self._session.say(*self._ask(self._mode, firmware.set_commanded_mode()))
+
+    def _may_fly(self, mission: OnboardMission, heartbeat: Heartbeat) -> bool:
+        return (
+            mission.is_ours is not False
+            and self._order.resume
+            and not self._flown_by_pilot
+            and heartbeat.armed
+            and self._firmware.is_mission(heartbeat.custom_mode)
+            and self._firmware.airborne(self._session.vehicle) is not False
+        )
+
+    def _go_on_in_the_air(self, position: Position) -> None:
+        self._flew = True
+        # Repeated now, it would interrupt what follows.
+        self._session.say(*self._takeoff.command.cancel(self._session.now_s))
+        if self._arm.command.given:  # what it does without us may not have been read to the end
+            self._failsafes.ask()
+        if not self._climbing or self._high_enough(position):
+            self._climbing = False
+            self._settle()
 
     def _left_by_others(self) -> str | None:
         """Why it does not start by itself: somebody may be walking up to it."""
@@ -230,126 +240,105 @@ class Preparation:
             return _FLOWN_BY_PILOT
         return _ARMED_BY_OTHERS if self._armed_by_others else None
 
-    def _start_motors(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
+    def _start_motors(self) -> list[Outbound]:
+        vehicle = self._session.vehicle
         if self._flew:
             return self._fail("the vehicle disarmed after takeoff")
         if self._order.left_in_air and not self._arm.command.given:
             return self._fail(_CAME_DOWN)
-        unready = self._firmware.unready(vehicle)
-        if unready is None and (arming_objection := self._safety.arming_objection(vehicle, now_s)):
-            return self._wait(arming_objection)
-        if unready is not None:
-            return self._wait(self._with_warning(unready, vehicle, now_s))
+        if unready := self._firmware.unready(vehicle):
+            return self._wait(self._with_warning(unready))
+        if objection := self._arming_objection():
+            return self._wait(objection)
         if vehicle.position is not None and (fault := self._start_fault(vehicle.position)):
             return self._fail(fault)
         if objection := self._failsafes.objection:
             return self._wait(objection)
         if self._mission is not None and not self._mission.is_uploaded:
-            return self._upload_way_home(self._mission, now_s)
+            return self._upload_way_home(self._mission)
         self._consent.arm()
-        return self._ask(self._arm, self._firmware.arm(), vehicle, now_s)
+        return self._ask(self._arm, self._firmware.arm())
+
+    def _arming_objection(self) -> str | None:
+        session = self._session
+        return session.safety.arming_objection(session.vehicle, session.now_s)
 
     def _start_fault(self, position: Position) -> str | None:
         return start_fault(self._order, position, self._config)
 
-    def _take_off(self, position: Position, vehicle: VehicleState, now_s: float) -> list[Outbound]:
+    def _take_off(self, position: Position) -> list[Outbound]:
         self._climbing = True
-        self._climbed_at_s = now_s
+        self._climbed_at_s = self._session.now_s
         self._highest_m = position.alt_m
         # Also here, as a vehicle found armed on the ground comes straight to takeoff.
-        if arming_objection := self._safety.arming_objection(vehicle, now_s):
-            return self._wait(arming_objection)
+        if objection := self._arming_objection():
+            return self._wait(objection)
         if fault := self._start_fault(position):
             return self._fail(fault)
         if self._mission is not None and not self._mission.is_uploaded and not self.took_off:
-            return self._upload_way_home(self._mission, now_s)
+            return self._upload_way_home(self._mission)
         command = self._firmware.takeoff(self._start_alt_m, home_alt_m(position))
-        return self._ask(self._takeoff, command, vehicle, now_s)
+        return self._ask(self._takeoff, command)
 
-    def _follow_takeoff(self, now_s: float) -> list[Outbound]:
+    def _follow_takeoff(self) -> None:
         """Wait for the end of a takeoff that the vehicle carries out in a mode of its own."""
         self._saw_takeoff = True
         if not self.took_off:
             # An earlier life's, or a pilot's.
             self._flown_by_pilot = self._consent.needed
-            return self._wait("waiting for the takeoff under way to end")
+            self.waiting_for = "waiting for the takeoff under way to end"
+            return
+        self.waiting_for = "climbing"
         # The heartbeat that tells its end may come as late as any other.
         patience_s = self._config.climb_timeout_s + self._config.silence_timeout_s
-        if now_s - self._climbed_at_s > patience_s:
-            return self._fail(_CLIMB_STOPPED)
-        return self._wait("climbing")
+        if self._session.now_s - self._climbed_at_s > patience_s:
+            self.failure = _CLIMB_STOPPED
 
-    def _may_fly_our_mission(self, vehicle: VehicleState, heartbeat: Heartbeat) -> bool:
-        return (
-            self._mission is not None
-            and self._mission.is_ours is not False
-            and self._order.resume
-            and not self._flown_by_pilot
-            and heartbeat.armed
-            and self._firmware.is_mission(heartbeat.custom_mode)
-            and self._firmware.airborne(vehicle) is not False
-        )
-
-    def _take_on_mission(self, now_s: float) -> list[Outbound]:
-        """Find out whether the mission flown is one of ours; the vehicle flies on meanwhile."""
-        if self._mission is None:
-            return []
-        if self._mission.is_ours:
-            self._flew = self.done = True
-            return []
-        self._wait("reading the mission that the vehicle flies")
-        return self._mission.look(now_s)
-
-    def _high_enough(self, position: Position, now_s: float) -> bool:
+    def _high_enough(self, position: Position) -> bool:
         height_m = self._start_alt_m - home_alt_m(position)
         tolerance_m = max(
             self._config.acceptance_radius_m, _CLIMB_TOLERANCE_M, _CLIMB_TOLERANCE_FRAC * height_m
         )
         if position.alt_m >= self._start_alt_m - tolerance_m:
             return True
-        if now_s - self._climbed_at_s > self._config.climb_timeout_s:
-            self._fail(_CLIMB_STOPPED)
-        else:
-            self._wait(f"climbing to {height_m:.0f} m")
+        self.waiting_for = f"climbing to {height_m:.0f} m"
+        if self._session.now_s - self._climbed_at_s > self._config.climb_timeout_s:
+            self.failure = _CLIMB_STOPPED
         return False
 
-    def _settle(self, vehicle: VehicleState, now_s: float) -> list[Outbound]:
+    def _settle(self) -> None:
         """Fly to the start, unless the vehicle is resumed in the air, and set the speed."""
-        out: list[Outbound] = []
-        if self._leg is None and not self._resumes(vehicle):
-            place = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
-            message = self._firmware.reposition(*place, self._order.speed_m_s)
-            self._leg = RepositionLeg(
-                self._order.position_enu_m,
-                message,
-                self._config,
-                self._commands,
-                lambda result: self._firmware.place_refusal(vehicle, result),
-            )
-            out += self._leg.start(now_s)
+        order, speed = self._order, self._speed
+        if self._leg is None and not self._resumes:
+            place = (order.position_enu_m, order.speed_m_s)
+            self._leg = RepositionLeg(self._session, self._firmware, *place)
+            self._leg.start()
         leg = self._leg
         # ArduPilot forgets a speed set before the first target after takeoff.
-        if (leg is None or leg.accepted) and not self._speed.begun:
-            out += self._speed.start(self._commands, now_s)
-        out += self._speed.on_time(now_s)
-        failure = self._speed.failure if leg is None else leg.failure or self._speed.failure
-        if failure is not None:
-            return out + self._fail(failure)
-        there = (leg is None or leg.arrived) and self._speed.done
+        if (leg is None or leg.accepted) and not speed.begun:
+            speed.start()
+        speed.on_time()
+        self.failure = speed.failure if leg is None else leg.failure or speed.failure
+        if self.failure is not None:
+            return
+        there = (leg is None or leg.arrived) and speed.done
         if there and leg is not None and self._mission is not None:
-            return out + self._begin_mission(self._mission, now_s)
+            self._begin_mission(self._mission)
+            return
         self.done = there
-        self._wait("setting the cruise speed" if leg is None else "flying to the start")
-        return out
+        self.waiting_for = "setting the cruise speed" if leg is None else "flying to the start"
 
-    def _upload_way_home(self, mission: OnboardMission, now_s: float) -> list[Outbound]:
+    @property
+    def _resumes(self) -> bool:
+        """Whether it flies on orders of an earlier life, beyond its takeoff."""
+        taking_off = self._saw_takeoff or self._session.vehicle.landed is Landed.TAKEOFF
+        return self._order.resume and not self.took_off and not taking_off
+
+    def _upload_way_home(self, mission: OnboardMission) -> list[Outbound]:
         """Put a mission on the vehicle that waits at the start and then comes home."""
-        reason = mission.failure
-        self._wait(
-            f"putting the way home on it failed ({reason}), trying again"
-            if reason
-            else "putting the way home on it"
-        )
+        now_s, reason = self._session.now_s, mission.failure
+        again = f" failed ({reason}), trying again" if reason else ""
+        self.waiting_for = f"putting the way home on it{again}"
         if now_s < self._upload_at_s or mission.is_uploading:
             return []
         if self._uploads >= self._config.mode_tries:
@@ -358,40 +347,34 @@ class Preparation:
         self._upload_at_s = now_s + self._config.retry_delay_s
         return mission.upload(self._order.position_enu_m, self._order.speed_m_s, now_s)
 
-    def _begin_mission(self, mission: OnboardMission, now_s: float) -> list[Outbound]:
+    def _begin_mission(self, mission: OnboardMission) -> None:
         """From now on the way home stands on the vehicle whatever becomes of us."""
         if not mission.is_uploaded:  # as it was found in the air
-            return self._upload_way_home(mission, now_s)
-        mission.begin(now_s)
+            self._session.say(*self._upload_way_home(mission))
+            return
+        mission.begin(self._session.now_s)
         self._mission_begun = True
-        return self._wait("starting the mission")
+        self.waiting_for = "starting the mission"
 
-    def _follow_mission(self, mission: OnboardMission, heartbeat: Heartbeat) -> list[Outbound]:
+    def _follow_mission(self, mission: OnboardMission, heartbeat: Heartbeat) -> None:
         if not heartbeat.armed:
-            return self._fail("the vehicle disarmed after takeoff")
-        if mission.unverified or mission.failure is not None:
-            return self._fail(mission.failure or "which mission it flies is not known")
-        self.done = mission.is_flown
-        return []
+            self.failure = "the vehicle disarmed after takeoff"
+        elif mission.unverified or mission.failure is not None:
+            self.failure = mission.failure or "which mission it flies is not known"
+        else:
+            self.done = mission.is_flown
 
-    def _resumes(self, vehicle: VehicleState) -> bool:
-        """Whether it flies on orders of an earlier life, beyond its takeoff."""
-        taking_off = self._saw_takeoff or vehicle.landed is Landed.TAKEOFF
-        return self._order.resume and not self.took_off and not taking_off
-
-    def _ask(
-        self, step: _Step, command: VehicleCommand, vehicle: VehicleState, now_s: float
-    ) -> list[Outbound]:
-        refusal, repeated = "", step.command
+    def _ask(self, step: _Step, command: VehicleCommand) -> list[Outbound]:
+        """What to tell the vehicle, if that step is to be asked for now."""
+        session, repeated, refusal = self._session, step.command, ""
         if repeated.refused:
             # Of modes and motors nothing depends on a place.
-            of_place = step is self._takeoff
-            words = self._firmware.place_refusal(vehicle, repeated.result) if of_place else None
-            refusal = words or result_text(repeated.result)
-            if text := vehicle.telling_warning(now_s):
+            words = self._firmware.place_refusal(session.vehicle, repeated.result)
+            refusal = words if step is self._takeoff else result_text(repeated.result)
+            if text := session.vehicle.telling_warning(session.now_s):
                 refusal = f"{refusal}: {text}"
         self._wait(f"{step.what} refused ({refusal}), trying again" if refusal else step.what)
-        out = repeated.give(command, now_s)
+        out = repeated.give(command, session.now_s)
         if out is None:
             why = f"last answer: {refusal}" if refusal else "its effect was never seen to stay"
             return self._fail(f"{step.what} failed {repeated.given} times; {why}")

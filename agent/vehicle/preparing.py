@@ -27,6 +27,8 @@ class Preparing(Activity):
 
     phase = FlightPhase.PREPARING
     polls = True
+    may_disarm = True
+    """Autopilots disarm by themselves if nothing follows."""
 
     def __init__(self, session: VehicleSession, order: Prepare, *, ours: bool) -> None:
         super().__init__(session)
@@ -38,11 +40,6 @@ class Preparing(Activity):
     def in_our_hands(self) -> bool:
         """Whether the motors run, or may run, because of us."""
         return self._preparation is not None and self._preparation.engaged
-
-    @property
-    def may_disarm(self) -> bool:
-        """Autopilots disarm by themselves if nothing follows."""
-        return True
 
     @property
     def took_off(self) -> bool:
@@ -70,19 +67,17 @@ class Preparing(Activity):
     def on_message(self, message: Inbound) -> None:
         """Take what matters of a message beside the vehicle's state."""
         if self._preparation is not None:
-            self._session.say(*self._preparation.on_message(message, self._session.now_s))
+            self._preparation.on_message(message)
 
     def on_position(self, position: Position) -> None:
         """Take a fresh position."""
         if self._preparation is not None:
-            session = self._session
-            out = self._preparation.on_position(position, session.place_enu_m, session.now_s)
-            session.say(*out)
+            self._preparation.on_position(position)
 
     def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of a command."""
         if self._preparation is not None:
-            self._session.say(*self._preparation.on_ended(ended, self._session.now_s))
+            self._preparation.on_ended(ended)
 
     def advance(self) -> None:
         """Do what the state seen asks for next, and say what is waited for."""
@@ -95,7 +90,7 @@ class Preparing(Activity):
         if self._preparation is None:
             self._preparation = Preparation(session, session.firmware, self.order, ours=self._ours)
         preparation = self._preparation
-        session.say(*preparation.advance(session.vehicle, heartbeat, session.now_s))
+        preparation.advance(heartbeat)
         if preparation.caution is not None:
             session.tell_caution(preparation.caution)
         if not preparation.done and preparation.failure is None:

@@ -11,22 +11,15 @@ import math
 
 from agent.core.interface import Return
 from agent.vehicle.activity import Activity, FlightPhase
-from agent.vehicle.commands import (
-    CommandEnded,
-    CommandOutcome,
-    RepeatedCommand,
-    result_text,
-)
-from agent.vehicle.firmware.profile import Firmware
-from agent.vehicle.leg import TARGET_TAG, ArrivalDetector, ArrivalState
-from agent.vehicle.messages import Heartbeat, Landed, Outbound, Position
+from agent.vehicle.commands import CommandEnded, result_text
+from agent.vehicle.firmware.profile import UNCHANGED, Firmware
+from agent.vehicle.leg import TARGET_TAG, RepositionLeg
+from agent.vehicle.messages import Heartbeat, Landed, Position
 from agent.vehicle.session import VehicleSession
-from swarm.model.frames import wgs84_from_enu
+from swarm.protocol.fields import Point
 
 __all__ = ["ReturnVia", "Returning"]
 
-
-Point = tuple[float, float, float]
 
 _DISARMED_LONG_S = 5.0
 """A vehicle disarmed for that long is down, even if it does not say that it landed."""
@@ -44,6 +37,7 @@ class Returning(Activity):
 
     phase = FlightPhase.RETURNING
     polls = True
+    may_disarm = True
 
     def __init__(
         self,
@@ -57,14 +51,7 @@ class Returning(Activity):
         self._from_mission = session.mission is not None
         self._return_via = return_via
         self._firmware = firmware
-        config = session.config
-        self._mode = RepeatedCommand(
-            "return",
-            session.commands,
-            config.mode_tries,
-            config.effect_timeout_s,
-            config.retry_delay_s,
-        )
+        self._mode = session.repeated("return", session.config.mode_tries)
         self._disarmed_since_s: float | None = None
         self._seen = self._told_seen = False
         self.failure: str | None = None
@@ -75,15 +62,10 @@ class Returning(Activity):
         """Whether it does not fly to a place first."""
         return self._return_via is None
 
-    @property
-    def may_disarm(self) -> bool:
-        """It lands."""
-        return True
-
     def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of a command."""
         if self._return_via is not None:
-            self._return_via.on_ended(ended, self._session.now_s)
+            self._return_via.on_ended(ended)
         self._mode.on_ended(ended, self._session.now_s)
 
     def expects(self, heartbeat: Heartbeat) -> bool:
@@ -114,15 +96,14 @@ class Returning(Activity):
 
     def go_straight(self) -> None:
         """Return from where the vehicle is."""
-        return_via, self._return_via = self._return_via, None
-        if return_via is not None:
-            self._session.say(*return_via.end(self._session.now_s))
+        if self._return_via is not None:
+            self._return_via.end()
+            self._return_via = None
 
     def on_position(self, position: Position) -> None:
         """See whether it is where it flies to first."""
         if self._return_via is not None:
-            session, velocity_enu_m_s = self._session, position.velocity_enu_m_s
-            self._return_via.on_position(session.place_enu_m, velocity_enu_m_s, session.now_s)
+            self._return_via.on_position(position)
 
     def advance(self) -> None:
         """Set the mode as long as it is not seen and the vehicle still takes our orders."""
@@ -131,7 +112,7 @@ class Returning(Activity):
             return
         if self._return_via is not None:
             if not self._seen:
-                session.say(*self._return_via.advance(heartbeat, session.now_s))
+                self._return_via.advance(heartbeat)
             if not (self._return_via.done or self._seen):
                 return
             self.go_straight()
@@ -160,13 +141,8 @@ class Returning(Activity):
         return since_s is not None and session.now_s - since_s >= _DISARMED_LONG_S
 
 
-_MODE_TAG = "homeward mode"
-
 _SLOWEST_M_S = 1.0
 """Cruise speed that is reckoned with where none is known."""
-
-_UNKNOWN_SPEED_M_S = -1.0
-"""The vehicle is to fly as fast as it is set to."""
 
 _START_S = 30.0
 
@@ -187,20 +163,23 @@ class ReturnVia:
     def __init__(
         self, session: VehicleSession, firmware: Firmware, via_enu_m: Point, place_enu_m: Point
     ) -> None:
-        config, speed_m_s = session.config, session.cruise_speed_m_s
-        self._config = config
-        self._commands = session.commands
-        self._firmware = firmware
-        self._arrival = ArrivalDetector(via_enu_m, config)
-        place = wgs84_from_enu(config.origin, via_enu_m)
+        speed_m_s = session.cruise_speed_m_s
         known = speed_m_s > 0.0
-        self._target = firmware.reposition(*place, speed_m_s if known else _UNKNOWN_SPEED_M_S)
+        self._session = session
+        self._firmware = firmware
+        self._mode = session.repeated("homeward mode", 1)
+        speed = speed_m_s if known else UNCHANGED
+        self._leg = RepositionLeg(session, firmware, via_enu_m, speed, insists=False)
         flight_s = math.dist(place_enu_m, via_enu_m) / (speed_m_s if known else _SLOWEST_M_S)
         self._until_s = session.now_s + _START_S + _PATIENCE * flight_s
-        self._mode_until_s: float | None = None
-        self._mode_seen = self._told = self._accepted = False
-        self.done = False
-        """The vehicle is there, or will not be; stays once true."""
+        self._mode_seen = self._told = self._over = False
+
+    @property
+    def done(self) -> bool:
+        """The vehicle is there, or will not be."""
+        leg = self._leg
+        stands = leg.arrived or leg.stopped is not None or leg.failure is not None
+        return self._over or self._mode.refused or stands
 
     def expects(self, custom_mode: int, *, from_mission: bool) -> bool:
         """Whether that mode fits; anything else is somebody else's doing."""
@@ -209,41 +188,31 @@ class ReturnVia:
             return True
         return from_mission and not self._mode_seen and self._firmware.is_mission(custom_mode)
 
-    def on_ended(self, ended: CommandEnded, now_s: float) -> None:
+    def on_ended(self, ended: CommandEnded) -> None:
         """Take a command's outcome."""
-        if ended.tag not in (_MODE_TAG, TARGET_TAG):
-            return
-        if ended.ending is not CommandOutcome.ACCEPTED:
-            self.done = True
-        elif ended.tag == TARGET_TAG:
-            self._accepted = True
-        else:
-            self._mode_until_s = now_s + self._config.effect_timeout_s
+        self._mode.on_ended(ended, self._session.now_s)
+        self._leg.on_ended(ended)
 
-    def on_position(self, place_enu_m: Point, velocity_enu_m_s: Point, now_s: float) -> None:
+    def on_position(self, position: Position) -> None:
         """See whether it is there, or stands still elsewhere."""
-        if self._accepted and not self.done:
-            arrival = self._arrival.judge(place_enu_m, velocity_enu_m_s, now_s)
-            self.done = arrival is not ArrivalState.UNDERWAY
+        self._leg.on_position(position)
 
-    def advance(self, heartbeat: Heartbeat, now_s: float) -> list[Outbound]:
+    def advance(self, heartbeat: Heartbeat) -> None:
         """Tell the vehicle what is still to be told: the mode until it is seen, then the place."""
-        if now_s >= self._until_s:
-            self.done = True
+        session = self._session
+        self._over |= session.now_s >= self._until_s
         if self.done or self._told:
-            return []
+            return
         if self._firmware.is_commanded(heartbeat.custom_mode):
             self._told = True
-            return [*self._commands.send(TARGET_TAG, self._target, now_s)]
-        if self._mode_until_s is not None:
-            self.done = now_s >= self._mode_until_s
-            return []
-        if self._commands.pending(_MODE_TAG):
-            return []
-        return [*self._commands.send(_MODE_TAG, self._firmware.set_commanded_mode(), now_s)]
+            self._leg.start()
+            return
+        out = self._mode.give(self._firmware.set_commanded_mode(), session.now_s)
+        self._over = out is None
+        session.say(*out or ())
 
-    def end(self, now_s: float) -> list[Outbound]:
+    def end(self) -> None:
         """It returns from where it is; nothing more is told about the place."""
-        self.done = True
-        commands = self._commands
-        return [*commands.cancel(_MODE_TAG, now_s), *commands.cancel(TARGET_TAG, now_s)]
+        session = self._session
+        session.say(*self._mode.cancel(session.now_s))
+        session.say(*session.commands.cancel(TARGET_TAG, session.now_s))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from agent.core.interface import Caution, NotReady, VehicleOrder, VehicleReport
 from agent.vehicle.codec import MavlinkCodec
-from agent.vehicle.commands import CommandQueue
+from agent.vehicle.commands import CommandQueue, RepeatedCommand
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.contact import Contact
 from agent.vehicle.firmware.profile import Firmware
@@ -22,6 +22,7 @@ from agent.vehicle.parameter_override import ParameterOverride
 from agent.vehicle.signing import Signing
 from agent.vehicle.state import PositionFilter, VehicleState
 from agent.vehicle.supervision import CruiseWatch, SafetyMonitor
+from swarm.protocol.fields import Point
 from swarm.protocol.timing import earliest
 
 __all__ = [
@@ -67,8 +68,6 @@ class SendBytes:
 
     data: bytes
 
-
-Point = tuple[float, float, float]
 
 BridgeEvent = BytesReceived | TimePassed | LinkOpened | LinkClosed | VehicleOrder
 
@@ -204,6 +203,12 @@ class VehicleSession:
         """A failure, and what the autopilot has said about it lately."""
         text = self.vehicle.telling_warning(self.now_s)
         return f"{failure}: {text}" if text and text not in failure else failure
+
+    def repeated(self, tag: str, tries: int, *, patience: float = 1.0) -> RepeatedCommand:
+        """A command that is given so often, and its effect awaited that many times as long."""
+        effect_timeout_s = patience * self.config.effect_timeout_s
+        waits_s = (effect_timeout_s, self.config.retry_delay_s)
+        return RepeatedCommand(tag, self.commands, tries, *waits_s)
 
     def say(self, *messages: Outbound) -> None:
         """To the vehicle."""

@@ -24,6 +24,7 @@ from agent.vehicle.messages import (
     StatusText,
     SystemStatus,
 )
+from swarm.protocol.fields import Point
 
 __all__ = ["PositionFilter", "PositionNews", "VehicleState"]
 
@@ -208,9 +209,6 @@ def _is_failsafe(text: str) -> bool:
 
 def _has_word(text: str, words: tuple[str, ...]) -> bool:
     return any(word in text.lower() for word in words)
-
-
-Point = tuple[float, float, float]
 
 
 _FASTEST_M_S = 40.0

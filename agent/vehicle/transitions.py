@@ -72,6 +72,7 @@ class Searching(Activity):
 
     phase = FlightPhase.IDLE
     polls = True
+    in_our_hands = False
 
     def __init__(self, session: VehicleSession, order: Return | Hold) -> None:
         super().__init__(session)
@@ -82,11 +83,6 @@ class Searching(Activity):
         """The vehicle has had its time."""
         self._until_s = session.now_s + _UNHEARD_TIMEOUTS * session.config.silence_timeout_s
         session.tell_anew()
-
-    @property
-    def in_our_hands(self) -> bool:
-        """Not known."""
-        return False
 
     def advance(self) -> None:
         """Look, and say what is waited for."""
