@@ -229,16 +229,9 @@ class MavlinkCodec:
             case CommandLong(command, params, confirmation):
                 return mavlink.MAVLink_command_long_message(*to, command, confirmation, *params)
             case CommandInt(command, frame, params, lat_deg, lon_deg, alt_m):
+                place = (*_wire_place(lat_deg, lon_deg), alt_m)
                 return mavlink.MAVLink_command_int_message(
-                    *to,
-                    _INT_FRAME[frame],
-                    command,
-                    0,
-                    0,
-                    *params,
-                    round(lat_deg * 1e7),
-                    _wire_lon(lon_deg),
-                    alt_m,
+                    *to, _INT_FRAME[frame], command, 0, 0, *params, *place
                 )
             case ParameterRead(name):
                 return mavlink.MAVLink_param_request_read_message(*to, name.encode(), -1)
@@ -249,17 +242,11 @@ class MavlinkCodec:
             case MissionCount(count):
                 return mavlink.MAVLink_mission_count_message(*to, count)
             case MissionItem():
+                head = (message.seq, _INT_FRAME[message.frame], message.command)
+                flags = (int(message.current), int(message.autocontinue))
+                place = (*_wire_place(message.lat_deg, message.lon_deg), message.alt_m)
                 return mavlink.MAVLink_mission_item_int_message(
-                    *to,
-                    message.seq,
-                    _INT_FRAME[message.frame],
-                    message.command,
-                    int(message.current),
-                    int(message.autocontinue),
-                    *message.params,
-                    round(message.lat_deg * 1e7),
-                    _wire_lon(message.lon_deg),
-                    message.alt_m,
+                    *to, *head, *flags, *message.params, *place
                 )
             case MissionRequest(seq):
                 return mavlink.MAVLink_mission_request_int_message(*to, seq)
@@ -273,9 +260,9 @@ class MavlinkCodec:
                 return mavlink.MAVLink_mission_set_current_message(*to, seq)
 
 
-def _wire_lon(lon_deg: float) -> int:
-    """Longitude [1e-7 deg] within -180..180, for missions across the antimeridian."""
-    return round(((lon_deg + 180.0) % 360.0 - 180.0) * 1e7)
+def _wire_place(lat_deg: float, lon_deg: float) -> tuple[int, int]:
+    """[1e-7 deg]; the longitude within -180..180, for missions across the antimeridian."""
+    return round(lat_deg * 1e7), round(((lon_deg + 180.0) % 360.0 - 180.0) * 1e7)
 
 
 def _heartbeat(raw: Any) -> Inbound | None:
@@ -325,17 +312,9 @@ def _battery(raw: Any) -> Inbound | None:
     return BatteryStatus(_battery_frac(raw.battery_remaining)) if raw.id == 0 else None
 
 
-def _ekf(raw: Any) -> Inbound | None:
-    return EkfStatus(raw.flags)
-
-
 def _extended_state(raw: Any) -> Inbound | None:
     landed = _LANDED_BY_WIRE.get(raw.landed_state)
     return None if landed is None else ExtendedState(landed)
-
-
-def _command_ack(raw: Any) -> Inbound | None:
-    return CommandAck(raw.command, raw.result)
 
 
 def _parameter(raw: Any) -> Inbound | None:
@@ -347,22 +326,10 @@ def _parameter(raw: Any) -> Inbound | None:
     return ParameterValue(raw.param_id, raw.param_value, integer)
 
 
-def _parameter_missing(raw: Any) -> Inbound | None:
-    return ParameterMissing(raw.param_id)
-
-
-def _mission_request(raw: Any) -> Inbound | None:
-    return MissionRequest(raw.seq) if raw.mission_type == 0 else None
-
-
-def _mission_count(raw: Any) -> Inbound | None:
-    return MissionCount(raw.count) if raw.mission_type == 0 else None
-
-
 def _mission_item(raw: Any) -> Inbound | None:
     frame = _FRAME_BY_WIRE.get(raw.frame)
     numbers = (raw.param1, raw.param2, raw.param3, raw.param4)
-    if raw.mission_type != 0 or frame is None or not math.isfinite(raw.z):
+    if frame is None or not math.isfinite(raw.z):
         return None
     return MissionItem(
         seq=raw.seq,
@@ -377,16 +344,11 @@ def _mission_item(raw: Any) -> Inbound | None:
     )
 
 
-def _mission_ack(raw: Any) -> Inbound | None:
-    return MissionAck(raw.type) if raw.mission_type == 0 else None
-
-
-def _mission_current(raw: Any) -> Inbound | None:
-    return MissionCurrent(raw.seq)
-
-
-def _mission_reached(raw: Any) -> Inbound | None:
-    return MissionReached(raw.seq)
+def _mission(convert: Callable[[Any], Inbound | None]) -> Callable[[Any], Inbound | None]:
+    """Of missions proper only, not of fences and rally points."""
+    return lambda raw: (
+        convert(raw) if raw.mission_type == mavlink.MAV_MISSION_TYPE_MISSION else None
+    )
 
 
 _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
@@ -394,18 +356,18 @@ _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _position,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: _system_status,
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery,
-    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
-    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: _ekf,
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: lambda raw: EkfStatus(raw.flags),
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: lambda raw: EkfStatus(raw.flags),
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_state,
-    mavlink.MAVLINK_MSG_ID_COMMAND_ACK: _command_ack,
+    mavlink.MAVLINK_MSG_ID_COMMAND_ACK: lambda raw: CommandAck(raw.command, raw.result),
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
-    mavlink.MAVLINK_MSG_ID_PARAM_ERROR: _parameter_missing,
-    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: _mission_request,
-    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: _mission_request,
-    mavlink.MAVLINK_MSG_ID_MISSION_COUNT: _mission_count,
-    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: _mission_item,
-    mavlink.MAVLINK_MSG_ID_MISSION_ACK: _mission_ack,
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: _mission_current,
-    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: _mission_reached,
+    mavlink.MAVLINK_MSG_ID_PARAM_ERROR: lambda raw: ParameterMissing(raw.param_id),
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: _mission(lambda raw: MissionRequest(raw.seq)),
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: _mission(lambda raw: MissionRequest(raw.seq)),
+    mavlink.MAVLINK_MSG_ID_MISSION_COUNT: _mission(lambda raw: MissionCount(raw.count)),
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: _mission(_mission_item),
+    mavlink.MAVLINK_MSG_ID_MISSION_ACK: _mission(lambda raw: MissionAck(raw.type)),
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda raw: MissionCurrent(raw.seq),
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: lambda raw: MissionReached(raw.seq),
 }
 """Converters by message id; one returns None for contents that cannot be."""

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
+from typing import ClassVar
 
 from agent.vehicle.commands import CommandPolicy
 from swarm.model.frames import Origin
+from swarm.protocol.fields import Point
 from swarm.runtime.errors import Fault, InputError
 
 __all__ = [
@@ -27,7 +30,6 @@ __all__ = [
 
 ONBOARD_COMPUTER = 191
 """Component id of a companion (MAV_COMP_ID_ONBOARD_COMPUTER, MAV_COMPONENT of common.xml)."""
-
 
 _INSIDE = 0.999
 """Of the fence: rounding must not lead out of it again."""
@@ -129,42 +131,15 @@ class BridgeConfig:
             value = getattr(self, name)
             if not (isinstance(value, int) and 1 <= value <= 255):
                 raise ValueError(f"{name} must be a whole number within 1..255, not {value}")
-        for name in (
-            "acceptance_radius_m",
-            "arrival_speed_m_s",
-            "position_rate_hz",
-            "status_rate_hz",
-            "heartbeat_interval_s",
-            "silence_timeout_s",
-            "peer_silence_s",
-            "stream_timeout_s",
-            "mode_tries",
-            "arm_tries",
-            "takeoff_tries",
-            "retry_delay_s",
-            "effect_timeout_s",
-            "climb_timeout_s",
-            "takeoff_min_m",
-            "home_tolerance_m",
-            "stall_timeout_s",
-            "stall_tries",
-            "mission_patience_s",
-            "mission_reply_timeout_s",
-            "mission_tries",
-            "reached_radius_m",
-            "position_timeout_s",
-            "fence_radius_m",
-            "fence_height_m",
-        ):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be a number > 0, not {value}")
-
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.type in ("int", "float") and not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{each.name} must be a number > 0, not {value}")
         reserve_frac = self.battery_reserve_frac
         if reserve_frac is not None and not 0.0 < reserve_frac < 1.0:
             raise ValueError(f"battery_reserve_frac must be within 0..1, not {reserve_frac}")
 
-    def out_of_bounds(self, position_enu_m: tuple[float, float, float]) -> str | None:
+    def out_of_bounds(self, position_enu_m: Point) -> str | None:
         """Why a target must not be sent to the vehicle, in words; None if it may be."""
         east_m, north_m, up_m = position_enu_m
         if not all(math.isfinite(c) for c in position_enu_m):
@@ -175,9 +150,7 @@ class BridgeConfig:
             return f"target height {up_m:g} m is beyond {self.fence_height_m:g} m"
         return None
 
-    def within_fence(
-        self, position_enu_m: tuple[float, float, float]
-    ) -> tuple[float, float, float]:
+    def within_fence(self, position_enu_m: Point) -> Point:
         """The nearest place that may be a target: that one itself, or a little inside the fence."""
         east_m, north_m, up_m = position_enu_m
         away_m, radius_m = math.hypot(east_m, north_m), self.fence_radius_m
@@ -232,36 +205,32 @@ _HOST = re.compile(
 
 
 @dataclass(frozen=True, slots=True)
-class TcpAddress:
+class _HostAddress:
+    scheme: ClassVar[str]
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}:{host}:{self.port}"
+
+
+class TcpAddress(_HostAddress):
     """A TCP server to connect to."""
 
-    host: str
-    port: int
-
-    def __str__(self) -> str:
-        return f"tcp:{_bracketed(self.host)}:{self.port}"
+    scheme = "tcp"
 
 
-@dataclass(frozen=True, slots=True)
-class UdpOutAddress:
+class UdpOutAddress(_HostAddress):
     """A UDP peer to speak to."""
 
-    host: str
-    port: int
-
-    def __str__(self) -> str:
-        return f"udpout:{_bracketed(self.host)}:{self.port}"
+    scheme = "udpout"
 
 
-@dataclass(frozen=True, slots=True)
-class UdpInAddress:
+class UdpInAddress(_HostAddress):
     """A local UDP address to wait at."""
 
-    host: str
-    port: int
-
-    def __str__(self) -> str:
-        return f"udpin:{_bracketed(self.host)}:{self.port}"
+    scheme = "udpin"
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,23 +257,21 @@ def parse_link(url: str, source: str = "--mavlink") -> LinkAddress:
     Raises:
         InputError: the URL is none of the four kinds.
     """
-    scheme, place, value = _parts(url, ("tcp", "udpout", "udpin", "serial"), source, _LINK_REMEDY)
-    if scheme == "serial":
-        if value == 0:
-            raise _fault(source, url, "0 is no baud rate", _LINK_REMEDY)
-        return SerialAddress(place, value)
-    host = _host(url, place, value, source, _LINK_REMEDY)
-    if scheme == "tcp":
-        return TcpAddress(host, value)
-    return UdpOutAddress(host, value) if scheme == "udpout" else UdpInAddress(host, value)
+    kinds = {kind.scheme: kind for kind in (TcpAddress, UdpOutAddress, UdpInAddress)}
+    scheme, place, value = _parts(url, (*kinds, "serial"), source, _LINK_REMEDY)
+    if scheme != "serial":
+        return kinds[scheme](_host(url, place, value, source, _LINK_REMEDY), value)
+    if value == 0:
+        raise _fault(source, url, "0 is no baud rate", _LINK_REMEDY)
+    return SerialAddress(place, value)
 
 
 def parse_forward(url: str, source: str = "--forward") -> UdpOutAddress:
-    """Where a ground station listens that ``url`` names.
+    """Where a ground station listens that ``url``, ``udp:HOST:PORT``, names.
 
     Args:
-        url: ``udp:HOST:PORT``.
-        source: where the URL came from, for the message.
+        url: the URL.
+        source: where it came from, for the message.
 
     Raises:
         InputError: the URL is no such address.
@@ -313,16 +280,19 @@ def parse_forward(url: str, source: str = "--forward") -> UdpOutAddress:
     return UdpOutAddress(_host(url, place, value, source, _FORWARD_REMEDY), value)
 
 
-def _parts(url: str, schemes: tuple[str, ...], source: str, remedy: str) -> tuple[str, str, int]:
+def _parts(url: str, schemes: Collection[str], source: str, remedy: str) -> tuple[str, str, int]:
     """Scheme, place and number of ``url``."""
     scheme, _, rest = url.partition(":")
     place, _, number = rest.rpartition(":")
+    problem = None
     if scheme not in schemes:
-        raise _fault(source, url, f"{scheme!r} is no kind of link", remedy)
-    if not place:
-        raise _fault(source, url, "a part is missing", remedy)
-    if not (number.isascii() and number.isdigit() and len(number) < 9):
-        raise _fault(source, url, f"{number!r} is not a whole number", remedy)
+        problem = f"{scheme!r} is no kind of link"
+    elif not place:
+        problem = "a part is missing"
+    elif not (number.isascii() and number.isdigit() and len(number) < 9):
+        problem = f"{number!r} is not a whole number"
+    if problem is not None:
+        raise _fault(source, url, problem, remedy)
     return scheme, place, int(number)
 
 
@@ -337,7 +307,3 @@ def _host(url: str, place: str, port: int, source: str, remedy: str) -> str:
 
 def _fault(source: str, url: str, problem: str, remedy: str) -> InputError:
     return InputError(Fault(source, url, problem, remedy))
-
-
-def _bracketed(host: str) -> str:
-    return f"[{host}]" if ":" in host else host
