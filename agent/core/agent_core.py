@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from agent.core.announcer import Announcer
+from agent.core.context import AgentContext, AgentPart
 from agent.core.interface import Action, Event, OrderVehicle, Telemetry
 from agent.core.memory import RecoveredState, SaveCondition
 from agent.core.mission_view import MissionView, Peers
@@ -34,7 +35,6 @@ from swarm.protocol.events import (
     Finish,
     KeysReplaced,
     LinkChanged,
-    LogLine,
     MessageReceived,
     PeerGone,
     PeerSeen,
@@ -60,7 +60,7 @@ _MINDS_BUS_LOSS = TAKES_TASKS | PAUSED_BY_OPERATOR | {AgentState.PREPARING}
 """There is a flight to break off for want of a bus."""
 
 
-class AgentCore:
+class AgentCore(AgentPart):
     """The agent of one UAV.
 
     Args:
@@ -99,42 +99,26 @@ class AgentCore:
         self._rejoin = rejoin
         if memory is not None:  # the calendar clock may have gone back since
             incarnation = max(incarnation, memory.incarnation + 1)
-        self._announcer = Announcer(RegisterWriter(mission, uav, incarnation), self.replica, timing)
-        self._peers = Peers(uav, timing)
-        self._mission_view = MissionView(mission, uav, self.replica)
-        self._machine = AgentStateMachine(self._note_impossible)
-        self._tasking = Tasking(
-            uav,
-            self.replica,
-            self._mission_view,
-            self._peers,
-            self._announcer,
-            self._machine,
-            timing,
-            make_rule,
+        context = AgentContext(
+            uav=uav,
+            timing=timing,
+            replica=self.replica,
+            mission_view=MissionView(mission, uav, self.replica),
+            peers=Peers(uav, timing),
+            announcer=Announcer(RegisterWriter(mission, uav, incarnation), self.replica, timing),
+            machine=AgentStateMachine(self._note_impossible),
         )
-        self._ending = EndCondition(self.replica, self._mission_view, self._peers, timing)
-        self._commander = VehicleCommander(
-            self._machine, self._mission_view, self._announcer, self._tasking, self._ending
-        )
-        self._sync = StateSync(
-            uav,
-            self.replica,
-            self._mission_view,
-            self._peers,
-            self._announcer,
-            self._tasking,
-            self._machine,
-            timing,
-        )
+        super().__init__(context)
+        self._tasking = Tasking(context, make_rule)
+        self._ending = EndCondition(context)
+        self._commander = VehicleCommander(context, self._tasking, self._ending)
+        self._sync = StateSync(context, self._tasking)
         self._queries = self._sync.queries
         self._recovered = RecoveredState(uav, memory, memory_age_s, timing)
         self._saving = SaveCondition(uav, self.replica, timing)
         self._operator_commands = OperatorCommands(uav, self.replica, rejoin=rejoin)
         self._bus_loss = BusLossTimer(without_bus_s)
         self._stall_detector = StallDetector(timing.pause_s)
-        self._actions: list[Action] = []
-        """What has come of the step so far."""
         self._deadline_s: float | None = None
 
     # -- the one entry point ------------------------------------------------------
@@ -158,7 +142,7 @@ class AgentCore:
             return []
         if not self._machine.has_ended:
             if self._stall_detector.late(now_s):
-                self._actions += self._sync.held_up(now_s)
+                self._sync.held_up(now_s)
             self._handle(event, now_s)
             if not self._machine.has_ended:
                 self._advance(now_s)
@@ -227,11 +211,11 @@ class AgentCore:
     def _handle(self, event: Event, now_s: float) -> None:
         match event:
             case MessageReceived(message):
-                self._actions += self._sync.hear(message, now_s)
+                self._sync.hear(message, now_s)
             case SnapshotsReceived(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
-                self._actions += self._sync.see(writer, now_s)
+                self._sync.see(writer, now_s)
             case PeerGone(writer):
                 self._sync.miss(writer, now_s)
             case KeysReplaced(names):
@@ -239,22 +223,22 @@ class AgentCore:
                 self._recovered.demote_revoked(names)
             case LinkChanged(up):
                 self._bus_loss.link(up, now_s)
-                self._actions += self._sync.link(up, now_s)
+                self._sync.link(up, now_s)
             case Stop(reason):
                 if self.state is AgentState.SYNCING:
                     self._recollect(now_s, last_chance=True)
-                self._go_home(reason, now_s, hurry=True)
+                self._commander.go_home(reason, now_s, hurry=True)
             case Tick():
                 pass
             case report:
-                self._actions += self._commander.hear(report, now_s)
+                self._commander.hear(report, now_s)
 
     def _learn(self, snapshots: tuple[Snapshot, ...], now_s: float) -> None:
         if self._sync.yields_to(snapshots):
             # Without a word, and without an order: the other speaks for this UAV and flies it.
             self._machine.take(Trigger.SUPERSEDED)
         else:
-            self._actions += self._sync.learn(snapshots, now_s)
+            self._sync.learn(snapshots, now_s)
 
     def _changes_nothing_else(self, now_s: float) -> bool:
         """Whether nothing follows from where the vehicle is: known before, and nothing is due."""
@@ -266,14 +250,14 @@ class AgentCore:
 
     def _advance(self, now_s: float) -> None:
         """What is due by now, whatever the event was: first what others say, then what it does."""
-        self._actions += self._sync.lose(now_s)
+        self._sync.lose(now_s)
         if self._is_beginning:
             self._recollect(now_s)
         if self._knows_enough:
             self._obey(now_s)
             self._go_home_if_over(now_s)
         if self.state in _MINDS_BUS_LOSS and self._bus_loss.too_long(now_s):
-            self._go_home(f"without the bus for {self._bus_loss.patience_s:g} s", now_s)
+            self._commander.go_home(f"without the bus for {self._bus_loss.patience_s:g} s", now_s)
         if self._is_beginning:
             self._begin(now_s)
         if self._machine.takes_tasks and self._mission_view.running:
@@ -288,7 +272,7 @@ class AgentCore:
     def _go_on(self, now_s: float) -> None:
         """Do what the tasks ask for; whoever is alone then is woken by nobody but itself."""
         before = self.phase, self._tasking.undecided
-        self._actions += self._tasking.advance(now_s, informed=self._queries.current)
+        self._tasking.advance(now_s, informed=self._queries.current)
         if before != (self.phase, self._tasking.undecided):
             self._go_home_if_over(now_s)
 
@@ -309,14 +293,14 @@ class AgentCore:
         brief = self.replica.brief
         memory = self._recovered.fitting(brief, now_s, last_chance=last_chance)
         if memory is not None:
-            self._actions += self._sync.remember(memory, now_s)
-            self._actions.append(LogLine("remembers", {"confirmed": brief is not None}))
+            self._sync.remember(memory, now_s)
+            self._log("remembers", confirmed=brief is not None)
         claim = self.replica.claims.get(self.uav)
         self._commander.recall(claim, rejoin=self._rejoin)
         if self._recovered.unconfirmed:
-            self._go_home("nobody knows of a mission", now_s, status=1)
+            self._commander.go_home("nobody knows of a mission", now_s, status=1)
         elif claim is not None and claim.phase is ClaimPhase.OUT and not self._rejoin:
-            self._actions += self._commander.stay_out(claim, now_s)
+            self._commander.stay_out(claim, now_s)
 
     def _begin(self, now_s: float) -> None:
         """Get the vehicle ready; in a running mission, from where an earlier life left it."""
@@ -326,17 +310,14 @@ class AgentCore:
             waits = "waiting for the coordinator's brief" if unknown else "not in the brief"
             if self._announcer.note != waits:
                 self._announcer.explain(waits)
-                self._actions.append(LogLine(waits, {"uav": self.uav}))
+                self._log(waits, uav=self.uav)
             return
-        self._actions += self._commander.prepare(me, Trigger.SYNCED)
+        self._commander.prepare(me, Trigger.SYNCED)
         claim = self.replica.claims.get(self.uav)
         if claim is not None and self._mission_view.running:
-            self._actions += self._tasking.resume(claim, now_s)
+            self._tasking.resume(claim, now_s)
 
     # -- what takes it from its tasks ---------------------------------------------------
-
-    def _go_home(self, reason: str, now_s: float, *, status: int = 0, hurry: bool = False) -> None:
-        self._actions += self._commander.go_home(reason, now_s, status=status, hurry=hurry)
 
     def _go_home_if_over(self, now_s: float) -> None:
         if self.state in HEADED_HOME:
@@ -344,9 +325,9 @@ class AgentCore:
         undecided, refused = self._tasking.undecided, self._tasking.leaves_refused(now_s)
         reason = self._ending.reason(self.phase, now_s, undecided=undecided, refused=refused)
         if reason is not None and self.state is AgentState.PAUSED:
-            self._actions += self._commander.stay_paused(now_s)
+            self._commander.stay_paused(now_s)
         elif reason is not None:
-            self._go_home(reason, now_s)
+            self._commander.go_home(reason, now_s)
 
     def _obey(self, now_s: float) -> None:
         """Do what the operator has said since; an abort ends the mission besides.
@@ -356,18 +337,17 @@ class AgentCore:
         command = self._operator_commands.news(begins=not self._machine.acts)
         if command is None:
             return
-        fields: dict[str, object] = {"command": command.kind.value, "reason": command.reason}
-        self._actions.append(LogLine("told by the operator", fields))
+        self._log("told by the operator", command=command.kind.value, reason=command.reason)
         if self.state is AgentState.OUT:
             return
         reason = describe_command(command)
         match command.kind:
             case CommandKind.HOLD:
-                self._actions += self._commander.hold(reason, now_s)
+                self._commander.hold(reason, now_s)
             case CommandKind.RESUME if self.state in PAUSED_BY_OPERATOR:
-                self._actions += self._commander.resume(reason, now_s)
+                self._commander.resume(reason, now_s)
             case CommandKind.RETURN | CommandKind.ABORT:
-                self._go_home(reason, now_s)
+                self._commander.go_home(reason, now_s)
             case _:
                 pass
 
@@ -376,10 +356,11 @@ class AgentCore:
     def _finish(self, now_s: float) -> None:
         """The process is to end."""
         if self.state is AgentState.YIELDED:
-            self._actions += [LogLine("another agent already flies this UAV"), Finish(1)]
+            self._log("another agent already flies this UAV")
+            self._actions.append(Finish(1))
         else:
-            said = self._announcer.say(self._status(now_s))
-            self._actions += [said, Finish(self._commander.exit_status)]
+            self._say(self._status(now_s))
+            self._actions.append(Finish(self._commander.exit_status))
 
     def _status(self, now_s: float) -> Status:
         claim, telemetry = self.claim, self._mission_view.telemetry
@@ -396,12 +377,12 @@ class AgentCore:
         )
 
     def _note_impossible(self, state: AgentState, trigger: Trigger) -> None:
-        fields: dict[str, object] = {"state": state.name, "trigger": trigger.name}
-        self._actions.append(LogLine(IMPOSSIBLE, fields))
+        self._log(IMPOSSIBLE, state=state.name, trigger=trigger.name)
 
     def _end_step(self, now_s: float) -> list[Action]:
         """What came of the step; a change worth it is kept for a later life."""
-        actions, self._actions = self._actions, []
+        actions = self._actions.copy()
+        self._actions.clear()
         remembers = self.state not in (AgentState.SYNCING, AgentState.YIELDED)
         if remembers and self._saving.worth_keeping(actions, now_s):
             actions.insert(0, Save())

@@ -17,14 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agent.core.announcer import Announcer
+from agent.core.context import AgentContext, AgentPart
 from swarm.allocation.lower_level import Decision, Rule, ScoringRule, TeamState, decisions
 from swarm.allocation.problem import IntArray, Problem
 from swarm.allocation.rules import GuidedRule
 from swarm.protocol.board import TaskBoard, after_outcomes, claim_strength, finish_claim, ranks
 from swarm.protocol.events import PublishLast
 from swarm.protocol.messages import Message, PlanEpoch, Stamp
-from swarm.protocol.registers import Replica
 from swarm.protocol.sync import combined, fingerprint
 from swarm.protocol.uav_messages import (
     MAX_CANDIDATES,
@@ -218,19 +217,15 @@ class RecordingRule:
         return found or ((decision.task, decision.score),)
 
 
-class ChoiceReporter:
-    """Reports the choices of the agent of ``uav`` in this life of it.
+class ChoiceReporter(AgentPart):
+    """Reports the choices of one agent in this life of it.
 
     Args:
-        uav: id of the UAV.
-        replica: the shared registers.
-        announcer: says what the agent says.
+        context: the agent.
     """
 
-    def __init__(self, uav: str, replica: Replica, announcer: Announcer) -> None:
-        self._uav = uav
-        self._replica = replica
-        self._announcer = announcer
+    def __init__(self, context: AgentContext) -> None:
+        super().__init__(context)
         self._number = 0
 
     @property

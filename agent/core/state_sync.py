@@ -12,15 +12,13 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from statistics import median_high
 
-from agent.core.announcer import Announcer
-from agent.core.interface import Action
-from agent.core.mission_view import MissionChange, MissionView, Peers
-from agent.core.states import AgentStateMachine
+from agent.core.context import AgentContext, AgentPart
+from agent.core.mission_view import MissionChange
 from agent.core.tasking import Tasking
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.events import Ask, LogLine
+from swarm.protocol.events import Ask
 from swarm.protocol.messages import Body, Message, MissionConfig, MissionPhase, PlanEpoch, Snapshot
-from swarm.protocol.registers import Replica, without_signers
+from swarm.protocol.registers import without_signers
 from swarm.protocol.sync import QuestionTimer
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import ClaimPhase
@@ -32,40 +30,18 @@ _WORTH_TELLING_S = 0.1
 """A correction of the mission clock by less is the network's."""
 
 
-class StateSync:
-    """What the agent of ``uav`` takes from the bus.
+class StateSync(AgentPart):
+    """What one agent takes from the bus.
 
     Args:
-        uav: id of the UAV.
-        replica: the shared registers.
-        mission_view: the mission.
-        peers: the others.
-        announcer: says what this agent says.
+        context: the agent.
         tasking: hears of it when a task may have opened.
-        machine: whether this life has begun to act.
-        timing: timers.
     """
 
-    def __init__(
-        self,
-        uav: str,
-        replica: Replica,
-        mission_view: MissionView,
-        peers: Peers,
-        announcer: Announcer,
-        tasking: Tasking,
-        machine: AgentStateMachine,
-        timing: Timing,
-    ) -> None:
-        self.queries = StateQueries(timing)
-        self._uav = uav
-        self._replica = replica
-        self._mission_view = mission_view
-        self._peers = peers
-        self._announcer = announcer
+    def __init__(self, context: AgentContext, tasking: Tasking) -> None:
+        super().__init__(context)
+        self.queries = StateQueries(context.timing)
         self._tasking = tasking
-        self._machine = machine
-        self._timing = timing
         self._answered: set[str] = set()
         self._insisted = False
         self._insists_until_s = -math.inf
@@ -81,7 +57,7 @@ class StateSync:
 
     # -- what is said -----------------------------------------------------------------
 
-    def hear(self, message: Message, now_s: float) -> list[Action]:
+    def hear(self, message: Message, now_s: float) -> None:
         """Somebody says so just now."""
         writer, body = message.writer, message.body
         if writer == self._uav:
@@ -92,29 +68,25 @@ class StateSync:
                 self._echoes.append(message)
             elif message != self._replica.known(message):
                 self._replica.stale += 1
-            return []
-        actions = (
-            self._greet(writer, now_s) if self._peers.heard(message, self._replica, now_s) else []
-        )
+            return
+        if self._peers.heard(message, self._replica, now_s):
+            self._greet(writer, now_s)
         if not self._machine.acts and self._is_first(body):
             # Whoever answered before did not know the mission; now somebody may know more.
             self.queries.doubt(now_s)
         known = self._replica.epoch_stamp
-        actions += self._take_in(message, now_s)
+        self._take_in(message, now_s)
         # What was said before tells what time it is only to whom nothing else does.
         is_word = self._replica.epoch_stamp != known or not self._mission_view.knows_time
         if is_word and isinstance(body, PlanEpoch) and body.phase is MissionPhase.RUNNING:
-            actions += self._set_clock(body.mission_s, now_s)
-        return actions
+            self._set_clock(body.mission_s, now_s)
 
-    def learn(self, snapshots: Sequence[Snapshot], now_s: float) -> list[Action]:
+    def learn(self, snapshots: Sequence[Snapshot], now_s: float) -> None:
         """The answers to a question."""
-        actions, told = list[Action](), list[Message]()
-        for snapshot in snapshots:
-            told += snapshot.messages
+        told = [message for snapshot in snapshots for message in snapshot.messages]
         for message in told + self._echoes:
             if self._replica.known(message) is not message:
-                actions += self._take_in(message, now_s)
+                self._take_in(message, now_s)
         self._expect_claimants(now_s)
         self._echoes.clear()
         self._learn_clock(snapshots, now_s)
@@ -127,7 +99,6 @@ class StateSync:
             self._tasking.consider_diversion()
         if self.queries.current:
             self._insist(now_s)
-        return actions
 
     def _insist(self, now_s: float) -> None:
         """Ask again while somebody is there who has not answered: it may know the newest.
@@ -149,12 +120,12 @@ class StateSync:
         self._insists_until_s = now_s + self._timing.relink_grace_s
         self.queries.doubt(now_s)
 
-    def remember(self, memory: Snapshot, now_s: float) -> list[Action]:
+    def remember(self, memory: Snapshot, now_s: float) -> None:
         """An earlier life of this agent knew so."""
-        actions = [a for message in memory.messages for a in self._take_in(message, now_s)]
+        for message in memory.messages:
+            self._take_in(message, now_s)
         self._expect_claimants(now_s)
         self._learn_clock([memory], now_s)
-        return actions
 
     def yields_to(self, snapshots: Iterable[Snapshot]) -> bool:
         """Whether one of them is of a twin, another process under this name, that keeps the UAV.
@@ -176,15 +147,16 @@ class StateSync:
             isinstance(body, PlanEpoch) and self._replica.epoch is None
         )
 
-    def _take_in(self, message: Message, now_s: float) -> list[Action]:
+    def _take_in(self, message: Message, now_s: float) -> None:
         if message.writer == self._uav:
             if self._machine.acts:
-                return [*self._announcer.hear_echo(message)]
-            self._announcer.remember(message)
-            return []
+                self._actions += self._announcer.hear_echo(message)
+            else:
+                self._announcer.remember(message)
+            return
         news = self._mission_view.take_in(message)
         if news is None:
-            return []
+            return
         self._peers.stated(message.writer, message.body, now_s)
         if news is MissionChange.APPEARANCE:
             self._tasking.consider_diversion()
@@ -192,21 +164,19 @@ class StateSync:
             self._awake(now_s)
         elif news is MissionChange.CLAIM:
             self._tasking.peer_claimed(now_s)
-        return []
 
     def _expect_claimants(self, now_s: float) -> None:
         """Whose claim is known by hearsay must speak: it may hang since, with a living token."""
         self._peers.membership.expect(self._replica.claims.keys() - {self._uav}, now_s)
 
-    def _set_clock(self, mission_s: float, now_s: float) -> list[Action]:
+    def _set_clock(self, mission_s: float, now_s: float) -> None:
         """The coordinator has just said that it is ``mission_s``."""
         change_s = self._mission_view.hear_time(mission_s, now_s)
         if change_s is None:
             self._awake(now_s)
-            return [LogLine("mission runs", {"mission_s": mission_s})]
-        if abs(change_s) < _WORTH_TELLING_S:
-            return []
-        return [LogLine("mission clock corrected", {"by_s": change_s, "mission_s": mission_s})]
+            self._log("mission runs", mission_s=mission_s)
+        elif abs(change_s) >= _WORTH_TELLING_S:
+            self._log("mission clock corrected", by_s=change_s, mission_s=mission_s)
 
     def _learn_clock(self, told: Iterable[Snapshot], now_s: float) -> None:
         """The coordinator's word counts; else one odd clock among many must not set the time.
@@ -223,57 +193,52 @@ class StateSync:
 
     # -- who is there -----------------------------------------------------------------
 
-    def see(self, writer: str, now_s: float) -> list[Action]:
+    def see(self, writer: str, now_s: float) -> None:
         """The token of ``writer`` is there."""
-        if writer == self._uav or not self._peers.membership.seen(writer, now_s):
-            return []
-        return self._greet(writer, now_s)
+        if writer != self._uav and self._peers.membership.seen(writer, now_s):
+            self._greet(writer, now_s)
 
     def miss(self, writer: str, now_s: float) -> None:
         """The token of ``writer`` has disappeared."""
         if writer != self._uav:
             self._peers.membership.gone(writer, now_s)
 
-    def link(self, up: bool, now_s: float) -> list[Action]:
+    def link(self, up: bool, now_s: float) -> None:
         """The own link came up or went down."""
         self._peers.membership.link(up, now_s)
-        if not up or not self.queries.ever:
-            return []
-        self._catch_up(now_s)
-        return self._announce(now_s)
+        if up and self.queries.ever:
+            self._catch_up(now_s)
+            self._announce(now_s)
 
-    def held_up(self, now_s: float) -> list[Action]:
+    def held_up(self, now_s: float) -> None:
         """This process was stopped or starved; what the others did meanwhile is unread."""
         self._peers.membership.held_up(now_s)
         self._catch_up(now_s)
-        return [LogLine("held up")]
+        self._log("held up")
 
-    def lose(self, now_s: float) -> list[Action]:
+    def lose(self, now_s: float) -> None:
         """Give up those who have been missing for long enough."""
-        actions: list[Action] = []
         for writer, why in self._peers.lost(now_s):
             claim = self._replica.claims.get(writer)
             left = claim is not None and claim.phase is ClaimPhase.OUT
-            actions.append(LogLine("left" if left else "lost", {"writer": writer, "why": why}))
+            self._log("left" if left else "lost", writer=writer, why=why)
             self._awake(now_s)
             self.queries.want(now_s)  # others may have heard its last words
             self._left_open = True
-        return actions
 
-    def _greet(self, writer: str, now_s: float) -> list[Action]:
+    def _greet(self, writer: str, now_s: float) -> None:
         """Somebody is there anew: tell it the own registers, and hear what it may know."""
-        actions, back = list[Action](), self._peers.back(writer)
-        if back:
-            actions.append(LogLine("back", {"writer": writer}))
+        if back := self._peers.back(writer):
+            self._log("back", writer=writer)
         if self.queries.ever:
-            actions += self._announce(now_s)
+            self._announce(now_s)
             if back or writer == COORDINATOR:
                 self.queries.want(now_s)
-        return actions
 
-    def _announce(self, now_s: float) -> list[Action]:
+    def _announce(self, now_s: float) -> None:
         """Repeat the own registers; what an earlier life said is not this one's to repeat."""
-        return [*self._announcer.announce(now_s)] if self._machine.acts else []
+        if self._machine.acts:
+            self._actions += self._announcer.announce(now_s)
 
     def _awake(self, now_s: float) -> None:
         """A task may have opened: everyone who is free decides anew, in sequence order."""

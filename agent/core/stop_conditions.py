@@ -7,7 +7,7 @@ Leaves out: what follows (agent.core.agent_core).
 
 from __future__ import annotations
 
-from agent.core.mission_view import MissionView, Peers
+from agent.core.context import AgentContext, AgentPart
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.messages import CommandKind, MissionPhase, OperatorCommand
 from swarm.protocol.operator_commands import (
@@ -17,29 +17,20 @@ from swarm.protocol.operator_commands import (
     newest_command,
 )
 from swarm.protocol.registers import Replica
-from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import StatusPhase
 
 __all__ = ["BusLossTimer", "EndCondition", "OperatorCommands"]
 
 
-class EndCondition:
+class EndCondition(AgentPart):
     """The end of the mission, as one agent finds it has come.
 
     Args:
-        replica: the shared registers.
-        mission_view: the mission.
-        peers: the others.
-        timing: how long to stay without a coordinator.
+        context: the agent.
     """
 
-    def __init__(
-        self, replica: Replica, mission_view: MissionView, peers: Peers, timing: Timing
-    ) -> None:
-        self._replica = replica
-        self._mission_view = mission_view
-        self._peers = peers
-        self._timing = timing
+    def __init__(self, context: AgentContext) -> None:
+        super().__init__(context)
         self._forsaken_at_s: float | None = None
 
     def reason(

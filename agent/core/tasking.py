@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agent.core.announcer import Announcer
+from agent.core.context import AgentContext, AgentPart
 from agent.core.decision import (
     ChoiceReporter,
     DecisionTurn,
@@ -20,13 +20,11 @@ from agent.core.decision import (
     decide,
     decide_diversion,
 )
-from agent.core.interface import Action, GoTo, OrderVehicle
-from agent.core.mission_view import MissionView, Peers
+from agent.core.interface import GoTo
 from agent.core.states import (
     FREE,
     TAKES_TARGETS,
     AgentState,
-    AgentStateMachine,
     FreePeriod,
     TaskAttempt,
     Trigger,
@@ -35,48 +33,24 @@ from swarm.allocation.lower_level import Decision, Rule
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule
 from swarm.protocol.board import RuleMaker, TaskState, ranks, rule_of
-from swarm.protocol.events import LogLine
 from swarm.protocol.messages import PlanEpoch, TaskEntry
-from swarm.protocol.registers import Replica
-from swarm.protocol.timing import Timing, earliest
+from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome
 
 __all__ = ["Tasking"]
 
 
-class Tasking:
+class Tasking(AgentPart):
     """What one UAV does about tasks, and its claim.
 
     Args:
-        uav: id of the UAV.
-        replica: the shared registers.
-        mission_view: the mission.
-        peers: the others.
-        announcer: says what this UAV claims and has done.
-        machine: the agent's state.
-        timing: timers.
+        context: the agent.
         make_rule: what a UAV decides by in an epoch of that rule and those routes.
     """
 
-    def __init__(
-        self,
-        uav: str,
-        replica: Replica,
-        mission_view: MissionView,
-        peers: Peers,
-        announcer: Announcer,
-        machine: AgentStateMachine,
-        timing: Timing,
-        make_rule: RuleMaker = rule_of,
-    ) -> None:
-        self._uav = uav
-        self._replica = replica
-        self._mission_view = mission_view
-        self._peers = peers
-        self._announcer = announcer
-        self._machine = machine
-        self._timing = timing
-        self._choices = ChoiceReporter(uav, replica, announcer)
+    def __init__(self, context: AgentContext, make_rule: RuleMaker = rule_of) -> None:
+        super().__init__(context)
+        self._choices = ChoiceReporter(context)
         self._make_rule = make_rule
         self._rule: Rule | None = None
         self._rule_basis: object = None
@@ -84,7 +58,7 @@ class Tasking:
         self._attempt = TaskAttempt()
         self._leg = 0
         """Number of the last order to fly somewhere; what the vehicle says of others is late."""
-        self._refused = RefusedTasks(timing.reconsider_s)
+        self._refused = RefusedTasks(context.timing.reconsider_s)
         self._diversion_due = False
         """Whether something has opened that may be worth turning to in flight."""
 
@@ -115,22 +89,24 @@ class Tasking:
         """For the log: which choice that leg came of, if it is the one being flown."""
         return self._choices.label if leg == self._leg and self._task() is not None else {}
 
-    def resume(self, claim: Claim, now_s: float) -> list[Action]:
+    def resume(self, claim: Claim, now_s: float) -> None:
         """An earlier life of this agent claimed so: stand by it, if it still counts.
 
         The vehicle may fly there, but takes no targets before `begin`.
         """
         if claim.task is None or not self._machine.take(Trigger.CLAIM_RECOVERED):
-            return []
+            return
         if (lost := self._lost()) is not None:
-            return self._release(lost, now_s)
+            self._release(lost, now_s)
+            return
         # Others keep away from the task only for a vehicle that shows itself.
         self._attempt = TaskAttempt(ready_by_s=now_s + self._timing.silence_s)
         if claim.phase is ClaimPhase.PROPOSED:
             self._attempt.held_at_s = now_s + self._timing.objection_window_s
-        return [self._announcer.say(claim), LogLine("resumes", {"task": claim.task})]
+        self._say(claim)
+        self._log("resumes", task=claim.task)
 
-    def begin(self, now_s: float) -> list[Action]:
+    def begin(self, now_s: float) -> None:
         """The vehicle takes targets: fly to the resumed task, or be free."""
         task = self._task()
         if task is None and self._machine.state is AgentState.RESUMING:
@@ -138,25 +114,21 @@ class Tasking:
         self._machine.take(Trigger.VEHICLE_READY)
         self._attempt.ready_by_s = None
         if task is not None:
-            return [self._order_to(task)]
-        self._become_free(self._mission_view.mission_s(now_s), adrift=self._free.adrift)
-        return [self._say_idle()]
+            self._order_to(task)
+        else:
+            self._become_free(self._mission_view.mission_s(now_s), adrift=self._free.adrift)
+            self._say_idle()
 
-    def end(self, now_s: float, *, handed_over: bool) -> list[Action]:
-        """The UAV takes no tasks any more.
+    def end(self, now_s: float, *, handed_over: bool) -> None:
+        """The UAV takes no tasks any more, perhaps because somebody else has its vehicle."""
+        self._withdraw(ClaimPhase.OUT, now_s, handed_over=handed_over)
 
-        Args:
-            now_s: now.
-            handed_over: because somebody else has its vehicle.
-        """
-        return [self._withdraw(ClaimPhase.OUT, now_s, handed_over=handed_over)]
-
-    def pause(self, now_s: float) -> list[Action]:
+    def pause(self, now_s: float) -> None:
         """The UAV gives its task up, and takes none before it `begin`s anew."""
         task = self._task()
-        said = self._withdraw(ClaimPhase.PAUSED, now_s, handed_over=False)
-        why = "the operator holds the UAV"
-        return [said] if task is None else [said, self._note("released", task.task, reason=why)]
+        self._withdraw(ClaimPhase.PAUSED, now_s, handed_over=False)
+        if task is not None:
+            self._note("released", task.task, reason="the operator holds the UAV")
 
     def wake(self, now_s: float) -> None:
         """Decide anew when free; who found nothing before takes no precedence from that."""
@@ -190,30 +162,32 @@ class Tasking:
         """The attempt at the task of that leg fails; its service takes its time all the same."""
         self._attempt.fails |= leg == self._leg and self._task() is not None
 
-    def refuse(self, leg: int, reason: str, now_s: float) -> list[Action]:
+    def refuse(self, leg: int, reason: str, now_s: float) -> None:
         """The vehicle will not fly that leg: leave its task alone for a while."""
         task = self._task()
-        if leg != self._leg or task is None or not self._machine.allows(Trigger.CLAIM_LOST):
-            return []
-        self._refused.add(task.task, now_s)
-        return self._release(f"vehicle refused: {reason}", now_s)
+        if leg == self._leg and task is not None and self._machine.allows(Trigger.CLAIM_LOST):
+            self._refused.add(task.task, now_s)
+            self._release(f"vehicle refused: {reason}", now_s)
 
-    def advance(self, now_s: float, *, informed: bool) -> list[Action]:
+    def advance(self, now_s: float, *, informed: bool) -> None:
         """What follows from the registers and the time, in a running mission.
 
         Args:
             now_s: now.
             informed: whether the registers are up to date, so that a decision may rest on them.
         """
-        actions = self._serve(now_s) + self._keep_or_lose_claim(now_s)
+        self._serve(now_s)
+        self._keep_or_lose_claim(now_s)
         if self._free.retry_at_s is not None and self._free.retry_at_s <= now_s:
             self.wake(now_s)
         ready = informed and self._machine.state in TAKES_TARGETS
         if self._diversion_due and ready:
-            actions += self._divert(now_s)
+            self._divert(now_s)
         if self._machine.state in FREE and self._free.to_decide:
-            actions += self._decide(now_s) if ready else self._give_up_claim()
-        return actions
+            if ready:
+                self._decide(now_s)
+            else:
+                self._give_up_claim()
 
     def next_deadline_s(self) -> float | None:
         """When `advance` will next have something to do."""
@@ -221,55 +195,49 @@ class Tasking:
 
     # -- with a task ----------------------------------------------------------------
 
-    def _serve(self, now_s: float) -> list[Action]:
+    def _serve(self, now_s: float) -> None:
         served_at_s, task = self._attempt.served_at_s, self._task()
         if served_at_s is None or served_at_s > now_s or task is None:
-            return []
+            return
         mission_s = self._mission_view.mission_s(now_s)
         result = AttemptResult.FAILED if self._attempt.fails else AttemptResult.DONE
         outcome = Outcome(task.task, result, self._attempt_at(task.task), mission_s)
         # The next claim, made in this same step, replaces the old one on the bus.
         self._machine.take(Trigger.SERVED)
         self._become_free(mission_s)
-        return [
-            self._announcer.say(outcome),
-            self._note(f"task {result}", task.task, mission_s=mission_s),
-        ]
+        self._say(outcome)
+        self._note(f"task {result}", task.task, mission_s=mission_s)
 
-    def _keep_or_lose_claim(self, now_s: float) -> list[Action]:
+    def _keep_or_lose_claim(self, now_s: float) -> None:
         claim, attempt = self.claim, self._attempt
         if claim is None or claim.task is None or self._machine.state in FREE:
-            return []
+            return
         if (lost := self._lost()) is not None:
-            return self._release(lost, now_s)
-        if attempt.ready_by_s is not None and attempt.ready_by_s <= now_s:
-            return self._release("the vehicle is not ready", now_s)
-        if attempt.held_at_s is not None and attempt.held_at_s <= now_s:
+            self._release(lost, now_s)
+        elif attempt.ready_by_s is not None and attempt.ready_by_s <= now_s:
+            self._release("the vehicle is not ready", now_s)
+        elif attempt.held_at_s is not None and attempt.held_at_s <= now_s:
             attempt.held_at_s = None
-            return [self._announcer.say(replace(claim, phase=ClaimPhase.HELD))]
-        return []
+            self._say(replace(claim, phase=ClaimPhase.HELD))
 
-    def _divert(self, now_s: float) -> list[Action]:
+    def _divert(self, now_s: float) -> None:
         """Leave the task for a better one, unless somebody free is about to take that."""
         self._diversion_due = False
         claim, epoch = self.claim, self._replica.epoch
         if claim is None or epoch is None or self._machine.state is not AgentState.FLYING:
-            return []
-        rule, actions = self._rule_of(epoch)
+            return
+        rule = self._rule_of(epoch)
         if not isinstance(rule, GuidedRule):
-            return actions  # no other one values the whole team
+            return  # no other one values the whole team
         problem = self._mission_view.board.problem
         turn = self._turn(self._mission_view.mission_s(now_s), now_s)
         if problem is None or turn is None or turn.awaited:
-            return actions
+            return
         decision = decide_diversion(problem, self._mission_view.board, rule, turn, claim)
-        if decision is None:
-            return actions
-        self._become_free(turn.now_s)
-        recording_rule = RecordingRule(rule, decision.uav)
-        return actions + self._set_off(
-            turn, problem, epoch, recording_rule, decision, now_s, left=claim.task
-        )
+        if decision is not None:
+            self._become_free(turn.now_s)
+            chosen = (RecordingRule(rule, decision.uav), decision)
+            self._set_off(turn, problem, epoch, *chosen, now_s, left=claim.task)
 
     def _lost(self) -> str | None:
         """Why the claimed task is not this UAV's to do; None if it is."""
@@ -280,35 +248,37 @@ class Tasking:
         rival = self._peers.winner(self._replica, task.task)
         return None if rival == self._uav else f"{rival} has the stronger claim"
 
-    def _release(self, reason: str, now_s: float) -> list[Action]:
+    def _release(self, reason: str, now_s: float) -> None:
         """Give the task up; a claim lost while only proposed keeps its place in the order."""
         claim = self.claim
         if claim is None:
-            return []
+            return
         self._machine.take(Trigger.CLAIM_LOST)
         proposed = claim.phase is ClaimPhase.PROPOSED
         since_s = claim.decided_s if proposed else self._mission_view.mission_s(now_s)
         self._become_free(since_s, adrift=True)
-        return [self._note("released", str(claim.task), reason=reason)]
+        self._note("released", str(claim.task), reason=reason)
 
     def _become_free(self, since_s: float, *, adrift: bool = False) -> None:
         self._free, self._attempt = FreePeriod(since_s, adrift), TaskAttempt()
 
     # -- without one ----------------------------------------------------------------
 
-    def _decide(self, now_s: float) -> list[Action]:
+    def _decide(self, now_s: float) -> None:
         epoch, problem = self._replica.epoch, self._mission_view.board.problem
         turn = self._turn(self._free.since_s, now_s)
         if epoch is None or problem is None or turn is None:
-            return []
-        rule, actions = self._rule_of(epoch)
+            return
+        rule = self._rule_of(epoch)
         if rule is None:
-            return actions + self._stay_idle(now_s)
+            self._stay_idle(now_s)
+            return
         recording_rule = RecordingRule(rule, problem.uav_ids.index(self._uav))
         decision = decide(problem, self._mission_view.board, recording_rule, turn)
         if decision is None:
-            return self._stay_idle(now_s)
-        return self._set_off(turn, problem, epoch, recording_rule, decision, now_s)
+            self._stay_idle(now_s)
+        else:
+            self._set_off(turn, problem, epoch, recording_rule, decision, now_s)
 
     def _turn(self, free_since_s: float, now_s: float) -> DecisionTurn | None:
         """The turn of this UAV, free since then; None as long as too little is known."""
@@ -326,16 +296,15 @@ class Tasking:
             excluded=self._refused.left_alone(now_s).keys(),
         )
 
-    def _rule_of(self, epoch: PlanEpoch) -> tuple[Rule | None, list[Action]]:
-        """The rule in force, and what to say about it when it is new."""
+    def _rule_of(self, epoch: PlanEpoch) -> Rule | None:
+        """The rule in force; None, and told once, if it is not known."""
         basis = epoch.rule, epoch.routes  # numbers are no proof: two coordinators may count alike
-        if self._rule_basis == basis:
-            return self._rule, []
-        self._rule, self._rule_basis = self._make_rule(*basis), basis
-        if self._rule is not None:
-            return self._rule, []
-        self._announcer.explain(f"cannot decide by rule {epoch.rule}")
-        return None, [LogLine("unknown rule", {"rule": epoch.rule})]
+        if self._rule_basis != basis:
+            self._rule, self._rule_basis = self._make_rule(*basis), basis
+            if self._rule is None:
+                self._announcer.explain(f"cannot decide by rule {epoch.rule}")
+                self._log("unknown rule", rule=epoch.rule)
+        return self._rule
 
     def _set_off(
         self,
@@ -346,7 +315,7 @@ class Tasking:
         decision: Decision,
         now_s: float,
         left: str | None = None,
-    ) -> list[Action]:
+    ) -> None:
         task = self._replica.board[problem.task_ids[decision.task]]
         rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
         self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
@@ -356,8 +325,12 @@ class Tasking:
             ClaimPhase.PROPOSED, task.task, self._free.since_s, rank, decision.completion_s
         )
         told = self._choices.made(turn, problem, epoch, recording_rule, decision, claim, left)
-        turns: dict[str, object] = {"task": left, "for": task.task, **self._choices.label}
-        decided = self._note(
+        if left is not None:
+            turns: dict[str, object] = {"task": left, "for": task.task}
+            self._log("turns aside", **turns, **self._choices.label)
+        self._order_to(task, idled=self._free.found_nothing)
+        self._say(claim)
+        self._note(
             "decided",
             task.task,
             score=decision.score,
@@ -365,17 +338,15 @@ class Tasking:
             certificate=decision.certificate,
             completion_s=decision.completion_s,
         )
-        order = self._order_to(task, idled=self._free.found_nothing)
-        actions = [order, self._announcer.say(claim), decided, told]
-        return actions if left is None else [LogLine("turns aside", turns), *actions]
+        self._actions.append(told)
 
-    def _stay_idle(self, now_s: float) -> list[Action]:
-        actions, telemetry = self._give_up_claim(), self._mission_view.telemetry
-        free = self._free
+    def _stay_idle(self, now_s: float) -> None:
+        self._give_up_claim()
+        free, telemetry = self._free, self._mission_view.telemetry
         if free.adrift and telemetry is not None:
             # Nothing to fly to any more: stop here rather than at a lost target.
             self._leg += 1
-            actions.append(OrderVehicle(GoTo(self._leg, telemetry.position_enu_m)))
+            self._order(GoTo(self._leg, telemetry.position_enu_m))
         free.adrift, free.to_decide, free.found_nothing = False, False, True
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         free.awaits_peers = patience_ends_s is not None
@@ -384,23 +355,22 @@ class Tasking:
             # By and by, lest a lost message strand a task; or when a refused one may be taken.
             until_s = self._refused.left_alone(now_s).values()
             free.retry_at_s = min([now_s + self._timing.announce_s, *until_s])
-        return actions
 
-    def _give_up_claim(self) -> list[Action]:
+    def _give_up_claim(self) -> None:
         """Say that the UAV is free, unless it has."""
-        claim = self.claim
-        return [] if claim is None or claim.phase is ClaimPhase.IDLE else [self._say_idle()]
+        if self.claim is not None and self.claim.phase is not ClaimPhase.IDLE:
+            self._say_idle()
 
     # -- pieces ---------------------------------------------------------------------
 
-    def _note(self, text: str, task: str, **fields: object) -> LogLine:
-        """A line about a task this UAV claims, and the choice it came of in this life."""
-        return LogLine(text, {"task": task, **fields, **self._choices.label})
+    def _note(self, text: str, task: str, **fields: object) -> None:
+        """Log a line about a task this UAV claims, and the choice it came of in this life."""
+        self._log(text, task=task, **fields, **self._choices.label)
 
-    def _withdraw(self, phase: ClaimPhase, now_s: float, *, handed_over: bool) -> Action:
+    def _withdraw(self, phase: ClaimPhase, now_s: float, *, handed_over: bool) -> None:
         mission_s = self._mission_view.mission_s(now_s)
         self._become_free(mission_s)
-        return self._announcer.say(Claim(phase, None, mission_s, 0, mission_s, handed_over))
+        self._say(Claim(phase, None, mission_s, 0, mission_s, handed_over))
 
     def _task(self) -> TaskEntry | None:
         claim = self.claim
@@ -411,12 +381,12 @@ class Tasking:
         earlier = self._replica.outcomes.get((self._uav, task))
         return 1 if earlier is None else earlier.attempt + 1
 
-    def _order_to(self, task: TaskEntry, *, idled: bool = False) -> Action:
+    def _order_to(self, task: TaskEntry, *, idled: bool = False) -> None:
         self._leg += 1
         place_enu_m = self._mission_view.in_layer(task.position_enu_m)
         attempt = self._attempt_at(task.task)
-        return OrderVehicle(GoTo(self._leg, place_enu_m, task.service_s, idled, task.task, attempt))
+        self._order(GoTo(self._leg, place_enu_m, task.service_s, idled, task.task, attempt))
 
-    def _say_idle(self) -> Action:
+    def _say_idle(self) -> None:
         since_s = self._free.since_s
-        return self._announcer.say(Claim(ClaimPhase.IDLE, None, since_s, 0, since_s))
+        self._say(Claim(ClaimPhase.IDLE, None, since_s, 0, since_s))

@@ -8,9 +8,8 @@ is flown (agent.vehicle).
 
 from __future__ import annotations
 
-from agent.core.announcer import Announcer
+from agent.core.context import AgentContext, AgentPart
 from agent.core.interface import (
-    Action,
     Arrived,
     AttemptFailed,
     Caution,
@@ -22,7 +21,6 @@ from agent.core.interface import (
     Hold,
     Home,
     NotReady,
-    OrderVehicle,
     Prepare,
     Refused,
     Return,
@@ -33,18 +31,15 @@ from agent.core.interface import (
     VehicleReady,
     VehicleReport,
 )
-from agent.core.mission_view import MissionView
 from agent.core.states import (
     HEADED_HOME,
     PAUSED_BY_OPERATOR,
     TAKES_TARGETS,
     AgentState,
-    AgentStateMachine,
     Trigger,
 )
 from agent.core.stop_conditions import EndCondition
 from agent.core.tasking import Tasking
-from swarm.protocol.events import LogLine
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import UavSpec
 from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD
@@ -57,30 +52,19 @@ _ALOFT = (ClaimPhase.IDLE, ClaimPhase.PROPOSED, ClaimPhase.HELD)
 """A UAV that claims so has its vehicle in the air."""
 
 
-class VehicleCommander:
+class VehicleCommander(AgentPart):
     """Commands one UAV's vehicle, all but its targets.
 
     Args:
-        machine: the agent's state.
-        mission_view: the mission, the vehicle's start and place.
-        announcer: tells readers of the status what is going on.
+        context: the agent.
         tasking: the UAV's tasks, which begin and end with the vehicle.
         ending: when the mission is over.
     """
 
-    def __init__(
-        self,
-        machine: AgentStateMachine,
-        mission_view: MissionView,
-        announcer: Announcer,
-        tasking: Tasking,
-        ending: EndCondition,
-    ) -> None:
+    def __init__(self, context: AgentContext, tasking: Tasking, ending: EndCondition) -> None:
+        super().__init__(context)
         self.exit_status = 0
         """Of the process, when it ends."""
-        self._machine = machine
-        self._mission_view = mission_view
-        self._announcer = announcer
         self._tasking = tasking
         self._ending = ending
         # What the state can't tell of the vehicle, as it stays true from state to state.
@@ -95,20 +79,20 @@ class VehicleCommander:
 
     # -- what it reports ------------------------------------------------------------
 
-    def hear(self, report: VehicleReport, now_s: float) -> list[Action]:
+    def hear(self, report: VehicleReport, now_s: float) -> None:
         """The vehicle says so; what comes late means nothing."""
         match report:
             case VehicleReady():
-                return self._take_targets(now_s)
+                self._take_targets(now_s)
             case NotReady(reason):
                 if self._machine.state not in PAUSED_BY_OPERATOR:  # why it holds is worth more
                     self._announcer.explain(reason)
-                return [LogLine("vehicle not ready", {"reason": reason})]
+                self._log("vehicle not ready", reason=reason)
             case Caution(reason):
                 self._caution = reason
                 if self._machine.state in TAKES_TARGETS:  # else the note says what it waits for
                     self._announcer.explain(reason)
-                return [LogLine("caution", {"reason": reason})]
+                self._log("caution", reason=reason)
             case Arrived(leg):
                 self._tasking.arrive(leg, now_s)
             case AttemptFailed(leg):
@@ -116,49 +100,47 @@ class VehicleCommander:
             case Telemetry():
                 self._mission_view.move(report)
             case Refused(order, reason):
-                return self._give_up_order(order, reason, now_s)
+                self._give_up_order(order, reason, now_s)
             case HandedOver(reason, silent):
-                return self.give_up(reason, now_s, handed_over=not silent)
+                self.give_up(reason, now_s, handed_over=not silent)
             case HandOverExplained(reason):
-                return self._explain(reason, now_s)
+                self._explain(reason, now_s)
             case HeardAgain(reason):
-                return self._turn_home(Trigger.HEARD_AGAIN, reason, None, now_s)
+                self._turn_home(Trigger.HEARD_AGAIN, reason, None, now_s)
             case ReturnBegun():
                 self._flown = True
             case ReturnAdvised(reason):
                 self._flown = True
                 if self._machine.state is not AgentState.OUT:
-                    return self.go_home(reason, now_s, hurry=True)
+                    self.go_home(reason, now_s, hurry=True)
             case Held():
                 if self._machine.state in PAUSED_BY_OPERATOR:
                     self._announcer.explain(self._announcer.note.removeprefix(BEING_STOPPED))
             case Home():
-                return self._land()
-        return []
+                if self._machine.take(Trigger.LANDED):
+                    self._log(self._how_it_ended)
 
-    def _take_targets(self, now_s: float) -> list[Action]:
+    def _take_targets(self, now_s: float) -> None:
         """It is in the air and under command."""
-        if not self._machine.allows(Trigger.VEHICLE_READY):
-            return []
-        self._flown = True
-        self._announcer.explain(self._caution)
-        self._mission_view.take_off()
-        return [*self._tasking.begin(now_s), LogLine("airborne")]
+        if self._machine.allows(Trigger.VEHICLE_READY):
+            self._flown = True
+            self._announcer.explain(self._caution)
+            self._mission_view.take_off()
+            self._tasking.begin(now_s)
+            self._log("airborne")
 
-    def _give_up_order(self, order: VehicleOrder, reason: str, now_s: float) -> list[Action]:
+    def _give_up_order(self, order: VehicleOrder, reason: str, now_s: float) -> None:
         label = self._tasking.label(order.leg) if isinstance(order, GoTo) else {}
-        fields = {"order": str(order), "reason": reason, **label}
-        actions: list[Action] = [LogLine("vehicle refused", fields)]
+        self._log("vehicle refused", order=str(order), reason=reason, **label)
         if isinstance(order, GoTo):
-            actions += self._tasking.refuse(order.leg, reason, now_s)
+            self._tasking.refuse(order.leg, reason, now_s)
         elif isinstance(order, Prepare) and self._flew_before:
             # It may be in the air.
-            actions += self.go_home(reason, now_s, status=1, hurry=True)
+            self.go_home(reason, now_s, status=1, hurry=True)
         elif isinstance(order, Hold) and self._machine.state in PAUSED_BY_OPERATOR:
             self._announcer.explain(f"{CANNOT_HOLD}{reason}")
         elif isinstance(order, Prepare | Return):
-            actions += self.give_up(reason, now_s, handed_over=False)
-        return actions
+            self.give_up(reason, now_s, handed_over=False)
 
     # -- on its way up ----------------------------------------------------------------
 
@@ -167,18 +149,17 @@ class VehicleCommander:
         self._flew_before = claim is not None
         self._left_in_air = claim is not None and claim.phase in _ALOFT and not rejoin
 
-    def stay_out(self, claim: Claim, now_s: float) -> list[Action]:
+    def stay_out(self, claim: Claim, now_s: float) -> None:
         """An earlier life took no more part, as it claimed: neither does this one."""
         if claim.handed_over:
-            return self.give_up("handed over in an earlier life", now_s, handed_over=True)
-        if self._mission_view.said_to_run:
-            return self.go_home("left the mission in an earlier life", now_s)
-        return []
+            self.give_up("handed over in an earlier life", now_s, handed_over=True)
+        elif self._mission_view.said_to_run:
+            self.go_home("left the mission in an earlier life", now_s)
 
-    def prepare(self, me: UavSpec, trigger: Trigger) -> list[Action]:
+    def prepare(self, me: UavSpec, trigger: Trigger) -> None:
         """Get it ready for tasks, or take it in hand where it is."""
         if not self._machine.take(trigger):
-            return []
+            return
         self._announcer.explain("")
         order = Prepare(
             self._mission_view.in_layer(me.position_enu_m),
@@ -187,40 +168,40 @@ class VehicleCommander:
             ground_up_m=me.position_enu_m[2],
             left_in_air=self._left_in_air,
         )
-        return [OrderVehicle(order)]
+        self._order(order)
 
     # -- stopped by the operator --------------------------------------------------------
 
-    def hold(self, reason: str, now_s: float) -> list[Action]:
+    def hold(self, reason: str, now_s: float) -> None:
         """Stop it, or leave it on the ground where nobody has begun to prepare it."""
         if not self._machine.allows(Trigger.HOLD):
-            return []
+            return
         before = self._machine.state
         self._flew_before |= before in TAKES_TARGETS
         untouched = before is AgentState.SYNCING and not self._flew_before
-        actions = [] if before in HEADED_HOME else self._tasking.pause(now_s)
+        if before not in HEADED_HOME:
+            self._tasking.pause(now_s)
         self._machine.take(Trigger.HOLD)
         self._announcer.explain(reason if untouched else f"{BEING_STOPPED}{reason}")
-        return actions if untouched else [*actions, OrderVehicle(Hold(reason))]
+        if not untouched:
+            self._order(Hold(reason))
 
-    def resume(self, reason: str, now_s: float) -> list[Action]:
+    def resume(self, reason: str, now_s: float) -> None:
         """Take part again, as far as there is anything to take part in."""
         me = self._mission_view.me
         if self._machine.allows(Trigger.RESUME) and me is not None:
-            return self.prepare(me, Trigger.RESUME)
-        return self.go_home(reason, now_s)
+            self.prepare(me, Trigger.RESUME)
+        else:
+            self.go_home(reason, now_s)
 
-    def stay_paused(self, now_s: float) -> list[Action]:
+    def stay_paused(self, now_s: float) -> None:
         """The mission has ended; the vehicle stays where the operator wants it."""
-        if not self._machine.take(Trigger.MISSION_OVER):
-            return []
-        return self._take_no_further_part(now_s)
+        if self._machine.take(Trigger.MISSION_OVER):
+            self._take_no_further_part(now_s)
 
     # -- on its way home ----------------------------------------------------------------
 
-    def go_home(
-        self, reason: str, now_s: float, *, status: int = 0, hurry: bool = False
-    ) -> list[Action]:
+    def go_home(self, reason: str, now_s: float, *, status: int = 0, hurry: bool = False) -> None:
         """Bring it home; where there is time, in its own layer as far as its start.
 
         One that is not ours to command any more is not waited for any longer.
@@ -234,32 +215,30 @@ class VehicleCommander:
         if self._machine.state is AgentState.OUT:
             self.exit_status = 0
             self._machine.take(Trigger.DISMISSED)
-            return []
+            return
         me = None if hurry else self._mission_view.me
         via_enu_m = None if me is None else self._mission_view.in_layer(me.position_enu_m)
         trigger = Trigger.RETURN_AT_ONCE if via_enu_m is None else Trigger.RETURN
         if self._machine.allows(trigger):
             self.exit_status = max(self.exit_status, status)
-        return self._turn_home(trigger, reason, via_enu_m, now_s)
+        self._turn_home(trigger, reason, via_enu_m, now_s)
 
     def _turn_home(
         self, trigger: Trigger, reason: str, via_enu_m: Point | None, now_s: float
-    ) -> list[Action]:
+    ) -> None:
         """Order the return, from whatever the vehicle does now."""
         before = self._machine.state
         if not self._machine.take(trigger):
-            return []
-        actions = [] if before in HEADED_HOME else self._take_no_further_part(now_s)
+            return
+        if before not in HEADED_HOME:
+            self._take_no_further_part(now_s)
         self._announcer.explain(reason)
-        order = Return(reason, self._flew_before, via_enu_m)
-        return [*actions, LogLine("returning", {"reason": reason}), OrderVehicle(order)]
+        self._log("returning", reason=reason)
+        self._order(Return(reason, self._flew_before, via_enu_m))
 
-    def _take_no_further_part(self, now_s: float) -> list[Action]:
+    def _take_no_further_part(self, now_s: float) -> None:
         self._ending.settle()
-        return self._tasking.end(now_s, handed_over=False)
-
-    def _land(self) -> list[Action]:
-        return [LogLine(self._how_it_ended)] if self._machine.take(Trigger.LANDED) else []
+        self._tasking.end(now_s, handed_over=False)
 
     @property
     def _how_it_ended(self) -> str:
@@ -270,28 +249,21 @@ class VehicleCommander:
 
     # -- not to be commanded any more ---------------------------------------------------
 
-    def give_up(self, reason: str, now_s: float, *, handed_over: bool) -> list[Action]:
-        """Command it no more.
-
-        Args:
-            reason: why, for the log and the status.
-            now_s: now.
-            handed_over: because somebody else has it.
-        """
+    def give_up(self, reason: str, now_s: float, *, handed_over: bool) -> None:
+        """Command it no more, because somebody else has it or it does not obey."""
         if not self._machine.take(Trigger.HANDED_OVER):
-            return []
+            return
         if self._machine.state is AgentState.LEFT:
             self.exit_status = 1
         self._announcer.explain(reason)
-        given_up = LogLine("vehicle given up", {"reason": reason})
-        return [given_up, *self._tasking.end(now_s, handed_over=handed_over)]
+        self._log("vehicle given up", reason=reason)
+        self._tasking.end(now_s, handed_over=handed_over)
 
-    def _explain(self, reason: str, now_s: float) -> list[Action]:
+    def _explain(self, reason: str, now_s: float) -> None:
         """More is known of the vehicle given up; one that was only silent is another's now."""
         if not self._machine.take(Trigger.EXPLAINED):
-            return []
+            return
         self._announcer.explain(reason)
-        actions: list[Action] = [LogLine("of the vehicle given up", {"reason": reason})]
+        self._log("of the vehicle given up", reason=reason)
         if not self._tasking.is_handed_over:
-            actions += self._tasking.end(now_s, handed_over=True)
-        return actions
+            self._tasking.end(now_s, handed_over=True)

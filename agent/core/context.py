@@ -1,0 +1,64 @@
+"""What the parts of one agent's core share: its state, what it knows, and what it is about to do.
+
+Leaves out: what follows from any of it (agent.core.agent_core and the parts themselves).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from agent.core.announcer import Announcer
+from agent.core.interface import Action, OrderVehicle, VehicleOrder
+from agent.core.mission_view import MissionView, Peers
+from agent.core.states import AgentStateMachine
+from swarm.protocol.events import LogLine
+from swarm.protocol.messages import Body
+from swarm.protocol.registers import Replica
+from swarm.protocol.timing import Timing
+
+__all__ = ["AgentContext", "AgentPart"]
+
+
+@dataclass(frozen=True, slots=True)
+class AgentContext:
+    """One agent, as all its parts see it."""
+
+    uav: str
+    timing: Timing
+    """Timers, in the seconds of ``now_s``."""
+    replica: Replica
+    """The shared registers."""
+    mission_view: MissionView
+    peers: Peers
+    announcer: Announcer
+    machine: AgentStateMachine
+    actions: list[Action] = field(default_factory=list)
+    """What has come of the step so far, in order."""
+
+
+class AgentPart:
+    """A part of an agent's core.
+
+    Args:
+        context: what it shares with the others.
+    """
+
+    def __init__(self, context: AgentContext) -> None:
+        self._uav = context.uav
+        self._timing = context.timing
+        self._replica = context.replica
+        self._mission_view = context.mission_view
+        self._peers = context.peers
+        self._announcer = context.announcer
+        self._machine = context.machine
+        self._actions = context.actions
+
+    def _say(self, body: Body) -> None:
+        """State the new content of an own register, or what is none: status and choice."""
+        self._actions.append(self._announcer.say(body))
+
+    def _log(self, text: str, **fields: object) -> None:
+        self._actions.append(LogLine(text, fields))
+
+    def _order(self, order: VehicleOrder) -> None:
+        self._actions.append(OrderVehicle(order))
