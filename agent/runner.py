@@ -100,10 +100,7 @@ async def seat_or_stop(
 ) -> Bus | None:
     """A seat on the bus, tried for until there is one; None when told to stop first.
 
-    Args:
-        open_bus: tries once, for a bounded time.
-        stop: asks to give up.
-        on_wait: called with the reason whenever a try has failed.
+    Each try takes a bounded time; ``on_wait`` is told why it failed.
     """
     loop = asyncio.get_running_loop()
     trying, stopped = loop.create_task(_seat(open_bus, on_wait)), loop.create_task(stop.wait())
@@ -237,17 +234,7 @@ async def run_agent(
 
 
 class _Flight:
-    """An agent's shell and, once the mission's origin is known, its vehicle.
-
-    Args:
-        core: the agent.
-        bus: open.
-        clock: gives the core's time.
-        mission: mission name.
-        make_vehicle: as for `run_agent`.
-        save: keeps what the core knows for its next life.
-        answer_s: how long a question waits for the slowest answer [wall s].
-    """
+    """An agent's shell and, once the mission's origin is known, its vehicle; see `run_agent`."""
 
     def __init__(
         self,

@@ -28,7 +28,6 @@ class Announcer:
     """States and repeats the registers and status of one UAV's agent.
 
     Args:
-        register_writer: stamps them.
         replica: holds the own registers among all others.
         timing: how often registers and status are repeated.
     """
@@ -110,13 +109,7 @@ class Announcer:
         ]
 
     def repeat(self, status: Callable[[], Status], now_s: float, *, learned: bool) -> list[Publish]:
-        """What is due again by now.
-
-        Args:
-            status: makes the status.
-            now_s: now.
-            learned: whether the own registers are known to be news at all.
-        """
+        """What is due again by now; registers only once they are ``learned`` to be news at all."""
         said: list[Publish] = []
         if learned and (self._announce_at_s is None or self._announce_at_s <= now_s):
             said += self.announce(now_s)

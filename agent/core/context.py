@@ -37,11 +37,7 @@ class AgentContext:
 
 
 class AgentPart:
-    """A part of an agent's core.
-
-    Args:
-        context: what it shares with the others.
-    """
+    """A part of an agent's core."""
 
     def __init__(self, context: AgentContext) -> None:
         self._uav = context.uav

@@ -77,7 +77,7 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: DecisionTurn) -
     Args:
         problem: every UAV and every task on the board.
         board: the registers and what they say about tasks.
-        rule: how UAVs choose in the epoch in force; see `swarm.protocol.board.rule_of`.
+        rule: of the epoch in force; see `swarm.protocol.board.rule_of`.
         turn: who decides, when and where.
     """
     mine = problem.uav_ids.index(turn.uav)
@@ -170,11 +170,7 @@ def _stronger_claims(
 
 
 class RefusedTasks:
-    """Tasks that a UAV's vehicle would not fly to, each left alone for a while.
-
-    Args:
-        pause_s: for how long after the first time [s].
-    """
+    """Tasks that a UAV's vehicle would not fly to, each left alone for a while."""
 
     def __init__(self, pause_s: float) -> None:
         self._pause_s = pause_s
@@ -218,11 +214,7 @@ class RecordingRule:
 
 
 class ChoiceReporter(AgentPart):
-    """Reports the choices of one agent in this life of it.
-
-    Args:
-        context: the agent.
-    """
+    """Reports the choices of one agent in this life of it."""
 
     def __init__(self, context: AgentContext) -> None:
         super().__init__(context)
@@ -245,14 +237,7 @@ class ChoiceReporter(AgentPart):
     ) -> PublishLast:
         """Count a choice that has been made, before it is claimed; what is to be said of it.
 
-        Args:
-            turn: who chose, when and where.
-            problem: every UAV and every task on the board.
-            epoch: in force.
-            recording_rule: by which it chose.
-            decision: what came of it.
-            claim: what the UAV is about to claim.
-            left: the task it turned aside from; None when it was free.
+        ``left`` is the task that the UAV turned aside from; None when it was free.
         """
         self._number += 1
         head, before = self._replica.heads.get(self._uav), self._announcer.claimed
@@ -284,10 +269,7 @@ class ChoiceReporter(AgentPart):
     def _basis(self, turn: DecisionTurn, head: Stamp | None, before: Message | None) -> ChoiceBasis:
         """What the choice rested on; of all registers only the own claim has changed since.
 
-        Args:
-            turn: who chose, when and where.
-            head: of the own statements when it chose.
-            before: the own claim register then.
+        ``head``, of the own statements, and ``before``, the own claim, are as it chose.
         """
         heads = {**self._replica.heads, self._uav: head}
         claims = [message for message in (before, self._announcer.claimed) if message is not None]

@@ -23,7 +23,6 @@ class RecoveredState:
     """The memory of an earlier life of the agent of ``uav``, until it is taken or dropped.
 
     Args:
-        uav: id of the UAV.
         memory: every register it knew, and the mission time of now as far as it knew; None
             if there was no earlier life.
         age_s: how long ago that was kept.
@@ -58,10 +57,8 @@ class RecoveredState:
     ) -> Snapshot | None:
         """The memory, once it is known to count; given once.
 
-        Args:
-            brief: what others have told; None as long as nobody has.
-            now_s: now.
-            last_chance: the agent is about to end.
+        The others' word on it is their ``brief``, None as long as nobody has told one; it is not
+        waited for at the ``last_chance``, when the agent is about to end.
         """
         if self._memory is None:
             return None
@@ -87,8 +84,6 @@ class SaveCondition:
     """When what the agent of ``uav`` knows is to be kept anew for a later life.
 
     Args:
-        uav: id of the UAV.
-        replica: the shared registers.
         timing: how old a memory is trusted.
     """
 
@@ -106,10 +101,6 @@ class SaveCondition:
 
         What others have done follows with its next announcement, and so does all when what is
         kept is about to grow old: each time is a write to a memory that wears out.
-
-        Args:
-            actions: what came of this step.
-            now_s: now.
         """
         replica = self._replica
         plan = None if replica.epoch is None else (replica.epoch.number, replica.epoch.phase)

@@ -42,13 +42,7 @@ class MissionChange(Enum):
 
 
 class MissionView:
-    """The mission in the eyes of the agent of ``uav``.
-
-    Args:
-        mission: mission name.
-        uav: id of the UAV.
-        replica: the shared registers.
-    """
+    """The mission in the eyes of the agent of ``uav``."""
 
     def __init__(self, mission: str, uav: str, replica: Replica) -> None:
         self.board = TaskBoard(replica, mission)

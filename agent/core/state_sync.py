@@ -34,7 +34,6 @@ class StateSync(AgentPart):
     """What one agent takes from the bus.
 
     Args:
-        context: the agent.
         tasking: hears of it when a task may have opened.
     """
 
@@ -272,11 +271,7 @@ class StateQueries:
         self._asking.want(now_s)
 
     def take(self, *, enough: bool) -> None:
-        """Answers have come.
-
-        Args:
-            enough: whether they are up to date whenever they were asked for.
-        """
+        """Answers have come; ``enough`` if they are up to date whenever they were asked for."""
         self.ever = True
         self.current |= enough or self._open > self._outdated == 0
         self._open, self._outdated = max(0, self._open - 1), max(0, self._outdated - 1)
@@ -284,10 +279,7 @@ class StateQueries:
     def questions(self, now_s: float, *, lacking: bool) -> list[Ask]:
         """The question that is due, if any.
 
-        Args:
-            now_s: now.
-            lacking: whether something is missing that only others can tell; like a doubt,
-                that is asked again and again.
+        Like a doubt, what is ``lacking`` and only others can tell is asked for again and again.
         """
         if self.current and not lacking:
             self._again_at_s = None

@@ -23,11 +23,7 @@ __all__ = ["BusLossTimer", "EndCondition", "OperatorCommands"]
 
 
 class EndCondition(AgentPart):
-    """The end of the mission, as one agent finds it has come.
-
-    Args:
-        context: the agent.
-    """
+    """The end of the mission, as one agent finds it has come."""
 
     def __init__(self, context: AgentContext) -> None:
         super().__init__(context)
@@ -135,8 +131,6 @@ class OperatorCommands:
     """What the operator told the agent of ``uav``.
 
     Args:
-        uav: id of the UAV.
-        replica: the shared registers.
         rejoin: the UAV takes part again, though an earlier life may have been sent home.
     """
 
@@ -151,9 +145,7 @@ class OperatorCommands:
     def news(self, *, begins: bool) -> OperatorCommand | None:
         """The newest command, if it has not been given before; an older one means nothing then.
 
-        Args:
-            begins: whether this life of the agent is yet to act; what it finds then was said to
-                an earlier one.
+        What a life finds as it ``begins``, before it has acted, was said to an earlier one.
         """
         found = newest_command(self._replica, self._uav)
         known, self._known = self._known, list(in_force(self._replica).values())

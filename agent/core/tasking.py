@@ -44,7 +44,6 @@ class Tasking(AgentPart):
     """What one UAV does about tasks, and its claim.
 
     Args:
-        context: the agent.
         make_rule: what a UAV decides by in an epoch of that rule and those routes.
     """
 
@@ -172,9 +171,7 @@ class Tasking(AgentPart):
     def advance(self, now_s: float, *, informed: bool) -> None:
         """What follows from the registers and the time, in a running mission.
 
-        Args:
-            now_s: now.
-            informed: whether the registers are up to date, so that a decision may rest on them.
+        A decision may rest on the registers only while this UAV is ``informed``.
         """
         self._serve(now_s)
         self._keep_or_lose_claim(now_s)

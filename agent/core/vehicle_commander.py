@@ -56,7 +56,6 @@ class VehicleCommander(AgentPart):
     """Commands one UAV's vehicle, all but its targets.
 
     Args:
-        context: the agent.
         tasking: the UAV's tasks, which begin and end with the vehicle.
         ending: when the mission is over.
     """
@@ -204,13 +203,8 @@ class VehicleCommander(AgentPart):
     def go_home(self, reason: str, now_s: float, *, status: int = 0, hurry: bool = False) -> None:
         """Bring it home; where there is time, in its own layer as far as its start.
 
-        One that is not ours to command any more is not waited for any longer.
-
-        Args:
-            reason: why, for the log and the status.
-            now_s: now.
-            status: exit status of the process, when the vehicle is home.
-            hurry: return from where it is.
+        One that is not ours to command any more is not waited for any longer. ``status`` is the
+        process's exit status when the vehicle is home; in a ``hurry`` it returns from where it is.
         """
         if self._machine.state is AgentState.OUT:
             self.exit_status = 0

@@ -53,8 +53,7 @@ class MavlinkVehicle:
         on_report: hears every report, in order, in the loop's thread. It may give
             orders from inside the call.
         key: shared with the autopilot: everything is signed, nothing unsigned believed.
-        forward: URLs of ground stations that are shown the vehicle; see
-            `agent.links.mavlink_vehicle`.
+        forward: URLs of ground stations that are shown the vehicle.
 
     Raises:
         InputError: a URL is wrong, or this machine cannot open such a link.
@@ -217,11 +216,7 @@ class MavlinkVehicle:
 
 
 class FrameForwarder:
-    """Ground stations that watch one vehicle. Close it in ``finally``.
-
-    Args:
-        addresses: where they listen.
-    """
+    """Ground stations that watch one vehicle. Close it in ``finally``."""
 
     def __init__(self, addresses: Iterable[UdpOutAddress]) -> None:
         self._links = [open_link(address, _Deaf()) for address in addresses]

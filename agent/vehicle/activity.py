@@ -30,11 +30,7 @@ class FlightPhase(Enum):
 
 
 class Activity:
-    """What one vehicle is being made to do, and what holds as long as it is.
-
-    Args:
-        session: with the vehicle.
-    """
+    """What one vehicle is being made to do, and what holds as long as it is."""
 
     phase: ClassVar[FlightPhase]
     polls: ClassVar[bool] = False

@@ -252,8 +252,6 @@ class RepeatedCommand:
 
     Args:
         tag: its commands'.
-        commands: carries them.
-        tries: how often.
         effect_timeout_s: wait for the effect of an accepted command to be seen.
         retry_delay_s: pause after any other outcome.
     """

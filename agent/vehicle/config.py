@@ -248,11 +248,11 @@ LinkAddress = TcpAddress | UdpOutAddress | UdpInAddress | SerialAddress
 
 
 def parse_link(url: str, source: str = "--mavlink") -> LinkAddress:
-    """The address that ``url`` names.
+    """The address that ``url`` names; see `agent.links.link`.
 
     Args:
-        url: see the module `agent.links.link`.
-        source: where the URL came from, for the message.
+        url: the URL.
+        source: where it came from, for the message.
 
     Raises:
         InputError: the URL is none of the four kinds.

@@ -59,14 +59,7 @@ class Contact:
         silent: bool,
         distrusted: Iterable[str] = (),
     ) -> str | None:
-        """Why there is no vehicle to command yet, in words; None if there is one.
-
-        Args:
-            heartbeat: its last one.
-            firmware: what flies it.
-            silent: whether the last heartbeat is too old.
-            distrusted: why frames were not believed.
-        """
+        """Why there is no vehicle to command yet, in words; None if there is one."""
         if heartbeat is None or silent:
             if not self.link_up:
                 return "no link to the autopilot"
@@ -188,10 +181,6 @@ class StreamRequests:
             request = CommandLong(_CMD_SET_MESSAGE_INTERVAL, params)
             out += commands.send(_tag(stream), request, now_s)
         return out
-
-    def next_deadline_s(self) -> float:
-        """When the next request may be due."""
-        return min(stream.ask_at_s for stream in self._streams.values())
 
     def _patience_s(self, stream: _Stream) -> float:
         return max(self._config.stream_timeout_s, 3.0 * stream.interval_s)

@@ -45,7 +45,6 @@ class HandOver(Activity):
     """The vehicle is somebody else's, until it is prepared anew or called home.
 
     Args:
-        session: with the vehicle.
         explanation: of a reason that may not have been said in full.
         loss: of a vehicle that fell silent, as long as it may be ours.
     """

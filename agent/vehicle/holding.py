@@ -33,9 +33,6 @@ class Holding(Activity):
     """Stops the vehicle: carries out one `Hold`.
 
     Args:
-        session: with the vehicle.
-        firmware: what flies it.
-        order: the order.
         leaves: whether a mode is one that the vehicle flies on our orders, and may be
             taken out of.
         motors_asked: the vehicle may be about to arm.
@@ -163,15 +160,7 @@ class Holding(Activity):
 def modes_to_leave(
     firmware: Firmware, mode: int, *, took_off: bool, on_missions: bool, returning: bool
 ) -> Callable[[int], bool]:
-    """Which modes the vehicle may be taken out of: those that our orders led to.
-
-    Args:
-        firmware: what flies it.
-        mode: the one it is in.
-        took_off: it was told to take off.
-        on_missions: it may fly a mission of ours.
-        returning: it was told to return.
-    """
+    """Which modes the vehicle may be taken out of: its ``mode``, and those our orders led to."""
 
     def leaves(custom_mode: int) -> bool:
         return (

@@ -86,7 +86,6 @@ class _Leg(ABC):
     """A target in force, or on its way to be.
 
     Args:
-        session: with the vehicle.
         target_enu_m: where to stop [m; mission origin].
     """
 
@@ -142,8 +141,6 @@ class RepositionLeg(_Leg):
     """A target told by one command, and told again if the vehicle stands still elsewhere.
 
     Args:
-        session: with the vehicle.
-        firmware: what flies it.
         target_enu_m: where to stop [m; mission origin].
         speed_m_s: cruise ground speed.
         insists: the target is told again if the vehicle stands still elsewhere. If not, one
@@ -241,13 +238,7 @@ class _MissionLeg(_Leg):
 
 
 class Flying(Activity):
-    """Flies to a target: carries out one `GoTo`.
-
-    Args:
-        session: with the vehicle.
-        firmware: what flies it.
-        order: the order.
-    """
+    """Flies to a target: carries out one `GoTo`."""
 
     phase = FlightPhase.FLYING
 

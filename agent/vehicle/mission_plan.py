@@ -189,10 +189,7 @@ class MissionStart:
     """Starts one verified mission, once.
 
     Args:
-        config: patience.
         commands: carries the mode.
-        firmware: what flies it.
-        plan: the mission.
         now_s: when the mission was verified.
         again: begin the mission anew even if its target is what the vehicle flies to.
     """
@@ -260,13 +257,7 @@ class MissionStart:
             self._next_mode_s = now_s + self._config.retry_delay_s
 
     def advance(self, heartbeat: Heartbeat, heard_at_s: float, now_s: float) -> list[Outbound]:
-        """Do what is still missing.
-
-        Args:
-            heartbeat: the last one.
-            heard_at_s: when it was heard: an older one than the mission proves nothing.
-            now_s: now.
-        """
+        """Do what is still missing; a heartbeat older than the mission proves nothing."""
         if self.done or self.failure is not None:
             return []
         seqs = self._seqs

@@ -337,10 +337,8 @@ class OnboardMission:
     def _give_up(self, reason: str, now_s: float, *, astray: bool) -> None:
         """The wanted mission is not flown: go on with the one that stands, if it may.
 
-        Args:
-            reason: why.
-            now_s: now.
-            astray: what the vehicle flies in the mission mode is not known.
+        It may not while the vehicle flies one in the mission mode of which nothing is known, as
+        one ``astray`` does.
         """
         failed_to_start = self._start is not None
         self._start = None

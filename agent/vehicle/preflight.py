@@ -50,7 +50,6 @@ class FailsafeReading:
     """The parameters of one vehicle that say what it does without its agent.
 
     Args:
-        firmware: what flies it.
         own_system_id: the agent's, to which the vehicle should listen.
         may_be_simulated: whether it matters that it is.
     """
@@ -106,12 +105,7 @@ class FailsafeReading:
 
 
 class FailsafeCheck:
-    """Reads one vehicle's failsafes while it stands on the ground.
-
-    Args:
-        firmware: what flies it.
-        session: with the vehicle.
-    """
+    """Reads one vehicle's failsafes while it stands on the ground."""
 
     def __init__(self, firmware: Firmware, session: VehicleSession) -> None:
         self._session = session

@@ -60,8 +60,6 @@ class Preparation:
 
     Args:
         session: with the vehicle; its mission may stand there since an earlier life.
-        firmware: what flies it.
-        order: the order.
         ours: the vehicle flies, or may fly, on our orders already.
     """
 

@@ -20,8 +20,6 @@ class Preparing(Activity):
     """Prepares the vehicle for flight, once there is one to command.
 
     Args:
-        session: with the vehicle.
-        order: the order.
         ours: the vehicle flew, or was about to fly, on our orders.
     """
 

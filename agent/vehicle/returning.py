@@ -29,9 +29,6 @@ class Returning(Activity):
     """Brings the vehicle home: carries out one `Return`.
 
     Args:
-        session: with the vehicle.
-        firmware: what flies it.
-        order: the order.
         return_via: flies it to a place first; None if it returns from where it is.
     """
 
@@ -154,8 +151,6 @@ class ReturnVia:
     """Flies to one place on the way home.
 
     Args:
-        session: with the vehicle.
-        firmware: what flies it.
         via_enu_m: where to [m; mission origin].
         place_enu_m: where the vehicle is.
     """

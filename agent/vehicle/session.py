@@ -80,11 +80,7 @@ _PLACES = 2
 
 
 class VehicleSession:
-    """One vehicle, as far as it is heard; and what was made of it in the step under way.
-
-    Args:
-        config: its settings.
-    """
+    """One vehicle, as far as it is heard; and what was made of it in the step under way."""
 
     def __init__(self, config: BridgeConfig, signing: Signing | None = None) -> None:
         self.config = config

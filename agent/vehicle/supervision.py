@@ -48,13 +48,7 @@ def intervention(
 ) -> str | None:
     """Why the vehicle is no longer ours to command; None while it is.
 
-    Args:
-        vehicle: what else it said.
-        heartbeat: the newest one.
-        firmware: what flies it.
-        now_s: now.
-        expected: whether the mode is one that our orders lead to.
-        may_disarm: whether our orders may lead to stopped motors.
+    Our orders lead to an ``expected`` mode, and perhaps to stopped motors (``may_disarm``).
     """
     warning = vehicle.telling_warning(now_s)
     said = f" ({warning})" if warning else ""
@@ -79,7 +73,6 @@ class PilotConsent:
     """What a pilot lets us do.
 
     Args:
-        firmware: what flies it.
         ours: the vehicle flies, or may fly, on our orders already.
     """
 
@@ -138,11 +131,7 @@ _HEARTBEATS_WITHOUT_POSITION = 3
 
 
 class SafetyMonitor:
-    """Monitors one vehicle in flight and before it.
-
-    Args:
-        config: reserve, fence and patience.
-    """
+    """Monitors one vehicle in flight and before it."""
 
     def __init__(self, config: BridgeConfig) -> None:
         self._config = config
@@ -173,13 +162,7 @@ class SafetyMonitor:
     def on_position(
         self, place_enu_m: tuple[float, float, float], fault: str | None, now_s: float
     ) -> None:
-        """Take a fresh position.
-
-        Args:
-            place_enu_m: [m; mission origin].
-            fault: why the autopilot itself does not trust it; None if it does.
-            now_s: now.
-        """
+        """Take a fresh position; ``fault`` is why the autopilot itself does not trust it."""
         self._position_fault = fault
         if fault is None:
             self._position_at_s, self._heartbeats = now_s, 0
@@ -291,13 +274,7 @@ class CruiseWatch:
     def judge(
         self, velocity_enu_m_s: tuple[float, float, float], told_m_s: float, now_s: float
     ) -> str | None:
-        """Take a velocity on the way to a target; what to tell people, or None.
-
-        Args:
-            velocity_enu_m_s: over ground [m/s].
-            told_m_s: cruise speed that was asked for [m/s].
-            now_s: now.
-        """
+        """Take a velocity on the way to a target; what to tell people, or None."""
         east_m_s, north_m_s, up_m_s = velocity_enu_m_s
         speed_m_s = math.hypot(east_m_s, north_m_s)
         cruising = speed_m_s >= _LEAST_FRAC * told_m_s and abs(up_m_s) <= _STEEPEST * speed_m_s

@@ -66,7 +66,6 @@ class Searching(Activity):
     """Finds out what there is to know before an order can be carried out.
 
     Args:
-        session: with the vehicle.
         order: to be carried out then.
     """
 

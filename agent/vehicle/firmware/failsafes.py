@@ -55,12 +55,7 @@ class Failsafes:
 
 
 def arducopter_failsafes(values: Mapping[str, float], own_system_id: int) -> Failsafes:
-    """The failsafes of an ArduCopter.
-
-    Args:
-        values: of its parameters, as far as they are known.
-        own_system_id: of the agent.
-    """
+    """The failsafes of an ArduCopter whose parameters have these values, as far as known."""
     battery = _battery("BATT_FS_LOW_ACT", values)
     action = values.get("FS_GCS_ENABLE")
     if not action:
