@@ -187,7 +187,7 @@ class AgentCore(AgentPart):
         return self._snapshot_of(self.replica.messages(), now_s)
 
     def _snapshot_of(self, messages: Iterable[Message], now_s: float) -> Snapshot:
-        mission_s = self._mission_view.known_mission_s(now_s)
+        mission_s = self._mission_view.clock.mission_s(now_s)
         incarnation = self._announcer.incarnation
         return Snapshot(self._mission, self.uav, incarnation, mission_s, tuple(messages))
 
@@ -371,7 +371,7 @@ class AgentCore(AgentPart):
             position_enu_m=self._mission_view.place_enu_m,
             velocity_enu_m_s=None if telemetry is None else telemetry.velocity_enu_m_s,
             battery_frac=None if telemetry is None else telemetry.battery_frac,
-            mission_s=self._mission_view.known_mission_s(now_s),
+            mission_s=self._mission_view.clock.mission_s(now_s),
             dropped=dict((+dropped).most_common(MOST_REASONS)),
             note=self._announcer.note,
         )

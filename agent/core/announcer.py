@@ -1,7 +1,4 @@
-"""What one agent says: its registers and status, when first and when again.
-
-Leaves out: what there is to say (agent.core.agent_core) and keys and bytes (swarm.protocol).
-"""
+"""What one agent says: its registers and status, when first and when again."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What the parts of one agent's core share: its state, what it knows, and what it is about to do.
-
-Leaves out: what follows from any of it (agent.core.agent_core and the parts themselves).
-"""
+"""What the parts of one agent's core share: state, knowledge, and what they are about to do."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
 """What goes into the agent's core and what comes out of it.
 
-Its shell tells it of the bus and of the vehicle, and carries out what it wants: statements on
-the bus, and orders to the vehicle. The MAVLink bridge (agent.vehicle) and the simulator's
-virtual vehicle both speak this; the core knows nothing else of flying. Leaves out: how any of
-it is done.
+Its shell tells it of the bus and of the vehicle, and carries out what it wants: statements on the
+bus, and orders to the vehicle. The MAVLink bridge (agent.vehicle) and the simulator's virtual
+vehicle both speak this; the core knows nothing else of flying.
 """
 
 from __future__ import annotations

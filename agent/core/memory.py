@@ -1,7 +1,7 @@
 """What one life of an agent leaves to the next: what counts of it, and when it is worth keeping.
 
 What an earlier life kept counts when the others speak of the same flight, or when nobody knows of
-any. Leaves out: what follows from it (agent.core.agent_core) and where it is kept (swarm.runtime).
+any.
 """
 
 from __future__ import annotations

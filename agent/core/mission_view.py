@@ -1,8 +1,7 @@
 """The mission and the other agents, as one agent sees them.
 
 Its UAV's entry and place, the mission clock, what is open; whose claims count, and who may yet
-decide first. Leaves out: what follows from a change (agent.core.agent_core,
-agent.core.tasking).
+decide first.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ class MissionView:
         self._place_enu_m: Point | None = None
         self._uav = uav
         self._replica = replica
-        self._clock = MissionClock()
+        self.clock = MissionClock()
         self._brief: MissionConfig | None = None
         self._me: UavSpec | None = None
         """The UAV's entry in that brief."""
@@ -68,7 +67,7 @@ class MissionView:
         entry = board.get(body.task) if isinstance(body, TaskEntry | TaskEdit) else None
         if not self._replica.join(message):
             return None
-        self._clock.heed(body, brief, epoch)
+        self.clock.heed(body, brief, epoch)
         match body:
             case TaskEntry(task=task) | TaskEdit(task=task) if entry is None and task in board:
                 return MissionChange.APPEARANCE
@@ -98,7 +97,7 @@ class MissionView:
         """Whether the mission has begun, at a known time, and has not ended."""
         epoch = self._replica.epoch
         over = epoch is None or epoch.phase is MissionPhase.ENDED
-        return self._clock.is_set and not over
+        return self.clock.is_set and not over
 
     @property
     def said_to_run(self) -> bool:
@@ -108,28 +107,9 @@ class MissionView:
 
     # -- the mission clock ------------------------------------------------------------
 
-    def hear_time(self, mission_s: float, now_s: float) -> float | None:
-        """Somebody says that it is ``mission_s``; see `MissionClock`.
-
-        Returns:
-            By how much the clock was put forward [s], negative if back; None if that set it.
-        """
-        known = self._clock.is_set
-        change_s = self._clock.hear(mission_s, now_s)
-        return change_s if known else None
-
-    @property
-    def knows_time(self) -> bool:
-        """Whether mission time is known."""
-        return self._clock.is_set
-
-    def known_mission_s(self, now_s: float) -> float | None:
-        """Mission time [s]; None while it is not known."""
-        return self._clock.mission_s(now_s)
-
     def mission_s(self, now_s: float) -> float:
         """Mission time [s]; 0 as long as the mission is not known to have begun."""
-        return self._clock.mission_s(now_s) or 0.0
+        return self.clock.mission_s(now_s) or 0.0
 
     # -- the UAV ----------------------------------------------------------------------
 

@@ -1,9 +1,8 @@
 """Keep what one agent knows in step with the others: what it hears, and when it asks.
 
 Its knowledge is old at the start, when its link is back and after it was itself held up. Until
-everyone has been asked since, and has had the time to answer, it goes on with the task it has
-and decides nothing new. Leaves out: what follows for the vehicle (agent.core.vehicle_commander)
-and for tasks (agent.core.tasking), and what an earlier life knew (agent.core.memory).
+everyone has been asked since, and has had the time to answer, it goes on with the task it has and
+decides nothing new.
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ class StateSync(AgentPart):
         known = self._replica.epoch_stamp
         self._take_in(message, now_s)
         # What was said before tells what time it is only to whom nothing else does.
-        is_word = self._replica.epoch_stamp != known or not self._mission_view.knows_time
+        is_word = self._replica.epoch_stamp != known or not self._mission_view.clock.is_set
         if is_word and isinstance(body, PlanEpoch) and body.phase is MissionPhase.RUNNING:
             self._set_clock(body.mission_s, now_s)
 
@@ -170,8 +169,9 @@ class StateSync(AgentPart):
 
     def _set_clock(self, mission_s: float, now_s: float) -> None:
         """The coordinator has just said that it is ``mission_s``."""
-        change_s = self._mission_view.hear_time(mission_s, now_s)
-        if change_s is None:
+        clock = self._mission_view.clock
+        was_set, change_s = clock.is_set, clock.hear(mission_s, now_s)
+        if not was_set:
             self._awake(now_s)
             self._log("mission runs", mission_s=mission_s)
         elif abs(change_s) >= _WORTH_TELLING_S:
@@ -186,9 +186,9 @@ class StateSync(AgentPart):
         if not known_s or self._replica.epoch is None:
             return
         if (mission_s := known_s.get(COORDINATOR)) is not None:
-            self._mission_view.hear_time(mission_s, now_s)
-        elif not self._mission_view.knows_time:
-            self._mission_view.hear_time(median_high(known_s.values()), now_s)
+            self._mission_view.clock.hear(mission_s, now_s)
+        elif not self._mission_view.clock.is_set:
+            self._mission_view.clock.hear(median_high(known_s.values()), now_s)
 
     # -- who is there -----------------------------------------------------------------
 

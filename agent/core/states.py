@@ -1,10 +1,9 @@
 """The states of an agent and the transitions between them: everything about them is in this file.
 
-An agent is in exactly one `AgentState`. It leaves it by a `Trigger` that `TRANSITIONS` has an
-entry for, and by nothing else. What comes from outside may come at any time, so where the table
-has no entry for it nothing follows; a decision of its own that has none is a bug, and dropped and
-told (see `AgentStateMachine`). Leaves out: when a trigger comes (agent.core.agent_core, for tasks
-agent.core.tasking) and what is done upon it (agent.core.vehicle_commander, agent.core.tasking).
+An agent is in exactly one `AgentState`. It leaves it by a `Trigger` that `TRANSITIONS` has an entry
+for, and by nothing else. What comes from outside may come at any time, so where the table has no
+entry for it nothing follows; a decision of its own that has none is a bug, and dropped and told
+(see `AgentStateMachine`).
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """What takes a UAV away from its tasks: the operator, the mission's end, a lost bus.
 
-Each of the operator's commands is obeyed once. An agent that the coordinator left flies on
-while there is anything to do, then goes home by itself. Of the bus only the own link counts.
-Leaves out: what follows (agent.core.agent_core).
+Each of the operator's commands is obeyed once. An agent that the coordinator left flies on while
+there is anything to do, then goes home by itself. Of the bus only the own link counts.
 """
 
 from __future__ import annotations

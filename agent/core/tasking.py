@@ -3,8 +3,7 @@
 Decides whenever the UAV is free, claims and flies at once, turns to something better that opens on
 the way, gives way to stronger claims and waits idle while there is nothing for it. A claim's way:
 `Tasking.advance`, which `AgentCore.step` calls, decides (`decide`), claims (`Announcer.say`) and
-orders the vehicle to the task (`GoTo`), all in one step. Leaves out: which task is best
-(agent.core.decision), getting airborne and going home (agent.core.vehicle_commander).
+orders the vehicle to the task (`GoTo`), all in one step.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """One UAV's vehicle in the hands of its agent: prepared, stopped, brought home, or given up.
 
 Says what follows for the vehicle and for the agent's state from each of the vehicle's reports and
-from each reason to stop or to go home. Leaves out: whence those reasons come
-(agent.core.agent_core), targets and what becomes of them (agent.core.tasking), and how any of it
-is flown (agent.vehicle).
+from each reason to stop or to go home.
 """
 
 from __future__ import annotations

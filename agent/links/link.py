@@ -18,7 +18,7 @@ import asyncio
 import contextlib
 import socket
 import struct
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Protocol, cast
 
@@ -181,7 +181,7 @@ class ByteLink:
         raise NotImplementedError
 
 
-class _TcpLink(ByteLink):
+class _TcpLink(ByteLink, asyncio.Protocol):
     """A TCP client."""
 
     def __init__(self, address: TcpAddress, listener: LinkListener, silence_s: float) -> None:
@@ -195,9 +195,7 @@ class _TcpLink(ByteLink):
     async def _open(self) -> None:
         loop = asyncio.get_running_loop()
         self._transport, _ = await loop.create_connection(
-            lambda: _StreamProtocol(self._on_data, self._on_lost),
-            self._address.host,
-            self._address.port,
+            lambda: self, self._address.host, self._address.port
         )
         connection: socket.socket = self._transport.get_extra_info("socket")
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _DISCARD_AT_CLOSE)
@@ -207,9 +205,12 @@ class _TcpLink(ByteLink):
         self._heard_s = loop.time()
         self._look_again_at(self._heard_s + self._silence_s)
 
-    def _on_data(self, data: bytes) -> None:
+    def data_received(self, data: bytes) -> None:
         self._heard_s = asyncio.get_running_loop().time()
         self._listener.received(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._on_lost(exc)
 
     def _look_again_at(self, when_s: float) -> None:
         self._watch = asyncio.get_running_loop().call_at(when_s, self._look)
@@ -264,24 +265,8 @@ def _unacknowledged(connection: socket.socket) -> bool:
     return any(answer)
 
 
-class _StreamProtocol(asyncio.Protocol):
-    """Hands the bytes of a TCP connection on."""
-
-    def __init__(
-        self, received: Callable[[bytes], None], lost: Callable[[Exception | None], None]
-    ) -> None:
-        self._received = received
-        self._lost = lost
-
-    def data_received(self, data: bytes) -> None:
-        self._received(data)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._lost(exc)
-
-
-class _UdpLink(ByteLink):
-    """A UDP socket that speaks to one peer."""
+class _UdpLink(ByteLink, asyncio.DatagramProtocol):
+    """A UDP socket that speaks to one peer; "port unreachable" closes nothing."""
 
     def __init__(self, address: UdpInAddress | UdpOutAddress, listener: LinkListener) -> None:
         super().__init__(str(address), listener)
@@ -293,16 +278,14 @@ class _UdpLink(ByteLink):
     async def _open(self) -> None:
         loop = asyncio.get_running_loop()
         place = (self._address.host, self._address.port)
+        local = isinstance(self._address, UdpInAddress)
         self._peer = None
         self._full = False
-
-        def protocol() -> _DatagramProtocol:
-            return _DatagramProtocol(self)
-
-        if isinstance(self._address, UdpInAddress):
-            self._transport, _ = await loop.create_datagram_endpoint(protocol, local_addr=place)
-        else:
-            self._transport, _ = await loop.create_datagram_endpoint(protocol, remote_addr=place)
+        self._transport, _ = await loop.create_datagram_endpoint(
+            lambda: self,
+            local_addr=place if local else None,
+            remote_addr=None if local else place,
+        )
         # Full with the first datagram that has to wait, so that none grows old. Typeshed puts
         # what all transports of asyncio have in those of streams alone.
         self._transport.set_write_buffer_limits(high=0)  # type: ignore[attr-defined]
@@ -311,24 +294,27 @@ class _UdpLink(ByteLink):
         """Send there from now on; nowhere if None."""
         self._peer = source
 
-    def on_datagram(self, data: bytes, sender: _Peer) -> None:
+    def datagram_received(self, data: bytes, addr: _Peer) -> None:
         if isinstance(self._address, UdpInAddress):
-            self._listener.received(data, sender)
+            self._listener.received(data, addr)
         else:
             self._listener.received(data)
 
-    def on_refused(self, error: Exception) -> None:
+    def error_received(self, exc: Exception) -> None:
         """The network did not take an earlier datagram; the peer may start later."""
         self.counts.unsent += 1
-        self._log.debug("datagram refused", error=str(error))
+        self._log.debug("datagram refused", error=str(exc))
 
-    def on_full(self, full: bool) -> None:
-        """The system takes no more datagrams for now, or takes them again."""
-        self._full = full
+    def pause_writing(self) -> None:
+        """The system takes no more datagrams for now."""
+        self._full = True
 
-    def on_lost(self, error: Exception | None) -> None:
-        """The socket is closed."""
-        self._on_lost(error)
+    def resume_writing(self) -> None:
+        """It takes them again."""
+        self._full = False
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._on_lost(exc)
 
     def _write(self, data: bytes) -> bool:
         transport = self._transport
@@ -349,28 +335,6 @@ class _UdpLink(ByteLink):
         if self._transport is not None:
             self._transport.abort()
             self._transport = None
-
-
-class _DatagramProtocol(asyncio.DatagramProtocol):
-    """Tells a link what its socket says; "port unreachable" closes nothing."""
-
-    def __init__(self, link: _UdpLink) -> None:
-        self._link = link
-
-    def datagram_received(self, data: bytes, addr: _Peer) -> None:
-        self._link.on_datagram(data, addr)
-
-    def error_received(self, exc: Exception) -> None:
-        self._link.on_refused(exc)
-
-    def pause_writing(self) -> None:
-        self._link.on_full(True)
-
-    def resume_writing(self) -> None:
-        self._link.on_full(False)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._link.on_lost(exc)
 
 
 def open_link(

@@ -1,9 +1,9 @@
 """The bridge with a link and a clock: the only place of it where time passes.
 
-Everything happens in the loop's thread and without waiting: an order is on its way to the
-autopilot before `order` returns. Ground stations may be shown the vehicle, one way only: its
-frames as they came, one datagram each. Two who command one vehicle undo each other's orders, so
-what they say is not read. Leaves out: every decision (agent.vehicle.bridge).
+Everything happens in the loop's thread and without waiting: an order is on its way to the autopilot
+before `order` returns. Ground stations may be shown the vehicle, one way only: its frames as they
+came, one datagram each. Two who command one vehicle undo each other's orders, so what they say is
+not read.
 """
 
 from __future__ import annotations

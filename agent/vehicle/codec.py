@@ -1,7 +1,6 @@
 """Bytes <-> messages; the one place where MAVLink's wire units change into SI.
 
-Leaves out: what a message means for the vehicle (agent.vehicle.bridge). Of pymavlink
-only the generated dialect is used, which does no I/O and keeps no globals.
+Of pymavlink only the generated dialect is used, which does no I/O and keeps no globals.
 
 Wire units: https://mavlink.io/en/messages/common.html
 """

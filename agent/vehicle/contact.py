@@ -1,12 +1,11 @@
 """Who is heard on a link: the configured vehicle, others, or nobody.
 
-A link to which anybody can send belongs to the one who speaks for the vehicle: proof is a frame
-of it, or with a signing key one that was believed for its signature. While that peer gives
-proof, what others send is dropped. The link moves at once to whoever proves it by a signature,
-as only the vehicle can; without a key only after the peer has given no proof for a while, since
-who is first to forge the vehicle's frames is not told from it. The messages that the bridge
-lives on are asked for, and again if one stops. Leaves out: what the vehicle says
-(agent.vehicle.state), and sockets (agent.links.link).
+A link to which anybody can send belongs to the one who speaks for the vehicle: proof is a frame of
+it, or with a signing key one that was believed for its signature. While that peer gives proof, what
+others send is dropped. The link moves at once to whoever proves it by a signature, as only the
+vehicle can; without a key only after the peer has given no proof for a while, since who is first to
+forge the vehicle's frames is not told from it. The messages that the bridge lives on are asked for,
+and again if one stops.
 
 Command: https://mavlink.io/en/messages/common.html (MAV_CMD_SET_MESSAGE_INTERVAL)
 """

@@ -1,8 +1,7 @@
 """Puts together what comes in pieces: frames from a byte stream, texts from chunks.
 
-Survives whatever else is in the stream. A text longer than one STATUSTEXT comes in chunks of
-one id; a chunk that is lost leaves "..." in its place. Leaves out: what frames and texts mean
-(agent.vehicle.codec, agent.vehicle.state).
+Survives whatever else is in the stream. A text longer than one STATUSTEXT comes in chunks of one
+id; a chunk that is lost leaves "..." in its place.
 
 Message: https://mavlink.io/en/messages/common.html#STATUSTEXT
 """

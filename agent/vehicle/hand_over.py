@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from agent.core.interface import HandedOver, HandOverExplained, HeardAgain
 from agent.vehicle.activity import Activity, FlightPhase
@@ -108,26 +109,26 @@ def hand_over(
     return HandOver(session, explanation, loss)
 
 
+@dataclass(frozen=True, slots=True)
 class HandOverReason:
-    """Why a vehicle was handed over, told in full once the words for it have come.
+    """Why a vehicle was handed over, told in full once the words for it have come."""
 
-    Args:
-        told: the reason, as far as it was known at once.
-        why: what it is, by all that was said until then and since.
-        now_s: when it was handed over.
-    """
+    told: str
+    """As far as it was known at once."""
+    why: Callable[[float], str | None]
+    """By all that was said until then and since."""
+    at_s: float
+    """When it was handed over."""
 
-    def __init__(self, told: str, why: Callable[[float], str | None], now_s: float) -> None:
-        self._told = told
-        self._why = why
-        self._at_s = now_s
-        self.due_s = now_s + _WORDS_LATE_S
+    @property
+    def due_s(self) -> float:
         """By then all has been said."""
+        return self.at_s + _WORDS_LATE_S
 
     def better(self) -> str | None:
         """The reason in full; None if it was known at once."""
-        reason = self._why(self._at_s)
-        return None if reason == self._told else reason
+        reason = self.why(self.at_s)
+        return None if reason == self.told else reason
 
 
 class LinkLoss:

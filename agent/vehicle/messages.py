@@ -1,7 +1,6 @@
 """What the bridge hears from and says to an autopilot, in SI units.
 
-Names follow https://mavlink.io/en/messages/common.html; only what the bridge uses
-is here. Leaves out: bytes and wire units (agent.vehicle.codec).
+Names follow https://mavlink.io/en/messages/common.html; only what the bridge uses is here.
 """
 
 from __future__ import annotations

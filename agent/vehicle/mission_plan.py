@@ -10,10 +10,10 @@ before: firmware carries out only such commands as stand before the item that th
 
 To start it, the current item is put right first, then the mode is set until it is *seen*: PX4
 acknowledges the mission mode and does not enter it for up to 2 s after an upload, and both
-firmwares go on where an earlier mission was left. What was heard before the mission was
-verified counts for nothing. A mission that gives way is begun anew for each target, and then
-the vehicle is told the mission's own place by a target; one that does not take it is sent on to
-the place as an item. Leaves out: the upload (agent.vehicle.mission_transfer).
+firmwares go on where an earlier mission was left. What was heard before the mission was verified
+counts for nothing. A mission that gives way is begun anew for each target, and then the vehicle is
+told the mission's own place by a target; one that does not take it is sent on to the place as an
+item.
 
 Protocol: https://mavlink.io/en/services/mission.html#current_mission_item
 Commands: https://mavlink.io/en/messages/common.html

@@ -1,12 +1,10 @@
 """Mission transfer as one transaction: upload, acknowledgement, read back, compare.
 
-The read-back decides: an upload whose acknowledgement got lost is still good if the
-vehicle tells the same items, and one that was acknowledged is not if it tells others.
-After any failure the last verified mission stays the one in force; where the vehicle
-may hold part of the new one, the old one is uploaded again before the failure is
-reported; if none was ever verified, all is cleared, so that no half mission can be flown. A vehicle
-may also be asked what stands on it. Leaves out: flying the mission and the flavour's item 0
-(the comparison gets the number of leading items that the vehicle owns).
+The read-back decides: an upload whose acknowledgement got lost is still good if the vehicle tells
+the same items, and one that was acknowledged is not if it tells others. After any failure the last
+verified mission stays the one in force; where the vehicle may hold part of the new one, the old one
+is uploaded again before the failure is reported; if none was ever verified, all is cleared, so that
+no half mission can be flown. A vehicle may also be asked what stands on it.
 
 Protocol: https://mavlink.io/en/services/mission.html
 """

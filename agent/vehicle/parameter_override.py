@@ -5,8 +5,7 @@ themselves, and come with a limit so low that it costs seconds of every leg. No 
 mission item says otherwise, so the parameter is overridden: set before the flight, put back when
 the vehicle is on its way home or is somebody else's. The value that is set carries the vehicle's
 own one in its decimals; so whoever finds it, such as an agent that was killed and started anew on
-another computer, knows what to put back. Leaves out: which parameter, and what is good for a flight
-(agent.vehicle.firmware).
+another computer, knows what to put back.
 
 Protocol: https://mavlink.io/en/services/parameter.html
 """

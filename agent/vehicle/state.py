@@ -2,8 +2,7 @@
 
 One position may be forged, or a glitch of the receiver, and a target made of it would send the
 vehicle there. So a place counts if the vehicle can have come there from the place that counted
-last; a place far from it has to be borne out by several in a row. Leaves out: what follows from
-any of it (agent.vehicle.bridge).
+last; a place far from it has to be borne out by several in a row.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """What a vehicle does by itself when its agent or its battery dies, as its parameters say.
 
-A parameter that is not known brings no vehicle home. Leaves out: how parameters are read
-(agent.vehicle.preflight).
+A parameter that is not known brings no vehicle home.
 
 Sources: ArduCopter's events.cpp and parameters FS_GCS_ENABLE, FS_GCS_TIMEOUT, MAV_GCS_SYSID
 (SYSID_MYGCS before 4.7), MAV_GCS_SYSID_HI and BATT_FS_LOW_ACT; PX4's failsafe.cpp and

@@ -1,7 +1,5 @@
 """What the bridge must know of a multicopter's firmware; one subclass for each.
 
-Leaves out: when to do what, which is the same for every firmware (agent.vehicle.bridge).
-
 Commands: https://mavlink.io/en/messages/common.html
 """
 
