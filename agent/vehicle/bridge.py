@@ -33,7 +33,7 @@ from agent.vehicle.contact import Contact, StreamRequests
 from agent.vehicle.firmware import firmware_of
 from agent.vehicle.hand_over import HandOver, HandOverReason, LinkLoss, hand_over
 from agent.vehicle.messages import CommandAck, DecodedMessage, GroundHeartbeat, Heartbeat, Position
-from agent.vehicle.preparing import Preparing
+from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning
 from agent.vehicle.session import (
     BridgeAction,

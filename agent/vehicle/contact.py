@@ -13,7 +13,7 @@ Command: https://mavlink.io/en/messages/common.html (MAV_CMD_SET_MESSAGE_INTERVA
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue, VehicleCommand
@@ -36,7 +36,8 @@ class Contact:
 
     def __init__(self, system_id: int) -> None:
         self._system_id = system_id
-        self._wrong_autopilot: int | None = None
+        self.wrong_autopilot: int | None = None
+        """System id of another vehicle that is heard."""
         self.link_up = False
         self.foreign: dict[int, int] = {}
         """Messages heard from other systems, by system id."""
@@ -47,35 +48,8 @@ class Contact:
             return heard.component_id == _AUTOPILOT_COMPONENT
         self.foreign[heard.system_id] = self.foreign.get(heard.system_id, 0) + 1
         if isinstance(heard.message, Heartbeat):
-            self._wrong_autopilot = heard.system_id
+            self.wrong_autopilot = heard.system_id
         return False
-
-    def missing(
-        self,
-        heartbeat: Heartbeat | None,
-        firmware: Firmware | None,
-        *,
-        silent: bool,
-        distrusted: Iterable[str] = (),
-    ) -> str | None:
-        """Why there is no vehicle to command yet, in words; None if there is one."""
-        if heartbeat is None or silent:
-            if not self.link_up:
-                return "no link to the autopilot"
-            if self._wrong_autopilot is not None and heartbeat is None:
-                return (
-                    f"heard the vehicle with system id {self._wrong_autopilot}, "
-                    f"not {self._system_id}"
-                )
-            if heartbeat is None and (reasons := " and ".join(distrusted)):
-                return f"heard only frames that are not to be believed: {reasons}"
-            return f"waiting for a heartbeat of system id {self._system_id}"
-        if firmware is None:
-            return (
-                f"autopilot {heartbeat.autopilot} on vehicle type {heartbeat.vehicle_type} "
-                "(MAV_AUTOPILOT, MAV_TYPE) is not supported"
-            )
-        return None
 
 
 class PeerLatch:

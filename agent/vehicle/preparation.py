@@ -1,5 +1,8 @@
 """From a silent box to a vehicle that takes targets, at its start or where it flies already.
 
+It is waited for first, then taken through the steps, which begin anew if it turns out to be another
+kind of vehicle, or if its autopilot reboots before the motors were asked for.
+
 No script: every time something is heard, the next step follows from the state *seen*,
 so an overwritten mode, an automatic disarming on the ground or a vehicle that flies
 already need no cases of their own. A vehicle that somebody else armed or flies is waited
@@ -17,6 +20,7 @@ import math
 from dataclasses import dataclass
 
 from agent.core.interface import Prepare
+from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, RepeatedCommand, VehicleCommand, result_text
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.leg import RepositionLeg
@@ -27,7 +31,7 @@ from agent.vehicle.session import VehicleSession
 from agent.vehicle.supervision import PilotConsent
 from swarm.model.frames import wgs84_from_enu
 
-__all__ = ["Preparation"]
+__all__ = ["Preparing"]
 
 
 _CLIMB_PROGRESS_M = 0.2
@@ -55,7 +59,7 @@ class _Step:
     command: RepeatedCommand
 
 
-class Preparation:
+class _Preparation:
     """The steps of one preparation of one vehicle.
 
     Args:
@@ -385,3 +389,82 @@ class Preparation:
     def _fail(self, reason: str) -> list[Outbound]:
         self.failure = reason
         return []
+
+
+class Preparing(Activity):
+    """Prepares the vehicle for flight, once there is one to command.
+
+    Args:
+        ours: the vehicle flew, or was about to fly, on our orders.
+    """
+
+    phase = FlightPhase.PREPARING
+    polls = True
+    may_disarm = True
+    """Autopilots disarm by themselves if nothing follows."""
+
+    def __init__(self, session: VehicleSession, order: Prepare, *, ours: bool) -> None:
+        super().__init__(session)
+        self.order = order
+        self._ours = ours
+        self._preparation: _Preparation | None = None
+
+    @property
+    def in_our_hands(self) -> bool:
+        """Whether the motors run, or may run, because of us."""
+        return self._preparation is not None and self._preparation.engaged
+
+    @property
+    def took_off(self) -> bool:
+        """Whether it has asked for takeoff."""
+        return self._preparation is not None and self._preparation.took_off
+
+    @property
+    def done(self) -> bool:
+        """Whether the vehicle is where it should be, with its cruise speed set."""
+        return self._preparation is not None and self._preparation.done
+
+    @property
+    def failure(self) -> str | None:
+        """Why it will not get there; None while it may."""
+        return None if self._preparation is None else self._preparation.failure
+
+    def begin_anew(self) -> None:
+        """It is another vehicle, as far as what was begun goes."""
+        self._preparation = None
+
+    def on_reboot(self) -> None:
+        """The autopilot began anew."""
+        self._preparation, self._ours = None, False
+
+    def on_message(self, message: Inbound) -> None:
+        """Take what matters of a message beside the vehicle's state."""
+        if self._preparation is not None:
+            self._preparation.on_message(message)
+
+    def on_position(self, position: Position) -> None:
+        """Take a fresh position."""
+        if self._preparation is not None:
+            self._preparation.on_position(position)
+
+    def on_ended(self, ended: CommandEnded) -> None:
+        """Take the outcome of a command."""
+        if self._preparation is not None:
+            self._preparation.on_ended(ended)
+
+    def advance(self) -> None:
+        """Do what the state seen asks for next, and say what is waited for."""
+        session, heartbeat = self._session, self._session.vehicle.heartbeat
+        if (reason := session.missing()) is not None:
+            session.tell_not_ready(reason)
+            return
+        if heartbeat is None or session.firmware is None:
+            return
+        if self._preparation is None:
+            self._preparation = _Preparation(session, session.firmware, self.order, ours=self._ours)
+        preparation = self._preparation
+        preparation.advance(heartbeat)
+        if preparation.caution is not None:
+            session.tell_caution(preparation.caution)
+        if not preparation.done and preparation.failure is None:
+            session.tell_not_ready(preparation.waiting_for)

@@ -120,13 +120,21 @@ class VehicleSession:
         return at_s is not None and self.now_s >= at_s
 
     def missing(self) -> str | None:
-        """Why there is no vehicle to command yet; None if there is one."""
-        return self.contact.missing(
-            self.vehicle.heartbeat,
-            self.firmware,
-            silent=self.silent,
-            distrusted=self.codec.distrusted,
-        )
+        """Why there is no vehicle to command yet, in words; None if there is one."""
+        heartbeat, contact, wanted = self.vehicle.heartbeat, self.contact, self.config.system_id
+        if heartbeat is not None and not self.silent:
+            unsupported = (
+                f"autopilot {heartbeat.autopilot} on vehicle type {heartbeat.vehicle_type} "
+                "(MAV_AUTOPILOT, MAV_TYPE) is not supported"
+            )
+            return unsupported if self.firmware is None else None
+        if not contact.link_up:
+            return "no link to the autopilot"
+        if heartbeat is None and contact.wrong_autopilot is not None:
+            return f"heard the vehicle with system id {contact.wrong_autopilot}, not {wanted}"
+        if heartbeat is None and (reasons := " and ".join(self.codec.distrusted)):
+            return f"heard only frames that are not to be believed: {reasons}"
+        return f"waiting for a heartbeat of system id {wanted}"
 
     def meet(self, firmware: Firmware | None) -> None:
         """Speak to it as to that kind of vehicle."""

@@ -31,7 +31,7 @@ from agent.vehicle.hand_over import HandOver, hand_over
 from agent.vehicle.holding import Holding, modes_to_leave
 from agent.vehicle.leg import Flying
 from agent.vehicle.messages import Landed
-from agent.vehicle.preparing import Preparing
+from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning, ReturnVia
 from agent.vehicle.session import VehicleSession
 
