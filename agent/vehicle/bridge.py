@@ -249,7 +249,7 @@ class Bridge:
         if fault is None:  # nothing is judged by a place that the vehicle itself distrusts
             session.position_filter.on_position(place_enu_m, session.now_s)
             if session.mission is not None:
-                session.mission.on_position(place_enu_m, session.now_s)
+                session.mission.on_position(place_enu_m)
             self._activity.on_position(position)
             self._settle()
 
@@ -268,7 +268,7 @@ class Bridge:
             if self._streams is not None:
                 self._streams.on_ended(one, session.now_s)
             if session.mission is not None:
-                session.mission.on_ended(one, session.now_s)
+                session.mission.on_ended(one)
             self._activity.on_ended(one)
             self._settle()
 

@@ -170,8 +170,7 @@ class RepositionLeg(_Leg):
 
     def start(self) -> None:
         """Tell the vehicle, in place of whatever it was told before."""
-        session = self._session
-        session.say(*session.commands.send(TARGET_TAG, self._message, session.now_s))
+        self._session.send(TARGET_TAG, self._message)
 
     def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of the command."""
@@ -229,12 +228,10 @@ class _MissionLeg(_Leg):
 
     def start(self) -> None:
         """Put the target in force, in place of whatever stands on the vehicle."""
-        session = self._session
-        target = (self._target_enu_m, self._stay_s, session.cruise_speed_m_s)
-        session.say(*self._mission.fly_to(*target, session.now_s))
+        self._mission.fly_to(self._target_enu_m, self._stay_s, self._session.cruise_speed_m_s)
 
     def _on_stalled(self) -> None:
-        self._mission.restart(self._session.now_s)
+        self._mission.restart()
 
 
 class Flying(Activity):

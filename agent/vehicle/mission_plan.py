@@ -25,8 +25,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue, result_text
-from agent.vehicle.config import BridgeConfig
+from agent.vehicle.commands import CommandEnded, CommandOutcome, result_text
+from agent.vehicle.conversation import Conversation
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import (
     AltitudeFrame,
@@ -35,7 +35,6 @@ from agent.vehicle.messages import (
     MissionCurrent,
     MissionItem,
     MissionSetCurrent,
-    Outbound,
 )
 
 __all__ = ["LONGEST_HOLD_S", "MissionPlan", "MissionSeqs", "MissionStart", "recognise_plan"]
@@ -189,23 +188,23 @@ class MissionStart:
     """Starts one verified mission, once.
 
     Args:
-        commands: carries the mode.
-        now_s: when the mission was verified.
+        conversation: with the vehicle.
+        firmware: what flies it.
+        plan: the mission.
         again: begin the mission anew even if its target is what the vehicle flies to.
     """
 
     def __init__(
         self,
-        config: BridgeConfig,
-        commands: CommandQueue,
+        conversation: Conversation,
         firmware: Firmware,
         plan: MissionPlan,
-        now_s: float,
         *,
         again: bool = False,
     ) -> None:
-        self._config = config
-        self._commands = commands
+        self._conversation = conversation
+        self._config = config = conversation.config
+        self._commands = conversation.commands
         self._firmware = firmware
         self._plan = plan
         self._seqs = plan.seqs(firmware)
@@ -214,7 +213,7 @@ class MissionStart:
         self._told: set[str] = set()
         """What the vehicle took while the mission gave way."""
         self._place_refusals = 0
-        self._began_s = now_s
+        self._began_s = now_s = conversation.now_s
         self._again = again
         self._current: int | None = None
         self._sets = 0
@@ -237,15 +236,14 @@ class MissionStart:
         if isinstance(message, MissionCurrent):
             self._current = message.seq
 
-    def cancel(self, now_s: float) -> list[Outbound]:
+    def cancel(self) -> None:
         """Tell the vehicle nothing more."""
-        out: list[Outbound] = []
         for tag in (_PLACE_TAG, _SPEED_TAG):
-            out += self._commands.cancel(tag, now_s)
-        return out
+            self._conversation.cancel(tag)
 
-    def on_ended(self, ended: CommandEnded, now_s: float) -> None:
+    def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of a command."""
+        now_s = self._conversation.now_s
         if ended.tag in (_PLACE_TAG, _SPEED_TAG):
             self._on_told(ended)
         if ended.tag != _MODE_TAG:
@@ -256,42 +254,43 @@ class MissionStart:
             self._refusal = result_text(ended.result)
             self._next_mode_s = now_s + self._config.retry_delay_s
 
-    def advance(self, heartbeat: Heartbeat, heard_at_s: float, now_s: float) -> list[Outbound]:
+    def advance(self, heartbeat: Heartbeat, heard_at_s: float) -> None:
         """Do what is still missing; a heartbeat older than the mission proves nothing."""
         if self.done or self.failure is not None:
-            return []
-        seqs = self._seqs
+            return
+        seqs, now_s = self._seqs, self._conversation.now_s
         begun = self._current is not None and seqs.speed <= self._current <= seqs.target
         if not self._firmware.is_mission(heartbeat.custom_mode):
-            return self._set_mode(now_s) if begun and self._sets else self._set_current(now_s)
-        if self._again:
-            return self._set_current(now_s)
-        if self._is_guided and not self._told >= {_PLACE_TAG, _SPEED_TAG}:
-            return self._guide(now_s)
-        if self._is_on_its_way:
+            if begun and self._sets:
+                self._set_mode(now_s)
+            else:
+                self._set_current(now_s)
+        elif self._again:
+            self._set_current(now_s)
+        elif self._is_guided and not self._told >= {_PLACE_TAG, _SPEED_TAG}:
+            self._guide()
+        elif self._is_on_its_way:
             self.done = heard_at_s > self._began_s
-            return []
-        if (begun or self._current is None) and now_s < self._look_until_s:
-            return []
-        return self._set_current(now_s)
+        elif not (begun or self._current is None) or now_s >= self._look_until_s:
+            self._set_current(now_s)
 
-    def _set_current(self, now_s: float) -> list[Outbound]:
+    def _set_current(self, now_s: float) -> None:
         if now_s < self._next_set_s:
-            return []
+            return
         if self._sets >= self._config.mode_tries:
             if self._current == self._seqs.target:
                 self._first = self._seqs.target
-                return []
+                return
             told = "nothing" if self._current is None else f"item {self._current}"
             self.failure = f"the vehicle does not take up the mission, but says it flies {told}"
-            return []
+            return
         self._sets += 1
         self._next_set_s = now_s + self._config.commands.ack_timeout_s
         self._look_until_s = now_s + _LOOKS * self._config.effect_timeout_s
         self._again = False
         self._current = None
         self._told.clear()
-        return [MissionSetCurrent(self._first)]
+        self._conversation.say(MissionSetCurrent(self._first))
 
     @property
     def _is_guided(self) -> bool:
@@ -315,17 +314,17 @@ class MissionStart:
         begun_before = self._sets == 0 and self._current == self._seqs.guided
         return self._current is not None and (self._is_guided or begun_before)
 
-    def _guide(self, now_s: float) -> list[Outbound]:
+    def _guide(self) -> None:
         """Tell the vehicle the mission's place as a target, and then the speed."""
         if self._commands.pending(_PLACE_TAG) or self._commands.pending(_SPEED_TAG):
-            return []
+            return
         plan = self._plan
         if _PLACE_TAG in self._told:
-            speed = self._firmware.change_speed(plan.speed_m_s)
-            return [*self._commands.send(_SPEED_TAG, speed, now_s)]
-        place = (plan.lat_deg, plan.lon_deg, plan.alt_m)
-        target = self._firmware.reposition(*place, plan.speed_m_s)
-        return [*self._commands.send(_PLACE_TAG, target, now_s)]
+            self._conversation.send(_SPEED_TAG, self._firmware.change_speed(plan.speed_m_s))
+        else:
+            place = (plan.lat_deg, plan.lon_deg, plan.alt_m)
+            target = self._firmware.reposition(*place, plan.speed_m_s)
+            self._conversation.send(_PLACE_TAG, target)
 
     def _on_told(self, ended: CommandEnded) -> None:
         if ended.ending is CommandOutcome.ACCEPTED:
@@ -338,11 +337,11 @@ class MissionStart:
             self._first, self._sets = self._seqs.target, 0
             self._again = True
 
-    def _set_mode(self, now_s: float) -> list[Outbound]:
+    def _set_mode(self, now_s: float) -> None:
         if self._commands.pending(_MODE_TAG) or now_s < self._next_mode_s:
-            return []
+            return
         if self._mode_tries >= self._config.mode_tries:
             self.failure = f"the mission mode cannot be set ({self._refusal})"
-            return []
+            return
         self._mode_tries += 1
-        return [*self._commands.send(_MODE_TAG, self._firmware.set_mission_mode(), now_s)]
+        self._conversation.send(_MODE_TAG, self._firmware.set_mission_mode())

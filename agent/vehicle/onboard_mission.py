@@ -19,8 +19,8 @@ import math
 from dataclasses import replace
 from enum import Enum, auto
 
-from agent.vehicle.commands import CommandEnded, CommandQueue
-from agent.vehicle.config import BridgeConfig
+from agent.vehicle.commands import CommandEnded
+from agent.vehicle.conversation import Conversation
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import Heartbeat, Inbound, MissionCurrent, MissionReached, Outbound
 from agent.vehicle.mission_plan import (
@@ -39,6 +39,7 @@ from agent.vehicle.mission_transfer import (
 )
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
 from swarm.protocol.fields import Point
+from swarm.protocol.timing import earliest
 
 __all__ = ["OnboardMission"]
 
@@ -65,9 +66,9 @@ class _Stage(Enum):
 class OnboardMission:
     """What one vehicle does if it hears nothing more."""
 
-    def __init__(self, config: BridgeConfig, commands: CommandQueue, firmware: Firmware) -> None:
-        self._config = config
-        self._commands = commands
+    def __init__(self, conversation: Conversation, firmware: Firmware) -> None:
+        self._conversation = conversation
+        self._config = config = conversation.config
         self._firmware = firmware
         vehicle_items = firmware.mission_vehicle_items
         self._transfer = MissionTransfer(
@@ -114,9 +115,7 @@ class OnboardMission:
         """Whether the newest target is what the vehicle is seen to fly to, or to wait at."""
         return self._stage is _Stage.FLOWN and self._wanted == self._standing
 
-    def fly_to(
-        self, target_enu_m: Point, stay_s: float, speed_m_s: float, now_s: float
-    ) -> list[Outbound]:
+    def fly_to(self, target_enu_m: Point, stay_s: float, speed_m_s: float) -> None:
         """Put a target in force, in place of the last one."""
         hold_s = math.ceil(stay_s + self._config.mission_patience_s)
         place = wgs84_from_enu(self._config.origin, target_enu_m)
@@ -127,9 +126,9 @@ class OnboardMission:
         if self._stage is _Stage.IDLE and self._mode_seen:
             # It was being taken out of the mission mode: whether it was is still to be seen.
             self._mode_seen, self._mode_asked = False, True
-        return self._want(plan, now_s)
+        self._conversation.say(*self._want(plan))
 
-    def upload(self, target_enu_m: Point, speed_m_s: float, now_s: float) -> list[Outbound]:
+    def upload(self, target_enu_m: Point, speed_m_s: float) -> list[Outbound]:
         """Put a first target on the vehicle, which flies to it once it is told to `begin`."""
         if self._stage is _Stage.UPLOADING_FIRST:
             return []
@@ -137,14 +136,14 @@ class OnboardMission:
         hold_s = min(math.ceil(self._config.mission_patience_s), LONGEST_HOLD_S)
         self.failure = None
         guided_s = self._guided_s(target_enu_m, speed_m_s)
-        out = self._want(MissionPlan(*place, speed_m_s, max(1, hold_s), guided_s), now_s)
+        out = self._want(MissionPlan(*place, speed_m_s, max(1, hold_s), guided_s))
         self._stage = _Stage.UPLOADING_FIRST
         return out
 
-    def begin(self, now_s: float) -> None:
+    def begin(self) -> None:
         """Fly the mission that was uploaded."""
         if self.is_uploaded:
-            self._begin(now_s)
+            self._begin()
 
     @property
     def is_uploaded(self) -> bool:
@@ -161,10 +160,10 @@ class OnboardMission:
         """Whether the vehicle may be in the mission mode because of us."""
         return self._mode_seen or self._mode_asked
 
-    def restart(self, now_s: float) -> None:
+    def restart(self) -> None:
         """Begin the mission anew: the vehicle stands still elsewhere than at its target."""
         if self._stage is _Stage.FLOWN:
-            self._begin(now_s, again=True)
+            self._begin(again=True)
 
     def wait_there(self) -> None:
         """The leg is over: keep the vehicle waiting until something else is wanted."""
@@ -182,11 +181,11 @@ class OnboardMission:
         self.suspend()
         self._mode_asked = self._mode_seen = False
 
-    def call_off(self, now_s: float) -> list[Outbound]:
+    def call_off(self) -> None:
         """The vehicle goes home: it is to fly no mission, and an upload under way ends here."""
         self.stand_down()
-        out = self._transfer.cancel("the vehicle goes home")
-        return out + self._settle(now_s)
+        self._conversation.say(*self._transfer.cancel("the vehicle goes home"))
+        self._settle()
 
     def carry_on(self) -> None:
         """The vehicle could not be taken out of the mission mode after all."""
@@ -199,29 +198,30 @@ class OnboardMission:
         self._sent = self.is_ours = None
         self._transfer.abort(reason)
 
-    def look(self, now_s: float) -> list[Outbound]:
+    def look(self) -> None:
         """Ask which mission the vehicle flies; `is_ours` tells."""
+        now_s = self._conversation.now_s
         if self._transfer.busy or self.is_ours is not None or now_s < self._look_at_s:
-            return []
+            return
         self._look_at_s = now_s + self._config.retry_delay_s
         own = self._firmware.mission_vehicle_items
         counts = {MissionSeqs(own, gives_way).count for gives_way in (False, True)}
-        return self._transfer.read(counts, now_s)
+        self._conversation.say(*self._transfer.read(counts, now_s))
 
-    def expects(self, custom_mode: int, now_s: float) -> bool:
+    def expects(self, custom_mode: int) -> bool:
         """Whether that mode is the mission's doing; else somebody switched to it."""
         firmware = self._firmware
         if firmware.is_mission(custom_mode):
             return self._mode_seen or self._mode_asked
         if firmware.is_commanded(custom_mode):
             return not self._mode_seen
-        if firmware.is_returning(custom_mode) and self._mode_seen and self._hold_is_over(now_s):
+        if firmware.is_returning(custom_mode) and self._mode_seen and self._hold_is_over:
             self.coming_home = True
         return self.coming_home
 
     # What happens.
 
-    def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
+    def on_message(self, message: Inbound) -> None:
         """Take what concerns missions."""
         if self._start is not None:
             self._start.on_message(message)
@@ -231,50 +231,49 @@ class OnboardMission:
                 case MissionCurrent(seq) if seq == seqs.home:
                     self.coming_home = True
                 case MissionReached(seq) if seq == seqs.target:
-                    self._on_reached(now_s)
+                    self._on_reached()
                 case _:
                     pass
-        return self._transfer.on_message(message, now_s) + self._settle(now_s)
+        self._conversation.say(*self._transfer.on_message(message, self._conversation.now_s))
+        self._settle()
 
-    def on_ended(self, ended: CommandEnded, now_s: float) -> None:
+    def on_ended(self, ended: CommandEnded) -> None:
         """Take a command's outcome."""
         if self._start is not None:
-            self._start.on_ended(ended, now_s)
+            self._start.on_ended(ended)
 
-    def on_position(self, position_enu_m: Point, now_s: float) -> None:
+    def on_position(self, position_enu_m: Point) -> None:
         """Note how near the vehicle is."""
         self._place_enu_m = position_enu_m
         flown = self._stage in (_Stage.STARTING, _Stage.FLOWN)
         if flown and self._near_since_s is None and self._is_near():
             # Of a mission that an earlier life left, the hold may have begun long ago.
-            self._near_since_s = -math.inf if self._inherited else now_s
+            self._near_since_s = -math.inf if self._inherited else self._conversation.now_s
 
-    def advance(self, heartbeat: Heartbeat, heard_at_s: float, now_s: float) -> list[Outbound]:
+    def advance(self, heartbeat: Heartbeat, heard_at_s: float) -> None:
         """Do what state and time ask for."""
-        out = self._transfer.on_time(now_s) + self._settle(now_s)
+        self._conversation.say(*self._transfer.on_time(self._conversation.now_s))
+        self._settle()
         start = self._start
         if self._stage is _Stage.STARTING and start is not None:
-            out += start.advance(heartbeat, heard_at_s, now_s)
+            start.advance(heartbeat, heard_at_s)
             self._mode_asked |= start.mode_asked
             if start.done:
-                out += start.cancel(now_s)
-                self._become_flown()
+                start.cancel()
+                self._stage, self._start = _Stage.FLOWN, None
+                self._mode_seen, self._renewing, self._inherited = True, False, False
             elif start.failure is not None:
                 in_mission = self._firmware.is_mission(heartbeat.custom_mode)
-                self._give_up(start.failure, now_s, astray=in_mission)
+                self._give_up(start.failure, astray=in_mission)
         elif self._stage is _Stage.IDLE and self._mode_asked:
             # Given up, and then the vehicle took it up after all.
             self.unverified |= self._firmware.is_mission(heartbeat.custom_mode)
-        if self._stage is _Stage.FLOWN and self._is_running_out(now_s):
-            out += self._renew(now_s)
-        return out
+        if self._stage is _Stage.FLOWN:
+            self._renew_in_time()
 
     def next_deadline_s(self) -> float | None:
         """When `advance` has something to do, beside what follows from news."""
-        times_s = [self._transfer.next_deadline_s()]
-        if (out_s := self._runs_out_s()) is not None:
-            times_s.append(max(out_s, self._renew_at_s))
-        return min((time_s for time_s in times_s if time_s is not None), default=None)
+        return earliest(self._transfer.next_deadline_s(), self._renewal_s())
 
     @property
     def is_starting(self) -> bool:
@@ -283,58 +282,52 @@ class OnboardMission:
 
     # Pieces.
 
-    def _want(self, plan: MissionPlan, now_s: float) -> list[Outbound]:
+    def _want(self, plan: MissionPlan) -> list[Outbound]:
         if plan == self._standing:
             # Neither firmware begins an identical mission anew.
             plan = replace(plan, hold_s=plan.hold_s + 1)
-        out = [] if self._start is None else self._start.cancel(now_s)
+        if self._start is not None:
+            self._start.cancel()
         self._wanted, self._start = plan, None
         self._stage = _Stage.UPLOADING
         self.coming_home = False
-        return out if self._transfer.busy else out + self._upload(plan, now_s)
+        return [] if self._transfer.busy else self._upload(plan)
 
-    def _upload(self, plan: MissionPlan, now_s: float) -> list[Outbound]:
+    def _upload(self, plan: MissionPlan) -> list[Outbound]:
         self._sent = plan
-        return self._transfer.upload(plan.items(self._firmware), now_s)
+        return self._transfer.upload(plan.items(self._firmware), self._conversation.now_s)
 
-    def _settle(self, now_s: float) -> list[Outbound]:
+    def _settle(self) -> None:
         """Take the outcome of a transfer, once."""
         if self._transfer.busy or self._transfer.result is None:
-            return []
+            return
         result, self._transfer.result = self._transfer.result, None
         sent, self._sent = self._sent, None
         if isinstance(result, MissionRead):
-            self._adopt(result, now_s)
+            self._adopt(result)
         elif isinstance(result, MissionInForce):
             self._standing = sent
         laying = self._stage is _Stage.UPLOADING_FIRST
         if self._wanted is None or not (laying or self._stage is _Stage.UPLOADING):
-            return []
+            return
         if sent != self._wanted:
-            return self._upload(self._wanted, now_s)
-        if isinstance(result, MissionFailed):
-            self._give_up(result.reason, now_s, astray=not result.old_mission_verified)
+            self._conversation.say(*self._upload(self._wanted))
+        elif isinstance(result, MissionFailed):
+            self._give_up(result.reason, astray=not result.old_mission_verified)
         elif laying:
             self._stage = _Stage.IDLE
         else:
             # One that gives way is not taken up by itself: it goes on as it was begun.
-            self._begin(now_s, again=not self._renewing and self._wanted.guided_s > 0)
-        return []
+            self._begin(again=not self._renewing and self._wanted.guided_s > 0)
 
-    def _begin(self, now_s: float, *, again: bool = False) -> None:
+    def _begin(self, *, again: bool = False) -> None:
         plan = self._standing
-        if plan is None:
-            return
-        self._stage = _Stage.STARTING
-        self._begun_s, self._near_since_s = now_s, None
-        parts = (self._config, self._commands, self._firmware, plan)
-        self._start = MissionStart(*parts, now_s, again=again)
+        if plan is not None:
+            self._stage = _Stage.STARTING
+            self._begun_s, self._near_since_s = self._conversation.now_s, None
+            self._start = MissionStart(self._conversation, self._firmware, plan, again=again)
 
-    def _become_flown(self) -> None:
-        self._stage, self._start = _Stage.FLOWN, None
-        self._mode_seen, self._renewing, self._inherited = True, False, False
-
-    def _give_up(self, reason: str, now_s: float, *, astray: bool) -> None:
+    def _give_up(self, reason: str, *, astray: bool) -> None:
         """The wanted mission is not flown: go on with the one that stands, if it may.
 
         It may not while the vehicle flies one in the mission mode of which nothing is known, as
@@ -345,7 +338,7 @@ class OnboardMission:
         if self._renewing:
             # Old or new, it is the same place with the way home behind it.
             self._renewing, astray = False, False
-            self._renew_at_s = now_s + self._config.retry_delay_s
+            self._renew_at_s = self._conversation.now_s + self._config.retry_delay_s
         else:
             self.failure = reason
         self._awaited = False
@@ -354,11 +347,11 @@ class OnboardMission:
             self.unverified = True
             self._stage = _Stage.IDLE
         elif self._mode_seen and self._standing is not None and not failed_to_start:
-            self._begin(now_s)
+            self._begin()
         else:
             self._stage = _Stage.FLOWN if self._mode_seen else _Stage.IDLE
 
-    def _adopt(self, read: MissionRead, now_s: float) -> None:
+    def _adopt(self, read: MissionRead) -> None:
         """Take on a mission that an earlier life left on the vehicle."""
         plan = recognise_plan(read.items, self._firmware)
         self.is_ours = plan is not None
@@ -369,7 +362,7 @@ class OnboardMission:
         self._stage, self._mode_seen = _Stage.FLOWN, True
         # Renewed once it is known that it is to wait: it may be called home.
         self._inherited = self._awaited = True
-        self._begun_s, self._near_since_s = now_s, None
+        self._begun_s, self._near_since_s = self._conversation.now_s, None
 
     def _guided_s(self, target_enu_m: Point, speed_m_s: float) -> int:
         """How long a mission gives way to targets: for the flight, with something to spare."""
@@ -382,9 +375,9 @@ class OnboardMission:
         flight_s = math.dist(target_enu_m, place_enu_m) / speed_m_s + climb_s
         return min(math.ceil(_SPARE_S + _SPARE * flight_s), LONGEST_HOLD_S)
 
-    def _on_reached(self, now_s: float) -> None:
+    def _on_reached(self) -> None:
         """The item is done, which it cannot be before its hold time: else it is an echo."""
-        standing = self._standing
+        standing, now_s = self._standing, self._conversation.now_s
         if standing is None or now_s < self._begun_s + standing.hold_s - _HOLD_SLACK_S:
             return
         self.reached = self._awaited and self._is_near()
@@ -399,29 +392,27 @@ class OnboardMission:
         )
         return math.dist(place_enu_m, target_enu_m) <= self._near_m
 
-    def _hold_is_over(self, now_s: float) -> bool:
+    @property
+    def _hold_is_over(self) -> bool:
         near_s, standing = self._near_since_s, self._standing
         if near_s is None or standing is None:
             return False
-        return now_s >= near_s + standing.hold_s - _HOLD_SLACK_S
+        return self._conversation.now_s >= near_s + standing.hold_s - _HOLD_SLACK_S
 
-    def _runs_out_s(self) -> float | None:
+    def _renewal_s(self) -> float | None:
         """When the wait is to be renewed; None while there is nothing to renew."""
         near_s, standing = self._near_since_s, self._standing
         flown = self._stage is _Stage.FLOWN and not self.coming_home
         if near_s is None or standing is None or self._awaited or not flown:
             return None
-        return near_s + standing.hold_s - _RENEWAL_FRAC * self._config.mission_patience_s
+        out_s = near_s + standing.hold_s - _RENEWAL_FRAC * self._config.mission_patience_s
+        return max(out_s, self._renew_at_s)
 
-    def _is_running_out(self, now_s: float) -> bool:
-        out_s = self._runs_out_s()
-        return out_s is not None and now_s >= max(out_s, self._renew_at_s)
-
-    def _renew(self, now_s: float) -> list[Outbound]:
-        standing = self._standing
-        if standing is None:
-            return []
+    def _renew_in_time(self) -> None:
+        due_s, standing = self._renewal_s(), self._standing
+        if due_s is None or standing is None or self._conversation.now_s < due_s:
+            return
         self._renewing = True
         # Up and down in turn, so that it always differs and never grows.
         hold_s = standing.hold_s + (-1 if standing.hold_s % 2 else 1)
-        return self._want(replace(standing, hold_s=max(1, hold_s)), now_s)
+        self._conversation.say(*self._want(replace(standing, hold_s=max(1, hold_s))))

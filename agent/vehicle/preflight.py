@@ -195,8 +195,8 @@ class CruiseSpeedSetting:
 
     def start(self) -> None:
         """Tell the vehicle."""
-        session, self.begun = self._session, True
-        session.say(*session.commands.send(_SPEED_TAG, self._command, session.now_s))
+        self.begun = True
+        self._session.send(_SPEED_TAG, self._command)
 
     def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of the command; refused, turn to the parameter."""

@@ -203,7 +203,7 @@ class _Preparation:
                 self._flew = self.done = True
             else:
                 self.waiting_for = "reading the mission that the vehicle flies"
-                self._session.say(*mission.look(self._session.now_s))
+                mission.look()
         elif heartbeat.armed:
             self._flown_by_pilot = True
             mode = firmware.mode_name(heartbeat.custom_mode)
@@ -347,14 +347,14 @@ class _Preparation:
             return self._fail(f"the way home cannot be put on it: {reason}")
         self._uploads += 1
         self._upload_at_s = now_s + self._config.retry_delay_s
-        return mission.upload(self._order.position_enu_m, self._order.speed_m_s, now_s)
+        return mission.upload(self._order.position_enu_m, self._order.speed_m_s)
 
     def _begin_mission(self, mission: OnboardMission) -> None:
         """From now on the way home stands on the vehicle whatever becomes of us."""
         if not mission.is_uploaded:  # as it was found in the air
             self._session.say(*self._upload_way_home(mission))
             return
-        mission.begin(self._session.now_s)
+        mission.begin()
         self._mission_begun = True
         self.waiting_for = "starting the mission"
 

@@ -208,6 +208,5 @@ class ReturnVia:
 
     def end(self) -> None:
         """It returns from where it is; nothing more is told about the place."""
-        session = self._session
-        session.say(*self._mode.cancel(session.now_s))
-        session.say(*session.commands.cancel(TARGET_TAG, session.now_s))
+        self._session.say(*self._mode.cancel(self._session.now_s))
+        self._session.cancel(TARGET_TAG)

@@ -10,13 +10,12 @@ from collections import deque
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from agent.core.interface import Caution, NotReady, VehicleOrder, VehicleReport
-from agent.vehicle.codec import MavlinkCodec
-from agent.vehicle.commands import CommandQueue, RepeatedCommand
+from agent.core.interface import VehicleOrder
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.contact import Contact
+from agent.vehicle.conversation import BridgeAction, Conversation, SendBytes
 from agent.vehicle.firmware.profile import Firmware
-from agent.vehicle.messages import Inbound, Outbound
+from agent.vehicle.messages import Inbound
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.parameter_override import ParameterOverride
 from agent.vehicle.signing import Signing
@@ -62,16 +61,7 @@ class LinkClosed:
     """The link is closed."""
 
 
-@dataclass(frozen=True, slots=True)
-class SendBytes:
-    """Send these bytes."""
-
-    data: bytes
-
-
 BridgeEvent = BytesReceived | TimePassed | LinkOpened | LinkClosed | VehicleOrder
-
-BridgeAction = SendBytes | VehicleReport
 
 POLL_S = 0.25
 """While something is waited for, look that often even if nothing is heard."""
@@ -79,20 +69,12 @@ POLL_S = 0.25
 _PLACES = 2
 
 
-class VehicleSession:
+class VehicleSession(Conversation):
     """One vehicle, as far as it is heard; and what was made of it in the step under way."""
 
     def __init__(self, config: BridgeConfig, signing: Signing | None = None) -> None:
-        self.config = config
+        super().__init__(config, signing)
         self.contact = Contact(config.system_id)
-        self.codec = MavlinkCodec(
-            config.system_id,
-            source_system_id=config.ground_system_id,
-            source_component_id=config.ground_component_id,
-            signing=signing,
-            peer_silence_s=config.peer_silence_s,
-        )
-        self.commands = CommandQueue(config.commands)
         self.vehicle = VehicleState()
         self.safety = SafetyMonitor(config)
         self.position_filter = PositionFilter()
@@ -108,10 +90,6 @@ class VehicleSession:
         """Where the vehicle is, by its newest position [m; mission origin]."""
         self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
         """Where the vehicle was last told to fly: of the newest it may not have heard."""
-        self.now_s = 0.0
-        self._actions: list[BridgeAction] = []
-        self._told_not_ready: str | None = None
-        self._told_caution: str | None = None
 
     @property
     def silent(self) -> bool:
@@ -151,7 +129,7 @@ class VehicleSession:
     def forget_mission(self) -> None:
         """Know nothing of what stands on the vehicle."""
         self.mission = (
-            OnboardMission(self.config, self.commands, self.firmware)
+            OnboardMission(self, self.firmware)
             if self._by_missions and self.firmware is not None
             else None
         )
@@ -163,7 +141,7 @@ class VehicleSession:
     def flies_for_us(self, custom_mode: int) -> bool:
         """Whether that mode is our doing, as far as targets go."""
         if self.mission is not None:
-            return self.mission.expects(custom_mode, self.now_s)
+            return self.mission.expects(custom_mode)
         return self.firmware is not None and self.firmware.is_commanded(custom_mode)
 
     def flies_unknown_mission(self) -> bool:
@@ -182,7 +160,7 @@ class VehicleSession:
     def on_message(self, message: Inbound) -> None:
         """Pass on what is no heartbeat, position or acknowledgement."""
         if self.mission is not None:
-            self.say(*self.mission.on_message(message, self.now_s))
+            self.mission.on_message(message)
         if self.override is not None:
             self.override.on_message(message)
 
@@ -190,7 +168,7 @@ class VehicleSession:
         """Carry on what stands on the vehicle, or is on its way there."""
         heartbeat, heard_s = self.vehicle.heartbeat, self.vehicle.heartbeat_at_s
         if self.mission is not None and heartbeat is not None and heard_s is not None:
-            self.say(*self.mission.advance(heartbeat, heard_s, self.now_s))
+            self.mission.advance(heartbeat, heard_s)
 
     def mission_deadline_s(self) -> float:
         """When mission or parameter may have something to do."""
@@ -207,41 +185,6 @@ class VehicleSession:
         """A failure, and what the autopilot has said about it lately."""
         text = self.vehicle.telling_warning(self.now_s)
         return f"{failure}: {text}" if text and text not in failure else failure
-
-    def repeated(self, tag: str, tries: int, *, patience: float = 1.0) -> RepeatedCommand:
-        """A command that is given so often, and its effect awaited that many times as long."""
-        effect_timeout_s = patience * self.config.effect_timeout_s
-        waits_s = (effect_timeout_s, self.config.retry_delay_s)
-        return RepeatedCommand(tag, self.commands, tries, *waits_s)
-
-    def say(self, *messages: Outbound) -> None:
-        """To the vehicle."""
-        self._actions += [SendBytes(self.codec.encode(message)) for message in messages]
-
-    def report(self, report: VehicleReport) -> None:
-        """To whoever gave the orders."""
-        self._actions.append(report)
-
-    def tell_not_ready(self, reason: str) -> None:
-        """Report what the vehicle is waited for, once."""
-        if reason != self._told_not_ready:
-            self._told_not_ready = reason
-            self.report(NotReady(reason))
-
-    def tell_caution(self, reason: str) -> None:
-        """Report what people should know of the vehicle, once."""
-        if reason != self._told_caution:
-            self._told_caution = reason
-            self.report(Caution(reason))
-
-    def tell_anew(self) -> None:
-        """Another wait begins: what was told may be told again."""
-        self._told_not_ready = self._told_caution = None
-
-    def take_actions(self) -> list[BridgeAction]:
-        """What was said and reported, in order, once."""
-        actions, self._actions = self._actions, []
-        return actions
 
     def forget_vehicle(self) -> None:
         """The autopilot began anew: nothing is known of it any more."""

@@ -97,7 +97,7 @@ class Searching(Activity):
         if isinstance(self.order, Hold) and session.vehicle.landed is Landed.UNDEFINED:
             return "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
         if session.mission is not None and session.flies_unknown_mission():
-            session.say(*session.mission.look(session.now_s))
+            session.mission.look()
             return "reading the mission that the vehicle flies"
         return None
 
@@ -142,7 +142,7 @@ def follow_mission(activity: Activity, session: VehicleSession) -> Activity:
     if mission.coming_home:
         reason = "nothing followed its last target in time, so it comes home by itself"
         session.commands.cancel_all()
-        session.say(*mission.call_off(session.now_s))
+        mission.call_off()
         session.report(ReturnAdvised(reason))
         return _come_home(Return(reason), firmware, session)
     if mission.unverified:
@@ -286,12 +286,12 @@ def _return_home(activity: Activity, order: Return, session: VehicleSession) -> 
     )
     commanded = firmware.is_commanded(mode) or taking_off or on_mission
     if mission is not None:
-        session.say(*mission.call_off(session.now_s))
+        mission.call_off()
     if not (heartbeat.armed and (took_off or firmware.airborne(session.vehicle) is not False)):
         # That it was armed may not have been heard yet.
         motors_asked = isinstance(activity, Preparing) and activity.in_our_hands
         if commanded and (heartbeat.armed or motors_asked):
-            session.say(*session.commands.send("disarm", firmware.disarm(), session.now_s))
+            session.send("disarm", firmware.disarm())
         session.report(Home())
         return Idle(session)
     if session.silent:
