@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from agent.vehicle.config import BridgeConfig
+from agent.vehicle.commands import CommandPolicy
 from agent.vehicle.messages import Inbound, Outbound, ParameterRead, ParameterSet, ParameterValue
 
 __all__ = ["OverrideSpec", "ParameterOverride"]
@@ -57,12 +57,12 @@ class ParameterOverride:
 
     Args:
         override_spec: which, and what it is for a flight.
-        config: how often and how long to ask.
+        policy: how often and how long to ask.
     """
 
-    def __init__(self, override_spec: OverrideSpec, config: BridgeConfig) -> None:
+    def __init__(self, override_spec: OverrideSpec, policy: CommandPolicy) -> None:
         self._lending = override_spec
-        self._config = config
+        self._policy = policy
         self._name: str | None = None
         self._own: float | None = None
         self._found = math.nan
@@ -89,12 +89,11 @@ class ParameterOverride:
         """Ask, or set, as long as it is not as wanted."""
         if self._is_as_wanted or now_s < self._next_at_s:
             return []
-        commands = self._config.commands
         self._tries += 1
-        if self._tries == commands.tries + 1:
+        if self._tries == self._policy.tries + 1:
             self._complain()
-        pace = 1.0 if self._tries <= commands.tries else _SELDOM
-        self._next_at_s = now_s + pace * commands.ack_timeout_s
+        pace = 1.0 if self._tries <= self._policy.tries else _SELDOM
+        self._next_at_s = now_s + pace * self._policy.ack_timeout_s
         if self._name is None or self._own is None:
             return [ParameterRead(name) for name in self._lending.names]
         return [ParameterSet(self._name, self._target(self._own))]

@@ -116,27 +116,18 @@ class VehicleSession(Conversation):
 
     def meet(self, firmware: Firmware | None) -> None:
         """Speak to it as to that kind of vehicle."""
-        self.firmware = firmware
-        override_spec = None
+        self.firmware, self.override = firmware, None
         if firmware is not None:
             self.commands.acknowledged_twice = firmware.acknowledged_twice
-            override_spec = firmware.override_spec
-        self.override = None
-        if override_spec is not None and self.config.raises_jerk:
-            self.override = ParameterOverride(override_spec, self.config)
+            if firmware.override_spec is not None and self.config.raises_jerk:
+                self.override = ParameterOverride(firmware.override_spec, self.config.commands)
         self.forget_mission()
 
     def forget_mission(self) -> None:
         """Know nothing of what stands on the vehicle."""
-        self.mission = (
-            OnboardMission(self, self.firmware)
-            if self._by_missions and self.firmware is not None
-            else None
-        )
-
-    @property
-    def _by_missions(self) -> bool:
-        return self.config.command is CommandStyle.MISSION
+        self.mission = None
+        if self.firmware is not None and self.config.command is CommandStyle.MISSION:
+            self.mission = OnboardMission(self, self.firmware)
 
     def flies_for_us(self, custom_mode: int) -> bool:
         """Whether that mode is our doing, as far as targets go."""
