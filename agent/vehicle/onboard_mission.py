@@ -330,8 +330,7 @@ class OnboardMission:
     def _give_up(self, reason: str, *, astray: bool) -> None:
         """The wanted mission is not flown: go on with the one that stands, if it may.
 
-        It may not while the vehicle flies one in the mission mode of which nothing is known, as
-        one ``astray`` does.
+        Of a vehicle ``astray`` it is not known what it flies in the mission mode: it may not.
         """
         failed_to_start = self._start is not None
         self._start = None
