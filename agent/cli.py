@@ -20,8 +20,6 @@ from swarm.runtime.options import (
     StateOption,
 )
 
-__all__ = ["agent"]
-
 
 @with_connection_options
 def agent(

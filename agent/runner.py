@@ -36,9 +36,6 @@ from swarm.runtime.process import SERVICE_NOTIFIER, ServiceNotifier, StopRequest
 from swarm.runtime.shell import Shell, join_mission
 from swarm.runtime.store import Memory, Store
 
-__all__ = ["Vehicle", "live_once", "pause_between_lives", "run_agent", "seat_or_stop"]
-
-
 RETRY_S = 0.5
 """Wall time between a failed try for a seat on the bus and the next."""
 NEXT_LIFE_S = 30.0

@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from swarm.model import Mission, Plan
     from swarm.protocol.messages import Snapshot
 
-__all__ = ["coordinator", "plan"]
-
 
 def plan(
     scenario: ScenarioArgument,

@@ -43,9 +43,6 @@ from swarm.runtime.process import SERVICE_NOTIFIER, call_in_background
 from swarm.runtime.shell import Shell, join_mission
 from swarm.runtime.store import Store
 
-__all__ = ["CoordinatorProcess", "run_coordinator"]
-
-
 MissionPlanner = Callable[[Mission, str, int, ShouldStop], Plan]
 T = TypeVar("T")
 

@@ -22,9 +22,6 @@ from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.task_files.mission_items import MavCommand, MavFrame
 from swarm.scenario.task_files.plan_file import LAYER_KEY
 
-__all__ = ["ExportFirmware", "require_origin", "uav_plan", "write_plans"]
-
-
 _QUADROTOR = 2
 _RELATIVE = 1
 _GROUND_SPEED = 1

@@ -20,8 +20,6 @@ from swarm.protocol.events import CommonEvent
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import remedy_for_name
 
-__all__ = ["flight_of", "plan", "read_recording"]
-
 
 def plan(
     mission: Mission,

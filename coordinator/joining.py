@@ -22,17 +22,6 @@ from swarm.runtime.console import say
 from swarm.runtime.errors import Fault, InputError, SwarmError
 from swarm.runtime.shell import Core, Shell, join_mission
 
-__all__ = [
-    "MissionDisplay",
-    "check_mission",
-    "find_missions",
-    "joined",
-    "observer_shell",
-    "only_mission",
-    "watch",
-]
-
-
 SETTLE_S = 0.4
 """Wall time after the first token of a mission in which those of others come too."""
 

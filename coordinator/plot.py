@@ -23,17 +23,6 @@ if TYPE_CHECKING:
 
     from swarm.allocation.problem import BoolArray, FloatArray
 
-__all__ = [
-    "PLOT_SUFFIXES",
-    "Label",
-    "PathStyle",
-    "draw_plan",
-    "path_styles",
-    "place_labels",
-    "plan_figure",
-]
-
-
 PLOT_SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of picture, named by the file's suffix."""
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

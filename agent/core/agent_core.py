@@ -51,9 +51,6 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import StallDetector, Timing, earliest
 from swarm.protocol.uav_messages import MOST_REASONS, Claim, ClaimPhase, Status, StatusPhase
 
-__all__ = ["IMPOSSIBLE", "AgentCore"]
-
-
 IMPOSSIBLE = "impossible transition"
 """Begins the log line about a trigger that the agent's state has no transition for: a bug."""
 _MINDS_BUS_LOSS = TAKES_TASKS | PAUSED_BY_OPERATOR | {AgentState.PREPARING}

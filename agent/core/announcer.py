@@ -12,9 +12,6 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import Claim, Outcome, Status
 
-__all__ = ["Announcer"]
-
-
 _LONGEST_NOTE = 200
 """Characters of a status's note; an autopilot's words may be longer."""
 _OUTCOMES_AT_ONCE = 4

@@ -13,8 +13,6 @@ from swarm.protocol.messages import Body
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 
-__all__ = ["AgentContext", "AgentPart"]
-
 
 @dataclass(frozen=True, slots=True)
 class AgentContext:

@@ -35,17 +35,6 @@ from swarm.protocol.uav_messages import (
     choice_id,
 )
 
-__all__ = [
-    "DIVERSION_MARGIN_FRAC",
-    "ChoiceReporter",
-    "DecisionTurn",
-    "RecordingRule",
-    "RefusedTasks",
-    "decide",
-    "decide_diversion",
-]
-
-
 DIVERSION_MARGIN_FRAC = 0.001
 """Of the value the team has still to win; a UAV turns aside for no less."""
 

@@ -11,32 +11,6 @@ from dataclasses import dataclass, field
 
 from swarm.protocol.events import CommonAction, CommonEvent
 
-__all__ = [
-    "Action",
-    "Arrived",
-    "AttemptFailed",
-    "Caution",
-    "Event",
-    "GoTo",
-    "HandOverExplained",
-    "HandedOver",
-    "HeardAgain",
-    "Held",
-    "Hold",
-    "Home",
-    "NotReady",
-    "OrderVehicle",
-    "Prepare",
-    "Refused",
-    "Return",
-    "ReturnAdvised",
-    "ReturnBegun",
-    "Telemetry",
-    "VehicleOrder",
-    "VehicleReady",
-    "VehicleReport",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Prepare:

@@ -16,8 +16,6 @@ from swarm.protocol.registers import Replica, snapshot_without
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import ClaimPhase, Status
 
-__all__ = ["RecoveredState", "SaveCondition"]
-
 
 class RecoveredState:
     """The memory of an earlier life of the agent of ``uav``, until it is taken or dropped.

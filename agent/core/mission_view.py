@@ -28,8 +28,6 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome
 
-__all__ = ["MissionChange", "MissionView", "Peers"]
-
 
 class MissionChange(Enum):
     """What a statement changes for an agent that is free to take a task."""

@@ -22,9 +22,6 @@ from swarm.protocol.sync import QuestionTimer
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import ClaimPhase
 
-__all__ = ["StateQueries", "StateSync"]
-
-
 _WORTH_TELLING_S = 0.1
 """A correction of the mission clock by less is the network's."""
 

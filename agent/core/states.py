@@ -16,23 +16,6 @@ from typing import Final
 from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import StatusPhase
 
-__all__ = [
-    "FREE",
-    "FROM_OUTSIDE",
-    "HEADED_HOME",
-    "PAUSED_BY_OPERATOR",
-    "STATUS_PHASE",
-    "TAKES_TARGETS",
-    "TAKES_TASKS",
-    "TERMINAL",
-    "TRANSITIONS",
-    "AgentState",
-    "AgentStateMachine",
-    "FreePeriod",
-    "TaskAttempt",
-    "Trigger",
-]
-
 
 class AgentState(Enum):
     """What an agent is about."""

@@ -18,8 +18,6 @@ from swarm.protocol.operator_commands import (
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import StatusPhase
 
-__all__ = ["BusLossTimer", "EndCondition", "OperatorCommands"]
-
 
 class EndCondition(AgentPart):
     """The end of the mission, as one agent finds it has come."""

@@ -36,8 +36,6 @@ from swarm.protocol.messages import PlanEpoch, TaskEntry
 from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome
 
-__all__ = ["Tasking"]
-
 
 class Tasking(AgentPart):
     """What one UAV does about tasks, and its claim.

@@ -43,9 +43,6 @@ from swarm.protocol.messages import UavSpec
 from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD
 from swarm.protocol.uav_messages import Claim, ClaimPhase
 
-__all__ = ["VehicleCommander"]
-
-
 _ALOFT = (ClaimPhase.IDLE, ClaimPhase.PROPOSED, ClaimPhase.HELD)
 """A UAV that claims so has its vehicle in the air."""
 

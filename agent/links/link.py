@@ -25,9 +25,6 @@ from typing import Protocol, cast
 from agent.vehicle.config import LinkAddress, SerialAddress, TcpAddress, UdpInAddress, UdpOutAddress
 from swarm.runtime.log import get_logger
 
-__all__ = ["SILENCE_S", "ByteLink", "LinkCounts", "LinkListener", "open_link"]
-
-
 try:
     import fcntl
     import termios

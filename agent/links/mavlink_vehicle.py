@@ -16,21 +16,12 @@ from agent.core.interface import HandedOver, VehicleOrder, VehicleReport
 from agent.links.link import ByteLink, open_link
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig, UdpOutAddress, parse_forward, parse_link
-from agent.vehicle.session import (
-    BridgeEvent,
-    BytesReceived,
-    LinkClosed,
-    LinkOpened,
-    SendBytes,
-    TimePassed,
-)
+from agent.vehicle.conversation import SendBytes
+from agent.vehicle.session import BridgeEvent, BytesReceived, LinkClosed, LinkOpened, TimePassed
 from agent.vehicle.signing import Signing, SigningKey
 from agent.vehicle.turnaround import TurnaroundMeter
 from swarm.runtime.clock import Clock, unix_s
 from swarm.runtime.log import get_logger
-
-__all__ = ["TURNAROUNDS", "FrameForwarder", "MavlinkVehicle"]
-
 
 TURNAROUNDS = "next targets sent"
 """Event in whose log line a vehicle tells how long each next target took."""

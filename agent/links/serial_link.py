@@ -13,9 +13,6 @@ from agent.links.link import ByteLink, LinkListener
 from agent.vehicle.config import SerialAddress
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["SerialLink"]
-
-
 if sys.platform != "win32":
     import fcntl
     import termios

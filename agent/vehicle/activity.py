@@ -14,8 +14,6 @@ from agent.vehicle.commands import CommandEnded
 from agent.vehicle.messages import Heartbeat, Inbound, Position
 from agent.vehicle.session import POLL_S, VehicleSession
 
-__all__ = ["Activity", "FlightPhase", "Hovering", "Idle"]
-
 
 class FlightPhase(Enum):
     """The kinds of activity."""

@@ -30,13 +30,13 @@ from agent.vehicle.codec import MavlinkCodec
 from agent.vehicle.commands import CommandEnded
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.contact import Contact, StreamRequests
+from agent.vehicle.conversation import BridgeAction
 from agent.vehicle.firmware import firmware_of
 from agent.vehicle.hand_over import HandOver, HandOverReason, LinkLoss, hand_over
 from agent.vehicle.messages import CommandAck, DecodedMessage, GroundHeartbeat, Heartbeat, Position
 from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning
 from agent.vehicle.session import (
-    BridgeAction,
     BridgeEvent,
     BytesReceived,
     LinkClosed,
@@ -50,8 +50,6 @@ from agent.vehicle.supervision import intervention
 from agent.vehicle.transitions import follow, follow_mission, obey
 from swarm.model.frames import enu_from_wgs84
 from swarm.protocol.timing import StallDetector
-
-__all__ = ["Bridge"]
 
 
 class Bridge:

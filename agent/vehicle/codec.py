@@ -48,9 +48,6 @@ from agent.vehicle.messages import (
 )
 from agent.vehicle.signing import Signing
 
-__all__ = ["MavlinkCodec"]
-
-
 _AUTOPILOT_COMPONENT = 1
 _PEER_SILENCE_S = 3.0
 _INT_FRAME = {AltitudeFrame.MEAN_SEA_LEVEL: 5, AltitudeFrame.HOME: 6, AltitudeFrame.NONE: 2}

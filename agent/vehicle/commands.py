@@ -19,17 +19,6 @@ from enum import Enum, IntEnum
 
 from agent.vehicle.messages import CommandAck, CommandInt, CommandLong
 
-__all__ = [
-    "CommandEnded",
-    "CommandOutcome",
-    "CommandPolicy",
-    "CommandQueue",
-    "RepeatedCommand",
-    "VehicleCommand",
-    "result_text",
-]
-
-
 VehicleCommand = CommandLong | CommandInt
 
 _OWED_TIMEOUTS = 2.0

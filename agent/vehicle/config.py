@@ -14,20 +14,6 @@ from swarm.model.frames import Origin
 from swarm.protocol.fields import Point
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = [
-    "ONBOARD_COMPUTER",
-    "BridgeConfig",
-    "CommandStyle",
-    "LinkAddress",
-    "SerialAddress",
-    "TcpAddress",
-    "UdpInAddress",
-    "UdpOutAddress",
-    "parse_forward",
-    "parse_link",
-]
-
-
 ONBOARD_COMPUTER = 191
 """Component id of a companion (MAV_COMP_ID_ONBOARD_COMPUTER, MAV_COMPONENT of common.xml)."""
 

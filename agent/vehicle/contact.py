@@ -21,9 +21,6 @@ from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import CommandLong, DecodedMessage, Heartbeat, Inbound, Position
 
-__all__ = ["Contact", "PeerLatch", "StreamRequests"]
-
-
 _AUTOPILOT_COMPONENT = 1
 
 

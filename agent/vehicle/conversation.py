@@ -11,8 +11,6 @@ from agent.vehicle.config import BridgeConfig
 from agent.vehicle.messages import Outbound
 from agent.vehicle.signing import Signing
 
-__all__ = ["BridgeAction", "Conversation", "SendBytes"]
-
 
 @dataclass(frozen=True, slots=True)
 class SendBytes:

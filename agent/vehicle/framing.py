@@ -18,9 +18,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from agent.vehicle.messages import StatusText
 from agent.vehicle.signing import SIGNATURE_BYTES, SIGNED, SignatureVerdict, Signing
 
-__all__ = ["Framer", "MavlinkFrame", "TextJoiner"]
-
-
 _START_V1 = 0xFE
 
 _START_V2 = 0xFD

@@ -19,9 +19,6 @@ from agent.vehicle.session import VehicleSession
 from agent.vehicle.supervision import intervention
 from swarm.protocol.fields import Point
 
-__all__ = ["HandOver", "HandOverReason", "LinkLoss", "hand_over"]
-
-
 _WORDS_LATE_S = 0.5
 """So much later than the mode the words may come that say why a failsafe set it. ArduCopter
 tells the mode first, some milliseconds before, on a link that loses nothing."""

@@ -26,8 +26,6 @@ from agent.vehicle.returning import Returning
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import wgs84_from_enu
 
-__all__ = ["Holding", "modes_to_leave"]
-
 
 class Holding(Activity):
     """Stops the vehicle: carries out one `Hold`.

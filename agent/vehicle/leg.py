@@ -23,9 +23,6 @@ from agent.vehicle.session import VehicleSession
 from swarm.model.frames import wgs84_from_enu
 from swarm.protocol.fields import Point
 
-__all__ = ["TARGET_TAG", "ArrivalDetector", "ArrivalState", "Flying", "RepositionLeg"]
-
-
 TARGET_TAG = "target"
 """Tag of the command that carries a target: a new one supersedes the last."""
 

@@ -8,38 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = [
-    "AltitudeFrame",
-    "BatteryStatus",
-    "CommandAck",
-    "CommandInt",
-    "CommandLong",
-    "DecodedMessage",
-    "EkfStatus",
-    "ExtendedState",
-    "GroundHeartbeat",
-    "Heartbeat",
-    "Inbound",
-    "Landed",
-    "MissionAck",
-    "MissionClearAll",
-    "MissionCount",
-    "MissionCurrent",
-    "MissionItem",
-    "MissionReached",
-    "MissionRequest",
-    "MissionRequestList",
-    "MissionSetCurrent",
-    "Outbound",
-    "ParameterMissing",
-    "ParameterRead",
-    "ParameterSet",
-    "ParameterValue",
-    "Position",
-    "StatusText",
-    "SystemStatus",
-]
-
 
 class Landed(IntEnum):
     """MAV_LANDED_STATE."""

@@ -37,9 +37,6 @@ from agent.vehicle.messages import (
     MissionSetCurrent,
 )
 
-__all__ = ["LONGEST_HOLD_S", "MissionPlan", "MissionSeqs", "MissionStart", "recognise_plan"]
-
-
 _CMD_NAV_WAYPOINT = 16
 
 _CMD_NAV_RETURN_TO_LAUNCH = 20

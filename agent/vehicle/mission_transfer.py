@@ -28,9 +28,6 @@ from agent.vehicle.messages import (
     Outbound,
 )
 
-__all__ = ["MissionFailed", "MissionInForce", "MissionPolicy", "MissionRead", "MissionTransfer"]
-
-
 _ACCEPTED = 0
 _ERROR = 1
 _INVALID_SEQUENCE = 13

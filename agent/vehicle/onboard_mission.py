@@ -41,9 +41,6 @@ from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
 from swarm.protocol.fields import Point
 from swarm.protocol.timing import earliest
 
-__all__ = ["OnboardMission"]
-
-
 _RENEWAL_FRAC = 0.5
 """The wait is renewed when that share of the patience is left."""
 _SPARE_S, _SPARE = 10.0, 1.5

@@ -18,9 +18,6 @@ from dataclasses import dataclass
 from agent.vehicle.commands import CommandPolicy
 from agent.vehicle.messages import Inbound, Outbound, ParameterRead, ParameterSet, ParameterValue
 
-__all__ = ["OverrideSpec", "ParameterOverride"]
-
-
 _MARK = 1e-3
 """Of the vehicle's own value, added to what is set for the flight."""
 _DECIMALS = 2

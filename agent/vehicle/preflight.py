@@ -26,15 +26,6 @@ from agent.vehicle.messages import (
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
 
-__all__ = [
-    "CruiseSpeedSetting",
-    "FailsafeCheck",
-    "FailsafeReading",
-    "home_alt_m",
-    "start_fault",
-]
-
-
 _SIMULATED = "SWARM_SIMULATED"
 """Parameter of the autopilots that `swarm autopilot` simulates; no firmware has it."""
 

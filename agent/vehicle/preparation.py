@@ -31,9 +31,6 @@ from agent.vehicle.session import VehicleSession
 from agent.vehicle.supervision import PilotConsent
 from swarm.model.frames import wgs84_from_enu
 
-__all__ = ["Preparing"]
-
-
 _CLIMB_PROGRESS_M = 0.2
 _CLIMB_TOLERANCE_FRAC = 0.05
 _CLIMB_TOLERANCE_M = 1.0

@@ -18,9 +18,6 @@ from agent.vehicle.messages import Heartbeat, Landed, Position
 from agent.vehicle.session import VehicleSession
 from swarm.protocol.fields import Point
 
-__all__ = ["ReturnVia", "Returning"]
-
-
 _DISARMED_LONG_S = 5.0
 """A vehicle disarmed for that long is down, even if it does not say that it landed."""
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from agent.core.interface import VehicleOrder
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.contact import Contact
-from agent.vehicle.conversation import BridgeAction, Conversation, SendBytes
+from agent.vehicle.conversation import Conversation
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import Inbound
 from agent.vehicle.onboard_mission import OnboardMission
@@ -23,18 +23,6 @@ from agent.vehicle.state import PositionFilter, VehicleState
 from agent.vehicle.supervision import CruiseWatch, SafetyMonitor
 from swarm.protocol.fields import Point
 from swarm.protocol.timing import earliest
-
-__all__ = [
-    "POLL_S",
-    "BridgeAction",
-    "BridgeEvent",
-    "BytesReceived",
-    "LinkClosed",
-    "LinkOpened",
-    "SendBytes",
-    "TimePassed",
-    "VehicleSession",
-]
 
 
 @dataclass(frozen=True, slots=True)

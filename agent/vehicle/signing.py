@@ -31,20 +31,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = [
-    "KEY_BYTES",
-    "LINK_ID",
-    "MAVLINK_KEY",
-    "SIGNATURE_BYTES",
-    "SIGNED",
-    "SignatureVerdict",
-    "Signing",
-    "SigningKey",
-    "load_signing_key",
-    "signing_key_of",
-]
-
-
 KEY_BYTES = 32
 
 SIGNATURE_BYTES = 13

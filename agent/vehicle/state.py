@@ -25,9 +25,6 @@ from agent.vehicle.messages import (
 )
 from swarm.protocol.fields import Point
 
-__all__ = ["PositionFilter", "PositionNews", "VehicleState"]
-
-
 _BOOT_REGRESSION_S = 2.0
 """A boot time that much behind the newest one is a late message or a reboot."""
 

@@ -17,16 +17,6 @@ from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import BatteryStatus, Heartbeat, Inbound, SystemStatus
 from agent.vehicle.state import VehicleState
 
-__all__ = [
-    "TERMINATED",
-    "CruiseWatch",
-    "PilotConsent",
-    "SafetyMonitor",
-    "intervention",
-    "was_terminated",
-]
-
-
 TERMINATED = "the flight was terminated"
 
 _STATE_CRITICAL, _STATE_EMERGENCY, _STATE_TERMINATION = 5, 6, 8

@@ -35,9 +35,6 @@ from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning, ReturnVia
 from agent.vehicle.session import VehicleSession
 
-__all__ = ["SUCCESSORS", "follow", "follow_mission", "obey"]
-
-
 _IN_THE_AIR = {FlightPhase.HOLDING, FlightPhase.RETURNING, FlightPhase.PREPARING}
 _LET_GO = {FlightPhase.IDLE, FlightPhase.HANDED_OVER}
 

@@ -22,9 +22,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import Arrived, GoTo, VehicleOrder, VehicleReport
 
-__all__ = ["Turnaround", "TurnaroundMeter"]
-
-
 _COMMAND_INT: Final[int] = mavlink.MAVLINK_MSG_ID_COMMAND_INT
 _MISSION_ACK: Final[int] = mavlink.MAVLINK_MSG_ID_MISSION_ACK
 _MISSION_COUNT: Final[int] = mavlink.MAVLINK_MSG_ID_MISSION_COUNT

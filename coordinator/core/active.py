@@ -49,8 +49,6 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import StallDetector, Timing, earliest
 from swarm.protocol.uav_messages import Claim, ClaimPhase
 
-__all__ = ["CoordinatorCore"]
-
 
 class CoordinatorCore:
     """The coordinator of one mission.

@@ -21,18 +21,6 @@ from swarm.protocol.operator_commands import abort_command
 from swarm.protocol.registers import Replica, snapshot_without, without_signers
 from swarm.protocol.sync import QuestionTimer
 
-__all__ = [
-    "InheritedState",
-    "LeadershipBid",
-    "LeadershipStage",
-    "Predecessors",
-    "Reunion",
-    "StateQuery",
-    "coordinator_messages",
-    "inherited_state",
-    "reunion",
-]
-
 
 class LeadershipStage(IntEnum):
     """How far a coordinator has come with its mission."""

@@ -23,22 +23,6 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import ClaimPhase
 
-__all__ = [
-    "CoordinatorAction",
-    "CoordinatorEvent",
-    "MakePlan",
-    "MissionEndCondition",
-    "PlanFailed",
-    "PlanMade",
-    "Replan",
-    "Replanned",
-    "StartDecision",
-    "StartGate",
-    "StopPlanning",
-    "TakeSeat",
-    "Withdraw",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class PlanMade:

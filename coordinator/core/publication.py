@@ -30,19 +30,6 @@ from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 
-__all__ = [
-    "FlightLayers",
-    "RegisterAnnouncer",
-    "exit_status",
-    "height_warning",
-    "last_epoch",
-    "mission_config_of",
-    "scenario_differences",
-    "task_entry_of",
-    "unreleased_tasks",
-]
-
-
 HIGHEST_M = 120.0
 """Above it unmanned aircraft need a permit of their own in the EU, Britain and Switzerland; 122 m
 (400 ft) in the USA."""

@@ -39,8 +39,6 @@ from swarm.protocol.operator_commands import abort_command, describe_command
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 
-__all__ = ["MARGIN_FRAC", "TRANSITIONS", "MissionStage", "ReplanPolicy", "StagedMission"]
-
 
 class MissionStage(Enum):
     """How far one process has come with coordinating its mission."""

@@ -34,9 +34,6 @@ from swarm.protocol.mission_clock import MissionClock
 from swarm.protocol.registers import Replica, snapshot_without
 from swarm.protocol.timing import StallDetector, Timing, earliest
 
-__all__ = ["MakeCoordinator", "StandbyCore"]
-
-
 MakeCoordinator = Callable[[Snapshot | None, float], CoordinatorCore]
 """Makes the coordinator with that memory, of that age [s]."""
 

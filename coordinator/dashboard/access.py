@@ -21,20 +21,6 @@ from pathlib import Path
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.extras import require_extra
 
-__all__ = [
-    "TOKEN_VARIABLE",
-    "AccessRules",
-    "RateLimit",
-    "ServeAddress",
-    "access_for",
-    "is_loopback",
-    "listen",
-    "parse_serve_address",
-    "read_token",
-    "url_of",
-]
-
-
 TOKEN_VARIABLE = "SWARM_DASHBOARD_TOKEN"  # noqa: S105 - a variable's name
 LEAST_TOKEN = 16
 """Characters of a token; fewer could be guessed."""

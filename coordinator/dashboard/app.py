@@ -36,9 +36,6 @@ from coordinator.dashboard.page_input import (
 from coordinator.dashboard.source import DashboardSource, Refusal, RefusedError
 from swarm.runtime.clock import Clock, SystemClock
 
-__all__ = ["STATIC", "Dashboard"]
-
-
 STATIC = Path(__file__).parent / "static"
 MAX_BODY_BYTES = 16 * 1024
 MAX_CLIENTS = 64

@@ -15,8 +15,6 @@ from swarm.protocol.board import mission_of
 from swarm.protocol.messages import MissionPhase
 from swarm.protocol.registers import Replica
 
-__all__ = ["Baseline", "baseline_of"]
-
 
 @dataclass(slots=True, eq=False)
 class Baseline:

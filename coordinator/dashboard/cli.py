@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from coordinator.dashboard.feed import PageSettings
     from swarm.bus.port import Bus
 
-__all__ = ["dashboard"]
-
 
 @with_connection_options
 def dashboard(

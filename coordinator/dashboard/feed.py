@@ -27,9 +27,6 @@ from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import abort_command, in_force
 from swarm.protocol.uav_messages import Choice
 
-__all__ = ["PROTOCOL", "Feed", "PageSettings"]
-
-
 PROTOCOL = 1
 _STORY, _CHOICES, _CURVE, _COMMANDS = 500, 300, 600, 200
 _MEASURES = 8

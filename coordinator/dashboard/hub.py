@@ -15,9 +15,6 @@ from swarm.runtime.clock import SystemClock
 from swarm.runtime.log import get_logger
 from swarm.runtime.process import call_in_background
 
-__all__ = ["Hub"]
-
-
 LOOK_S = 0.5
 """Wall time between two looks."""
 SOONEST_S = 0.05

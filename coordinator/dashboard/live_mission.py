@@ -22,9 +22,6 @@ from swarm.runtime.clock import Clock, incarnation
 from swarm.runtime.log import get_logger
 from swarm.runtime.shell import Shell
 
-__all__ = ["LiveMission"]
-
-
 EFFECT_S = 10.0
 """Wall time in which an order shows its effect, or it has not been obeyed."""
 

@@ -23,9 +23,6 @@ from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskState
 from swarm.protocol.messages import MissionConfig, MissionPhase
 
-__all__ = ["Metrics"]
-
-
 Samples = Iterable[tuple[Sequence[str], float]]
 """Values of labels, and of the metric."""
 

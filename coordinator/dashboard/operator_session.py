@@ -29,9 +29,6 @@ from swarm.protocol.events import (
 from swarm.protocol.messages import Message, MissionConfig
 from swarm.protocol.timing import Timing, earliest
 
-__all__ = ["OperatorSession"]
-
-
 KEPT_ROWS = 1000
 
 

@@ -15,9 +15,6 @@ from swarm.model.ids import FLEET
 from swarm.protocol.fields import Duration, Flag, Id, Point, Value
 from swarm.protocol.messages import CommandKind
 
-__all__ = ["CommandInput", "PlaybackInput", "TaskInput", "WithdrawalInput", "fault_of"]
-
-
 Reason = Annotated[str, Strict(), Len(0, 150)]
 """What is told of a command has to have room in a status."""
 Rate = Annotated[float, Strict(), Gt(0.0), Le(1000.0)]

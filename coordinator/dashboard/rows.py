@@ -7,8 +7,6 @@ from collections import deque
 from collections.abc import Hashable, Mapping
 from itertools import takewhile
 
-__all__ = ["AppendOnlyTable", "RowTable", "as_text"]
-
 
 def as_text(row: Mapping[str, object]) -> str:
     """``row`` as JSON without a needless sign."""

@@ -10,9 +10,6 @@ from collections.abc import AsyncIterator, Iterator
 import uvicorn
 from starlette.types import ASGIApp
 
-__all__ = ["serving"]
-
-
 END_S = 1
 """Wall time that connections have to end in order."""
 

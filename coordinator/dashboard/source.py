@@ -11,17 +11,6 @@ from coordinator.mission_view.mission_state import MissionState
 from coordinator.operator.requests import OperatorRequest
 from swarm.runtime.errors import SwarmError
 
-__all__ = [
-    "CommandRow",
-    "CommandState",
-    "DashboardSource",
-    "PlaybackControl",
-    "PlaybackState",
-    "Refusal",
-    "RefusedError",
-    "RequestSink",
-]
-
 
 class CommandState(StrEnum):
     """What has come of something the operator said."""

@@ -20,9 +20,6 @@ from swarm.bus.connection import ConnectionOptions
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.log import get_logger
 
-__all__ = ["supervised", "supervised_dashboard"]
-
-
 FIRST_PAUSE_S = 1.0
 """Wall time before the child is started again; doubles from one end to the next."""
 LONGEST_PAUSE_S = 30.0

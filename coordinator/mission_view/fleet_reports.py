@@ -14,9 +14,6 @@ from swarm.protocol.messages import REVOKED_INCARNATION, Stamp
 from swarm.protocol.registers import MOST_STRANGE, Replica
 from swarm.protocol.uav_messages import Choice, Status
 
-__all__ = ["CHOICES_KEPT", "FleetReports"]
-
-
 CHOICES_KEPT = 2000
 """What an observer remembers of why tasks were taken."""
 

@@ -12,8 +12,6 @@ from swarm.model import Mission, Task, TaskId, UavId
 from swarm.protocol.board import TaskBoard, TaskState
 from swarm.protocol.messages import TaskEdit
 
-__all__ = ["FlownMission"]
-
 
 class FlownMission:
     """One mission as it is flown."""

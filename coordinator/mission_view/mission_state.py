@@ -45,9 +45,6 @@ from swarm.protocol.sync import QuestionTimer
 from swarm.protocol.timing import StallDetector, Timing, earliest
 from swarm.protocol.uav_messages import AttemptResult, Choice, ClaimPhase, Outcome, Status
 
-__all__ = ["MissionState"]
-
-
 EPOCHS_KEPT = 16
 """Epochs that an observer tells from new ones; one is restated soon after it was stated, or not."""
 

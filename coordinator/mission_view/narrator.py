@@ -42,9 +42,6 @@ from swarm.protocol.uav_messages import (
     StatusPhase,
 )
 
-__all__ = ["MissionNarrator"]
-
-
 NAMES_TOLD = 5
 """Of those whose keys have changed."""
 _LEAVING = {

@@ -24,9 +24,6 @@ from swarm.protocol.operator_commands import abort_command
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import Status, StatusPhase
 
-__all__ = ["MissionObserver", "deserted"]
-
-
 _UNEVEN = 0.02
 """Change of the mission's pace that is worth setting the clock anew."""
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 from swarm.protocol.messages import Body, MissionConfig, PlanEpoch
 from swarm.protocol.mission_clock import MissionClock
 
-__all__ = ["PacedClock", "SpeedupEstimator"]
-
-
 BASELINE_S = 0.8
 """Two words of one UAV that far apart tell the pace [s of the observer's clock]."""
 TOLERANCE = 1.25

@@ -10,18 +10,6 @@ from dataclasses import dataclass
 from coordinator.mission_view.story import MissionEvent
 from coordinator.mission_view.wording import clean
 
-__all__ = [
-    "ASCII",
-    "BAD",
-    "UNICODE",
-    "Signs",
-    "signs_for",
-    "story_line",
-    "story_style",
-    "uav_colour",
-]
-
-
 _UAV_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 BAD = "bold red"
 """Style of losses and failures."""

@@ -22,9 +22,6 @@ from swarm.protocol.membership import Membership
 from swarm.protocol.messages import MissionPhase, PlanEpoch
 from swarm.protocol.uav_messages import AttemptResult, Choice, Claim, ClaimPhase, Outcome, Status
 
-__all__ = ["Reasons"]
-
-
 _SOON_S = 1.0
 """Within this time the reason of a claim has followed it, unless it was lost."""
 _TRYING = (ClaimPhase.PROPOSED, ClaimPhase.HELD)

@@ -16,23 +16,6 @@ from swarm.allocation.problem import Problem
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.protocol.uav_messages import AttemptResult, Outcome
 
-__all__ = [
-    "MissionResult",
-    "Progress",
-    "ProtectionSummary",
-    "QuantityComparison",
-    "ReportFact",
-    "RouteComparison",
-    "RouteStop",
-    "compare_quantities",
-    "compare_routes",
-    "deviations",
-    "lists_objective",
-    "progress_of",
-    "refusals",
-    "summary_line",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class MissionResult:

@@ -18,9 +18,6 @@ from swarm.protocol.board import TaskState
 from swarm.protocol.messages import CommandKind, MissionPhase, OperatorCommand
 from swarm.protocol.operator_commands import in_force
 
-__all__ = ["TAKEN", "Scene", "TaskView", "scene_of", "task_stands"]
-
-
 TAKEN = "taken"
 """How an open task stands that a UAV is on its way to, or serves."""
 

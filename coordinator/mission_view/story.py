@@ -11,9 +11,6 @@ from enum import StrEnum
 
 from coordinator.mission_view.wording import shown_s
 
-__all__ = ["STORY_KEPT", "EventKind", "MissionEvent", "Story", "notable"]
-
-
 STORY_KEPT = 20_000
 """Lines of the story that an observer remembers; there are some for each task and each loss."""
 

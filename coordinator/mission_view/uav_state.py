@@ -12,9 +12,6 @@ from coordinator.mission_view.mission_state import MissionState
 from swarm.model import TaskId, UavId
 from swarm.protocol.uav_messages import Claim, ClaimPhase, Status, StatusPhase
 
-__all__ = ["ABSENT", "LOST", "FleetStates", "UavState", "UavView"]
-
-
 Point = tuple[float, float, float]
 LOST = "lost"
 STARTING = "starting"

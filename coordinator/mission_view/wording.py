@@ -13,26 +13,6 @@ from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit, Task
 from swarm.protocol.operator_commands import describe_command
 from swarm.protocol.uav_messages import Choice, Claim, ClaimPhase
 
-__all__ = [
-    "because",
-    "choice_in_words",
-    "clean",
-    "command_in_words",
-    "contest_in_words",
-    "counted",
-    "entry_in_words",
-    "lateness_in_words",
-    "listed",
-    "order_in_words",
-    "place_in_words",
-    "seconds_in_words",
-    "short_names",
-    "shown_s",
-    "shown_value",
-    "value_in_words",
-]
-
-
 _PUNCTUAL_S = 0.005
 """Smaller differences are none."""
 _MOST_RIVALS = 3

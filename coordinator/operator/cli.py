@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from coordinator.operator.task_edits import Wgs84
     from swarm.protocol.fields import Point
 
-__all__ = ["abort", "hold", "resume", "return_home", "start", "task"]
-
-
 UavArgument = Annotated[
     str, typer.Argument(metavar="UAV", help="Id of the UAV.", autocompletion=complete_uav)
 ]

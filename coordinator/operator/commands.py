@@ -27,16 +27,6 @@ from swarm.protocol.messages import (
 from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD, dispensable
 from swarm.protocol.uav_messages import ClaimPhase, Status, StatusPhase
 
-__all__ = [
-    "CommandHandler",
-    "CommandRequest",
-    "RequestHandler",
-    "RequestResult",
-    "RequestVerdict",
-    "StartHandler",
-    "StartRequest",
-]
-
 
 class RequestResult(Enum):
     """What has come of a command or an order."""

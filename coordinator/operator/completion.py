@@ -20,9 +20,6 @@ from swarm.runtime.errors import SwarmError
 if TYPE_CHECKING:
     from swarm.bus.config import BusConfig
 
-__all__ = ["complete_uav"]
-
-
 _OPEN_S = 0.5
 _LOOK_S = 0.3
 

@@ -40,9 +40,6 @@ from swarm.protocol.messages import Message, OperatorCommand, StartWithout, Task
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.timing import Timing, earliest
 
-__all__ = ["OperatorClient", "OperatorRequest", "RequestTracker", "TrackedRequest"]
-
-
 OperatorRequest = CommandRequest | StartRequest | NewTask | TaskWithdrawal
 OperatorStatement = OperatorCommand | StartWithout | TaskEdit
 

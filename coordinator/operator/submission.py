@@ -22,9 +22,6 @@ from swarm.runtime.errors import Fault, InputError, SwarmError
 from swarm.runtime.log import LogLevel, configure_logging
 from swarm.runtime.process import run_until_stopped
 
-__all__ = ["MissionConnection", "check_reason_and_ids", "submit_request"]
-
-
 LONGEST_REASON = 150
 """What is told of a command has to have room in a status."""
 

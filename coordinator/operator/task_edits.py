@@ -27,9 +27,6 @@ from swarm.protocol.operator_commands import abort_command
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import ClaimPhase
 
-__all__ = ["NewTask", "TaskEditHandler", "TaskWithdrawal", "Wgs84", "task_edit_of"]
-
-
 FARTHEST_M: Final = 1e8
 MOST_VALUE: Final = 1e12
 LONGEST_S: Final = 1e9

@@ -12,8 +12,6 @@ import numpy as np
 
 from swarm.allocation.problem import FloatArray, IntArray
 
-__all__ = ["best_assignment"]
-
 
 def best_assignment(scores: FloatArray) -> dict[int, int]:
     """Columns by row, as many as there can be, with the largest sum of scores.

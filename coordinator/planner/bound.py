@@ -35,9 +35,6 @@ from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes import TeamArrays
 from swarm.kernels.routes_bound import priced_lists, shortest_legs_s
 
-__all__ = ["Pricing", "UpperBound", "lagrangian_bound", "trivial_bound", "upper_bound"]
-
-
 Pricing = Callable[[TeamArrays, FloatArray], tuple[float, IntArray]]
 """Of lists; see `swarm.kernels.routes_bound.priced_lists`."""
 _GROUPS = 10

@@ -15,18 +15,6 @@ from swarm.allocation.problem import Problem
 from swarm.kernels import exact as kernel
 from swarm.runtime.errors import SwarmError
 
-__all__ = [
-    "MAX_TASKS",
-    "MAX_UNCERTAIN_TASKS",
-    "Optimum",
-    "ProblemTooLargeError",
-    "estimated_s",
-    "optimum",
-    "optimum_before",
-    "worst_value",
-]
-
-
 MAX_TASKS = kernel.MOST_TASKS
 """With more the subsets are too many, even where every survival probability is 1."""
 MAX_UNCERTAIN_TASKS = kernel.MOST_UNCERTAIN_TASKS

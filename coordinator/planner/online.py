@@ -31,19 +31,6 @@ from swarm.protocol.board import (
 from swarm.protocol.messages import PlanEpoch
 from swarm.protocol.uav_messages import AttemptResult, ClaimPhase, Outcome
 
-__all__ = [
-    "EpochPolicy",
-    "Lists",
-    "Prediction",
-    "ReplanResult",
-    "Situation",
-    "complete_lists",
-    "objective_to_go",
-    "predicted",
-    "replan",
-]
-
-
 Lists = Mapping[str, tuple[str, ...]]
 """Task ids by UAV id, in order of execution."""
 _ITERATIONS_PER_TASK = 400

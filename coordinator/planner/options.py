@@ -12,20 +12,6 @@ from dataclasses import dataclass
 
 from swarm.runtime.clock import Clock
 
-__all__ = [
-    "BOUND_S",
-    "Limit",
-    "ShouldStop",
-    "after_evaluations",
-    "after_time",
-    "bound_frac",
-    "first_of",
-    "method_names",
-    "never",
-    "online_method_names",
-    "part_of",
-]
-
 
 def method_names() -> list[str]:
     """Of all planning methods, for the completion of commands, which load no planner otherwise."""

@@ -37,15 +37,6 @@ from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-__all__ = [
-    "METHODS",
-    "ONLINE_METHODS",
-    "GuidedPlan",
-    "check_online_method",
-    "guided_plan",
-    "make_plan",
-]
-
 ONLINE_METHODS = (*RULE_NAMES, GuidedRule.name)
 """Those whose rule agents can follow by themselves."""
 METHODS = (*ONLINE_METHODS, "exact")

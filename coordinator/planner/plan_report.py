@@ -11,9 +11,6 @@ from rich.text import Text
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.runtime.table import NONE, Column, ResultTable
 
-__all__ = ["late_tasks", "plan_as_json", "plan_from_json", "plan_table"]
-
-
 _LATE = "bold red"
 
 

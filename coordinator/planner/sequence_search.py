@@ -34,16 +34,6 @@ from swarm.allocation.problem import IntArray, Problem
 from swarm.kernels import lower_level as kernel
 from swarm.kernels.lower_level import EXACT_TASKS
 
-__all__ = [
-    "EXHAUSTIVE_UAVS",
-    "Progress",
-    "SearchLimits",
-    "SequenceSearch",
-    "best_sequence",
-    "search_sequence",
-]
-
-
 EXHAUSTIVE_UAVS = 8
 """Up to this many active UAVs every distinct first round is tried."""
 Progress = Callable[[int, float], None]

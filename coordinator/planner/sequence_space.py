@@ -18,19 +18,6 @@ from swarm.allocation.lower_level import CompiledRule, TeamState, next_decision
 from swarm.allocation.problem import FloatArray, Problem
 from swarm.kernels import lower_level as kernel
 
-__all__ = [
-    "FirstRound",
-    "FirstRounds",
-    "Sequence",
-    "SingleStage",
-    "has_plain_first_round",
-    "neighbours",
-    "perturbed",
-    "single_stage",
-    "twins",
-]
-
-
 Sequence = tuple[int, ...]
 """UAV indices, first decider first."""
 

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from coordinator.recording.playback import Playback
     from coordinator.recording.reader import Recording
 
-__all__ = ["explain", "record", "replay"]
-
-
 NewFileArgument = Annotated[
     Path, typer.Argument(metavar="FILE.mcap", help="File to be made.", show_default=False)
 ]

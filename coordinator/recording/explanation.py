@@ -22,9 +22,6 @@ from swarm.protocol.board import TaskState
 from swarm.protocol.uav_messages import AttemptResult, StatusPhase
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["Explanation", "explain_task", "explain_uav"]
-
-
 _MOST_NAMED = 12
 _MOST_PASSED_OVER = 3
 """Choices that passed a task over are told so often; of more only the number."""

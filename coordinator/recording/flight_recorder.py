@@ -25,18 +25,6 @@ from swarm.runtime.clock import SystemClock, unix_s
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.shell import Core
 
-__all__ = [
-    "FileSink",
-    "FlightRecorder",
-    "Job",
-    "RecordingThread",
-    "Sink",
-    "recording_to",
-    "virtual_ns",
-    "wall_ns",
-]
-
-
 PERIOD_S = 1.0
 """Wall time between two writes."""
 MAX_WAITING = 50_000

@@ -11,25 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-__all__ = [
-    "FOXGLOVE_SCHEMAS",
-    "LOCATION_FIX",
-    "LOG",
-    "SCENE_UPDATE",
-    "Json",
-    "Point",
-    "arrow",
-    "cube",
-    "entity",
-    "line_strip",
-    "location_fix",
-    "log",
-    "scene_update",
-    "sphere",
-    "text",
-]
-
-
 Json = dict[str, Any]
 Point = tuple[float, float, float]
 Colour = tuple[float, float, float, float]

@@ -41,9 +41,6 @@ from swarm.model import Origin
 from swarm.model.frames import wgs84_from_enu
 from swarm.protocol.board import TaskState
 
-__all__ = ["PROGRESS", "PROGRESS_SCHEMA", "FoxgloveTopics", "level_of", "log_line"]
-
-
 PROGRESS: Final = "peckorder.Progress"
 FRAME: Final = "mission"
 """Name of the local frame: metres east, north and up of the mission's origin."""

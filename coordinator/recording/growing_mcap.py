@@ -36,9 +36,6 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-__all__ = ["PADDING", "GrowingMcap", "Patch"]
-
-
 PADDING: Final = 0x80
 """Opcode of a record that readers pass over: the first of those that applications may use."""
 MAX_SUMMARY_BYTES: Final = 2 << 20

@@ -10,9 +10,6 @@ import typer
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.extras import require_extra
 
-__all__ = ["RecordOption", "check_new_recording"]
-
-
 RecordOption = Annotated[
     Path | None,
     typer.Option(

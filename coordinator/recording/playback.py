@@ -15,9 +15,6 @@ from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import MissionObserver
 from coordinator.recording.reader import Recording
 
-__all__ = ["MAX_SPEED", "Playback"]
-
-
 MAX_SPEED = 1000.0
 _MOST_KEPT = 24
 """Pictures on the way to which one can go back."""

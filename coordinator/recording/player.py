@@ -11,9 +11,6 @@ from coordinator.mission_view.mission_state import MissionState
 from coordinator.recording.playback import MAX_SPEED, Playback
 from swarm.runtime.clock import Clock
 
-__all__ = ["RecordingPlayer"]
-
-
 FRAME_S = 0.1
 """Wall time between two steps of a recording that plays."""
 

@@ -37,9 +37,6 @@ from swarm.protocol.messages import SCHEMA_VERSION
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["FileRecords", "RecordedFact", "RecordedPlan", "Recording", "is_mcap", "read_recording"]
-
-
 _HEAD: Final = struct.Struct("<BQ")
 _FOOTER: Final = struct.Struct("<BQQQI")
 _LARGEST_CHUNK: Final = 256 << 20

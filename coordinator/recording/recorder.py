@@ -40,9 +40,6 @@ from swarm.protocol.messages import SCHEMA_VERSION, MissionPhase
 from swarm.protocol.timing import Timing, earliest
 from swarm.runtime.shell import Core
 
-__all__ = ["METADATA", "FactSink", "RecordedCore", "Recorder", "RecordingInfo", "RecordingObserver"]
-
-
 A = TypeVar("A")
 
 

@@ -43,21 +43,6 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 
-__all__ = [
-    "FORMAT",
-    "SCHEMAS",
-    "FileMessage",
-    "RecordableFact",
-    "RecordingStarted",
-    "UnreadableError",
-    "body_name",
-    "decode",
-    "encode",
-    "schema_of",
-    "topics_of",
-]
-
-
 FORMAT: Final = "1"
 """Version of all schemas here; grows when what was written before cannot be read any more."""
 

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from swarm.protocol.timing import Timing
     from swarm.runtime.clock import ScaledClock
 
-__all__ = ["JsonLines", "print_status", "status"]
-
-
 PATIENCE_S = 4.0
 """How long to wait when looking once, unless told otherwise [wall s]."""
 

@@ -20,9 +20,6 @@ from swarm.model.ids import FLEET
 from swarm.protocol.messages import CommandKind, MissionPhase
 from swarm.protocol.uav_messages import StatusPhase
 
-__all__ = ["alerts", "fit_cells", "fleet_table", "table_width", "task_lists"]
-
-
 _DOES_CELLS = len(StatusPhase.PREPARING)
 _ETA_CELLS = 7
 _DONE_CELLS = 5

@@ -32,9 +32,6 @@ from coordinator.terminal.map_panel import ideal_width, map_panel
 from swarm.protocol.board import TaskState
 from swarm.protocol.messages import MissionPhase
 
-__all__ = ["LiveView", "live_picture", "mission_title", "task_counts"]
-
-
 _WIDE = 104
 """Columns from which on the story stands beside the map and not below."""
 _COLUMN = 48

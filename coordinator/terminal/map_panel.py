@@ -18,9 +18,6 @@ from coordinator.mission_view.scene import Scene, TaskView
 from coordinator.mission_view.uav_state import UavView
 from swarm.protocol.board import TaskState
 
-__all__ = ["Canvas", "Spot", "ideal_width", "map_panel"]
-
-
 Spot = tuple[float, float]
 """Column and row [cells], counted from the middle of the top left cell."""
 

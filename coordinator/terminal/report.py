@@ -32,9 +32,6 @@ from coordinator.planner.plan_report import plan_as_json
 from swarm.model import Mission, Plan, UavId
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["REPORT_SUFFIXES", "MissionReport", "check_report_path", "write_report"]
-
-
 REPORT_SUFFIXES = (".json", ".md")
 _LISTS_KEY = (
     "Each task @ its completion in s of mission time; `+` flown though not planned for this "

@@ -15,8 +15,6 @@ from coordinator.mission_view.wording import clean, command_in_words, shown_valu
 from coordinator.terminal.live_view import mission_title, task_counts
 from swarm.protocol.board import TaskState
 
-__all__ = ["status_as_json", "status_table"]
-
 
 def status_as_json(scene: Scene) -> dict[str, Any]:
     """``scene`` as `swarm status --json` prints it, ready for `json.dumps`."""

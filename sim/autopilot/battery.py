@@ -12,9 +12,6 @@ from enum import IntEnum
 
 from sim.autopilot.config import BatteryFailsafe
 
-__all__ = ["BatteryModel", "ChargeLevel"]
-
-
 _FULL_V = 12.6
 _EMPTY_V = 10.5
 _FLIGHT_A = 30.0

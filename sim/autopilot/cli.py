@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from sim.autopilot.faults import VehicleFault
     from sim.autopilot.options import Endpoint
 
-__all__ = ["autopilot"]
-
-
 _FAULT_HELP = """Let something happen to a UAV: UAV:KIND@T or UAV:KIND@T+DURATION, in vehicle
 seconds; T 0 is power-up, any other counts from the first arming. KIND: reboot, gps-lost,
 battery-low (battery-low=0.2 says how low), silent, stuck, pilot, failsafe-rtl, refuse-arming,

@@ -11,9 +11,6 @@ from dataclasses import dataclass, field
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-__all__ = ["ChannelCodec", "ChannelSigning"]
-
-
 _EPOCH_UNIX_S = 1_420_070_400
 """2015-01-01 GMT, from where MAVLink's signatures count."""
 _STAMPS_PER_S = 100_000

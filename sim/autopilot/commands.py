@@ -20,9 +20,6 @@ from sim.autopilot.positions import ABOVE_HOME_FRAMES, place_enu_m
 from sim.autopilot.telemetry import TelemetryReporter
 from sim.world.motion import Point
 
-__all__ = ["AutopilotCommand", "CommandExecutor", "command_from_message"]
-
-
 _FORCE_ARM = 21196.0
 _FORCE_REBOOT = 20190226.0
 

@@ -16,9 +16,6 @@ from sim.world.wind import Wind, WindyMotion, gusts_of
 from swarm.model import Mission, UavId
 from swarm.model.frames import DEFAULT_ORIGIN, Origin
 
-__all__ = ["BatteryFailsafe", "Delays", "FleetMember", "Physics", "VehicleConfig", "fleet_of"]
-
-
 _AIRSPEED_PER_CRUISE = 1.5
 _MAX_SYSTEM_ID = 254
 

@@ -11,23 +11,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 if TYPE_CHECKING:
     from sim.autopilot.firmware.model import FirmwareModel
 
-__all__ = [
-    "Connected",
-    "Disconnected",
-    "FirmwareEvent",
-    "MavlinkReceived",
-    "Narrator",
-    "Outbox",
-    "OutgoingMessage",
-    "OwnCommand",
-    "Reboot",
-    "Sender",
-    "TextTemplate",
-    "TimeAdvanced",
-    "VehicleEvent",
-]
-
-
 _TEXT = 50
 """Characters in a STATUSTEXT."""
 

@@ -21,9 +21,6 @@ from sim.autopilot.flight import FlightMode
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
 
-__all__ = ["FailsafeMonitor"]
-
-
 _RADIO = (TextTemplate(mavlink.MAV_SEVERITY_WARNING, "Radio Failsafe"),)
 _GROUND = (TextTemplate(mavlink.MAV_SEVERITY_WARNING, "GCS Failsafe"),)
 

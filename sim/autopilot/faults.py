@@ -12,8 +12,6 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["FAULT_RULE", "FaultKind", "VehicleFault", "parse_fault"]
-
 
 class FaultKind(StrEnum):
     """What goes wrong."""

@@ -22,9 +22,6 @@ from sim.autopilot.flight import FlightMode, MotionPhase
 from sim.autopilot.pilot import Pilot
 from sim.autopilot.vehicle import COMPONENT_ID, SimulatedAutopilot
 
-__all__ = ["FaultyAutopilot"]
-
-
 _DEFECT = "Compass not healthy"
 _SYSTEM_IDS = 254
 

@@ -8,8 +8,6 @@ from sim.autopilot.config import VehicleConfig
 from sim.autopilot.parameters import ParameterRole, ParameterTable
 from sim.world.motion import Motion, Point
 
-__all__ = ["FlightMode", "FlightStateMachine", "Milestone", "MotionPhase"]
-
 
 class FlightMode(Enum):
     """What the vehicle flies by; the value is the name people see on ArduPilot."""

@@ -9,9 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-__all__ = ["MessageRates"]
-
-
 _LEAST_INTERVAL_S = 0.001
 """Shorter intervals are taken as this one [s]."""
 

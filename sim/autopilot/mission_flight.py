@@ -14,9 +14,6 @@ from sim.world.motion import Point
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
 
-__all__ = ["MissionFlight"]
-
-
 _CLIMB_LEAST_M = 0.8
 """Less than this is not climbed before the first item [m]."""
 

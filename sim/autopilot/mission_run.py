@@ -15,9 +15,6 @@ from sim.autopilot.mission_store import StoredMissionItem
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
 
-__all__ = ["MissionRun", "MissionRunState"]
-
-
 _ITEMS_COMPARED = 3
 """Navigation items, from the current one, whose change makes the autopilot start it anew."""
 _REPEAT_S = 1.0

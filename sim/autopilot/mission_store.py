@@ -22,9 +22,6 @@ from swarm.model.frames import Origin
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
 
-__all__ = ["MissionServer", "MissionStore", "StoredMissionItem", "home_item", "item_place_enu_m"]
-
-
 _MAX_ITEMS = 724
 """Room for items, home included."""
 _RESEND_S = 1.0

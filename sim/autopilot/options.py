@@ -11,18 +11,6 @@ from sim.autopilot.config import FleetMember
 from sim.autopilot.faults import FAULT_RULE, VehicleFault, parse_fault
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-__all__ = [
-    "ENDPOINT_RULE",
-    "Endpoint",
-    "Transport",
-    "check_wind",
-    "faults_by_uav",
-    "parse_endpoint",
-    "parse_wind",
-    "require_finite",
-]
-
-
 ENDPOINT_RULE = "write tcp:HOST:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
 
 

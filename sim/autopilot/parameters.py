@@ -17,15 +17,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import Outbox, Sender
 
-__all__ = [
-    "ParameterBehaviour",
-    "ParameterEntry",
-    "ParameterRole",
-    "ParameterServer",
-    "ParameterTable",
-]
-
-
 _NO_INDEX = 65535
 """Index in a PARAM_VALUE that answers a request by name, as the autopilots send it."""
 

@@ -22,9 +22,6 @@ from sim.autopilot.positions import home_position, origin_position
 from sim.autopilot.readiness import PowerUpStage, Readiness
 from sim.world.motion import Point
 
-__all__ = ["Pilot"]
-
-
 _PREARM_TEXT_S = 30.0
 """How often a vehicle that can't be armed says why [s]."""
 _TASKS = frozenset({FlightMode.TAKEOFF, FlightMode.AUTO, FlightMode.LAND})

@@ -13,16 +13,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim.world.motion import Point
 from swarm.model.frames import Origin, enu_from_wgs84, wgs84_from_enu
 
-__all__ = [
-    "ABOVE_HOME_FRAMES",
-    "ABOVE_SEA_FRAMES",
-    "home_position",
-    "origin_position",
-    "place_enu_m",
-    "place_wgs84_e7",
-]
-
-
 ABOVE_HOME_FRAMES = frozenset(
     {mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
 )

@@ -9,8 +9,6 @@ from sim.autopilot.config import Delays
 from sim.autopilot.flight import FlightMode
 from sim.world.motion import Point
 
-__all__ = ["PowerUpStage", "Readiness"]
-
 
 class PowerUpStage(Enum):
     """Something that has just become ready."""

@@ -25,9 +25,6 @@ from sim.autopilot.options import Endpoint, Transport
 from sim.autopilot.vehicle import COMPONENT_ID, SimulatedAutopilot
 from swarm.runtime.clock import Clock, unix_s
 
-__all__ = ["ServedVehicle", "VehicleServer"]
-
-
 _Address = tuple[Any, ...]
 
 _MAX_PEERS = 32

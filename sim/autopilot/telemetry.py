@@ -16,9 +16,6 @@ from sim.autopilot.flight import MotionPhase
 from sim.autopilot.pilot import Pilot
 from sim.autopilot.positions import home_position, origin_position, place_wgs84_e7
 
-__all__ = ["DATA_STREAMS", "TelemetryReporter"]
-
-
 _EKF_ALIGNED = (
     mavlink.EKF_ATTITUDE
     | mavlink.EKF_VELOCITY_HORIZ

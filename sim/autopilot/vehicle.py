@@ -34,9 +34,6 @@ from sim.autopilot.pilot import Pilot
 from sim.autopilot.positions import place_enu_m
 from sim.autopilot.telemetry import DATA_STREAMS, TelemetryReporter
 
-__all__ = ["COMPONENT_ID", "SimulatedAutopilot"]
-
-
 COMPONENT_ID = 1
 _HEARTBEAT_S = 1.0
 _SIMULATED = ParameterEntry("SWARM_SIMULATED", 1.0, mavlink.MAV_PARAM_TYPE_REAL32, read_only=True)

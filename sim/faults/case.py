@@ -27,20 +27,6 @@ from swarm.model.ids import COORDINATOR
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = [
-    "MOST_TASKS",
-    "MOST_UAVS",
-    "TIMING",
-    "Case",
-    "CaseResult",
-    "format_case",
-    "limit_s",
-    "parse_case",
-    "play",
-    "quick_plan",
-]
-
-
 MOST_UAVS: Final = 6
 MOST_TASKS: Final = 15
 TIMING: Final = Timing(status_s=2.0)

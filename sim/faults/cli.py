@@ -16,8 +16,6 @@ from swarm.runtime.options import JsonOption
 if TYPE_CHECKING:
     from sim.faults.soak import Breach
 
-__all__ = ["soak"]
-
 
 def soak(
     seeds: Annotated[

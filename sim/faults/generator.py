@@ -21,9 +21,6 @@ from swarm.model.ids import COORDINATOR
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-__all__ = ["fly_with_faults", "kinds_of", "random_case", "random_schedule", "read_lines"]
-
-
 SPAN_S = 40.0
 """Faults of random fleets begin within this time, which most of their missions take."""
 

@@ -17,8 +17,6 @@ from sim.world.virtual_world import World
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import CommandKind
 
-__all__ = ["FaultInjector"]
-
 
 class FaultInjector:
     """Plays one schedule in a world that has not begun."""

@@ -48,9 +48,6 @@ from swarm.protocol.operator_commands import abort_command, newest_command
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, StatusPhase
 
-__all__ = ["SETTLED_S", "InvariantChecker"]
-
-
 SETTLED_S = 5.0
 """Calm for this long, the fleet must agree."""
 LOOK_EVERY_S = 0.5

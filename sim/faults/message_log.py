@@ -30,8 +30,6 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome, Status
 
-__all__ = ["MessageLog", "Violation"]
-
 
 @dataclass(frozen=True, slots=True)
 class Violation:

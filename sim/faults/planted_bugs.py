@@ -16,8 +16,6 @@ from swarm.protocol.membership import Membership
 from swarm.protocol.messages import Message
 from swarm.protocol.uav_messages import Claim, ClaimPhase
 
-__all__ = ["BUGS"]
-
 
 @contextmanager
 def _patched(place: object, name: str, value: object) -> Iterator[None]:

@@ -16,16 +16,6 @@ from typing import Final, TypeVar
 from sim.world.settings import RestartMemory
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = [
-    "Disturbance",
-    "DisturbanceKind",
-    "DisturbanceShape",
-    "format_schedule",
-    "parse_schedule",
-    "shape_of",
-]
-
-
 E = TypeVar("E", bound=StrEnum)
 
 

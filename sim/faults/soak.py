@@ -21,9 +21,6 @@ from sim.faults.schedule import Disturbance, DisturbanceKind, shape_of
 from sim.world.network import Topology
 from sim.world.settings import RestartMemory
 
-__all__ = ["Breach", "first_breach", "shrink", "shrunk", "soak"]
-
-
 BLOCK = 20
 """Seeds a worker plays between two reports."""
 

@@ -11,16 +11,6 @@ from sim.autopilot.firmware import FirmwareModelName
 from sim.fleet.firmware import FirmwareKind, SitlFirmware, find_firmware
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-__all__ = [
-    "Autopilots",
-    "RunningVehicles",
-    "SimulatedAutopilots",
-    "VehiclePlace",
-    "check_speedup",
-    "parse_autopilots",
-]
-
-
 _SOURCE = "--autopilot"
 _REMEDY = (
     "give sim, sim-px4, ardupilot, px4, or one URL for each UAV with commas between, "

@@ -24,9 +24,6 @@ from sim.fleet import guard
 from sim.fleet.fork_server import ForkServer, ForkServerLostError
 from swarm.runtime.errors import SwarmError
 
-__all__ = ["ChildFailedError", "ChildProcess", "ProgramEnvironment"]
-
-
 READY_TIMEOUT_S = 30.0
 """Wall time a child may take to say that it is ready."""
 SETTLE_S = 1.0

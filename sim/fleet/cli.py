@@ -23,8 +23,6 @@ from swarm.runtime.options import (
 if TYPE_CHECKING:
     from sim.fleet.layout import BusKind
 
-__all__ = ["run"]
-
 
 def run(
     scenario: ScenarioArgument,

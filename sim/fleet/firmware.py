@@ -32,9 +32,6 @@ from swarm.model import Mission
 from swarm.model.frames import DEFAULT_ORIGIN, wgs84_from_enu
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["FirmwareKind", "FirmwareProcess", "SitlFirmware", "find_firmware", "firmware_workplace"]
-
-
 _ARDUCOPTER_PORT: Final = 5760
 
 _ARDUCOPTER_PORTS_EACH: Final = 10

@@ -24,9 +24,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-__all__ = ["PRELOADED", "PRELOADED_FOR_KEYS", "ForkServer", "ForkServerLostError"]
-
-
 PRELOADED = (
     "agent.cli",
     "agent.core.agent_core",

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from swarm.identity.authority import Authority
     from swarm.model import Mission
 
-__all__ = ["RunKeys", "fresh_keys", "keys_in"]
-
-
 _DAYS = 1
 """How long keys that are made for one run are valid, should it leave them behind."""
 

@@ -18,9 +18,6 @@ from sim.fleet.layout import DASHBOARD, DialedLink, LaunchOptions, Layout, autop
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 
-__all__ = ["Launcher", "OnLog", "Through"]
-
-
 OnLog = Callable[[str, str], None]
 """Called with the name of a process and a line of its log."""
 Through = Callable[[DialedLink, str], Awaitable[str]]

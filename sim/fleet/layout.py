@@ -24,20 +24,6 @@ from swarm.model.ids import COORDINATOR
 from swarm.protocol.timing import LinkKind, preset
 from swarm.runtime.log import LogFormat
 
-__all__ = [
-    "AUTO_MESH_LIMIT",
-    "DASHBOARD",
-    "BusKind",
-    "DialedLink",
-    "LaunchOptions",
-    "Layout",
-    "RunDefaults",
-    "autopilot_groups",
-    "default_position_rate_hz",
-    "defaults_for",
-]
-
-
 AUTO_MESH_LIMIT = 16
 """Largest fleet for which peers link up directly by default (README of swarm.bus)."""
 OWN_AUTOPILOT_LIMIT = 20

@@ -15,15 +15,6 @@ from sim.fleet.autopilots import Autopilots, SimulatedAutopilots
 from swarm.model import Mission
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
-__all__ = [
-    "Fence",
-    "PassthroughOptions",
-    "check_passthrough",
-    "fence_around",
-    "parse_command_styles",
-]
-
-
 _RADIUS_FACTOR = 1.2
 
 _RADIUS_MARGIN_M = 200.0

@@ -33,9 +33,6 @@ from swarm.runtime.shell import Shell, join_mission
 if TYPE_CHECKING:
     from coordinator.recording.flight_recorder import FlightRecorder
 
-__all__ = ["OnFrame", "Run", "RunHooks", "RunResult", "fly", "open_run"]
-
-
 FRAME_S = 0.2
 """Wall time between two pictures."""
 PATIENCE = 4.0

@@ -13,9 +13,6 @@ from sim.fleet.keys import fresh_keys, keys_in
 from sim.fleet.layout import BusKind, LaunchOptions
 from swarm.model import Mission
 
-__all__ = ["protected", "security_of"]
-
-
 _UNSIGNED = "MAVLink is not signed, as the vehicles have been given no keys: see --signing-key"
 
 

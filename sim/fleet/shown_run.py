@@ -29,8 +29,6 @@ from swarm.runtime.errors import Fault, InputError
 if TYPE_CHECKING:
     from coordinator.recording.flight_recorder import FlightRecorder
 
-__all__ = ["LogFiles", "Outputs", "ShownRun"]
-
 
 @dataclass(frozen=True, slots=True)
 class Outputs:

@@ -19,6 +19,7 @@ from agent.core.interface import Home, Return, VehicleOrder, VehicleReport
 from agent.vehicle import session as ground
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig
+from agent.vehicle.conversation import BridgeAction, SendBytes
 from sim.autopilot import events as air
 from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.config import VehicleConfig
@@ -65,7 +66,7 @@ class Equipment:
 class SteppedBridge(Protocol):
     """A bridge, or one that somebody watches."""
 
-    def step(self, event: ground.BridgeEvent, now_s: float) -> list[ground.BridgeAction]:
+    def step(self, event: ground.BridgeEvent, now_s: float) -> list[BridgeAction]:
         """What to do about ``event``, in order."""
         ...
 
@@ -156,7 +157,7 @@ class BridgedVehicle:
             return
         frames = []
         for action in bridge.step(event, self._queue.now_s()):
-            if isinstance(action, ground.SendBytes):
+            if isinstance(action, SendBytes):
                 frames.append(action.data)
             else:
                 # Not from inside: whoever ordered is in the middle of its own step.

@@ -27,9 +27,6 @@ from swarm.kernels.lower_level import GREEDY, default_threads, evaluate_sequence
 from swarm.runtime.clock import SystemClock
 from tests.support.problems import random_problem
 
-__all__ = ["BatchSpeed", "batch_speed", "best_s", "decision_s", "exact_s", "sweep_limit"]
-
-
 SOURCE = Path(__file__).with_name("sweep_limit.cpp")
 OPTIONS = ("-std=c++17", "-O3", "-ffp-contract=off", "-fno-math-errno")
 

@@ -14,8 +14,6 @@ from swarm.runtime.options import JsonOption, SeedOption, SpeedupOption
 from swarm.scenario.files import resolve_scenario
 from tests.chaos.kills import KillTarget
 
-__all__ = ["chaos"]
-
 
 def chaos(
     what: Annotated[

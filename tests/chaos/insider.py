@@ -42,9 +42,6 @@ from swarm.protocol.uav_messages import (
     StatusPhase,
 )
 
-__all__ = ["Insider", "Lie", "Trick"]
-
-
 NEWEST = MAX_COUNT // 2
 """An incarnation that would beat every honest one, were the message believed."""
 REMEMBERED = 200

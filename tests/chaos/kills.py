@@ -24,16 +24,6 @@ from swarm.protocol.messages import MissionPhase
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import SwarmError
 
-__all__ = [
-    "KillTarget",
-    "KillTrial",
-    "PlannedKill",
-    "draw_kills",
-    "fly_kill_trial",
-    "fly_kill_trials",
-]
-
-
 LONGEST_GONE_S = 2.0
 """A process stays dead for up to this long [wall s]."""
 START_LIMIT_S = 120.0

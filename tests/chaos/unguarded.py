@@ -38,9 +38,6 @@ from swarm.runtime.errors import SwarmError
 from swarm.scenario.write import format_scenario
 from tests.chaos.insider import Insider, Trick
 
-__all__ = ["LIAR", "Unguarded", "fly_unguarded"]
-
-
 LIAR = "stolen"
 """Name of the UAV whose keys the liar has."""
 LIES_HZ, QUESTIONS_HZ = 100.0, 30.0

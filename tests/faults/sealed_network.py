@@ -19,8 +19,6 @@ from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.seal import Seal
 
-__all__ = ["SealedNetwork"]
-
 
 class SealedNetwork(RoughNetwork):
     """Joins seats that believe only what is signed.

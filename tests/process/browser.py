@@ -10,9 +10,6 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import BrowserContext, ConsoleMessage, Page, Request, sync_playwright
 
-__all__ = ["Watched", "open_page"]
-
-
 LOAD_MS = 120_000.0
 """Only bounds how long a test hangs: a browser takes its time on a busy machine."""
 _NAMES = ("chromium", "chromium-browser", "google-chrome")

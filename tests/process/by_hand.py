@@ -21,9 +21,6 @@ from tests.process.mission import wait_until
 from tests.process.pace import pace
 from tests.process.programs import Swarm
 
-__all__ = ["LIMIT_S", "ByHand"]
-
-
 LIMIT_S = 220.0
 
 

@@ -16,9 +16,6 @@ from swarm.scenario.write import format_scenario
 from tests.process.mission import POSITION_RATE_HZ
 from tests.process.pace import pace
 
-__all__ = ["all_done", "logged_done", "play", "story", "survey", "told"]
-
-
 LIMIT_S = 150.0
 
 

@@ -11,9 +11,6 @@ from typing import Any, Self
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
-__all__ = ["FeedReader", "answers", "post"]
-
-
 KEYS = {"uavs": "id", "tasks": "id", "commands": "n"}
 
 

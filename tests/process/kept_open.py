@@ -11,9 +11,6 @@ from dataclasses import replace
 from swarm.model import Mission, Task, TaskId
 from tests.process.programs import run_swarm
 
-__all__ = ["KEEPER", "kept_open", "let_end"]
-
-
 KEEPER = TaskId("keeper")
 
 

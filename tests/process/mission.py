@@ -17,9 +17,6 @@ from typing import Any, Self
 from sim.fleet import fork_server
 from tests.process.programs import Swarm
 
-__all__ = ["SwarmRun", "alive", "child_pids", "wait_until"]
-
-
 FORK_SERVER = fork_server.__name__
 POSITION_RATE_HZ = 25.0
 """Of each UAV, by the wall's clock; many tests have fewer processors than UAVs."""

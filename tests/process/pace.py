@@ -6,9 +6,6 @@ import time
 
 from tests.process.programs import run_swarm
 
-__all__ = ["pace"]
-
-
 START_S = 0.2
 """A process that takes longer to be forked, and to say its help, is on a slow machine [s]."""
 STARTS = 3

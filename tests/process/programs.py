@@ -17,9 +17,6 @@ from typing import Any
 
 from sim.fleet.fork_server import PRELOADED, PRELOADED_FOR_KEYS, ForkServer
 
-__all__ = ["Swarm", "fork_server", "run_swarm"]
-
-
 _PRELOADED = (
     *PRELOADED,
     *PRELOADED_FOR_KEYS,

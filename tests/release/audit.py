@@ -25,18 +25,6 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-__all__ = [
-    "Audit",
-    "Silence",
-    "audit",
-    "explanations",
-    "judge",
-    "main",
-    "pip_audit",
-    "runtime_pins",
-]
-
-
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 PROBE = "cryptography"
 """Asked for first, and for a short time, so that nobody waits long where nobody answers."""

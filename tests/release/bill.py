@@ -24,9 +24,6 @@ from typing import Any
 
 from packaging.utils import parse_wheel_filename
 
-__all__ = ["amended", "install", "leaflet_version", "main"]
-
-
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 LEAFLET = "coordinator/dashboard/static/vendor/leaflet/leaflet.js"
 

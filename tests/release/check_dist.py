@@ -35,9 +35,6 @@ from packaging.metadata import Metadata
 from swarm import __version__
 from tests.release.bill import install
 
-__all__ = ["check_metadata", "main", "shipped", "source_files"]
-
-
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("agent", "coordinator", "sim", "swarm")
 TESTED = ("agent", "swarm/allocation", "swarm/protocol", "swarm/protocol")

@@ -11,9 +11,6 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-__all__ = ["arducopter_stand_in", "px4_stand_in"]
-
-
 _ARDUCOPTER = """
 import argparse, os, sys
 parser = argparse.ArgumentParser(allow_abbrev=False)

@@ -28,7 +28,8 @@ from agent.core.interface import (
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig, CommandStyle
-from agent.vehicle.session import BridgeEvent, BytesReceived, LinkOpened, SendBytes, TimePassed
+from agent.vehicle.conversation import SendBytes
+from agent.vehicle.session import BridgeEvent, BytesReceived, LinkOpened, TimePassed
 from sim.autopilot import events as autopilot
 from sim.autopilot.codec import ChannelCodec
 from sim.autopilot.config import VehicleConfig

@@ -17,9 +17,6 @@ from swarm.scenario.files import resolve_scenario
 from tests.process.mission import SwarmRun
 from tests.process.pace import pace
 
-__all__ = ["MEADOW", "TASKS", "UAVS", "Autopilot", "Flown", "autopilot_of", "fly"]
-
-
 MEADOW = resolve_scenario("meadow")
 _MISSION = load_scenario(MEADOW)
 UAVS = [uav.id for uav in _MISSION.uavs]

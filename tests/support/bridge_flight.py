@@ -20,7 +20,8 @@ from agent.core.interface import (
 )
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig
-from agent.vehicle.session import BridgeEvent, BytesReceived, LinkOpened, SendBytes, TimePassed
+from agent.vehicle.conversation import SendBytes
+from agent.vehicle.session import BridgeEvent, BytesReceived, LinkOpened, TimePassed
 from agent.vehicle.signing import Signing, SigningKey
 from swarm.model.frames import Origin
 from tests.support.fake_copter import FakeCopter

@@ -24,14 +24,8 @@ from agent.vehicle.activity import FlightPhase
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.codec import _CONVERTERS
 from agent.vehicle.config import BridgeConfig, CommandStyle
-from agent.vehicle.session import (
-    BridgeEvent,
-    BytesReceived,
-    LinkClosed,
-    LinkOpened,
-    SendBytes,
-    TimePassed,
-)
+from agent.vehicle.conversation import SendBytes
+from agent.vehicle.session import BridgeEvent, BytesReceived, LinkClosed, LinkOpened, TimePassed
 from agent.vehicle.signing import Signing, SigningKey
 from tests.support.bridge_flight import ORIGIN, UNIX_S
 from tests.support.bridge_watch import BridgeWatch
@@ -46,9 +40,6 @@ from tests.support.fake_copter import (
 )
 from tests.support.fake_px4 import FakePx4
 from tests.support.mavlink_frames import crafted, frame, rebuilt, recorded
-
-__all__ = ["FLAVOURS", "Episode", "Hostile", "Setting", "setting_of", "settings"]
-
 
 FLAVOURS: dict[str, type[FakeCopter]] = {"arducopter": FakeCopter, "px4": FakePx4}
 KEY = SigningKey(bytes(range(1, 33)))

@@ -48,9 +48,10 @@ from agent.core.interface import (
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig, CommandStyle
+from agent.vehicle.conversation import BridgeAction, SendBytes
 from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.firmware.px4 import Px4Copter
-from agent.vehicle.session import BridgeAction, BridgeEvent, SendBytes, TimePassed
+from agent.vehicle.session import BridgeEvent, TimePassed
 from agent.vehicle.transitions import SUCCESSORS
 from swarm.model.frames import enu_from_wgs84
 from tests.support.fake_copter import (
@@ -63,9 +64,6 @@ from tests.support.fake_copter import (
     FakeCopter,
 )
 from tests.support.fake_px4 import FakePx4
-
-__all__ = ["BridgeWatch", "BrokenError"]
-
 
 _MODE_ENABLED = 1.0
 _TOLERANCE_M = 0.1

@@ -25,14 +25,8 @@ from agent.core.interface import (
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig, CommandStyle
-from agent.vehicle.session import (
-    BridgeAction,
-    BridgeEvent,
-    BytesReceived,
-    LinkOpened,
-    SendBytes,
-    TimePassed,
-)
+from agent.vehicle.conversation import BridgeAction, SendBytes
+from agent.vehicle.session import BridgeEvent, BytesReceived, LinkOpened, TimePassed
 from coordinator.operator.requests import OperatorClient
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.faults import VehicleFault, parse_fault
@@ -51,9 +45,6 @@ from tests.support.bridge_watch import BridgeWatch
 from tests.support.fake_copter import INTERVAL, FakeCopter
 from tests.support.fake_px4 import FakePx4
 from tests.support.fleet_builders import plan_for
-
-__all__ = ["FIELD", "KINDS", "BridgedFleet", "Change", "Logbook", "Sent", "fault", "fenced"]
-
 
 KINDS = [(flavour, style) for flavour in FirmwareModelName for style in CommandStyle]
 LIMIT_S = 400.0

@@ -31,8 +31,6 @@ from swarm.protocol.uav_messages import (
 )
 from tests.support.builders import MISSION, TIMING, brief, entry, uav
 
-__all__ = ["DeskPlay", "FakePlayer"]
-
 
 class DeskPlay:
     """A session beside a mission of which everything is told by the test."""

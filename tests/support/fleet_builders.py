@@ -19,8 +19,6 @@ from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import Claim
 from swarm.runtime.clock import SystemClock
 
-__all__ = ["Ear", "WatchedWorld", "able_uavs", "plan_for", "random_mission"]
-
 
 def random_mission(
     rng: np.random.Generator,

@@ -12,8 +12,6 @@ from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.seal import Seal
 from tests.support.builders import MISSION
 
-__all__ = ["Keyring"]
-
 
 class Keyring:
     """An authority and everyone's private keys.

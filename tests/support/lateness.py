@@ -6,9 +6,6 @@ import asyncio
 import contextlib
 from typing import Self
 
-__all__ = ["Lateness"]
-
-
 TURN_S = 0.005
 
 

@@ -30,8 +30,6 @@ from swarm.bus.port import (
 from swarm.protocol.seal import Seal
 from swarm.runtime.errors import BusError
 
-__all__ = ["MemoryBus", "MemoryNetwork"]
-
 
 @lru_cache(maxsize=1 << 16)
 def intersects(one: str, other: str) -> bool:

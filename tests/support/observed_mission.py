@@ -27,8 +27,6 @@ from swarm.runtime.clock import SystemClock
 from swarm.scenario import load_scenario
 from swarm.scenario.files import shipped_scenarios
 
-__all__ = ["Teller", "random_mission", "shipped", "watch"]
-
 
 def shipped(name: str) -> Mission:
     """A shipped scenario."""

@@ -20,8 +20,6 @@ from swarm.protocol.events import CommonAction
 from swarm.protocol.timing import Timing
 from swarm.runtime.clock import SystemClock
 
-__all__ = ["Disk", "Flown", "Steps", "fly_recorded"]
-
 
 @dataclass(slots=True)
 class Disk:

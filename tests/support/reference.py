@@ -16,25 +16,6 @@ from swarm.allocation.lower_level import TeamState
 from swarm.allocation.problem import FloatArray, Problem
 from swarm.kernels.routes_bound import Timetable
 
-__all__ = [
-    "best_of_neighbourhood",
-    "certificate",
-    "choice",
-    "completion_s",
-    "extreme_values",
-    "first_round",
-    "list_worth",
-    "lists",
-    "lists_from",
-    "neighbourhood",
-    "objective",
-    "ordered_partitions",
-    "team_worth",
-    "timed_list_worth",
-    "tour_worth",
-]
-
-
 Lists = list[list[int]]
 
 

@@ -15,9 +15,6 @@ import tomllib
 from importlib.util import find_spec
 from pathlib import Path
 
-__all__ = ["kept_releases", "python_of", "unpacked"]
-
-
 _KEPT = Path(__file__).parents[1] / "data" / "releases"
 _BEGIN = """
 import sys

@@ -10,8 +10,6 @@ from swarm.protocol.messages import Body, MissionPhase, TaskEntry
 from swarm.protocol.registers import Replica
 from tests.support.builders import IDLE, MISSION, brief_of, entries_of, epoch, message
 
-__all__ = ["RunningMission"]
-
 
 class RunningMission:
     """``mission`` as told on the bus: everybody is airborne, idle and heard of.

@@ -41,9 +41,6 @@ from swarm.protocol.timing import Timing
 from tests.support.builders import IDLE, held, message
 from tests.support.lone_coordinator import LAYERS, plan_of
 
-__all__ = ["TIMING", "Place", "SeatPlay"]
-
-
 TIMING = Timing()
 ANSWER_S = 1.0
 FIRST_LIFE = 1_000

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-__all__ = ["seeds"]
-
 
 def seeds(quick: int, thorough: int) -> list[object]:
     """The first ``thorough`` seeds, of which those after the first ``quick`` are marked as slow.

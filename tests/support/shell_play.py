@@ -9,9 +9,6 @@ from typing import TypeVar
 from swarm.bus.port import BusEvent
 from tests.support.memory_bus import MemoryBus
 
-__all__ = ["LIMIT_S", "HandClock", "play", "take_until", "until"]
-
-
 LIMIT_S = 5.0
 """Longest wait for anything that must happen."""
 

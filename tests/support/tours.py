@@ -12,8 +12,6 @@ from swarm.kernels import _kernels
 from swarm.kernels._kernels import TourTable
 from swarm.kernels.arrays import converted
 
-__all__ = ["good_tour", "tour_table"]
-
 
 def tour_table(
     weight: npt.ArrayLike, survival: npt.ArrayLike, leg_s: npt.ArrayLike, horizon_s: float

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-from agent.vehicle.session import SendBytes
+from agent.vehicle.conversation import SendBytes
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.events import MessageReceived, Publish

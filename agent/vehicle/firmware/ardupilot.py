@@ -25,9 +25,6 @@ from agent.vehicle.messages import (
 )
 from agent.vehicle.state import VehicleState
 
-__all__ = ["ArduCopter"]
-
-
 _AUTO, _GUIDED, _RTL, _LAND, _SMART_RTL, _AUTO_RTL = (3,), (4,), (6,), (9,), (21,), (27,)
 
 _RESULT_FAILED = 4

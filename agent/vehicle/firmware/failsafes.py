@@ -12,9 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["ARDUCOPTER_NAMES", "PX4_NAMES", "Failsafes", "arducopter_failsafes", "px4_failsafes"]
-
-
 Names = tuple[tuple[str, ...], ...]
 """Parameters to be read, each by all the names that it has had."""
 

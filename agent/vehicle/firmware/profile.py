@@ -24,9 +24,6 @@ from agent.vehicle.messages import (
 from agent.vehicle.parameter_override import OverrideSpec
 from agent.vehicle.state import VehicleState
 
-__all__ = ["UNCHANGED", "Firmware", "Mode", "SpeedParameter"]
-
-
 Mode = tuple[int, ...]
 """A mode by the numbers that the firmware has for it."""
 

@@ -26,9 +26,6 @@ from agent.vehicle.messages import (
 from agent.vehicle.parameter_override import OverrideSpec
 from agent.vehicle.state import VehicleState
 
-__all__ = ["Px4Copter"]
-
-
 _AUTO = 4
 _TAKEOFF, _LOITER, _MISSION = (_AUTO, 2), (_AUTO, 3), (_AUTO, 4)
 _RTL, _LAND, _PRECLAND = (_AUTO, 5), (_AUTO, 6), (_AUTO, 9)

@@ -38,9 +38,6 @@ from sim.autopilot.readiness import PowerUpStage
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
 
-__all__ = ["ArduCopterModel"]
-
-
 _GROUND_LOST_LANDS = (5.0, 7.0)
 """Values of FS_GCS_ENABLE."""
 _FENCE_CIRCLE = 2

@@ -22,16 +22,6 @@ from sim.autopilot.readiness import PowerUpStage
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
 
-__all__ = [
-    "FailsafeBehaviour",
-    "FirmwareModel",
-    "GcsFailsafe",
-    "MissionBehaviour",
-    "ModeBehaviour",
-    "RefusalCodes",
-    "texts_of",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class RefusalCodes:

@@ -37,9 +37,6 @@ from sim.autopilot.parameters import (
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
 
-__all__ = ["Px4Model"]
-
-
 _REAL = mavlink.MAV_PARAM_TYPE_REAL32
 _INT32 = mavlink.MAV_PARAM_TYPE_INT32
 

@@ -31,9 +31,6 @@ from swarm.protocol.key_space import ANY_TOKEN, KeySpace, mission_of_token
 from swarm.protocol.sync import NONCE_BYTES, encode_question
 from swarm.runtime.errors import SwarmError
 
-__all__ = ["BusView", "DialResult", "check_bus", "check_session", "check_zenoh", "judge_dial"]
-
-
 DIAL_S = 2.0
 """How long a connection may take before it is given up [wall s]."""
 SETTLE_S = 0.6

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from sim.fleet.doctor.finding import CheckFinding
     from swarm.identity import Identity
 
-__all__ = ["doctor"]
-
-
 _LEAST_PYTHON = (3, 11)
 _DEFAULT_UAVS = 3
 """Fleet for which the machine is judged without a scenario."""

@@ -13,8 +13,6 @@ from rich.text import Text
 from coordinator.mission_view.presentation import BAD
 from coordinator.mission_view.wording import clean
 
-__all__ = ["CheckFinding", "CheckState", "as_json", "fails", "fine", "print_findings", "warns"]
-
 
 class CheckState(StrEnum):
     """How it stands."""

@@ -13,21 +13,6 @@ from pathlib import Path
 
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 
-__all__ = [
-    "ClockReading",
-    "ResourceLimits",
-    "StateFolder",
-    "check_clock",
-    "check_kernels",
-    "check_key",
-    "check_limits",
-    "check_packages",
-    "check_port",
-    "check_python",
-    "check_state",
-]
-
-
 _LONGEST_AGE_S = 20 * 365.25 * 86_400.0
 
 _SKEW_S = 1.0

@@ -16,8 +16,6 @@ from swarm.model import Mission
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario
 
-__all__ = ["check_folder", "check_identity", "check_roster", "check_scenario", "read_keys"]
-
 
 def check_scenario(path: Path) -> tuple[Mission | None, list[CheckFinding]]:
     """The mission, if the file is sound, and what is to be said of it."""

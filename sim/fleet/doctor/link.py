@@ -18,9 +18,6 @@ from sim.fleet.doctor.vehicle import ASK_AGAIN_S, VehicleListener
 from swarm.runtime.clock import SystemClock, unix_s
 from swarm.runtime.errors import Fault, InputError
 
-__all__ = ["VehicleAddress", "check_vehicle", "parse_vehicle"]
-
-
 LISTEN_S = 2.0
 """How long a vehicle that was heard is listened to at least [wall s]."""
 _CONDITION_S = 0.05

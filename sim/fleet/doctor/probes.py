@@ -18,9 +18,6 @@ from sim.fleet.doctor.finding import CheckFinding
 from sim.fleet.doctor.host import ClockReading, ResourceLimits, StateFolder, check_port
 from swarm.runtime.clock import SystemClock, unix_s
 
-__all__ = ["file_mode", "look_at_port", "read_clock", "read_folder", "read_limits"]
-
-
 _SLEPT_S = 0.02
 _TIMEX_BYTES = 512
 """More than any system's `struct timex`."""

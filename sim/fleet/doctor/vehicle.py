@@ -30,9 +30,6 @@ from agent.vehicle.signing import Signing
 from agent.vehicle.state import VehicleState
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 
-__all__ = ["OWN_SYSTEM_ID", "VehicleListener"]
-
-
 OWN_SYSTEM_ID = 254
 """Not a ground station's 255: an autopilot would take its end for the loss of its station."""
 ASK_AGAIN_S = 1.0

@@ -16,20 +16,6 @@ from swarm.protocol.messages import Message
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import Choice, Claim, Status
 
-__all__ = [
-    "AGREE_WITHIN_S",
-    "CompletedVisit",
-    "ProcessDown",
-    "Rivalry",
-    "Trouble",
-    "agreement_s",
-    "disagreements",
-    "message_logs",
-    "rivalries",
-    "visits",
-]
-
-
 AGREE_WITHIN_S = 5.0
 """After the end of a trouble, living UAVs have this long to agree on all claims [s]."""
 SHORT_RIVALRY_S = 1.5

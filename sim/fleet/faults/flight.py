@@ -30,9 +30,6 @@ from swarm.model import Mission
 from swarm.protocol.messages import Message
 from swarm.runtime.clock import SystemClock
 
-__all__ = ["ChaosFlight", "ChaosVerdict", "open_chaos_flight"]
-
-
 CUT = "the network"
 LEFT = "left its task"
 TURN_LINE = re.compile(r'event="turns aside" .*\btask=(\S+)')

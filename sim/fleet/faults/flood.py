@@ -35,19 +35,6 @@ from swarm.scenario import load_scenario
 from swarm.scenario.files import shipped_scenarios
 from swarm.scenario.write import format_scenario
 
-__all__ = [
-    "RATE_HZ",
-    "STATUS",
-    "Flood",
-    "fly_flooded",
-    "hold_back",
-    "let_go",
-    "long_mission",
-    "times_for",
-    "watched",
-]
-
-
 RATE_HZ = 24.0
 """Messages of each kind per second."""
 HOSTILE = "hostile"

@@ -31,9 +31,6 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome, Status
 
-__all__ = ["REASONS", "Forgery", "Malformation", "MessageForger"]
-
-
 NEWEST = MAX_COUNT // 2
 """An incarnation that would beat every honest one, were the message taken."""
 SETTLED_S = 3.0

@@ -22,9 +22,6 @@ from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message
 from swarm.runtime.clock import Clock
 
-__all__ = ["RECORDER", "BusEntry", "BusRecorder", "recorder_seats"]
-
-
 RECORDER = "recorder"
 """Name of its place in a mesh."""
 

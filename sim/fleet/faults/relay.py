@@ -34,9 +34,6 @@ import numpy as np
 
 from sim.fleet.layout import DialedLink
 
-__all__ = ["Relay", "RelayNetwork", "RelayQuality", "stall_s"]
-
-
 SEGMENT_BYTES = 1448
 SHORTEST_TIMEOUT_S = 0.2
 """Linux waits at least this long, and a round trip, before it sends a segment again."""

@@ -33,9 +33,6 @@ from swarm.protocol.seal import SIGNATURE_BYTES, Seal, open_envelope, seal_of
 from swarm.protocol.uav_messages import Claim, ClaimPhase
 from swarm.runtime.clock import SystemClock
 
-__all__ = ["main", "torrent"]
-
-
 _GENUINE = 2000
 """Its own claims that are signed beforehand."""
 _TURN_S = 0.01

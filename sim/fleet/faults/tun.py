@@ -23,9 +23,6 @@ import numpy as np
 
 from sim.fleet.faults.relay import RelayQuality
 
-__all__ = ["HERE", "THERE", "TunPath", "TunUnavailableError", "enter_own_network"]
-
-
 HERE, THERE = "10.77.0.1", "10.77.0.2"
 _NETMASK = "255.255.255.0"
 _DEVICE = b"badlink0"

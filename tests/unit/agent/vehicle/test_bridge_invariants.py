@@ -12,6 +12,7 @@ from agent.core.interface import Arrived, HandedOver, Hold, Refused, VehicleRead
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig
+from agent.vehicle.conversation import BridgeAction, SendBytes
 from agent.vehicle.messages import (
     AltitudeFrame,
     CommandInt,
@@ -21,7 +22,7 @@ from agent.vehicle.messages import (
     Outbound,
     ParameterSet,
 )
-from agent.vehicle.session import BridgeAction, BridgeEvent, LinkOpened, SendBytes, TimePassed
+from agent.vehicle.session import BridgeEvent, LinkOpened, TimePassed
 from tests.support.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.support.bridge_fuzz import FLAVOURS, Episode, Setting, setting_of, settings
 from tests.support.bridge_watch import BridgeWatch, BrokenError

@@ -17,7 +17,8 @@ from agent.core.interface import (
 )
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig
-from agent.vehicle.session import BridgeAction, BridgeEvent, SendBytes
+from agent.vehicle.conversation import BridgeAction, SendBytes
+from agent.vehicle.session import BridgeEvent
 from sim.autopilot.config import VehicleConfig
 from sim.world.bridged_vehicle import BridgedVehicle, Equipment, LinkQuality
 from sim.world.engine import EventQueue
