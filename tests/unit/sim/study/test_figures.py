@@ -22,10 +22,13 @@ def legend(figure: Figure) -> str:
     return "\n".join(text.get_text() for text in figure.legends[0].get_texts())
 
 
-def test_each_figure_is_a_valid_png_and_svg(found: Reproduction, tmp_path: Path) -> None:
-    drawn = draw_figures(found, tmp_path)
+@pytest.fixture(scope="module")
+def drawn(found: Reproduction, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return draw_figures(found, tmp_path_factory.mktemp("figures"))
 
-    assert sorted(drawn) == sorted(tmp_path.iterdir())
+
+def test_each_figure_is_a_valid_png_and_svg(drawn: list[Path]) -> None:
+    assert sorted(drawn) == sorted(drawn[0].parent.iterdir())
     assert [path.suffix for path in drawn] == [".png", ".svg"] * 3
     for path in drawn:
         if path.suffix == ".svg":
@@ -35,13 +38,13 @@ def test_each_figure_is_a_valid_png_and_svg(found: Reproduction, tmp_path: Path)
             assert min(height, width) >= 600
 
 
-def test_same_results_give_the_same_files(found: Reproduction, tmp_path: Path) -> None:
-    folders = tmp_path / "one", tmp_path / "other"
-    for folder in folders:
-        folder.mkdir()
-    one, other = (draw_figures(found, folder) for folder in folders)
+def test_same_results_give_the_same_files(
+    found: Reproduction, drawn: list[Path], tmp_path: Path
+) -> None:
+    again = draw_figures(found, tmp_path)
 
-    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
+    assert [path.name for path in again] == [path.name for path in drawn]
+    assert [path.read_bytes() for path in again] == [path.read_bytes() for path in drawn]
 
 
 def test_maps_show_the_lists_of_the_hierarchy_and_the_optimal_ones(found: Reproduction) -> None:
