@@ -17,7 +17,7 @@ from tests.process.pace import pace
 
 pytestmark = [pytest.mark.process]
 
-FAR = {f"uav{number:02}" for number in (2, 4, 6)}
+FAR = {"uav02", "uav04"}
 SPEEDUP = 4.0
 
 
@@ -45,9 +45,9 @@ def test_parted_halves_of_a_mesh_agree_after_healing_and_lose_nothing(tmp_path: 
         await flight.until_done(5)
         await part_until_both_go_on(flight, FAR)
 
-    verdict = play(survey(6, 42), tmp_path, script, bus=BusKind.MESH, speedup=SPEEDUP, relayed=True)
+    verdict = play(survey(4, 28), tmp_path, script, bus=BusKind.MESH, speedup=SPEEDUP, relayed=True)
 
-    all_done(verdict, 42)
+    all_done(verdict, 28)
     assert verdict.duplicates > 0  # a parting that nobody noticed would prove nothing
     assert verdict.agreement_s <= AGREE_WITHIN_S
 
@@ -60,11 +60,11 @@ def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Pa
             for link, relay in flight.network.relays.items()
             if link.listener == "router 2" and relay.connections
         }
-        assert len(served) == 3
+        assert len(served) == 2
         await part_until_both_go_on(flight, served | {"router 2"})
 
     verdict = play(
-        survey(6, 42),
+        survey(4, 28),
         tmp_path,
         script,
         bus=BusKind.ROUTER,
@@ -73,13 +73,13 @@ def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Pa
         relayed=True,
     )
 
-    all_done(verdict, 42)
+    all_done(verdict, 28)
     assert verdict.duplicates > 0
     assert verdict.agreement_s <= AGREE_WITHIN_S
 
 
 def test_agents_cut_off_from_their_only_router_come_back(tmp_path: Path) -> None:
-    cut_off = {"uav01", "uav03", "uav05"}
+    cut_off = {"uav01", "uav03"}
 
     async def script(flight: ChaosFlight) -> None:
         def missed() -> bool:
@@ -90,10 +90,10 @@ def test_agents_cut_off_from_their_only_router_come_back(tmp_path: Path) -> None
         await part_and_heal(flight, cut_off, missed, "the loss of all who are cut off")
 
     verdict = play(
-        survey(6, 40), tmp_path, script, bus=BusKind.ROUTER, speedup=SPEEDUP, relayed=True
+        survey(4, 27), tmp_path, script, bus=BusKind.ROUTER, speedup=SPEEDUP, relayed=True
     )
 
-    all_done(verdict, 40)
+    all_done(verdict, 27)
     for uav in cut_off:
         assert f"{uav} is back" in story(verdict)
     assert verdict.agreement_s <= AGREE_WITHIN_S
@@ -110,9 +110,9 @@ def test_nobody_is_lost_on_a_slow_and_lossy_link(tmp_path: Path, bus: BusKind) -
     # A busy machine alone may keep a process waiting for longer than that lease.
     link = LinkKind.NORMAL if pace(1.0) == 1.0 else LinkKind.BAD
     verdict = play(
-        survey(6, 30), tmp_path, script, bus=bus, speedup=SPEEDUP, relayed=True, link=link
+        survey(4, 20), tmp_path, script, bus=bus, speedup=SPEEDUP, relayed=True, link=link
     )
 
-    all_done(verdict, 30)
+    all_done(verdict, 20)
     assert verdict.flight.result.lost_uavs == ()
     assert [line for line in verdict.lines if "event=lost" in line[1]] == []

@@ -18,12 +18,14 @@ from tests.process.pace import pace
 
 pytestmark = [pytest.mark.process]
 
+N_TASK = 20
+
 
 @pytest.fixture
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    """The arguments for a fleet of five, half as large, which is enough to lose a process of."""
+    """The arguments for a small fleet, whose flight is long enough to lose a process of."""
     scenario = tmp_path_factory.mktemp("fleet") / "scenario.toml"
-    scenario.write_text(format_scenario(survey(5, 30)))
+    scenario.write_text(format_scenario(survey(3, N_TASK)))
     return [str(scenario), "--speedup", f"{pace(6.0):g}"]
 
 
@@ -40,7 +42,7 @@ def test_paper_mission_flies_the_offline_plan(tmp_path: Path, bus: str) -> None:
     logs, scenario = tmp_path / "logs", tmp_path / "scenario.toml"
     scenario.write_text(format_scenario(replace(long_mission(TIMES), name="table-1")))
     arguments = [str(scenario), "--bus", bus, "--method", "greedy", "--logs", str(logs)]
-    arguments += ["--position-rate-hz", "100"]  # an arrival is seen at the next report
+    arguments += ["--position-rate-hz", "50"]  # an arrival is seen at the next report
     with SwarmRun(arguments, tmp_path) as run:
         status, told = run.result()
 
@@ -106,7 +108,7 @@ def test_fleet_finishes_without_its_coordinator(tmp_path: Path, fleet: list[str]
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 30
+        assert len(told["done"]) == N_TASK
         assert told["executed_routes"].keys() == told["routes"].keys()
         assert any("coordinator lost" in line for line in run.lines)
         run.assert_nothing_left()
@@ -119,7 +121,7 @@ def test_dead_autopilot_costs_its_uav_and_no_task(tmp_path: Path, fleet: list[st
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 30
+        assert len(told["done"]) == N_TASK
         assert any("uav03 takes no further part" in line for line in run.lines)
         run.assert_nothing_left()
 
@@ -133,7 +135,7 @@ def test_dead_router_is_started_again_and_the_mission_goes_on(
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 30
+        assert len(told["done"]) == N_TASK
         assert told["lost_uavs"] == []
         assert told["processes"] == ["router 1: killed by SIGKILL"]
         assert any("router 1 killed by SIGKILL; started again" in line for line in run.lines)
@@ -151,7 +153,7 @@ def test_fleet_with_two_routers_keeps_one_when_the_other_dies(
         status, told = run.result()
 
         assert status == 0, run.story()
-        assert len(told["done"]) == 30
+        assert len(told["done"]) == N_TASK
         assert told["lost_uavs"] == []
         run.assert_nothing_left()
 
