@@ -9,7 +9,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
-.PHONY: demo test test-all browser lint audit format kernels sanitize soak chaos fuzz clean help
+.PHONY: demo test test-all test-computed test-processes browser lint audit format kernels sanitize soak chaos fuzz clean help
 .PHONY: dist check-dist sbom wheels check-units
 
 help:
@@ -36,12 +36,24 @@ demo: $(VENV)/.installed
 
 # What the marker `slow` says (pyproject.toml) is for the night: `make test-all`.
 TESTED := -m "not slow"
-test: lint browser
-	$(BIN)/python -m pytest -n 2 $(TESTED) tests/unit tests/contract tests/faults
-	$(BIN)/python -m pytest -n 4 --dist worksteal $(TESTED) tests/process tests/sitl
+# Tests with real processes wait for them most of the time. What only computes is flown beside them,
+# and is nice to them: it takes what they leave of the processors.
+test: $(VENV)/.installed-dev browser
+	+$(MAKE) --no-print-directory -j 3 lint test-computed test-processes TESTED='$(TESTED)'
 
 test-all: TESTED :=
 test-all: test
+
+# Tells all at its end, lest two reports be mixed.
+COMPUTED := build/test-computed.txt
+test-computed: $(VENV)/.installed-dev
+	@mkdir -p $(dir $(COMPUTED))
+	@echo "tests/unit and tests/faults go on beside the others and report at their end ($(COMPUTED))"
+	@nice $(BIN)/python -m pytest -n 2 $(TESTED) tests/unit tests/faults >$(COMPUTED) 2>&1; \
+	status=$$?; cat $(COMPUTED); exit $$status
+
+test-processes: $(VENV)/.installed-dev browser
+	$(BIN)/python -m pytest -n 4 --dist worksteal $(TESTED) tests/contract tests/process tests/sitl
 
 # The dashboard is tested in a real browser: Chromium under one of these names.
 CHROMIUM := chromium chromium-browser google-chrome
@@ -59,7 +71,7 @@ browser:
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
+	nice $(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m tests.release.audit
 
