@@ -11,6 +11,7 @@ On Linux only. Elsewhere, and when the server is gone, processes are started as 
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import gc
@@ -20,9 +21,10 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NoReturn, Self
 
 PRELOADED = (
     "agent.cli",
@@ -289,10 +291,30 @@ def main(number: int, modules: str) -> int | None:
             ForkServer.shared = ForkServer(ours)
         sys.argv[1:] = request["arguments"]
         _entitle([sys.executable, "-m", "swarm", *sys.argv[1:]])
-        from swarm.cli import console_main
-
-        return console_main()
+        _run()
     return None
+
+
+def _run() -> NoReturn:
+    """Run the command and leave without taking the interpreter apart.
+
+    Taken apart, it would touch all that was imported, which is shared with the server, and thereby
+    copy it: half of what a short command costs.
+    """
+    from swarm.cli import console_main
+
+    try:
+        status = console_main()
+    except SystemExit as end:
+        if not isinstance(end.code, int):
+            raise
+        status = end.code
+    threading._shutdown()  # type: ignore[attr-defined]  # noqa: SLF001 - as the interpreter does
+    atexit._run_exitfuncs()  # noqa: SLF001
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):  # closed, or never there
+            stream.flush()
+    os._exit(status)
 
 
 if __name__ == "__main__":
