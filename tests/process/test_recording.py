@@ -19,6 +19,7 @@ from swarm.scenario.write import format_scenario
 from tests.process.chaos_play import survey
 from tests.process.kept_open import kept_open, let_end
 from tests.process.mission import SwarmRun, wait_until
+from tests.process.pace import pace
 from tests.process.programs import Swarm
 from tests.process.test_status import router_of
 
@@ -85,7 +86,7 @@ def test_killed_recorders_leave_whole_files_and_the_flight_goes_on(tmp_path: Pat
         reader = make_reader(file, validate_crcs=True)
         last_ns = max(message.log_time for _, _, message in reader.iter_messages())
     # A second, what it takes to write, and what this machine was late by.
-    assert killed_s - last_ns / 1e9 < 1.5 + late_s
+    assert killed_s - last_ns / 1e9 < 1.5 / pace(1.0) + late_s
     assert read_recording(by_onlooker).torn is None
 
     recording = read_recording(by_run)

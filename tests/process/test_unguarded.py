@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.process]
 
 
 def test_lies_that_a_router_passes_on_are_seen_through_and_counted_by_every_uav() -> None:
-    flight = asyncio.run(fly_unguarded(2.0 / pace(1.0), speedup=2.0))
+    flight = asyncio.run(fly_unguarded(2.0 / pace(1.0), speedup=pace(2.0)))
 
     assert flight.fates == ()
     assert len(flight.result.done) == 8
