@@ -45,9 +45,9 @@ def test_parted_halves_of_a_mesh_agree_after_healing_and_lose_nothing(tmp_path: 
         await flight.until_done(5)
         await part_until_both_go_on(flight, FAR)
 
-    verdict = play(survey(4, 28), tmp_path, script, bus=BusKind.MESH, speedup=SPEEDUP, relayed=True)
+    verdict = play(survey(4, 20), tmp_path, script, bus=BusKind.MESH, speedup=SPEEDUP, relayed=True)
 
-    all_done(verdict, 28)
+    all_done(verdict, 20)
     assert verdict.duplicates > 0  # a parting that nobody noticed would prove nothing
     assert verdict.agreement_s <= AGREE_WITHIN_S
 
@@ -64,7 +64,7 @@ def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Pa
         await part_until_both_go_on(flight, served | {"router 2"})
 
     verdict = play(
-        survey(4, 28),
+        survey(4, 20),
         tmp_path,
         script,
         bus=BusKind.ROUTER,
@@ -73,7 +73,7 @@ def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Pa
         relayed=True,
     )
 
-    all_done(verdict, 28)
+    all_done(verdict, 20)
     assert verdict.duplicates > 0
     assert verdict.agreement_s <= AGREE_WITHIN_S
 
