@@ -272,7 +272,7 @@ def _second(requests: socket.socket) -> None:
     _entitle([sys.executable, "-m", __spec__.name, str(requests.fileno())])
 
 
-def main(number: int, modules: str) -> int | None:
+def main(number: int, modules: str) -> None:
     """Serve the socket of that number to its end, or run a command in a forked process."""
     requests = socket.socket(fileno=number)
     for module in modules.split(","):
@@ -292,7 +292,6 @@ def main(number: int, modules: str) -> int | None:
         sys.argv[1:] = request["arguments"]
         _entitle([sys.executable, "-m", "swarm", *sys.argv[1:]])
         _run()
-    return None
 
 
 def _run() -> NoReturn:
@@ -319,4 +318,4 @@ def _run() -> NoReturn:
 
 if __name__ == "__main__":
     # Under its own name, not as `__main__`, since the command may open a server, too.
-    sys.exit(importlib.import_module(__spec__.name).main(int(sys.argv[1]), sys.argv[2]))
+    importlib.import_module(__spec__.name).main(int(sys.argv[1]), sys.argv[2])

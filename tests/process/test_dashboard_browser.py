@@ -17,6 +17,7 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.browser import open_page
 from tests.process.by_hand import ByHand
 from tests.process.mission import wait_until
+from tests.process.pace import pace
 
 pytestmark = [pytest.mark.process]
 
@@ -99,7 +100,7 @@ def test_an_operator_sees_and_commands_a_living_fleet_in_a_browser(flown: ByHand
         all_uavs_move(page)
 
         task_is_done(page, task)
-        shown_lost_within(page, "uav3", flown.agents[2], 2.0)
+        shown_lost_within(page, "uav3", flown.agents[2], 2.0 / pace(1.0))
         abort(page)
         for uav in ("uav1", "uav2"):
             expect(uav_row(page, uav).locator(".col-does")).to_contain_text("home", timeout=SOON_MS)

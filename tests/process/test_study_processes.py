@@ -42,8 +42,14 @@ def flown(fly: Fly, study: Study = STUDY, roster: PolicyRoster = ROSTER) -> list
     return [without_wall_times(row) for row in rows]
 
 
-def test_numbers_are_the_same_with_one_process_and_with_two() -> None:
-    assert flown(in_processes(2)) == flown(fly_here)
+@pytest.fixture(scope="module")
+def numbers() -> list[TrialRow]:
+    """What one process finds."""
+    return flown(fly_here)
+
+
+def test_numbers_are_the_same_with_one_process_and_with_two(numbers: list[TrialRow]) -> None:
+    assert flown(in_processes(2)) == numbers
     assert not multiprocessing.active_children()
 
 
@@ -128,8 +134,10 @@ def cluster() -> Iterator[LocalCluster]:
     assert not multiprocessing.active_children()
 
 
-def test_numbers_are_the_same_on_a_dask_cluster(cluster: LocalCluster) -> None:
-    assert flown(on_dask(cluster.scheduler_address)) == flown(fly_here)
+def test_numbers_are_the_same_on_a_dask_cluster(
+    cluster: LocalCluster, numbers: list[TrialRow]
+) -> None:
+    assert flown(on_dask(cluster.scheduler_address)) == numbers
 
 
 def test_lost_worker_of_a_dask_cluster_costs_nothing(cluster: LocalCluster) -> None:
