@@ -33,8 +33,9 @@ def kill(pid: int) -> None:
     os.kill(pid, signal.SIGKILL)
 
 
-TIMES = 4.0
-"""What a busy machine is late by counts that much less when the paper's map is that much larger."""
+TIMES, SPEEDUP = 16.0, 4.0
+"""What a busy machine is late by counts a fourth when the paper's map is that much larger; flown
+faster, since else most of the time goes to taking off and landing."""
 
 
 @pytest.mark.parametrize("bus", ["mesh", "router"])
@@ -42,6 +43,7 @@ def test_paper_mission_flies_the_offline_plan(tmp_path: Path, bus: str) -> None:
     logs, scenario = tmp_path / "logs", tmp_path / "scenario.toml"
     scenario.write_text(format_scenario(replace(long_mission(TIMES), name="table-1")))
     arguments = [str(scenario), "--bus", bus, "--method", "greedy", "--logs", str(logs)]
+    arguments += ["--speedup", f"{SPEEDUP:g}"]
     arguments += ["--position-rate-hz", "50"]  # an arrival is seen at the next report
     with SwarmRun(arguments, tmp_path) as run:
         status, told = run.result()
@@ -53,9 +55,9 @@ def test_paper_mission_flies_the_offline_plan(tmp_path: Path, bus: str) -> None:
         assert told["failed"] == told["open"] == told["lost_uavs"] == []
         assert told["duplicate_visits"] == 0
         assert told["epochs"] == 1
-        assert told["objective"] == pytest.approx(TIMES * 118.4939, abs=2e-4)
+        assert told["objective"] == pytest.approx(TIMES * 118.4939, abs=1e-3)
         assert told["executed_objective"] == pytest.approx(TIMES * 118.49, rel=0.02)
-        assert told["optimum"] == pytest.approx(TIMES * 120.3335, abs=2e-4)
+        assert told["optimum"] == pytest.approx(TIMES * 120.3335, abs=1e-3)
         assert_every_line_tells_whose_it_is(logs)
         scenario.unlink()
         run.assert_nothing_left(but="logs")
