@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -190,21 +191,18 @@ def agent(
       --keys keys/quad-2 --connect tls/192.168.1.2:7447 --state /var/lib/peckorder
     """
     import asyncio
-    import gc
-    from collections.abc import Callable
 
     from agent.core.agent_core import AgentCore
     from agent.core.interface import VehicleReport
     from agent.links.mavlink_vehicle import MavlinkVehicle
     from agent.runner import Vehicle, live_once
-    from agent.vehicle.config import BridgeConfig, parse_forward, parse_link
+    from agent.vehicle.config import BridgeConfig
     from agent.vehicle.signing import load_signing_key
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.identity import Role
     from swarm.model import Origin
     from swarm.runtime.clock import ScaledClock, incarnation
     from swarm.runtime.log import configure_logging, get_logger
-    from swarm.runtime.process import SERVICE_NOTIFIER
     from swarm.runtime.store import Memory, Store
 
     # A life begins with its process: of two agents of one UAV the one started last counts.
@@ -213,22 +211,15 @@ def agent(
     _check_ids(mission, uav)
     network = seat.network
     config = seat.config(mission=mission, roles=(Role.UAV,), name=uav)
-    parse_link(mavlink)
-    for url in forward or ():
-        parse_forward(url)
+    _check_links(mavlink, forward or ())
     own_system_id, own_component_id = _ground_ids(ground_id)
     key = None if signing_key is None else load_signing_key(signing_key)
     if check:
         return 0
-    log = get_logger(uav)
     if config.identity is not None and key is None:
         path = config.identity.mavlink_key_path
         hint = f"give the autopilot its pass phrase, and --signing-key {path}"
-        log.warning("what is said to the autopilot is not signed", hint=hint)
-
-    def no_seat_yet(reason: str) -> None:
-        log.warning("no bus yet", reason=reason)
-        SERVICE_NOTIFIER.waiting(f"{uav}: no bus yet: {reason}")
+        get_logger(uav).warning("what is said to the autopilot is not signed", hint=hint)
 
     def vehicle(origin: Origin, report: Callable[[VehicleReport], None]) -> Vehicle:
         settings = BridgeConfig(
@@ -261,9 +252,6 @@ def agent(
 
     clock = ScaledClock(speedup)
     store = None if state is None else Store(state, mission, uav, speedup=speedup)
-    # What has been imported stays: a full collection would look through all of it for tens of
-    # milliseconds, in which a vehicle may wait for its next target.
-    gc.freeze()
     try:
         return asyncio.run(
             live_once(
@@ -276,12 +264,28 @@ def agent(
                 store=store,
                 answer_s=network.answer_s,
                 lifeline=lifeline,
-                on_wait=no_seat_yet,
+                on_wait=lambda reason: _tell_no_bus(uav, reason),
             )
         )
     finally:
         if store is not None:
             store.close()
+
+
+def _check_links(mavlink: str, forward: Sequence[str]) -> None:
+    from agent.vehicle.config import parse_forward, parse_link
+
+    parse_link(mavlink)
+    for url in forward:
+        parse_forward(url)
+
+
+def _tell_no_bus(uav: str, reason: str) -> None:
+    from swarm.runtime.log import get_logger
+    from swarm.runtime.process import SERVICE_NOTIFIER
+
+    get_logger(uav).warning("no bus yet", reason=reason)
+    SERVICE_NOTIFIER.waiting(f"{uav}: no bus yet: {reason}")
 
 
 def _ground_ids(text: str) -> tuple[int, int]:

@@ -33,8 +33,11 @@ from swarm.runtime.options import (
 )
 
 if TYPE_CHECKING:
+    from contextlib import AbstractAsyncContextManager
+
     from rich.status import Status
 
+    from coordinator.daemon import CoordinatorProcess
     from coordinator.planner.options import ShouldStop
     from swarm.model import Mission, Plan
     from swarm.protocol.messages import Snapshot
@@ -311,7 +314,7 @@ def coordinator(
     from swarm.protocol.seal import seal_of
     from swarm.runtime.clock import ScaledClock, SystemClock, incarnation
     from swarm.runtime.log import configure_logging, get_logger, identify
-    from swarm.runtime.process import SERVICE_NOTIFIER, run_until_stopped
+    from swarm.runtime.process import run_until_stopped
     from swarm.runtime.store import Store
     from swarm.scenario import load_scenario
 
@@ -368,25 +371,29 @@ def coordinator(
         seal=seal_of(config.identity),
     )
 
-    async def coordinate() -> int:
-        if standby:
-            return await service.stand_by()
-        status, stood_down = await service.coordinate()
-        if stood_down is not None:
-            print(f"{stood_down}; add --standby to wait for its loss", file=sys.stderr)
-        return status
-
-    async def work() -> int:
-        async with page:
-            status = await coordinate()
-        # Whoever supervises it must not take a mission's end for a failure, and fly it again.
-        return 0 if SERVICE_NOTIFIER.supervised else status
-
     try:
-        return asyncio.run(run_until_stopped(work(), lifeline=lifeline))
+        work = _work(service, page, standby=standby)
+        return asyncio.run(run_until_stopped(work, lifeline=lifeline))
     finally:
         if store is not None:
             store.close()
+
+
+async def _work(
+    service: CoordinatorProcess, page: AbstractAsyncContextManager[object], *, standby: bool
+) -> int:
+    """Coordinate, or wait until it is wanted; with the dashboard, if there is one."""
+    from swarm.runtime.process import SERVICE_NOTIFIER
+
+    async with page:
+        if standby:
+            status = await service.stand_by()
+        else:
+            status, stood_down = await service.coordinate()
+            if stood_down is not None:
+                print(f"{stood_down}; add --standby to wait for its loss", file=sys.stderr)
+    # Whoever supervises it must not take a mission's end for a failure, and fly it again.
+    return 0 if SERVICE_NOTIFIER.supervised else status
 
 
 def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
