@@ -144,8 +144,8 @@ SEEDS ?= 10000
 soak: $(VENV)/.installed
 	$(BIN)/swarm soak --seeds $(SEEDS)
 
-chaos: $(VENV)/.installed
-	$(BIN)/python -m sim.fleet.faults --jobs 2
+chaos: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.chaos --jobs 2
 
 STEPS ?= 1000000
 SEED ?= 1

@@ -1,4 +1,4 @@
-"""``python -m sim.fleet.faults``: kill processes of real fleets at random moments."""
+"""``python -m tests.chaos``: kill processes of real fleets at random moments."""
 
 import sys
 from importlib.metadata import EntryPoint

@@ -1,4 +1,4 @@
-"""The command ``python -m sim.fleet.faults``.
+"""The command ``python -m tests.chaos``.
 
 Leaves out: what it does (tests.chaos.kills).
 """
@@ -49,8 +49,8 @@ def chaos(
     messages held.
 
     Examples:
-        python -m sim.fleet.faults
-        python -m sim.fleet.faults --what agent --trials 20 --seed 7
+        python -m tests.chaos
+        python -m tests.chaos --what agent --trials 20 --seed 7
     """
     import asyncio
     import sys

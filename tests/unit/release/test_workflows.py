@@ -72,3 +72,24 @@ def test_the_versions_of_python_that_are_tested_are_the_ends_of_those_that_are_p
     tested = {each["python"] for each in matrix["matrix"]["include"]}
 
     assert tested == {promised[0], promised[-1]}
+
+
+def test_every_module_that_somebody_is_told_to_run_can_be_run() -> None:
+    told = [ROOT / "Makefile", *ROOT.glob("*.md"), *(ROOT / ".github").rglob("*.*")]
+    for package in ("swarm", "agent", "coordinator", "sim", "tests", "deploy"):
+        for kind in ("*.py", "*.md", "*.sh", "*.yml"):
+            told += (ROOT / package).rglob(kind)
+    modules = {
+        (module, file)
+        for file in told
+        for module in re.findall(
+            r"python -m ((?:swarm|agent|coordinator|sim|tests)(?:\.\w+)*)", file.read_text("utf-8")
+        )
+    }
+
+    assert {"swarm", "tests.chaos", "tests.benchmarks.fuzz_bridge"} <= {name for name, _ in modules}
+    for name, file in modules:
+        path = ROOT.joinpath(*name.split("."))
+        module = path / "__main__.py" if path.is_dir() else path.with_suffix(".py")
+        assert module.exists(), (name, file)
+        assert module.name == "__main__.py" or "__main__" in module.read_text("utf-8"), (name, file)
