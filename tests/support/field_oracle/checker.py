@@ -57,7 +57,7 @@ def check_plan(
     if ill_formed:
         return ill_formed
     schedule: Schedule = result["schedule"]
-    found = []
+    found: list[str] = []
     for uav in scenario.uavs:
         found += walk(scenario, times, uav, schedule[uav.id], slack)
     found += check_slots(scenario, schedule, result["sequence"], slack)
@@ -178,8 +178,9 @@ def _sequence(scenario: FieldScenario, result: Json) -> Iterator[str]:
 
 
 def _is_number(value: object) -> bool:
-    is_number = isinstance(value, float | int) and not isinstance(value, bool)
-    return is_number and math.isfinite(float(str(value)))
+    if isinstance(value, bool) or not isinstance(value, float | int):
+        return False
+    return math.isfinite(value)
 
 
 def _totals(
@@ -227,7 +228,7 @@ def _executed(
     slack: Slack,
 ) -> Iterator[str]:
     """Complaints about what holds whatever happens: order, windows, due, zones, energy."""
-    sortie_s, budget_s = 0.0, uav.first_budget_s
+    airborne_s, budget_s, since_s = 0.0, uav.first_budget_s, 0.0
     for index, entry in enumerate(entries):
         where = f"executed {uav.id}[{index}] {entry['go']}"
         stations = [entry[key] for key in ("depart_s", "arrive_s", "begin_s", "end_s")]
@@ -245,14 +246,18 @@ def _executed(
                 yield f"{where}: began at {entry['begin_s']} s, not within its window"
             if task.due_s is not None and entry["end_s"] > task.due_s + slack.time_s:
                 yield f"{where}: ended at {entry['end_s']} s, was due at {task.due_s} s"
-        if index > 0 and entries[index - 1]["go"].startswith("base:"):
-            sortie_s = entry["depart_s"]
-        lands = entry["go"] == "start" or entry["go"].startswith("base:")
-        airborne_s = entry["begin_s" if lands else "end_s"] - sortie_s
+        if index > 0 and _lands(entries[index - 1]):
+            since_s = entry["depart_s"]
+            if entries[index - 1]["go"] != "start":
+                airborne_s, budget_s = 0.0, uav.full_budget_s
+        until_s = entry["begin_s" if _lands(entry) else "end_s"]
+        airborne_s, since_s = airborne_s + until_s - since_s, until_s
         if airborne_s > budget_s + slack.time_s:
             yield f"{where}: {airborne_s} s airborne, {budget_s} s allowed"
-        if entry["go"].startswith("base:"):
-            budget_s = uav.full_budget_s
+
+
+def _lands(entry: Json) -> bool:
+    return entry["go"] == "start" or entry["go"].startswith("base:")
 
 
 def _closest_approach(scenario: FieldScenario, told_m: object) -> Iterator[str]:

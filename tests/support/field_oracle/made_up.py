@@ -139,11 +139,17 @@ def _energy(rng: random.Random, draft: Draft) -> None:
 
 
 def _slots(rng: random.Random, draft: Draft) -> None:
-    if not draft["base"]:
-        _energy(rng, draft)
-    for base in draft["base"]:
-        base["slots"] = 1
-        base["swap_s"] = float(rng.randint(30, 90))
+    """One base with one slot, and batteries that bring everybody there soon."""
+    draft["base"] = []
+    _bases(rng, draft, 1)
+    base = draft["base"][0]
+    base["position_m"] = [100.0 + x / 2 for x in _place(rng)]
+    base["slots"] = 1
+    base["swap_s"] = float(rng.randint(40, 120))
+    for uav in draft["uav"]:
+        uav["endurance_s"] = float(rng.randint(60, 110))
+        uav["reserve_frac"] = rng.choice([0.0, 0.1])
+        uav["charge_frac"] = _tenths(rng, 0.3, 0.6)
 
 
 def _bases(rng: random.Random, draft: Draft, n: int) -> None:
