@@ -257,7 +257,8 @@ def _executed(
 
 
 def _lands(entry: Json) -> bool:
-    return entry["go"] == "start" or entry["go"].startswith("base:")
+    go: str = entry["go"]
+    return go == "start" or go.startswith("base:")
 
 
 def _closest_approach(scenario: FieldScenario, told_m: object) -> Iterator[str]:

@@ -21,6 +21,9 @@ Draft = dict[str, Any]
 SIDE_M = 400.0
 """Everything lies within a square of this side."""
 
+HEIGHTS_M = [(0.0, 120.0), (0.0, 11.5), (11.5, 40.5), (200.0, 300.0)]
+"""Floors and ceilings: layers lie at 10 m, 13 m, … above places of whole metres."""
+
 
 def made_up(seed: int, kind: str = "all", n_uavs: int = 2, n_tasks: int = 4) -> Draft:
     """A scenario of that kind (`KINDS`), always the same of the same seed.
@@ -165,7 +168,7 @@ def _zones(rng: random.Random, draft: Draft) -> None:
         middle = [100.0 + x / 2 for x in _place(rng)]
         zone: Draft = {"id": f"z{index}", "polygon_m": _star(rng, middle, 90.0)}
         if rng.random() < 0.25:
-            zone["floor_m"], zone["ceiling_m"] = rng.choice([(0.0, 120.0), (200.0, 300.0)])
+            zone["floor_m"], zone["ceiling_m"] = rng.choice(HEIGHTS_M)
         draft["zone"].append(zone)
     if rng.random() < 0.3:  # a yard with a gate, and its inside a hole that is shut
         x, y = 20.0 + rng.randrange(200), 20.0 + rng.randrange(200)
@@ -214,9 +217,15 @@ def _lines(rng: random.Random, draft: Draft) -> None:
 
 
 def _heights(rng: random.Random, draft: Draft) -> None:
+    """With wind all the same, since the text leaves open what it does to a climb."""
+    climbs = "wind_m_s" not in draft["mission"]
+    common_m = float(rng.randint(0, 60))
     for row in (*draft["uav"], *draft["task"], *draft["base"]):
+        height_m = float(rng.randint(0, 60)) if climbs else common_m
         if "position_m" in row:
-            row["position_m"] = [*row["position_m"][:2], float(rng.randint(0, 60))]
+            row["position_m"] = [*row["position_m"][:2], height_m]
+        else:
+            row["path_m"] = [[*point[:2], height_m] for point in row["path_m"]]
     if rng.random() < 0.5:
         draft["mission"]["band_m"] = [30.0, 110.0]
 

@@ -263,12 +263,13 @@ def check_slots(
             free_from_s[free_from_s.index(min(free_from_s))] = leaves_s
 
 
-def intrusion_m(zone: FieldZone, a: Point, b: Point, margin_m: float, n: int = 200) -> float:
+def intrusion_m(zone: FieldZone, a: Point, b: Point, margin_m: float) -> float:
     """How deep the straight piece reaches into ``zone`` or its margin, from below.
 
-    Sampled: a check of a way that says at once how bad it is, by other means than the search.
+    Sampled every 2 m: a check that says how bad a way is, by other means than the search.
     """
     deepest_m = 0.0
+    n = 2 + math.floor(math.dist(a, b) / 2.0)
     for index in range(n + 1):
         share = index / n
         point = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
