@@ -53,7 +53,7 @@ def check_plan(
     slack = slack or Slack()
     ill_formed = [*_missing(result, PLAN_KEYS)]
     if not ill_formed:
-        ill_formed = [*_form(scenario, result["schedule"]), *_sequence(scenario, result)]
+        ill_formed = [*_form(scenario, result["schedule"]), *_names(scenario, result)]
     if ill_formed:
         return ill_formed
     schedule: Schedule = result["schedule"]
@@ -172,7 +172,9 @@ def _form(scenario: FieldScenario, schedule: Schedule) -> Iterator[str]:
                 yield f"{where}: via_m is empty, its last is where the work begins"
 
 
-def _sequence(scenario: FieldScenario, result: Json) -> Iterator[str]:
+def _names(scenario: FieldScenario, result: Json) -> Iterator[str]:
+    if result["scenario"] != scenario.name:
+        yield f"it is of the scenario {result['scenario']!r}"
     if sorted(result["sequence"]) != sorted(uav.id for uav in scenario.uavs):
         yield f"the sequence {result['sequence']} is not of the UAVs"
 

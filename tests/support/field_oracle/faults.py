@@ -14,7 +14,7 @@ from tests.support.field_oracle.geometry import Side, blocks, side_of
 from tests.support.field_oracle.rounded import SLACK_M, distance_m
 from tests.support.field_oracle.scenario import FieldScenario, FieldZone, Point, Stop, read
 
-__all__ = ["faults"]
+__all__ = ["faults", "is_faultless"]
 
 NEW_KEYS: Mapping[str, Sequence[str]] = {
     "mission": ("wind_m_s", "zone_margin_m", "separation_m", "band_m"),
@@ -32,10 +32,21 @@ NEW_TABLES = ("base", "zone", "area", "terrain")
 
 def faults(table: Mapping[str, Any]) -> list[str]:
     """Every fault, in words."""
+    return list(_faults(table))
+
+
+def is_faultless(table: Mapping[str, Any]) -> bool:
+    """Whether there is no fault at all; stops at the first."""
+    return next(_faults(table), None) is None
+
+
+def _faults(table: Mapping[str, Any]) -> Iterator[str]:
     if table.get("schema") == 1:
-        return [f"schema = 1 with {key}: say schema = 2" for key in _new_keys(table)]
+        yield from (f"schema = 1 with {key}: say schema = 2" for key in _new_keys(table))
+        return
     scenario = read(table)
-    return [*_slow_uavs(scenario), *_forbidden_places(scenario)]
+    yield from _slow_uavs(scenario)
+    yield from _forbidden_places(scenario)
 
 
 def _slow_uavs(scenario: FieldScenario) -> Iterator[str]:

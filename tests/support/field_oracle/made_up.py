@@ -11,7 +11,7 @@ import random
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from tests.support.field_oracle.faults import faults
+from tests.support.field_oracle.faults import is_faultless
 from tests.support.field_oracle.scenario import Point
 
 __all__ = ["KINDS", "as_toml", "made_up"]
@@ -39,7 +39,7 @@ def made_up(seed: int, kind: str = "all", n_uavs: int = 2, n_tasks: int = 4) -> 
         draft = _plain(rng, f"made-up-{kind}-{seed}", n_uavs, n_tasks)
         for name in PARTS[kind]:
             ADD[name](rng, draft)
-        if not faults(draft):
+        if is_faultless(draft):
             return draft
     raise AssertionError("no draft without faults in 1000")
 

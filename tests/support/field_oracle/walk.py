@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from tests.support.field_oracle.flight import FlightTimes, Leg
-from tests.support.field_oracle.geometry import Side, side_of
 from tests.support.field_oracle.rounded import distance_m
 from tests.support.field_oracle.scenario import (
     FieldBase,
@@ -278,7 +277,17 @@ def intrusion_m(zone: FieldZone, a: Point, b: Point, margin_m: float) -> float:
             for ring in zone.rings
             for c, d in zip(ring, [*ring[1:], ring[0]], strict=True)
         )
-        wrong = Side.OUTSIDE if zone.inclusive else Side.INSIDE
-        signed_m = -border_m if side_of(point, zone.rings) is wrong else border_m
+        signed_m = border_m if _is_within(zone, point) is zone.inclusive else -border_m
         deepest_m = max(deepest_m, margin_m - signed_m)
     return deepest_m
+
+
+def _is_within(zone: FieldZone, point: Point) -> bool:
+    """By the crossings of a ray to the east; near the border either way, as depth is 0 there."""
+    x, y = point
+    n_crossings = 0
+    for ring in zone.rings:
+        for (ax, ay), (bx, by) in zip(ring, [*ring[1:], ring[0]], strict=True):
+            if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
+                n_crossings += 1
+    return n_crossings % 2 == 1

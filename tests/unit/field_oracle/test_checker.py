@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import random
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -19,8 +20,8 @@ from tests.support.field_oracle.checker import (
 from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.made_up import KINDS, made_up
 from tests.support.field_oracle.scenario import FieldScenario, read
-from tests.support.field_oracle.schedule import Swap, Work
-from tests.support.field_oracle.slots import fly_all
+from tests.support.field_oracle.schedule import Item, Swap, Work
+from tests.support.field_oracle.slots import fly_all, objective
 from tests.support.field_oracle.telling import plan_json
 from tests.unit.field_oracle.conftest import Make
 
@@ -79,6 +80,56 @@ def test_best_plans_of_every_kind_are_praised(kind: str) -> None:
     assert check_against_best(scenario, told, best, exact=True) == []
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_plan_of_any_kind_is_praised(kind: str) -> None:
+    """Most lists by chance can't be flown; those that can need not be good."""
+    rng = random.Random(kind)
+    n_flown = 0
+    for seed in range(3):
+        scenario = read(made_up(seed, kind))
+        times = FlightTimes(scenario)
+        for _ in range(30):
+            lists = lists_by_chance(rng, scenario)
+            sequence = rng.sample(list(lists), len(lists))
+            flights = fly_all(scenario, times, lists, sequence)
+            if objective(flights) is not None:
+                told = plan_json(scenario, times, flights, sequence=sequence)
+                assert check_plan(scenario, told, times) == []
+                n_flown += 1
+
+    assert n_flown >= 10
+
+
+def lists_by_chance(rng: random.Random, scenario: FieldScenario) -> dict[str, list[Item]]:
+    lists: dict[str, list[Item]] = {uav.id: [] for uav in scenario.uavs}
+    for task in rng.sample(scenario.known, len(scenario.known)):
+        own = lists[rng.choice(list(lists))]
+        if rng.random() < 0.5:
+            continue
+        if scenario.bases and rng.random() < 0.4:
+            own.append(Swap(rng.choice(scenario.bases).id))
+        own.append(Work(task.id, task.is_line and rng.random() < 0.5))
+    return lists
+
+
+def test_plans_in_which_uavs_wait_for_slots_are_praised() -> None:
+    rng = random.Random(1)
+    n_waits = 0
+    for seed in range(6):
+        scenario = read(made_up(seed, "slots", n_uavs=3))
+        uavs = [replace(uav, charge_frac=1.0, endurance_s=300.0) for uav in scenario.uavs]
+        mild = replace(scenario, uavs=tuple(uavs))
+        times = FlightTimes(mild)
+        for _ in range(60):
+            flights = fly_all(mild, times, lists_by_chance(rng, mild))
+            if objective(flights) is not None:
+                assert check_plan(mild, plan_json(mild, times, flights), times) == []
+                entries = [entry for flight in flights.values() for entry in flight.entries[:-1]]
+                n_waits += any(e.begin_s > e.arrive_s for e in entries)
+
+    assert n_waits >= 10
+
+
 def entry(plan: Json, uav: str, index: int) -> Json:
     found: Json = plan["schedule"][uav][index]
     return found
@@ -125,6 +176,7 @@ FAULTS: dict[str, tuple[Callable[[Json], object], str]] = {
     "objective": (lambda p: p.update(objective=p["objective"] + 1e-3), "objective is"),
     "reason": (lambda p: p["left_out"].update(far="energy"), "left_out is"),
     "sequence": (lambda p: p.update(sequence=["u1"]), "the sequence"),
+    "other scenario": (lambda p: p.update(scenario="other"), "it is of the scenario"),
     "gap": (lambda p: p.update(optimum=2.0 * p["objective"], gap=0.1), "gap is"),
 }
 

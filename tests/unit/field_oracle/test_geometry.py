@@ -239,7 +239,7 @@ def test_chain_of_an_arc_is_hardly_shorter_than_the_arc() -> None:
 def test_arcs_lie_between_polygons_in_and_round_them(seed: int) -> None:
     """The margin of a convex zone is a hull of circles; polygons in and round those bound it."""
     rng = random.Random(seed)
-    margin_m, n = rng.uniform(3.0, 25.0), 16
+    margin_m, n = rng.uniform(3.0, 25.0), 12
     zones, within, around = [], [], []
     for index in range(rng.randint(1, 2)):
         middle = (rng.uniform(60.0, 240.0), rng.uniform(40.0, 260.0))
@@ -283,6 +283,34 @@ def hull(points: list[Point]) -> list[Point]:
         if best == start or len(corners) > len(points):
             return corners
         corners.append(best)
+
+
+@pytest.mark.parametrize("kind", ["zones", "inclusive"])
+@pytest.mark.parametrize("seed", range(4))
+def test_smallest_margin_hardly_changes_a_way(kind: str, seed: int) -> None:
+    """Corners that jut in, holes and inclusive zones: two searches with nothing in common."""
+    scenario = read(made_up(seed, kind))
+    straight, rounded = StraightWays(scenario.zones), RoundedWays(scenario.zones, 1e-3)
+    ends = [task.stops[0].at for task in scenario.tasks]
+
+    for a, b in itertools.pairwise(ends):
+        one, two = straight.find(a, b), rounded.find(a, b)
+        assert (one is None) is (two is None)
+        if one is not None:
+            assert one.length_m - 1e-6 <= length_m(two) <= one.length_m + 0.05
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_way_keeps_the_margin(seed: int) -> None:
+    scenario = read(made_up(seed, "margin"))
+    ways = RoundedWays(scenario.zones, scenario.margin_m)
+    ends = [task.stops[0].at for task in scenario.tasks]
+
+    for a, b in itertools.pairwise(ends):
+        way = ways.find(a, b)
+        for one, two in itertools.pairwise(() if way is None else way.points):
+            deep_m = max(intrusion_m(z, one, two, scenario.margin_m) for z in scenario.zones)
+            assert deep_m < 1e-5 * scenario.margin_m + 1e-6
 
 
 def test_distance_of_straight_pieces() -> None:
