@@ -1,0 +1,139 @@
+"""What zones keep out of, with their margin: which pieces and places are clear of it.
+
+The predicates are GEOS's, by way of shapely. Leaves out: ways round (swarm.allocation.legs.planner).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from swarm.model.zones import Zone
+
+__all__ = ["TOUCH_M", "Obstacles"]
+
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+TOUCH_M = 1e-6
+"""Who is no deeper inside than this only touches [m]: places on a border are rounded."""
+
+_FAR_M = 1e8
+"""Where the world ends that an inclusive zone keeps out of [m]."""
+
+_ROUND_STEPS = 64
+"""Chords per quarter of a circle where a shape is needed, not a distance."""
+
+
+class Obstacles:
+    """Keep-out shapes of some zones, each by itself: where two touch one may fly between.
+
+    Args:
+        zones: all of them, whatever their heights.
+        margin_m: who is nearer than this to a shape is inside it [m]; >= 0.
+
+    Raises:
+        ValueError: the margin is below 0.
+    """
+
+    def __init__(self, zones: Iterable[Zone], margin_m: float = 0.0) -> None:
+        if not 0.0 <= margin_m < _FAR_M:
+            raise ValueError(f"margin_m must be >= 0, not {margin_m}")
+        self.margin_m = margin_m
+        """Distance to keep [m]."""
+        self.rings_m: list[FloatArray] = []
+        """(k, 2) corners of each border, with what is kept out of on the left."""
+        self._depth_m = max(0.0, margin_m - TOUCH_M)
+        self._shapes: list[shapely.Geometry] = []  # nearer to these than _depth_m is inside
+        self._solids = [part for zone in zones for part in self._add(zone)]
+        for shape in self._shapes:
+            shapely.prepare(shape)
+        bounds_m = shapely.bounds(self._shapes).reshape(-1, 4)
+        self._bounds_m = bounds_m + np.array([-1.0, -1.0, 1.0, 1.0]) * self._depth_m
+
+    def __len__(self) -> int:
+        return len(self._shapes)
+
+    def _add(self, zone: Zone) -> list[shapely.Polygon]:
+        shape = shapely.orient_polygons(zone.shape())
+        rings = [np.array(ring.coords)[:-1] for ring in (shape.exterior, *shape.interiors)]
+        self.rings_m += [ring[::-1] for ring in rings] if zone.inclusive else rings
+        touch_m = TOUCH_M if self._depth_m == 0.0 else 0.0
+        if zone.inclusive:
+            self._shapes.append(_around(_grown(shape, touch_m)))
+            return list(_around(shape).geoms)
+        self._shapes.append(_grown(shape, -touch_m))
+        return [shape]
+
+    def clear(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
+        """(n,) whether straight pieces between (n, 2) places [m] stay outside of every shape."""
+        clear = np.ones(len(from_m), dtype=np.bool_)
+        low_m, high_m = np.minimum(from_m, to_m), np.maximum(from_m, to_m)
+        near = self._near(low_m, high_m)
+        some = near.any(axis=1)
+        if not some.any():
+            return clear
+        pieces = np.empty(len(from_m), dtype=object)
+        pieces[some] = shapely.linestrings(np.stack([from_m[some], to_m[some]], axis=1))
+        for number in range(len(self._shapes)):
+            open_question = clear & near[:, number]
+            clear[open_question] = ~self._inside(number, pieces[open_question])
+        return clear
+
+    def free(self, place_m: FloatArray) -> BoolArray:
+        """(n,) whether (n, 2) places [m] are outside of every shape."""
+        free = np.ones(len(place_m), dtype=np.bool_)
+        near = self._near(place_m, place_m)
+        for number in np.flatnonzero(near.any(axis=0)):
+            open_question = free & near[:, number]
+            points = shapely.points(place_m[open_question])
+            free[open_question] = ~self._inside(int(number), points)
+        return free
+
+    def way_out_m(self, place_m: FloatArray) -> FloatArray:
+        """(2,) the nearest place [m] to a (2,) place inside that is outside of every shape.
+
+        The margin's round corners are cut into chords here, which lie at most 0.01 % of the margin
+        further out. Whoever has nowhere to go stays where it is.
+        """
+        reach_m = (self.margin_m + TOUCH_M) / np.cos(np.pi / (4 * _ROUND_STEPS))
+        shapes = shapely.buffer(self._solids, reach_m, quad_segs=_ROUND_STEPS)
+        border = shapely.boundary(shapely.union_all(shapes))
+        out_m = np.array(shapely.shortest_line(border, shapely.Point(place_m)).coords[0])
+        return out_m if self.free(out_m[None])[0] else np.array(place_m, dtype=np.float64)
+
+    def _near(self, low_m: FloatArray, high_m: FloatArray) -> BoolArray:
+        """(n, shapes) whose bounding boxes meet those from (n, 2) ``low_m`` to ``high_m``."""
+        west_m, south_m, east_m, north_m = self._bounds_m.T
+        near: BoolArray = (
+            (high_m[:, :1] >= west_m)
+            & (high_m[:, 1:] >= south_m)
+            & (low_m[:, :1] <= east_m)
+            & (low_m[:, 1:] <= north_m)
+        )
+        return near
+
+    def _inside(self, number: int, pieces: npt.NDArray[np.object_]) -> BoolArray:
+        shape = self._shapes[number]
+        if self._depth_m == 0.0:
+            return shapely.intersects(shape, pieces)
+        return shapely.dwithin(shape, pieces, self._depth_m)
+
+
+def _grown(shape: shapely.Polygon, by_m: float) -> shapely.Geometry:
+    if by_m == 0.0:
+        return shape
+    return shapely.buffer(shape, by_m, join_style="mitre")
+
+
+def _around(shape: shapely.Geometry) -> shapely.MultiPolygon:
+    """All the world but ``shape``."""
+    world = shapely.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
+    parts = shapely.get_parts(shape)
+    shells = [part.exterior for part in parts]
+    holes = [shapely.Polygon(hole) for part in parts for hole in part.interiors]
+    return shapely.MultiPolygon([shapely.Polygon(world.exterior, shells), *holes])
