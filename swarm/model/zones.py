@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, NewType
 
 from swarm.model.ids import require_id
@@ -49,7 +50,7 @@ class Zone:
     polygon_enu_m: tuple[Corner, ...]
     """Corners [m; east, north of the mission origin]."""
     holes_enu_m: tuple[tuple[Corner, ...], ...] = ()
-    """Inside of these the zone is not; they touch neither each other nor the border but in points."""
+    """Inside of these the zone is not; they touch each other and the border in points at most."""
     floor_m: float | None = None
     """Lowest height [m above the mission origin]; None: from the ground up."""
     ceiling_m: float | None = None
@@ -126,7 +127,7 @@ def _ring(corners: Sequence[Sequence[float]], what: str) -> tuple[Corner, ...]:
         ring.pop()
     if len(ring) < _LEAST_CORNERS:
         raise ValueError(f"{what} must have at least three corners, not {len(ring)}")
-    for number, (before, corner) in enumerate(zip(ring, ring[1:], strict=False), start=2):
+    for number, (before, corner) in enumerate(pairwise(ring), start=2):
         if before == corner:
             raise ValueError(f"{what}: corner {number} repeats the one before it, {corner}")
     _require_simple(ring, what)

@@ -45,7 +45,7 @@ class Arcs:
         return len(self.begin_rad)
 
     def along_rad(self, arc: IntArray, direction_rad: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """(...) angles on (...) arcs, counted from where each begins, and whether they are on it."""
+        """(...) angles from where (...) arcs begin, and whether they are on the arcs."""
         angle_rad = np.mod(direction_rad - self.begin_rad[arc] + SAME_RAD, _TURN) - SAME_RAD
         extent_rad = self.extent_rad[arc]
         on_arc = angle_rad <= extent_rad + SAME_RAD

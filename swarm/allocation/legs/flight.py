@@ -56,7 +56,7 @@ class FlightModel:
         return self.airspeed_m_s is not None
 
     def straight_s(self, offset_m: FloatArray) -> FloatArray:
-        """(...) times of straight legs with offsets (3, ...) [m; east, north, up]; inf: can't [s]."""
+        """(...) times of straight legs with (3, ...) offsets [m; ENU]; inf: it can't [s]."""
         length_m = straight_m(offset_m)
         if not self.heeds_direction:
             return self.rest_to_rest_s(length_m)
@@ -101,9 +101,9 @@ class FlightModel:
         return np.where(long_enough, cruising_s, never_at_speed_s)
 
     def even_s(self, length_m: FloatArray, slow_s: FloatArray) -> FloatArray:
-        """(...) times over paths of (...) lengths [m] that without acceleration take ``slow_s`` [s].
+        """(...) times over paths of (...) lengths [m], flown evenly [s].
 
-        inf stays inf: some piece can't be flown.
+        ``slow_s`` is Σ(piece ÷ its speed) [s]; inf, and so is the time: some piece can't be flown.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             speed_m_s = np.where(slow_s > 0.0, length_m / slow_s, self.speed_m_s)

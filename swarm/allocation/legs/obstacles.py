@@ -1,6 +1,7 @@
 """What zones keep out of, with their margin: which pieces and places are clear of it.
 
-The predicates are GEOS's, by way of shapely. Leaves out: ways round (swarm.allocation.legs.planner).
+The predicates are GEOS's, by way of shapely. Leaves out: ways round them
+(swarm.allocation.legs.planner).
 """
 
 from __future__ import annotations
@@ -117,11 +118,11 @@ class Obstacles:
         )
         return near
 
-    def _inside(self, number: int, pieces: npt.NDArray[np.object_]) -> BoolArray:
+    def _inside(self, number: int, pieces: npt.NDArray[np.object_] | shapely.Geometry) -> BoolArray:
         shape = self._shapes[number]
         if self._depth_m == 0.0:
-            return shapely.intersects(shape, pieces)
-        return shapely.dwithin(shape, pieces, self._depth_m)
+            return np.asarray(shapely.intersects(shape, pieces))
+        return np.asarray(shapely.dwithin(shape, pieces, self._depth_m))
 
 
 def _grown(shape: shapely.Polygon, by_m: float) -> shapely.Geometry:

@@ -183,7 +183,9 @@ class Paths:
         turn_rad = sum(float(hop.to_rad[0] - hop.from_rad[0]) for hop in hops)
         excess_m = EXCESS_FRAC * float(self.length_m[row, column])
         bent_m = self._arcs.radius_m * turn_rad
-        step_rad = _CHORD_RAD if bent_m <= 0.0 else min(_CHORD_RAD, np.sqrt(11.0 * excess_m / bent_m))
+        step_rad = (
+            _CHORD_RAD if bent_m <= 0.0 else min(_CHORD_RAD, np.sqrt(11.0 * excess_m / bent_m))
+        )
         places_m = [self._place_m[row][None]]
         if self._out_m[row] > 0.0:
             places_m.append(self._begin_m[row][None])
@@ -194,13 +196,14 @@ class Paths:
         """(k, 2) corners [m] of chords round the arc of a hop of one path."""
         arc = arc_of(hop.node)[0]
         if self._arcs.radius_m == 0.0:
-            return self._arcs.centre_m[arc][None]
+            return self._arcs.centre_m[[arc]]
         turn_rad = max(0.0, float(hop.to_rad[0] - hop.from_rad[0]))
         n_chord = max(1, int(np.ceil(turn_rad / step_rad)))
         middle_rad = hop.from_rad[0] + turn_rad * (np.arange(n_chord) + 0.5) / n_chord
         direction_rad = self._arcs.begin_rad[arc] + sense_of(hop.node)[0] * middle_rad
         reach_m = self._arcs.radius_m / np.cos(turn_rad / (2 * n_chord))
-        return self._arcs.centre_m[arc] + reach_m * unit(direction_rad)
+        chain_m: FloatArray = self._arcs.centre_m[arc] + reach_m * unit(direction_rad)
+        return chain_m
 
 
 @dataclass(frozen=True, slots=True, eq=False)

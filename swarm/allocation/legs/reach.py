@@ -59,7 +59,7 @@ class Touches:
     onward: IntArray
     """(k,) first tangent that leaves that node from there on; their number: none."""
     last_m: FloatArray
-    """(k, n_target) length if the target is the next thing left for; inf: it isn't to be had [m]."""
+    """(k, n_target) length if the target is what is left for next; inf: it can't be [m]."""
     last: IntArray
     """(k, n_target) approach of the target that is flown then; -1: none."""
 
@@ -86,8 +86,8 @@ class Reach:
         self._ends = np.argsort(keys, kind="stable")
         self._end_keys = keys[self._ends]
         self._met = self.touches(tangents.meets, tangents.meets_rad)
-        # Potential where a tangent is left, plus length to each target, the least of it and of those
-        # that leave its node later, and which that is; the last row stands for none.
+        # Potential where a tangent is left plus length from there to each target, the least of it
+        # and of those that leave its node later, and which that is; the last row stands for none.
         self._least_m = np.full((len(tangents) + 1, n_target), np.inf)
         self._best = np.zeros((len(tangents) + 1, n_target), dtype=np.int64)
         self._settle()
@@ -142,9 +142,7 @@ class Reach:
             )
             touches, rows = self._met, chosen
 
-    def _last_hop(
-        self, path: IntArray, touches: Touches, rows: IntArray, targets: IntArray
-    ) -> Hop:
+    def _last_hop(self, path: IntArray, touches: Touches, rows: IntArray, targets: IntArray) -> Hop:
         end = touches.last[rows, targets]
         return Hop(
             path,

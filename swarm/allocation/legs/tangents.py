@@ -171,9 +171,7 @@ def approaches(arcs: Arcs, obstacles: Obstacles, place_m: FloatArray) -> Approac
     for sense in _SENSES:
         heading_rad = straight_rad - sense * aside_rad
         meets_rad, on_arc = arcs.along_rad(arc, heading_rad - sense * _QUARTER_RAD)
-        found = Approaches(
-            place, node_of(arc, sense), sense * meets_rad, length_m, heading_rad
-        )
+        found = Approaches(place, node_of(arc, sense), sense * meets_rad, length_m, heading_rad)
         parts.append(_taken(found, np.flatnonzero(on_arc)))
     found = _concatenated(parts)
     from_m = place_m[found.place]

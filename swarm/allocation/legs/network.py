@@ -1,0 +1,304 @@
+"""Legs of a mission: lengths, times and corners between its places, and from anywhere to them.
+
+A leg's length is √(h² + dz²), h that of the shortest horizontal path round the zones that concern
+it, dz the difference of the ends' heights, gained evenly. Leaves out: who flies which leg.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.allocation.legs.arcs import Arcs
+from swarm.allocation.legs.flight import FlightModel, straight_m
+from swarm.allocation.legs.planner import PathPlanner, Paths, Piece, Targets
+from swarm.allocation.legs.reach import Hop
+from swarm.allocation.legs.tangents import arc_of, sense_of
+from swarm.model.zones import Zone
+
+__all__ = ["Airspace", "LegNetwork", "Legs"]
+
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
+
+_AT_ONCE = 50_000
+"""Pairs of places that are looked at together: work arrays of some 100 MB."""
+
+_GAUSS = np.polynomial.legendre.leggauss(32)
+"""Places within -1..1 and weights by which speeds round an arc are averaged."""
+
+
+class Airspace:
+    """All zones of a mission, and a planner for each selection of them that was asked for.
+
+    Args:
+        zones: whatever their heights.
+        margin_m: distance to keep from them [m]; >= 0.
+    """
+
+    def __init__(self, zones: Sequence[Zone] = (), margin_m: float = 0.0) -> None:
+        self.zones = tuple(zones)
+        """All of them."""
+        self.margin_m = margin_m
+        """Distance to keep [m]."""
+        self._planners: dict[tuple[int, ...], PathPlanner] = {}
+        self._bottom_m = np.array([zone.bottom_m for zone in self.zones])
+        self._top_m = np.array([zone.top_m for zone in self.zones])
+
+    def concerning(self, low_m: float, high_m: float) -> PathPlanner:
+        """For who uses heights from ``low_m`` to ``high_m`` [m above the mission origin]."""
+        return self.planner((low_m < self._top_m) & (high_m > self._bottom_m))
+
+    def planner(self, concerned: BoolArray) -> PathPlanner:
+        """For (n_zone,) ``concerned`` ones."""
+        numbers = tuple(int(number) for number in np.flatnonzero(concerned))
+        if numbers not in self._planners:
+            zones = [self.zones[number] for number in numbers]
+            self._planners[numbers] = PathPlanner(zones, self.margin_m)
+        return self._planners[numbers]
+
+    def sides(self, low_m: FloatArray, high_m: FloatArray) -> list[_Side]:
+        """Places by how their (n,) lowest and (n,) greatest heights [m] lie to floors and ceilings.
+
+        Of two places it is then known at once which zones concern who flies between them.
+        """
+        below = low_m[:, None] < self._top_m
+        above = high_m[:, None] > self._bottom_m
+        if not len(low_m):
+            return []
+        if not self.zones:
+            return [_Side(np.arange(len(low_m)), below[0], above[0])]
+        patterns, members = np.unique(
+            np.concatenate([below, above], axis=1), axis=0, return_inverse=True
+        )
+        n_zone = len(self.zones)
+        return [
+            _Side(np.flatnonzero(members.ravel() == number), pattern[:n_zone], pattern[n_zone:])
+            for number, pattern in enumerate(patterns)
+        ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Side:
+    """Places that lie alike to all zones' floors and ceilings."""
+
+    rows: IntArray
+    below: BoolArray
+    """(n_zone,) reaching below the ceiling."""
+    above: BoolArray
+    """(n_zone,) reaching above the floor."""
+
+    def concerned_with(self, other: _Side) -> BoolArray:
+        """(n_zone,) which zones meet the heights of a leg between the two."""
+        return (self.below | other.below) & (self.above | other.above)
+
+
+class LegNetwork:
+    """The n nodes of a mission (starts, bases, tasks, ends of lines) and all that is between them.
+
+    Args:
+        airspace: zones.
+        node_enu_m: (n, 3) places [m; east, north, up from the mission origin].
+        low_m: lowest height used at each node, or everywhere [m above the origin]; by default its
+            own. A leg uses all from the lower end's lowest to the higher end's greatest.
+        high_m: greatest height, alike.
+    """
+
+    def __init__(
+        self,
+        airspace: Airspace,
+        node_enu_m: FloatArray,
+        low_m: FloatArray | float | None = None,
+        high_m: FloatArray | float | None = None,
+    ) -> None:
+        self.node_enu_m: FloatArray = np.asarray(node_enu_m, dtype=np.float64).reshape(-1, 3)
+        """(n, 3) places [m]."""
+        self._airspace = airspace
+        self._heights_m = _heights_m(self.node_enu_m, low_m, high_m)
+        self._sides = airspace.sides(*self._heights_m)
+        self._targets: dict[tuple[int, PathPlanner], Targets] = {}
+
+    def __len__(self) -> int:
+        return len(self.node_enu_m)
+
+    @cached_property
+    def legs(self) -> Legs:
+        """From every node to every other; worked out when first asked for."""
+        return self.legs_from(self.node_enu_m, *self._heights_m)
+
+    def legs_from(
+        self,
+        place_enu_m: FloatArray,
+        low_m: FloatArray | float | None = None,
+        high_m: FloatArray | float | None = None,
+    ) -> Legs:
+        """From (m, 3) places [m; ENU] to every node.
+
+        Args:
+            place_enu_m: anywhere; in a zone the leg begins with the shortest way out.
+            low_m: lowest height used at each [m above the origin], as for the nodes.
+            high_m: greatest height, alike.
+        """
+        places_m = np.asarray(place_enu_m, dtype=np.float64).reshape(-1, 3)
+        blocks = []
+        at_once = max(1, _AT_ONCE // max(1, len(self)))
+        for side in self._airspace.sides(*_heights_m(places_m, low_m, high_m)):
+            for number, other in enumerate(self._sides):
+                planner = self._airspace.planner(side.concerned_with(other))
+                targets = self._targets_of(number, planner)
+                for first in range(0, len(side.rows), at_once):
+                    rows = side.rows[first : first + at_once]
+                    paths = targets.paths_from(places_m[rows, :2])
+                    blocks.append(_Block(rows, other.rows, paths, planner.arcs))
+        return Legs(places_m, self.node_enu_m, blocks)
+
+    def _targets_of(self, side: int, planner: PathPlanner) -> Targets:
+        if (side, planner) not in self._targets:
+            places_m = self.node_enu_m[self._sides[side].rows, :2]
+            self._targets[side, planner] = planner.targets(places_m)
+        return self._targets[side, planner]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Block:
+    """Some places' paths to some nodes."""
+
+    rows: IntArray
+    columns: IntArray
+    paths: Paths
+    arcs: Arcs
+
+
+class Legs:
+    """Legs from m places to n nodes, for every kind of UAV."""
+
+    def __init__(
+        self, place_enu_m: FloatArray, node_enu_m: FloatArray, blocks: Sequence[_Block]
+    ) -> None:
+        self._place_enu_m = place_enu_m
+        self._node_enu_m = node_enu_m
+        self._blocks = blocks
+        offset_m = self._offset_m()
+        self.length_m: FloatArray = straight_m(offset_m)
+        """(m, n) lengths [m]; inf: the zones leave no way."""
+        for block in blocks:
+            winding = ~block.paths.is_straight
+            cells = np.ix_(block.rows, block.columns)
+            flat_m, rise_m = block.paths.length_m, offset_m[2][cells]
+            length_m = np.sqrt(flat_m * flat_m + rise_m * rise_m)
+            self.length_m[cells] = np.where(winding, length_m, self.length_m[cells])
+        self._times_s: dict[FlightModel, FloatArray] = {}
+
+    def times_s(self, model: FlightModel) -> FloatArray:
+        """(m, n) times of one kind of UAV [s]; inf: it can't. Read-only, kept for the next call."""
+        if model not in self._times_s:
+            times_s = self._flown_s(model)
+            times_s.setflags(write=False)
+            self._times_s[model] = times_s
+        return self._times_s[model]
+
+    def corners_m(self, row: int, column: int) -> FloatArray | None:
+        """(k, 3) places [m; ENU] of a leg, both ends included, to be flown straight; None: no way.
+
+        Round corners are chains, see `swarm.allocation.legs.planner.Paths.corners_m`.
+        """
+        for block in self._blocks:
+            rows, columns = (
+                np.flatnonzero(block.rows == row),
+                np.flatnonzero(block.columns == column),
+            )
+            if not (len(rows) and len(columns)):
+                continue
+            if not np.isfinite(block.paths.length_m[rows[0], columns[0]]):
+                return None
+            flat_m = block.paths.corners_m(int(rows[0]), int(columns[0]))
+            begin_up_m, end_up_m = self._place_enu_m[row, 2], self._node_enu_m[column, 2]
+            piece_m = np.hypot(*np.diff(flat_m, axis=0).T)
+            flown_m = np.concatenate([[0.0], np.cumsum(piece_m)])
+            share = (
+                flown_m / flown_m[-1] if flown_m[-1] > 0.0 else np.linspace(0.0, 1.0, len(flat_m))
+            )
+            up_m = begin_up_m + share * (end_up_m - begin_up_m)
+            up_m[-1] = end_up_m
+            return np.column_stack([flat_m, up_m])
+        raise IndexError(f"there is no leg from place {row} to node {column}")
+
+    def _offset_m(self) -> FloatArray:
+        """(3, m, n) from places to nodes [m]."""
+        nodes_m = np.ascontiguousarray(self._node_enu_m.T)
+        return nodes_m[:, None, :] - self._place_enu_m.T[:, :, None]
+
+    def _flown_s(self, model: FlightModel) -> FloatArray:
+        if not model.heeds_direction:
+            return model.rest_to_rest_s(self.length_m)
+        offset_m = self._offset_m()
+        times_s = model.straight_s(offset_m)
+        for block in self._blocks:
+            winding = ~block.paths.is_straight
+            cells = np.ix_(block.rows, block.columns)
+            times_s[cells] = np.where(winding, np.inf, times_s[cells])
+            row, column = np.nonzero(winding & np.isfinite(block.paths.length_m))
+            if len(row):
+                to = block.rows[row], block.columns[column]
+                rise = offset_m[2][to] / block.paths.length_m[row, column]
+                pieces = block.paths.pieces(row, column)
+                slow_s = _slow_s(model, block.arcs, rise, pieces)
+                times_s[to] = model.even_s(self.length_m[to], slow_s)
+        return times_s
+
+
+def _slow_s(
+    model: FlightModel, arcs: Arcs, rise: FloatArray, pieces: Iterator[Piece]
+) -> FloatArray:
+    """(k,) Σ(piece ÷ its speed) of k paths that gain (k,) metres of height for each metre [s]."""
+    slow_s = np.zeros(len(rise))
+    for piece in pieces:
+        slow_s[piece.path] += _piece_s(model, piece.length_m, piece.heading_rad, rise[piece.path])
+        if piece.hop is not None and arcs.radius_m > 0.0:
+            slow_s[piece.path] += _arc_s(model, arcs, piece.hop, rise[piece.path])
+    return slow_s
+
+
+def _arc_s(model: FlightModel, arcs: Arcs, hop: Hop, rise: FloatArray) -> FloatArray:
+    """(k,) times round arcs, by Gauss and Legendre, as if they were of many pieces [s]."""
+    sense = sense_of(hop.node)
+    begin_rad = arcs.begin_rad[arc_of(hop.node)]
+    half_rad = np.maximum(0.0, hop.to_rad - hop.from_rad) / 2.0
+    middle_rad = (hop.to_rad + hop.from_rad) / 2.0
+    place, weight = _GAUSS
+    progress_rad = middle_rad + place[:, None] * half_rad
+    # Counter-clockwise the progress is the angle from where the arc begins, clockwise minus it.
+    heading_rad = begin_rad + sense * (progress_rad + np.pi / 2.0)
+    length_m = weight[:, None] * (half_rad * arcs.radius_m)
+    piece_s: FloatArray = _piece_s(model, length_m, heading_rad, rise).sum(axis=0)
+    return piece_s
+
+
+def _piece_s(
+    model: FlightModel, length_m: FloatArray, heading_rad: FloatArray, rise: FloatArray
+) -> FloatArray:
+    """(..., k) times of pieces of so many horizontal lengths [m], unaccelerated; inf: can't [s]."""
+    offset_m = np.empty((3, *length_m.shape))
+    offset_m[0] = length_m * np.cos(heading_rad)
+    offset_m[1] = length_m * np.sin(heading_rad)
+    offset_m[2] = length_m * rise
+    inclined_m = straight_m(offset_m)
+    speed_m_s = model.speed_over_m_s(offset_m, inclined_m)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(inclined_m > 0.0, inclined_m / speed_m_s, 0.0)
+
+
+def _heights_m(
+    place_enu_m: FloatArray, low_m: FloatArray | float | None, high_m: FloatArray | float | None
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) lowest and (n,) greatest heights used at (n, 3) places [m above the origin]."""
+    up_m = place_enu_m[:, 2]
+    low_m = up_m if low_m is None else np.broadcast_to(low_m, up_m.shape)
+    high_m = up_m if high_m is None else np.broadcast_to(high_m, up_m.shape)
+    return low_m, high_m
