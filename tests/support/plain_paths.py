@@ -7,8 +7,6 @@ a margin paths bend at places spread round every corner, so they are a little to
 
 from __future__ import annotations
 
-import heapq
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -46,68 +44,62 @@ class PlainZones:
     def __init__(self, zones: Sequence[Zone], margin_m: float = 0.0) -> None:
         self.margin_m = margin_m
         self.zones = [(zone.inclusive, *edges(zone)) for zone in zones]
-        self.corners_m = np.concatenate(
-            [np.empty((0, 2)), *(begin_m for _, begin_m, _ in self.zones)]
-        )
+        begins = [begin_m for _, begin_m, _ in self.zones]
+        self.corners_m = np.concatenate([np.empty((0, 2)), *begins])
 
-    def depth_m(self, place_m: FloatArray) -> float:
-        """How deep a place lies inside, the margin included; negative outside."""
-        deepest = -math.inf
+    def depth_m(self, place_m: FloatArray) -> FloatArray:
+        """(...) how deep (..., 2) places lie inside, the margin included; negative outside."""
+        deepest = np.full(place_m.shape[:-1], -np.inf)
         for inclusive, begin_m, end_m in self.zones:
-            distance_m = min(
-                segments_apart_m(place_m, place_m, b, e)
-                for b, e in zip(begin_m, end_m, strict=True)
-            )
+            border_m = apart_m(place_m[..., None, :], begin_m, end_m).min(axis=-1)
             kept_out = within(place_m, begin_m, end_m) != inclusive
-            deepest = max(deepest, self.margin_m + (distance_m if kept_out else -distance_m))
-        return deepest
+            deepest = np.maximum(deepest, np.where(kept_out, border_m, -border_m))
+        return deepest + self.margin_m
 
-    def depth_along_m(self, from_m: FloatArray, to_m: FloatArray) -> float:
-        """The same of the deepest place of a straight piece; exact outside, a bound inside."""
-        deepest = max(self.depth_m(from_m), self.depth_m(to_m))
+    def depth_along_m(self, from_m: FloatArray, to_m: FloatArray) -> FloatArray:
+        """(n,) the same of a deep place of each straight piece; of the deepest if it is outside."""
+        deepest = np.maximum(self.depth_m(from_m), self.depth_m(to_m))
+        p, q = from_m[:, None], to_m[:, None]
         for _, begin_m, end_m in self.zones:
-            crossings = [0.0, 1.0]
-            for b, e in zip(begin_m, end_m, strict=True):
-                apart_m = segments_apart_m(from_m, to_m, b, e)
-                deepest = max(deepest, self.margin_m - apart_m)
-                crossings += crossing(from_m, to_m, b, e)
-            crossings.sort()
-            for low, high in zip(crossings, crossings[1:], strict=False):
-                deepest = max(deepest, self.depth_m(from_m + (low + high) / 2 * (to_m - from_m)))
+            cut = crossing(p, q, begin_m, end_m)
+            border_m = np.minimum(apart_m(p, begin_m, end_m), apart_m(q, begin_m, end_m))
+            for corner_m in (begin_m, end_m):
+                border_m = np.minimum(border_m, apart_m(corner_m, p, q))
+            border_m[np.isfinite(cut)] = 0.0
+            deepest = np.maximum(deepest, self.margin_m - border_m.min(axis=1))
+            cut[~np.isfinite(cut)] = 0.0
+            ends = np.zeros((len(from_m), 1))
+            cut = np.sort(np.concatenate([ends, cut, ends + 1.0], axis=1), axis=1)
+            middle = (cut[:, 1:, None] + cut[:, :-1, None]) / 2
+            deepest = np.maximum(deepest, self.depth_m(p + middle * (q - p)).max(axis=1))
         return deepest
-
-    def clear(self, from_m: FloatArray, to_m: FloatArray) -> bool:
-        return self.depth_along_m(from_m, to_m) <= DEPTH_M
 
     def length_m(self, from_m: FloatArray, to_m: FloatArray) -> float:
         """Shortest path over places at corners; inf: none."""
-        places = [from_m, to_m, *self._bends_m()]
-        least = [math.inf] * len(places)
-        least[0] = 0.0
-        queue = [(0.0, 0)]
-        done = set()
-        while queue:
-            flown_m, here = heapq.heappop(queue)
+        places_m = np.concatenate([from_m[None], to_m[None], self._bends_m()])
+        least_m = np.full(len(places_m), np.inf)
+        least_m[0] = 0.0
+        open_m = least_m.copy()
+        while np.isfinite(open_m).any():
+            here = int(open_m.argmin())
             if here == 1:
-                return flown_m
-            if here in done:
-                continue
-            done.add(here)
-            for there, place_m in enumerate(places):
-                ahead_m = flown_m + math.dist(places[here], place_m)
-                if ahead_m < least[there] and self.clear(places[here], place_m):
-                    least[there] = ahead_m
-                    heapq.heappush(queue, (ahead_m, there))
-        return math.inf
+                break
+            open_m[here] = np.inf
+            ahead_m = least_m[here] + np.hypot(*(places_m - places_m[here]).T)
+            nearer = np.flatnonzero(ahead_m < least_m)
+            from_here_m = np.broadcast_to(places_m[here], (len(nearer), 2))
+            nearer = nearer[self.depth_along_m(from_here_m, places_m[nearer]) <= DEPTH_M]
+            least_m[nearer] = open_m[nearer] = ahead_m[nearer]
+        return float(least_m[1])
 
-    def _bends_m(self) -> list[FloatArray]:
+    def _bends_m(self) -> FloatArray:
         if self.margin_m == 0.0:
-            return list(self.corners_m)
+            return self.corners_m
         angles = np.arange(PLACES_ROUND) * 2 * np.pi / PLACES_ROUND
         ring_m = np.column_stack([np.cos(angles), np.sin(angles)])
-        ring_m *= self.margin_m / math.cos(np.pi / PLACES_ROUND)
-        places = (self.corners_m[:, None] + ring_m).reshape(-1, 2)
-        return [place_m for place_m in places if self.depth_m(place_m) <= DEPTH_M]
+        ring_m *= self.margin_m / np.cos(np.pi / PLACES_ROUND)
+        places_m = (self.corners_m[:, None] + ring_m).reshape(-1, 2)
+        return places_m[self.depth_m(places_m) <= DEPTH_M]
 
 
 def edges(zone: Zone) -> tuple[FloatArray, FloatArray]:
@@ -116,37 +108,30 @@ def edges(zone: Zone) -> tuple[FloatArray, FloatArray]:
     return np.concatenate(rings), np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
 
 
-def within(place_m: FloatArray, begin_m: FloatArray, end_m: FloatArray) -> bool:
-    """Whether a ray to the east crosses edges an odd number of times."""
-    inside = False
-    for (bx, by), (ex, ey) in zip(begin_m, end_m, strict=True):
-        if (by > place_m[1]) != (ey > place_m[1]):
-            east = bx + (place_m[1] - by) / (ey - by) * (ex - bx)
-            inside ^= bool(place_m[0] < east)
+def within(place_m: FloatArray, begin_m: FloatArray, end_m: FloatArray) -> npt.NDArray[np.bool_]:
+    """(...) whether a ray to the east from (..., 2) places crosses edges an odd number of times."""
+    east_m, north_m = place_m[..., :1], place_m[..., 1:]
+    spans = (begin_m[:, 1] > north_m) != (end_m[:, 1] > north_m)
+    rise_m = np.where(end_m[:, 1] == begin_m[:, 1], 1.0, end_m[:, 1] - begin_m[:, 1])
+    meets_m = begin_m[:, 0] + (north_m - begin_m[:, 1]) / rise_m * (end_m - begin_m)[:, 0]
+    inside: npt.NDArray[np.bool_] = (spans & (east_m < meets_m)).sum(axis=-1) % 2 == 1
     return inside
 
 
-def crossing(p: FloatArray, q: FloatArray, b: FloatArray, e: FloatArray) -> list[float]:
-    """Where along p → q it crosses b → e, from 0 to 1; parallels never do."""
-    along, edge = q - p, e - b
-    area = along[0] * edge[1] - along[1] * edge[0]
-    if area == 0.0:
-        return []
-    t = ((b[0] - p[0]) * edge[1] - (b[1] - p[1]) * edge[0]) / area
-    s = ((b[0] - p[0]) * along[1] - (b[1] - p[1]) * along[0]) / area
-    return [float(t)] if 0.0 <= t <= 1.0 and 0.0 <= s <= 1.0 else []
+def crossing(p: FloatArray, q: FloatArray, b: FloatArray, e: FloatArray) -> FloatArray:
+    """(...) where along p → q, from 0 to 1, each crosses b → e; nan: nowhere, or parallel."""
+    along, edge, over = q - p, e - b, b - p
+    with np.errstate(divide="ignore", invalid="ignore"):
+        area = along[..., 0] * edge[..., 1] - along[..., 1] * edge[..., 0]
+        t = (over[..., 0] * edge[..., 1] - over[..., 1] * edge[..., 0]) / area
+        s = (over[..., 0] * along[..., 1] - over[..., 1] * along[..., 0]) / area
+    return np.where((t >= 0.0) & (t <= 1.0) & (s >= 0.0) & (s <= 1.0), t, np.nan)
 
 
-def segments_apart_m(p: FloatArray, q: FloatArray, b: FloatArray, e: FloatArray) -> float:
-    """Distance of two segments; 0 if they cross."""
-    if crossing(p, q, b, e):
-        return 0.0
-    return min(apart_m(p, b, e), apart_m(q, b, e), apart_m(b, p, q), apart_m(e, p, q))
-
-
-def apart_m(place_m: FloatArray, b: FloatArray, e: FloatArray) -> float:
-    """Distance of a place and a segment."""
+def apart_m(place_m: FloatArray, b: FloatArray, e: FloatArray) -> FloatArray:
+    """(...) distances of (..., 2) places and segments from b to e."""
     edge = e - b
-    square = float(edge @ edge)
-    t = 0.0 if square == 0.0 else min(1.0, max(0.0, float((place_m - b) @ edge) / square))
-    return math.dist(place_m, b + t * edge)
+    square = np.maximum((edge * edge).sum(axis=-1), 1e-300)
+    t = np.clip(((place_m - b) * edge).sum(axis=-1) / square, 0.0, 1.0)
+    offset = place_m - b - t[..., None] * edge
+    return np.sqrt((offset * offset).sum(axis=-1))  # type: ignore[no-any-return]

@@ -42,7 +42,7 @@ def free_places(
     return places_m[planner.free(places_m)][:count]
 
 
-# -- By hand -----------------------------------------------------------------------------------------
+# -- By hand --------------------------------------------------------------------------------------
 
 
 def test_path_round_a_square_bends_at_its_corners() -> None:
@@ -58,7 +58,7 @@ def test_path_round_a_square_bends_at_its_corners() -> None:
 def test_margin_rounds_the_corners() -> None:
     planner = PathPlanner([zone(SQUARE)], margin_m=1.0)
     to_tangent_m = math.sqrt(5.0**2 + 5.0**2 - 1.0)
-    turn_rad = math.pi / 4 - math.asin(1.0 / math.hypot(5.0, 5.0))
+    turn_rad = math.pi / 4 + math.asin(1.0 / math.hypot(5.0, 5.0))
 
     found_m = length_m(planner, at(-5.0, 5.0), at(15.0, 5.0))
 
@@ -84,7 +84,7 @@ def test_margin_closes_a_gap_that_is_narrower_than_two() -> None:
 
 
 def test_overlapping_margins_hide_corners() -> None:
-    """In the notch between two boxes the arcs cross, and no path leans on what lies in the other."""
+    """Arcs cross in the notch between two boxes: none is passed inside of the other."""
     two = [box(0.0, 0.0, 10.0, 10.0), box(10.5, -3.0, 20.0, 10.0)]
     planner, plain = PathPlanner(two, margin_m=1.0), PlainZones(two, margin_m=1.0)
 
@@ -174,12 +174,11 @@ def test_margin_below_zero_is_refused() -> None:
         PathPlanner([], margin_m=-1.0)
 
 
-# -- Against a plain reference -----------------------------------------------------------------------
+# -- Against a plain reference --------------------------------------------------------------------
 
 
 def max_depth_m(plain: PlainZones, corners_m: FloatArray) -> float:
-    pieces = zip(corners_m, corners_m[1:], strict=False)
-    return max(plain.depth_along_m(from_m, to_m) for from_m, to_m in pieces)
+    return float(plain.depth_along_m(corners_m[:-1], corners_m[1:]).max())
 
 
 @pytest.mark.parametrize("seed", range(12))
