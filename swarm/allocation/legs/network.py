@@ -257,26 +257,36 @@ def _slow_s(
     model: FlightModel, arcs: Arcs, rise: FloatArray, pieces: Iterator[Piece]
 ) -> FloatArray:
     """(k,) Σ(piece ÷ its speed) of k paths that gain (k,) metres of height for each metre [s]."""
-    slow_s = np.zeros(len(rise))
-    for piece in pieces:
-        slow_s[piece.path] += _piece_s(model, piece.length_m, piece.heading_rad, rise[piece.path])
-        if piece.hop is not None and arcs.radius_m > 0.0:
-            slow_s[piece.path] += _arc_s(model, arcs, piece.hop, rise[piece.path])
+    flown = list(pieces)
+    path = np.concatenate([piece.path for piece in flown])
+    length_m = np.concatenate([piece.length_m for piece in flown])
+    heading_rad = np.concatenate([piece.heading_rad for piece in flown])
+    piece_s = _piece_s(model, length_m, heading_rad, rise[path])
+    slow_s = np.bincount(path, weights=piece_s, minlength=len(rise))
+    hops = [piece.hop for piece in flown if piece.hop is not None]
+    if hops and arcs.radius_m > 0.0:
+        path = np.concatenate([piece.path for piece in flown if piece.hop is not None])
+        arc_s = _arc_s(model, arcs, hops, rise[path])
+        slow_s += np.bincount(path, weights=arc_s, minlength=len(rise))
     return slow_s
 
 
-def _arc_s(model: FlightModel, arcs: Arcs, hop: Hop, rise: FloatArray) -> FloatArray:
-    """(k,) times round arcs, by Gauss and Legendre, as if they were of many pieces [s]."""
-    sense = sense_of(hop.node)
-    begin_rad = arcs.begin_rad[arc_of(hop.node)]
-    half_rad = np.maximum(0.0, hop.to_rad - hop.from_rad) / 2.0
-    middle_rad = (hop.to_rad + hop.from_rad) / 2.0
+def _arc_s(model: FlightModel, arcs: Arcs, hops: Sequence[Hop], rise: FloatArray) -> FloatArray:
+    """(k,) times round all arcs of ``hops``, by Gauss and Legendre, as if of many pieces [s]."""
+    node = np.concatenate([hop.node for hop in hops])
+    from_rad = np.concatenate([hop.from_rad for hop in hops])
+    to_rad = np.concatenate([hop.to_rad for hop in hops])
+    sense = sense_of(node)
+    begin_rad = arcs.begin_rad[arc_of(node)]
+    half_rad = np.maximum(0.0, to_rad - from_rad) / 2.0
+    middle_rad = (to_rad + from_rad) / 2.0
     place, weight = _GAUSS
     progress_rad = middle_rad + place[:, None] * half_rad
     # Counter-clockwise the progress is the angle from where the arc begins, clockwise minus it.
     heading_rad = begin_rad + sense * (progress_rad + np.pi / 2.0)
     length_m = weight[:, None] * (half_rad * arcs.radius_m)
-    piece_s: FloatArray = _piece_s(model, length_m, heading_rad, rise).sum(axis=0)
+    # Added up one by one: numpy's sum goes another way for one path than for many.
+    piece_s: FloatArray = np.add.accumulate(_piece_s(model, length_m, heading_rad, rise))[-1]
     return piece_s
 
 
