@@ -98,7 +98,7 @@ class PlainZones:
         angles = np.arange(PLACES_ROUND) * 2 * np.pi / PLACES_ROUND
         ring_m = np.column_stack([np.cos(angles), np.sin(angles)])
         ring_m *= self.margin_m / np.cos(np.pi / PLACES_ROUND)
-        places_m = (self.corners_m[:, None] + ring_m).reshape(-1, 2)
+        places_m: FloatArray = (self.corners_m[:, None] + ring_m).reshape(-1, 2)
         return places_m[self.depth_m(places_m) <= DEPTH_M]
 
 
@@ -134,4 +134,5 @@ def apart_m(place_m: FloatArray, b: FloatArray, e: FloatArray) -> FloatArray:
     square = np.maximum((edge * edge).sum(axis=-1), 1e-300)
     t = np.clip(((place_m - b) * edge).sum(axis=-1) / square, 0.0, 1.0)
     offset = place_m - b - t[..., None] * edge
-    return np.sqrt((offset * offset).sum(axis=-1))  # type: ignore[no-any-return]
+    distance_m: FloatArray = np.sqrt((offset * offset).sum(axis=-1))
+    return distance_m

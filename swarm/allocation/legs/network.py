@@ -51,6 +51,9 @@ class Airspace:
         self._bottom_m = np.array([zone.bottom_m for zone in self.zones])
         self._top_m = np.array([zone.top_m for zone in self.zones])
 
+    def __reduce__(self) -> tuple[type[Airspace], tuple[object, ...]]:
+        return type(self), (self.zones, self.margin_m)
+
     def concerning(self, low_m: float, high_m: float) -> PathPlanner:
         """For who uses heights from ``low_m`` to ``high_m`` [m above the mission origin]."""
         return self.planner((low_m < self._top_m) & (high_m > self._bottom_m))
@@ -123,6 +126,9 @@ class LegNetwork:
         self._heights_m = _heights_m(self.node_enu_m, low_m, high_m)
         self._sides = airspace.sides(*self._heights_m)
         self._targets: dict[tuple[int, PathPlanner], Targets] = {}
+
+    def __reduce__(self) -> tuple[type[LegNetwork], tuple[object, ...]]:
+        return type(self), (self._airspace, self.node_enu_m, *self._heights_m)
 
     def __len__(self) -> int:
         return len(self.node_enu_m)
@@ -262,7 +268,7 @@ def _slow_s(
     length_m = np.concatenate([piece.length_m for piece in flown])
     heading_rad = np.concatenate([piece.heading_rad for piece in flown])
     piece_s = _piece_s(model, length_m, heading_rad, rise[path])
-    slow_s = np.bincount(path, weights=piece_s, minlength=len(rise))
+    slow_s: FloatArray = np.bincount(path, weights=piece_s, minlength=len(rise)).astype(float)
     hops = [piece.hop for piece in flown if piece.hop is not None]
     if hops and arcs.radius_m > 0.0:
         path = np.concatenate([piece.path for piece in flown if piece.hop is not None])

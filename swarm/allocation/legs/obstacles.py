@@ -1,18 +1,22 @@
 """What zones keep out of, with their margin: which pieces and places are clear of it.
 
-The predicates are GEOS's, by way of shapely. Leaves out: ways round them
-(swarm.allocation.legs.planner).
+The predicates are GEOS's, by way of shapely, which is imported where the first zone is: it takes
+longer than all else here. Leaves out: ways round them (swarm.allocation.legs.planner).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 
 from swarm.model.zones import Zone
+
+if TYPE_CHECKING:
+    import shapely
 
 __all__ = ["TOUCH_M", "Obstacles"]
 
@@ -50,25 +54,30 @@ class Obstacles:
         """(k, 2) corners of each border, with what is kept out of on the left."""
         self._depth_m = max(0.0, margin_m - TOUCH_M)
         self._shapes: list[shapely.Geometry] = []  # nearer to these than _depth_m is inside
+        self._boxes_m: list[FloatArray] = []  # (1, 4) west, south, east, north of what is inside
         self._solids = [part for zone in zones for part in self._add(zone)]
-        for shape in self._shapes:
-            shapely.prepare(shape)
-        bounds_m = shapely.bounds(self._shapes).reshape(-1, 4)
-        self._bounds_m = bounds_m + np.array([-1.0, -1.0, 1.0, 1.0]) * self._depth_m
+        self._bounds_m = np.concatenate([np.empty((0, 4)), *self._boxes_m])
 
     def __len__(self) -> int:
         return len(self._shapes)
 
     def _add(self, zone: Zone) -> list[shapely.Polygon]:
+        import shapely
+
         shape = shapely.orient_polygons(zone.shape())
         rings = [np.array(ring.coords)[:-1] for ring in (shape.exterior, *shape.interiors)]
         self.rings_m += [ring[::-1] for ring in rings] if zone.inclusive else rings
         touch_m = TOUCH_M if self._depth_m == 0.0 else 0.0
         if zone.inclusive:
-            self._shapes.append(_around(_grown(shape, touch_m)))
-            return list(_around(shape).geoms)
-        self._shapes.append(_grown(shape, -touch_m))
-        return [shape]
+            keeps_out: shapely.Geometry = _around(_grown(shape, touch_m))
+            solids = list(_around(shape).geoms)
+        else:
+            keeps_out, solids = _grown(shape, -touch_m), [shape]
+        shapely.prepare(keeps_out)
+        self._shapes.append(keeps_out)
+        around_m = np.array([-1.0, -1.0, 1.0, 1.0]) * self._depth_m
+        self._boxes_m.append(shapely.bounds(keeps_out)[None] + around_m)
+        return solids
 
     def clear(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
         """(n,) whether straight pieces between (n, 2) places [m] stay outside of every shape."""
@@ -78,6 +87,8 @@ class Obstacles:
         some = near.any(axis=1)
         if not some.any():
             return clear
+        import shapely
+
         pieces = np.empty(len(from_m), dtype=object)
         pieces[some] = shapely.linestrings(np.stack([from_m[some], to_m[some]], axis=1))
         for number in range(len(self._shapes)):
@@ -89,6 +100,10 @@ class Obstacles:
         """(n,) whether (n, 2) places [m] are outside of every shape."""
         free = np.ones(len(place_m), dtype=np.bool_)
         near = self._near(place_m, place_m)
+        if not near.any():
+            return free
+        import shapely
+
         for number in np.flatnonzero(near.any(axis=0)):
             open_question = free & near[:, number]
             points = shapely.points(place_m[open_question])
@@ -101,11 +116,20 @@ class Obstacles:
         The margin's round corners are cut into chords here, which lie at most 0.01 % of the margin
         further out. Whoever has nowhere to go stays where it is.
         """
+        import shapely
+
+        out = shapely.shortest_line(self._border, shapely.Point(place_m))
+        out_m = np.array(out.coords[0])
+        return out_m if self.free(out_m[None])[0] else np.array(place_m, dtype=np.float64)
+
+    @cached_property
+    def _border(self) -> shapely.Geometry:
+        """Of all shapes together, with their margin and a little more."""
+        import shapely
+
         reach_m = (self.margin_m + TOUCH_M) / np.cos(np.pi / (4 * _ROUND_STEPS))
         shapes = shapely.buffer(self._solids, reach_m, quad_segs=_ROUND_STEPS)
-        border = shapely.boundary(shapely.union_all(shapes))
-        out_m = np.array(shapely.shortest_line(border, shapely.Point(place_m)).coords[0])
-        return out_m if self.free(out_m[None])[0] else np.array(place_m, dtype=np.float64)
+        return shapely.boundary(shapely.union_all(shapes))
 
     def _near(self, low_m: FloatArray, high_m: FloatArray) -> BoolArray:
         """(n, shapes) whose bounding boxes meet those from (n, 2) ``low_m`` to ``high_m``."""
@@ -119,6 +143,8 @@ class Obstacles:
         return near
 
     def _inside(self, number: int, pieces: npt.NDArray[np.object_] | shapely.Geometry) -> BoolArray:
+        import shapely
+
         shape = self._shapes[number]
         if self._depth_m == 0.0:
             return np.asarray(shapely.intersects(shape, pieces))
@@ -128,11 +154,15 @@ class Obstacles:
 def _grown(shape: shapely.Polygon, by_m: float) -> shapely.Geometry:
     if by_m == 0.0:
         return shape
+    import shapely
+
     return shapely.buffer(shape, by_m, join_style="mitre")
 
 
 def _around(shape: shapely.Geometry) -> shapely.MultiPolygon:
     """All the world but ``shape``."""
+    import shapely
+
     world = shapely.box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
     parts = shapely.get_parts(shape)
     shells = [part.exterior for part in parts]

@@ -31,6 +31,9 @@ EXCESS_FRAC = 1e-6
 _CHORD_RAD = 0.2
 """Greatest angle that a chord stands for [rad]."""
 
+_FINER = 8
+"""How often chords are halved at most: beyond, 1e-6 m of a gap are told from none."""
+
 
 class PathPlanner:
     """Shortest paths that meet no zone's inside and stay a margin away.
@@ -109,7 +112,7 @@ class Paths:
 
     def __init__(self, targets: Targets, place_m: FloatArray) -> None:
         planner = targets.planner
-        self._arcs = planner.arcs
+        self._planner = planner
         self._targets = targets
         self._place_m = place_m
         self._begin_m, stayed = planner.way_out_m(place_m)
@@ -173,36 +176,43 @@ class Paths:
         """(k, 2) places [m] of the path between the two, both included, to be flown straight.
 
         Arcs become chains of chords outside of them, so that the margin is kept; all of them
-        lengthen the path by less than 1e-6 of its length.
+        lengthen the path by less than 1e-6 of its length. In a gap with no room for that they are
+        shorter.
         """
         hops = [
             piece.hop
             for piece in self.pieces(np.array([row]), np.array([column]))
             if piece.hop is not None and len(piece.hop.path)
         ]
-        turn_rad = sum(float(hop.to_rad[0] - hop.from_rad[0]) for hop in hops)
-        excess_m = EXCESS_FRAC * float(self.length_m[row, column])
-        bent_m = self._arcs.radius_m * turn_rad
-        step_rad = (
-            _CHORD_RAD if bent_m <= 0.0 else min(_CHORD_RAD, np.sqrt(11.0 * excess_m / bent_m))
+        bent_m = self._planner.arcs.radius_m * sum(
+            float(hop.to_rad[0] - hop.from_rad[0]) for hop in hops
         )
-        places_m = [self._place_m[row][None]]
+        excess_m = EXCESS_FRAC * float(self.length_m[row, column])
+        # Chords of angle s are longer than their arc by s²/12 of it, and a little more.
+        step_rad = _CHORD_RAD if bent_m <= 0.0 else min(_CHORD_RAD, np.sqrt(11 * excess_m / bent_m))
+        begin_m, end_m = self._begin_m[row][None], self._targets.place_m[column][None]
+        for _ in range(_FINER):
+            ahead_m = np.concatenate(
+                [begin_m, *(self._chain_m(hop, step_rad) for hop in hops), end_m]
+            )
+            if bent_m <= 0.0 or self._planner.clear(ahead_m[:-1], ahead_m[1:]).all():
+                break
+            step_rad /= 2.0
         if self._out_m[row] > 0.0:
-            places_m.append(self._begin_m[row][None])
-        places_m += [self._chain_m(hop, step_rad) for hop in hops]
-        return np.concatenate([*places_m, self._targets.place_m[column][None]])
+            return np.concatenate([self._place_m[row][None], ahead_m])
+        return ahead_m
 
     def _chain_m(self, hop: Hop, step_rad: float) -> FloatArray:
         """(k, 2) corners [m] of chords round the arc of a hop of one path."""
         arc = arc_of(hop.node)[0]
-        if self._arcs.radius_m == 0.0:
-            return self._arcs.centre_m[[arc]]
+        if self._planner.arcs.radius_m == 0.0:
+            return self._planner.arcs.centre_m[[arc]]
         turn_rad = max(0.0, float(hop.to_rad[0] - hop.from_rad[0]))
         n_chord = max(1, int(np.ceil(turn_rad / step_rad)))
         middle_rad = hop.from_rad[0] + turn_rad * (np.arange(n_chord) + 0.5) / n_chord
-        direction_rad = self._arcs.begin_rad[arc] + sense_of(hop.node)[0] * middle_rad
-        reach_m = self._arcs.radius_m / np.cos(turn_rad / (2 * n_chord))
-        chain_m: FloatArray = self._arcs.centre_m[arc] + reach_m * unit(direction_rad)
+        direction_rad = self._planner.arcs.begin_rad[arc] + sense_of(hop.node)[0] * middle_rad
+        reach_m = self._planner.arcs.radius_m / np.cos(turn_rad / (2 * n_chord))
+        chain_m: FloatArray = self._planner.arcs.centre_m[arc] + reach_m * unit(direction_rad)
         return chain_m
 
 

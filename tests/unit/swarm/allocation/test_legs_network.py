@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import numpy as np
 import numpy.typing as npt
@@ -134,14 +135,20 @@ def test_a_uav_that_a_zone_is_drawn_over_leaves_it_first() -> None:
     corners_m = legs.corners_m(0, 0)
 
     assert corners_m is not None
-    np.testing.assert_allclose(
-        corners_m[:, :2], [[9.0, 9.5], [9.0, 10.0], [10.0, 10.0], [20, 9]], atol=1e-5
-    )
+    expected_m = np.array([[9.0, 9.5], [9.0, 10.0], [10.0, 10.0], [20.0, 9.0]])
+    np.testing.assert_allclose(corners_m[:, :2], expected_m, atol=1e-5)
     assert legs.length_m[0, 0] == pytest.approx(1.5 + math.hypot(10.0, 1.0))
     assert legs.times_s(WINDY)[0, 0] == pytest.approx(WINDY.path_s(corners_m), rel=1e-9)
     assert legs.length_m[0, 1] == math.inf
     assert legs.times_s(WINDY)[0, 1] == math.inf
     assert legs.corners_m(0, 1) is None
+
+
+def test_a_network_goes_to_other_processes() -> None:
+    network = random_network(2, 4.0)
+    again = pickle.loads(pickle.dumps(network))
+
+    assert again.legs.times_s(WINDY).tolist() == network.legs.times_s(WINDY).tolist()
 
 
 def test_a_network_may_be_empty() -> None:

@@ -267,3 +267,28 @@ def test_an_answer_does_not_depend_on_what_else_is_asked(seed: int) -> None:
             targets.paths_from(places_m[row : row + 1]).length_m[0].tolist() == all_m[row].tolist()
         )
         assert length_m(planner, places_m[row], places_m[3]) == all_m[row, 3]
+
+
+@pytest.mark.parametrize("margin_m", [0.0, 4.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_on_its_way_a_uav_finds_the_rest_of_its_path(seed: int, margin_m: float) -> None:
+    """Although places on a border, on an arc or at a corner are rounded."""
+    rng = np.random.default_rng(seed)
+    planner = PathPlanner(random_zones(rng, 5, n_corner=9, size_m=200.0), margin_m)
+    places_m = free_places(rng, planner, 12, size_m=200.0)
+    targets = planner.targets(places_m)
+    paths = targets.paths_from(places_m)
+    bent = np.isfinite(paths.length_m) & ~paths.is_straight
+
+    for row, column in np.argwhere(bent)[:25]:
+        corners_m = paths.corners_m(int(row), int(column))
+        piece_m = np.hypot(*np.diff(corners_m, axis=0).T)
+        begun = rng.integers(0, len(piece_m), 4)
+        share = np.append(rng.uniform(0.0, 1.0, 3), 0.0)
+        here_m = corners_m[begun] + share[:, None] * (corners_m[begun + 1] - corners_m[begun])
+        rest_m = [
+            piece_m[n + 1 :].sum() + (1.0 - s) * piece_m[n]
+            for n, s in zip(begun, share, strict=True)
+        ]
+        found_m = targets.paths_from(here_m).length_m[:, column]
+        np.testing.assert_allclose(found_m, rest_m, atol=2e-6 * paths.length_m[row, column])

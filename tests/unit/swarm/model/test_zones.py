@@ -11,8 +11,13 @@ SQUARE: tuple[Corner, ...] = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)
 HOLE: tuple[Corner, ...] = ((2.0, 2.0), (4.0, 2.0), (3.0, 4.0))
 
 
-def zone(polygon: tuple[Corner, ...] = SQUARE, *holes: tuple[Corner, ...], **others: float) -> Zone:
-    return Zone(ZoneId("village"), polygon, holes, **others)
+def zone(
+    polygon: tuple[Corner, ...],
+    *holes: tuple[Corner, ...],
+    floor_m: float | None = None,
+    ceiling_m: float | None = None,
+) -> Zone:
+    return Zone(ZoneId("village"), polygon, holes, floor_m, ceiling_m)
 
 
 def test_polygon_may_go_round_either_way_and_end_where_it_began() -> None:
