@@ -23,6 +23,7 @@ __all__ = ["TOUCH_M", "Obstacles"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
 
 TOUCH_M = 1e-6
 """Who is no deeper inside than this only touches [m]: places on a border are rounded."""
@@ -54,9 +55,11 @@ class Obstacles:
         """(k, 2) corners of each border, with what is kept out of on the left."""
         self._depth_m = max(0.0, margin_m - TOUCH_M)
         self._shapes: list[shapely.Geometry] = []  # nearer to these than _depth_m is inside
-        self._boxes_m: list[FloatArray] = []  # (1, 4) west, south, east, north of what is inside
+        self._boxes: list[FloatArray] = []  # west, south, east, north of what is inside
+        self._circles: list[FloatArray] = []  # middle and radius of one round what is inside
         self._solids = [part for zone in zones for part in self._add(zone)]
-        self._bounds_m = np.concatenate([np.empty((0, 4)), *self._boxes_m])
+        self._boxes_m = np.array(self._boxes).reshape(-1, 4)
+        self._circles_m = np.array(self._circles).reshape(-1, 3)
 
     def __len__(self) -> int:
         return len(self._shapes)
@@ -73,10 +76,16 @@ class Obstacles:
             solids = list(_around(shape).geoms)
         else:
             keeps_out, solids = _grown(shape, -touch_m), [shape]
+        if shapely.is_empty(keeps_out):  # narrower than what counts as a touch
+            return solids
         shapely.prepare(keeps_out)
         self._shapes.append(keeps_out)
-        around_m = np.array([-1.0, -1.0, 1.0, 1.0]) * self._depth_m
-        self._boxes_m.append(shapely.bounds(keeps_out)[None] + around_m)
+        corners_m = shapely.get_coordinates(keeps_out)
+        low_m, high_m = corners_m.min(axis=0), corners_m.max(axis=0)
+        middle_m = (low_m + high_m) / 2.0
+        radius_m = np.hypot(*(corners_m - middle_m).T).max() + self._depth_m + TOUCH_M
+        self._boxes.append(np.concatenate([low_m - self._depth_m, high_m + self._depth_m]))
+        self._circles.append(np.append(middle_m, radius_m))
         return solids
 
     def clear(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
@@ -84,6 +93,8 @@ class Obstacles:
         clear = np.ones(len(from_m), dtype=np.bool_)
         low_m, high_m = np.minimum(from_m, to_m), np.maximum(from_m, to_m)
         near = self._near(low_m, high_m)
+        row, shape = np.nonzero(near)
+        near[row, shape] = self._in_reach(shape, from_m[row], to_m[row])
         some = near.any(axis=1)
         if not some.any():
             return clear
@@ -133,7 +144,7 @@ class Obstacles:
 
     def _near(self, low_m: FloatArray, high_m: FloatArray) -> BoolArray:
         """(n, shapes) whose bounding boxes meet those from (n, 2) ``low_m`` to ``high_m``."""
-        west_m, south_m, east_m, north_m = self._bounds_m.T
+        west_m, south_m, east_m, north_m = self._boxes_m.T
         near: BoolArray = (
             (high_m[:, :1] >= west_m)
             & (high_m[:, 1:] >= south_m)
@@ -141,6 +152,17 @@ class Obstacles:
             & (low_m[:, 1:] <= north_m)
         )
         return near
+
+    def _in_reach(self, shape: IntArray, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
+        """(k,) whether pieces come into the circles round (k,) shapes: cheaper than to ask GEOS."""
+        piece_m = to_m - from_m
+        centre_m = self._circles_m[shape, :2] - from_m
+        square_m2 = np.maximum((piece_m * piece_m).sum(axis=1), TOUCH_M * TOUCH_M)
+        share = np.clip((centre_m * piece_m).sum(axis=1) / square_m2, 0.0, 1.0)
+        apart_m = centre_m - share[:, None] * piece_m
+        reach_m = self._circles_m[shape, 2]
+        in_reach: BoolArray = (apart_m * apart_m).sum(axis=1) <= reach_m * reach_m
+        return in_reach
 
     def _inside(self, number: int, pieces: npt.NDArray[np.object_] | shapely.Geometry) -> BoolArray:
         import shapely
