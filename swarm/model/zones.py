@@ -16,9 +16,6 @@ from swarm.model.ids import require_id
 if TYPE_CHECKING:
     import shapely
 
-__all__ = ["Corner", "Zone", "ZoneId"]
-
-
 ZoneId = NewType("ZoneId", str)
 
 Corner = tuple[float, float]

@@ -15,9 +15,6 @@ import numpy.typing as npt
 
 from swarm.allocation.legs.obstacles import TOUCH_M, Obstacles
 
-__all__ = ["SAME_RAD", "Arcs", "arcs_of", "unit"]
-
-
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]

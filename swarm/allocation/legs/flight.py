@@ -11,9 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["FlightModel", "straight_m"]
-
-
 FloatArray = npt.NDArray[np.float64]
 
 

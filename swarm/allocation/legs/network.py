@@ -20,9 +20,6 @@ from swarm.allocation.legs.reach import Hop
 from swarm.allocation.legs.tangents import arc_of, sense_of
 from swarm.model.zones import Zone
 
-__all__ = ["Airspace", "LegNetwork", "Legs"]
-
-
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]

@@ -18,9 +18,6 @@ from swarm.model.zones import Zone
 if TYPE_CHECKING:
     import shapely
 
-__all__ = ["TOUCH_M", "Obstacles"]
-
-
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]

@@ -1,7 +1,7 @@
 """Shortest horizontal paths round zones, with their margin.
 
 A `PathPlanner` knows some zones, all of which concern whoever flies; it is made once and asked
-often. Leaves out: heights and times (swarm.allocation.legs.table).
+often. Leaves out: heights and times (swarm.allocation.legs.network).
 """
 
 from __future__ import annotations
@@ -17,9 +17,6 @@ from swarm.allocation.legs.obstacles import Obstacles
 from swarm.allocation.legs.reach import Hop, Reach, Touches
 from swarm.allocation.legs.tangents import Approaches, approaches, arc_of, sense_of, tangents
 from swarm.model.zones import Zone
-
-__all__ = ["PathPlanner", "Paths", "Piece", "Targets"]
-
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

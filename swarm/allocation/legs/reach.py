@@ -21,9 +21,6 @@ import numpy.typing as npt
 from swarm.allocation.legs.arcs import SAME_RAD
 from swarm.allocation.legs.tangents import Approaches, Tangents, sort_key
 
-__all__ = ["Hop", "Reach"]
-
-
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 

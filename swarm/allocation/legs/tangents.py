@@ -18,18 +18,6 @@ import numpy.typing as npt
 from swarm.allocation.legs.arcs import Arcs
 from swarm.allocation.legs.obstacles import TOUCH_M, Obstacles
 
-__all__ = [
-    "Approaches",
-    "Tangents",
-    "approaches",
-    "arc_of",
-    "node_of",
-    "sense_of",
-    "sort_key",
-    "tangents",
-]
-
-
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]

@@ -35,8 +35,6 @@ from tests.support.field_oracle.schedule import (
 )
 from tests.support.field_oracle.slots import fly_all, objective
 
-__all__ = ["Best", "best_plan", "can_do_alone", "reasons_left_out"]
-
 ROUNDING = 1e-9
 """Sums of bounds are compared with so much to spare."""
 

@@ -16,8 +16,6 @@ from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.scenario import FieldScenario, FieldUav
 from tests.support.field_oracle.walk import ENTRY_KEYS, Slack, check_slots, intrusion_m, walk
 
-__all__ = ["check_against_best", "check_plan", "check_simulation", "value_of"]
-
 Json = Mapping[str, Any]
 Schedule = Mapping[str, Sequence[Json]]
 

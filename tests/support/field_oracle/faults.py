@@ -14,8 +14,6 @@ from tests.support.field_oracle.geometry import Side, blocks, side_of
 from tests.support.field_oracle.rounded import SLACK_M, distance_m
 from tests.support.field_oracle.scenario import FieldScenario, FieldZone, Point, Stop, read
 
-__all__ = ["faults", "is_faultless"]
-
 NEW_KEYS: Mapping[str, Sequence[str]] = {
     "mission": ("wind_m_s", "zone_margin_m", "separation_m", "band_m"),
     "uav": (

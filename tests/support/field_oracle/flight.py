@@ -21,8 +21,6 @@ from tests.support.field_oracle.scenario import (
     Stop,
 )
 
-__all__ = ["FlightTimes", "Leg", "rest_to_rest_s", "speed_over_ground_m_s"]
-
 
 @dataclass(frozen=True, slots=True)
 class Leg:

@@ -20,17 +20,6 @@ from typing import TypeVar
 
 from tests.support.field_oracle.scenario import FieldZone, Point
 
-__all__ = [
-    "Piece",
-    "Side",
-    "StraightWays",
-    "Way",
-    "blocks",
-    "shortest_chain",
-    "side_of",
-    "straight_way",
-]
-
 Node = TypeVar("Node", bound=Hashable)
 Exact = tuple[Fraction, Fraction]
 

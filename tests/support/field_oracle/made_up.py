@@ -14,8 +14,6 @@ from typing import Any
 from tests.support.field_oracle.faults import is_faultless
 from tests.support.field_oracle.scenario import Point
 
-__all__ = ["KINDS", "as_toml", "made_up"]
-
 Draft = dict[str, Any]
 
 SIDE_M = 400.0

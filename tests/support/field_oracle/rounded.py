@@ -24,8 +24,6 @@ from tests.support.field_oracle.geometry import (
 )
 from tests.support.field_oracle.scenario import FieldZone, Point
 
-__all__ = ["SLACK_M", "STEP_RAD", "RoundedWays", "distance_m"]
-
 SLACK_M = 1e-7
 """By so much a way may come nearer than the margin, since tangents are rounded."""
 STEP_RAD = math.radians(0.5)

@@ -13,18 +13,6 @@ from typing import Any
 
 from swarm.model.frames import Origin, enu_from_wgs84
 
-__all__ = [
-    "FieldBase",
-    "FieldScenario",
-    "FieldTask",
-    "FieldUav",
-    "FieldZone",
-    "Point",
-    "Stop",
-    "Table",
-    "read",
-]
-
 LOWEST_LAYER_M = 10.0
 LAYER_SPACING_M = 3.0
 

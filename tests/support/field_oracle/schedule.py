@@ -20,24 +20,6 @@ from tests.support.field_oracle.scenario import (
     Stop,
 )
 
-__all__ = [
-    "TOLERANCE_S",
-    "Entry",
-    "Flight",
-    "Flown",
-    "Item",
-    "Refused",
-    "Swap",
-    "Work",
-    "departure_s",
-    "do_task",
-    "fly_alone",
-    "go_home",
-    "reach_base",
-    "swap_there",
-    "take_off",
-]
-
 TOLERANCE_S = 1e-6
 
 

@@ -27,8 +27,6 @@ from tests.support.field_oracle.schedule import (
     take_off,
 )
 
-__all__ = ["fly_all", "objective"]
-
 
 @dataclass(slots=True)
 class _Pilot:

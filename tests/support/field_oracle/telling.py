@@ -10,8 +10,6 @@ from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.scenario import FieldScenario
 from tests.support.field_oracle.schedule import Flight
 
-__all__ = ["plan_json"]
-
 
 def plan_json(
     scenario: FieldScenario,

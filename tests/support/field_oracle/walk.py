@@ -24,8 +24,6 @@ from tests.support.field_oracle.scenario import (
     Stop,
 )
 
-__all__ = ["ENTRY_KEYS", "Slack", "check_slots", "intrusion_m", "walk"]
-
 ENTRY_KEYS = (
     "go",
     "from_m",
