@@ -192,7 +192,16 @@ class ChildProcess:
         return f"killed by signal {-code}"
 
     async def start(self) -> None:
-        """Start it; returns at once."""
+        """Start it; returns at once. One that is started while this is cancelled is killed."""
+        starting = asyncio.ensure_future(self._start())
+        try:
+            await asyncio.shield(starting)
+        except asyncio.CancelledError:
+            await starting  # whoever was cancelled does not know of it: nobody else would end it
+            await self.kill()
+            raise
+
+    async def _start(self) -> None:
         self._process = await self._forked() or await self._executed()
         loop = asyncio.get_running_loop()
         self._readers = [loop.create_task(self._read_out()), loop.create_task(self._read_err())]

@@ -66,6 +66,20 @@ def test_what_is_preloaded_starts_no_thread(server: ForkServer) -> None:
     assert len(list((Path("/proc") / str(server.pid) / "task").iterdir())) == 1
 
 
+@pytest.mark.parametrize("forked", [True, False])
+def test_nothing_lives_on_whose_start_was_cancelled(server: ForkServer, *, forked: bool) -> None:
+    async def scenario() -> ChildProcess:
+        child = ChildProcess("router", ROUTER, server=server if forked else None)
+        starting = asyncio.ensure_future(child.start())
+        await asyncio.sleep(0)  # it has begun
+        starting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await starting
+        return child
+
+    assert asyncio.run(scenario()).returncode == -signal.SIGKILL
+
+
 def test_a_forked_child_is_ours_in_a_session_of_its_own_under_its_own_name(
     server: ForkServer,
 ) -> None:
