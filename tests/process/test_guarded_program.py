@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.fleet import guard
+from sim.fleet import child_process, guard
 from sim.fleet.child_process import ChildFailedError, ChildProcess, ProgramEnvironment
 from tests.process.mission import alive, child_pids, wait_until
 
@@ -78,7 +78,11 @@ def test_a_program_runs_in_its_folder_with_its_variables(tmp_path: Path) -> None
     assert made.last_words() == f"green in {os.path.realpath(tmp_path)}"
 
 
-def test_a_program_that_ends_at_once_has_failed(tmp_path: Path) -> None:
+def test_a_program_that_ends_at_once_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(child_process, "SETTLE_S", 60.0)  # on a busy machine it starts late
+
     async def work() -> None:
         made = child(["/bin/sh", "-c", "echo bind failed >&2; exit 1"], tmp_path)
         await made.start()
