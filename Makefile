@@ -36,10 +36,11 @@ demo: $(VENV)/.installed
 
 # What the marker `slow` says (pyproject.toml) is for the night: `make test-all`.
 TESTED := -m "not slow"
-# Tests with real processes wait for them most of the time. What only computes is flown beside them,
-# and is nice to them: it takes what they leave of the processors.
+# What only computes is tested beside the checks. Tests with real processes have the machine to
+# themselves: beside others they fly more slowly, and take longer than both in turn.
 test: $(VENV)/.installed-dev browser
-	+$(MAKE) --no-print-directory -j 3 lint test-computed test-processes TESTED='$(TESTED)'
+	+$(MAKE) --no-print-directory -j 2 lint test-computed TESTED='$(TESTED)'
+	+$(MAKE) --no-print-directory test-processes TESTED='$(TESTED)'
 
 test-all: TESTED :=
 test-all: test
@@ -48,12 +49,12 @@ test-all: test
 COMPUTED := build/test-computed.txt
 test-computed: $(VENV)/.installed-dev
 	@mkdir -p $(dir $(COMPUTED))
-	@echo "tests/unit and tests/faults go on beside the others and report at their end ($(COMPUTED))"
-	@nice $(BIN)/python -m pytest -n 2 $(TESTED) tests/unit tests/faults >$(COMPUTED) 2>&1; \
+	@echo "tests/unit and tests/faults go on beside the checks and report at their end ($(COMPUTED))"
+	@$(BIN)/python -m pytest -n 2 $(TESTED) tests/unit tests/faults >$(COMPUTED) 2>&1; \
 	status=$$?; cat $(COMPUTED); exit $$status
 
 test-processes: $(VENV)/.installed-dev browser
-	$(BIN)/python -m pytest -n 5 --dist worksteal --durations 20 $(TESTED) tests/contract tests/process tests/sitl
+	$(BIN)/python -m pytest -n 4 --dist worksteal $(TESTED) tests/contract tests/process tests/sitl
 
 # The dashboard is tested in a real browser: Chromium under one of these names.
 CHROMIUM := chromium chromium-browser google-chrome
