@@ -66,6 +66,7 @@ class Bridge:
         self._streams: StreamRequests | None = None
         self._heartbeat_at_s = -math.inf
         self._raises_jerk = False
+        self._next_deadline_s = -math.inf
         self._stall_detector = StallDetector(config.silence_timeout_s / 2.0)
 
     @property
@@ -112,11 +113,15 @@ class Bridge:
             case TimePassed():
                 pass
         self._advance()
-        self._stall_detector.expect_by(self.next_deadline_s())
+        self._next_deadline_s = self._earliest_deadline_s()
+        self._stall_detector.expect_by(self._next_deadline_s)
         return session.take_actions()
 
     def next_deadline_s(self) -> float:
         """When to step with `TimePassed` if nothing else happens before."""
+        return self._next_deadline_s
+
+    def _earliest_deadline_s(self) -> float:
         session, activity = self._session, self._activity
         deadlines_s = [
             self._heartbeat_at_s,
