@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +20,16 @@ from swarm.runtime.options import (
     SpeedupOption,
     StateOption,
 )
+
+if TYPE_CHECKING:
+    from agent.core.agent_core import AgentCore
+    from agent.core.interface import VehicleReport
+    from agent.runner import Vehicle
+    from swarm.bus.config import BusConfig
+    from swarm.identity import Identity
+    from swarm.model import Origin
+    from swarm.runtime.clock import ScaledClock
+    from swarm.runtime.store import Memory, Store
 
 
 @with_connection_options
@@ -190,20 +200,14 @@ def agent(
       swarm agent --mission valley-survey --uav quad-2 --mavlink serial:/dev/ttyAMA0:921600
       --keys keys/quad-2 --connect tls/192.168.1.2:7447 --state /var/lib/peckorder
     """
-    import asyncio
-
     from agent.core.agent_core import AgentCore
-    from agent.core.interface import VehicleReport
     from agent.links.mavlink_vehicle import MavlinkVehicle
-    from agent.runner import Vehicle, live_once
     from agent.vehicle.config import BridgeConfig
     from agent.vehicle.signing import load_signing_key
-    from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.identity import Role
-    from swarm.model import Origin
     from swarm.runtime.clock import ScaledClock, incarnation
-    from swarm.runtime.log import configure_logging, get_logger
-    from swarm.runtime.store import Memory, Store
+    from swarm.runtime.log import configure_logging
+    from swarm.runtime.store import Store
 
     # A life begins with its process: of two agents of one UAV the one started last counts.
     life = incarnation()
@@ -217,9 +221,7 @@ def agent(
     if check:
         return 0
     if config.identity is not None and key is None:
-        path = config.identity.mavlink_key_path
-        hint = f"give the autopilot its pass phrase, and --signing-key {path}"
-        get_logger(uav).warning("what is said to the autopilot is not signed", hint=hint)
+        _tell_unsigned(uav, config.identity)
 
     def vehicle(origin: Origin, report: Callable[[VehicleReport], None]) -> Vehicle:
         settings = BridgeConfig(
@@ -252,17 +254,48 @@ def agent(
 
     clock = ScaledClock(speedup)
     store = None if state is None else Store(state, mission, uav, speedup=speedup)
+    return _live(
+        config,
+        core,
+        vehicle,
+        clock,
+        mission=mission,
+        uav=uav,
+        store=store,
+        answer_s=network.answer_s,
+        lifeline=lifeline,
+    )
+
+
+def _live(
+    config: BusConfig,
+    make_core: Callable[[Memory | None], AgentCore],
+    make_vehicle: Callable[[Origin, Callable[[VehicleReport], None]], Vehicle],
+    clock: ScaledClock,
+    *,
+    mission: str,
+    uav: str,
+    store: Store | None,
+    answer_s: float,
+    lifeline: bool,
+) -> int:
+    """Live on the bus to the end, and close the store; the exit status of the command."""
+    import asyncio
+
+    from agent.runner import live_once
+    from swarm.bus.zenoh_bus import open_zenoh_bus
+
     try:
         return asyncio.run(
             live_once(
                 lambda: open_zenoh_bus(config),
-                core,
-                vehicle,
+                make_core,
+                make_vehicle,
                 clock,
                 mission=mission,
                 uav=uav,
                 store=store,
-                answer_s=network.answer_s,
+                answer_s=answer_s,
                 lifeline=lifeline,
                 on_wait=lambda reason: _tell_no_bus(uav, reason),
             )
@@ -278,6 +311,13 @@ def _check_links(mavlink: str, forward: Sequence[str]) -> None:
     parse_link(mavlink)
     for url in forward:
         parse_forward(url)
+
+
+def _tell_unsigned(uav: str, identity: Identity) -> None:
+    from swarm.runtime.log import get_logger
+
+    hint = f"give the autopilot its pass phrase, and --signing-key {identity.mavlink_key_path}"
+    get_logger(uav).warning("what is said to the autopilot is not signed", hint=hint)
 
 
 def _tell_no_bus(uav: str, reason: str) -> None:

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from coordinator.planner.options import ShouldStop
     from swarm.model import Mission, Plan
     from swarm.protocol.messages import Snapshot
+    from swarm.runtime.store import Store
 
 
 def plan(
@@ -137,14 +138,7 @@ def plan(
         remedy = "choose --method guided, greedy or lookahead"
         raise InputError(Fault(str(scenario), "", str(error), remedy)) from error
     if plot is not None:
-        from coordinator.plot import draw_plan
-
-        try:
-            draw_plan(mission, result, plot)
-        except OSError as error:
-            problem = f"cannot write {plot}: {error.strerror or error}"
-            raise InputError(Fault("--plot", "", problem, "name a file that can be")) from error
-        print(f"drawn: {plot}", file=sys.stderr)
+        _draw(plot, mission, result)
     if export is not None:
         _export(export, mission, result, firmware)
     if json:
@@ -154,6 +148,17 @@ def plan(
 
         Console(highlight=False).print(plan_table(mission, result))
     return EXIT_INTERRUPTED if told_to_stop else 0
+
+
+def _draw(picture: Path, mission: Mission, made: Plan) -> None:
+    from coordinator.plot import draw_plan
+
+    try:
+        draw_plan(mission, made, picture)
+    except OSError as error:
+        problem = f"cannot write {picture}: {error.strerror or error}"
+        raise InputError(Fault("--plot", "", problem, "name a file that can be")) from error
+    print(f"drawn: {picture}", file=sys.stderr)
 
 
 def _export(folder: Path, mission: Mission, made: Plan, firmware: str) -> None:
@@ -298,23 +303,18 @@ def coordinator(
         swarm coordinator valley-survey --keys keys/coordinator-2 --standby
         swarm coordinator valley-survey --dashboard 8080
     """
-    import asyncio
-    from json import dumps
-
     from coordinator.core.active import CoordinatorCore
     from coordinator.core.publication import FlightLayers, height_warning
     from coordinator.daemon import CoordinatorProcess
     from coordinator.dashboard.access import parse_serve_address
     from coordinator.dashboard.supervisor import supervised_dashboard
-    from coordinator.planner.plan import check_online_method, make_plan
-    from coordinator.planner.plan_report import plan_as_json
+    from coordinator.planner.plan import check_online_method
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.identity import Role
     from swarm.model.ids import COORDINATOR
     from swarm.protocol.seal import seal_of
-    from swarm.runtime.clock import ScaledClock, SystemClock, incarnation
+    from swarm.runtime.clock import ScaledClock, incarnation
     from swarm.runtime.log import configure_logging, get_logger, identify
-    from swarm.runtime.process import run_until_stopped
     from swarm.runtime.store import Store
     from swarm.scenario import load_scenario
 
@@ -325,12 +325,6 @@ def coordinator(
     config = seat.config(mission=mission.name, roles=(Role.COORDINATOR,))
     timing = network.timing.scaled(speedup)
     timing = replace(timing, hover_s=hover_s * max(1.0, speedup))
-
-    def planner(what: Mission, how: str, planner_seed: int, unwanted: ShouldStop) -> Plan:
-        made = make_plan(what, how, clock=SystemClock(), seed=planner_seed, stop=unwanted)
-        if json and not unwanted(0.0):
-            print(dumps(plan_as_json(made), allow_nan=False), flush=True)
-        return made
 
     identify(mission=mission.name)
     layers = FlightLayers(lowest_layer_m, layer_spacing_m)
@@ -362,7 +356,7 @@ def coordinator(
     service = CoordinatorProcess(
         mission=mission,
         make_core=core,
-        make_plan=planner,
+        make_plan=_printed_plan if json else _planned,
         open_bus=lambda: open_zenoh_bus(config),
         clock=ScaledClock(speedup),
         timing=timing,
@@ -370,6 +364,40 @@ def coordinator(
         store=store,
         seal=seal_of(config.identity),
     )
+    return _serve(service, page, store, standby=standby, lifeline=lifeline)
+
+
+def _planned(mission: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
+    from coordinator.planner.plan import make_plan
+    from swarm.runtime.clock import SystemClock
+
+    return make_plan(mission, method, clock=SystemClock(), seed=seed, stop=unwanted)
+
+
+def _printed_plan(mission: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
+    """The same, printed unless nobody wants it any more."""
+    from json import dumps
+
+    from coordinator.planner.plan_report import plan_as_json
+
+    made = _planned(mission, method, seed, unwanted)
+    if not unwanted(0.0):
+        print(dumps(plan_as_json(made), allow_nan=False), flush=True)
+    return made
+
+
+def _serve(
+    service: CoordinatorProcess,
+    page: AbstractAsyncContextManager[object],
+    store: Store | None,
+    *,
+    standby: bool,
+    lifeline: bool,
+) -> int:
+    """Work to the end, and close the store; the exit status of the command."""
+    import asyncio
+
+    from swarm.runtime.process import run_until_stopped
 
     try:
         work = _work(service, page, standby=standby)

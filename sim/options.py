@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from coordinator.planner.options import online_method_names
+from coordinator.recording.options import check_new_recording
 from swarm.runtime.options import complete_from
 
 if TYPE_CHECKING:
@@ -208,6 +209,18 @@ ReportOption = Annotated[
         show_default=False,
     ),
 ]
+
+
+def check_flight(method: str, report: Path | None, record: Path | None) -> None:
+    """Refuse a method, and files to be written, before anything is flown."""
+    from coordinator.planner.plan import check_online_method
+    from coordinator.terminal.report import check_report_path
+
+    check_online_method(method)
+    if report is not None:
+        check_report_path(report)
+    if record is not None:
+        check_new_recording(record)
 
 
 def print_report(told: MissionReport, *, json: bool, report: Path | None) -> int:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coordinator.recording.options import RecordOption, check_new_recording
-from sim.options import MethodOption, ReportOption
+from coordinator.recording.options import RecordOption
+from sim.options import MethodOption, ReportOption, check_flight
 from swarm.protocol.timing import LinkKind
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 from swarm.runtime.options import (
@@ -21,7 +21,9 @@ from swarm.runtime.options import (
 )
 
 if TYPE_CHECKING:
-    from sim.fleet.layout import BusKind
+    from sim.fleet.layout import BusKind, LaunchOptions
+    from sim.fleet.shown_run import ShownRun
+    from swarm.model import Mission
 
 
 def run(
@@ -256,12 +258,9 @@ def run(
         swarm run pair.toml --autopilot udpin:0.0.0.0:14550,serial:/dev/ttyUSB0:57600#7
         swarm run table-1 --json
     """
-    import asyncio
     import os
 
     from coordinator.dashboard.access import parse_serve_address
-    from coordinator.planner.plan import check_online_method
-    from coordinator.terminal.report import check_report_path
     from sim.fleet.autopilots import check_speedup, parse_autopilots
     from sim.fleet.firmware import SitlFirmware
     from sim.fleet.layout import LaunchOptions, defaults_for
@@ -271,18 +270,12 @@ def run(
         fence_around,
         parse_command_styles,
     )
-    from sim.fleet.security import protected
     from sim.fleet.shown_run import Outputs, ShownRun
     from swarm.protocol.timing import preset
     from swarm.runtime.log import LogFormat, LogLevel, configure_logging
-    from swarm.runtime.process import run_until_stopped
     from swarm.scenario import load_scenario
 
-    check_online_method(method)
-    if report is not None:
-        check_report_path(report)
-    if record is not None:
-        check_new_recording(record)
+    check_flight(method, report, record)
     mission = load_scenario(scenario)
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
@@ -326,6 +319,18 @@ def run(
         Outputs(json=json, report=report, record=record, logs=logs, verbose=verbose),
     )
     shown.warn(plain)
+    return _fly(shown, mission, plain, secure=secure, keys=keys)
+
+
+def _fly(
+    shown: ShownRun, mission: Mission, plain: LaunchOptions, *, secure: bool, keys: Path | None
+) -> int:
+    """Fly it, protected as asked; the exit status of the command."""
+    import asyncio
+
+    from sim.fleet.security import protected
+    from swarm.runtime.process import run_until_stopped
+
     with protected(mission, plain, secure=secure, keys=keys) as options:
         return asyncio.run(run_until_stopped(shown.fly(options)))
 

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coordinator.recording.options import RecordOption, check_new_recording
+from coordinator.recording.options import RecordOption
 from sim.options import (
     ChanceOptions,
     CoordinatorLostOption,
     MethodOption,
     ReportOption,
+    check_flight,
     print_report,
     with_options,
     with_reattempts,
 )
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.options import JsonOption, OptionalScenarioArgument, SeedOption
+
+if TYPE_CHECKING:
+    from coordinator.terminal.report import MissionReport
+    from sim.world.uncertainty import Uncertainty
+    from swarm.model import Mission
 
 
 @with_options
@@ -83,69 +89,78 @@ def simulate(
         remedy = "name a scenario, such as table-1, or a recording with --from"
         raise InputError(Fault("swarm simulate", "", "nothing to simulate", remedy))
 
-    from coordinator.planner.plan import check_online_method
-    from coordinator.terminal.report import MissionReport, check_report_path
-    from sim.faults.generator import fly_with_faults
-    from sim.faults.schedule import format_schedule
+    from coordinator.terminal.report import MissionReport
     from sim.world.simulation import recording_simulation, simulate_mission
     from sim.world.uncertainty import Uncertainty
     from swarm.scenario import load_scenario
 
-    check_online_method(method)
-    if report is not None:
-        check_report_path(report)
-    if record is not None:
-        check_new_recording(record)
+    check_flight(method, report, record)
     uncertainty = chance.changed(Uncertainty())
     mission = with_reattempts(load_scenario(scenario), reattempt=chance.reattempt)
-    if faults is None:
-        with recording_simulation(mission.name, str(scenario), record) as looks_on:
-            flown = simulate_mission(
-                mission,
-                method=method,
-                seed=seed,
-                uncertainty=uncertainty,
-                coordinator_lost_s=coordinator_lost_s,
-                make_observer=looks_on,
-            )
-            if not flown.in_time:
-                typer.echo("broken off: somebody would have waited for ever", err=True)
-            told = MissionReport(
-                mission=flown.world.mission,
-                plan=flown.world.mission_state.plan,
-                result=flown.result,
-                story=tuple(flown.world.mission_state.story),
-                lost_because=flown.lost_because,
-                value=flown.value,
-            )
-            return print_report(told, json=json, report=report)
-    if record is not None:
-        problem, remedy = "does not go with --faults", "leave one of them out"
-        raise InputError(Fault("--record", str(record), problem, remedy))
+    if faults is not None:
+        if record is not None:
+            problem, remedy = "does not go with --faults", "leave one of them out"
+            raise InputError(Fault("--record", str(record), problem, remedy))
+        if coordinator_lost_s is not None:
+            raise _refused_beside(faults)
+        told, broken = _fly_with_faults(mission, method, seed, uncertainty, faults)
+        status = print_report(told, json=json, report=report)
+        return 1 if broken else status
+    with recording_simulation(mission.name, str(scenario), record) as looks_on:
+        flown = simulate_mission(
+            mission,
+            method=method,
+            seed=seed,
+            uncertainty=uncertainty,
+            coordinator_lost_s=coordinator_lost_s,
+            make_observer=looks_on,
+        )
+        if not flown.in_time:
+            typer.echo("broken off: somebody would have waited for ever", err=True)
+        told = MissionReport(
+            mission=flown.world.mission,
+            plan=flown.world.mission_state.plan,
+            result=flown.result,
+            story=tuple(flown.world.mission_state.story),
+            lost_because=flown.lost_because,
+            value=flown.value,
+        )
+        return print_report(told, json=json, report=report)
+
+
+def _fly_with_faults(
+    mission: Mission, method: str, seed: int, uncertainty: Uncertainty, faults: str
+) -> tuple[MissionReport, bool]:
+    """Fly it, and tell what goes wrong; its report, and whether an invariant was broken."""
+    from coordinator.terminal.report import MissionReport
+    from sim.faults.generator import fly_with_faults
+    from sim.faults.schedule import format_schedule
+    from sim.world.uncertainty import Uncertainty
+
     beside_faults = Uncertainty(
         loss=uncertainty.loss,
         popup=uncertainty.popup,
         popups_per_min=uncertainty.popups_per_min,
     )
-    if uncertainty != beside_faults or coordinator_lost_s is not None:
-        problem = "goes with --loss, --popup and --popup-rate only"
-        remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"
-        raise InputError(Fault("--faults", faults, problem, remedy))
+    if uncertainty != beside_faults:
+        raise _refused_beside(faults)
     verdict = fly_with_faults(
         mission, method=method, seed=seed, uncertainty=uncertainty, faults=faults
     )
     typer.echo(format_schedule(verdict.case.schedule), nl=False, err=True)
     if verdict.broken is not None:
         typer.echo(f"broken: {verdict.broken}", err=True)
-    world = verdict.world
+    state = verdict.world.mission_state
     told = MissionReport(
-        mission=world.mission_state.mission,
-        plan=world.mission_state.plan,
-        result=world.mission_state.result(),
-        story=tuple(world.mission_state.story),
+        mission=state.mission, plan=state.plan, result=state.result(), story=tuple(state.story)
     )
-    status = print_report(told, json=json, report=report)
-    return status if verdict.broken is None else 1
+    return told, verdict.broken is not None
+
+
+def _refused_beside(faults: str) -> InputError:
+    problem = "goes with --loss, --popup and --popup-rate only"
+    remedy = "leave the others out, or ask for kinds of fault such as weather, cut or slow"
+    return InputError(Fault("--faults", faults, problem, remedy))
 
 
 def _refuse_all_but(ctx: typer.Context, *names: str) -> None:
