@@ -18,6 +18,7 @@ import asyncio
 import contextlib
 import socket
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Protocol, cast
@@ -79,7 +80,7 @@ class LinkCounts:
     unsent_bytes: int = 0
 
 
-class ByteLink:
+class ByteLink(ABC):
     """One link; `start` it once and `close` it once.
 
     Subclasses open, write and shut one kind of transport.
@@ -108,16 +109,16 @@ class ByteLink:
 
     def answer(self, source: Hashable | None) -> None:
         """Send to that one of those heard from now on; nothing but where anybody can send."""
+        del source
 
     def give_up(self) -> None:
         """Open the link anew; what was sent and is still in this machine is never delivered."""
         self._shut()
         self._lost.set()
 
+    @abstractmethod
     def discard(self) -> None:
         """Throw away what was sent and is still in this machine, if there is anything."""
-        if self._holds_unsent():
-            self.give_up()
 
     async def close(self) -> None:
         """Close for good; closing twice is fine."""
@@ -164,18 +165,17 @@ class ByteLink:
             self._log.debug("link broke", error=str(error))
         self._lost.set()
 
+    @abstractmethod
     async def _open(self) -> None:
-        raise NotImplementedError
+        """Open the transport once; OSError where that cannot be."""
 
+    @abstractmethod
     def _write(self, data: bytes) -> bool:
-        raise NotImplementedError
+        """Hand it to the transport; False if it cannot be sent now."""
 
-    def _holds_unsent(self) -> bool:
-        raise NotImplementedError
-
+    @abstractmethod
     def _shut(self) -> None:
         """Close without delivering anything more; shutting twice is fine."""
-        raise NotImplementedError
 
 
 class _TcpLink(ByteLink, asyncio.Protocol):
@@ -232,6 +232,11 @@ class _TcpLink(ByteLink, asyncio.Protocol):
             return False
         transport.write(data)
         return True
+
+    def discard(self) -> None:
+        """Open the link anew if the peer's system has not acknowledged everything yet."""
+        if self._holds_unsent():
+            self.give_up()
 
     def _holds_unsent(self) -> bool:
         """Whether the peer's system has not acknowledged everything yet."""
@@ -325,8 +330,10 @@ class _UdpLink(ByteLink, asyncio.DatagramProtocol):
             transport.sendto(data)
         return True
 
-    def _holds_unsent(self) -> bool:
-        return self._full
+    def discard(self) -> None:
+        """Open the link anew if this machine could not send everything yet."""
+        if self._full:
+            self.give_up()
 
     def _shut(self) -> None:
         if self._transport is not None:

@@ -5,6 +5,7 @@ What is to be said, and what has come of it.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -71,7 +72,7 @@ Wish = TypeVar("Wish")
 Statement = TypeVar("Statement")
 
 
-class RequestHandler(Generic[Wish, Statement]):
+class RequestHandler(ABC, Generic[Wish, Statement]):
     """One request: what to say for it, and what comes of it.
 
     Args:
@@ -92,9 +93,9 @@ class RequestHandler(Generic[Wish, Statement]):
         self._stamp: Stamp | None = None
         """Of the statement that `known_to` is about."""
 
+    @abstractmethod
     def body(self, brief: MissionConfig) -> Statement | RequestVerdict:
         """What to say; or why it cannot be said."""
-        raise NotImplementedError
 
     def apart(self, said: Message) -> Statement | None:
         """What to say instead, as somebody has said something else in the same place."""
@@ -111,9 +112,9 @@ class RequestHandler(Generic[Wish, Statement]):
                 if any(m.key == said.key and m.stamp >= said.stamp for m in snapshot.messages):
                     self.known_to.add(snapshot.writer)
 
+    @abstractmethod
     def judge(self, said: Message, now_s: float, *, late: bool) -> RequestVerdict | None:
         """What has come of it by now; None as long as that is open, and it is not ``late``."""
-        raise NotImplementedError
 
     def next_deadline_s(self) -> float | None:
         """When `judge` may find something though nothing happens."""

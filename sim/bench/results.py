@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from operator import attrgetter
@@ -24,7 +25,7 @@ def unheard(what: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class BenchResult:
+class BenchResult(ABC):
     """What one run of a benchmark found."""
 
     machine: MachineInfo
@@ -33,9 +34,9 @@ class BenchResult:
         """Everything, ready for `json.dumps`."""
         return asdict(self)
 
+    @abstractmethod
     def parts(self) -> Iterable[RenderableType]:
         """What people are shown below the machine, in the width of a terminal of 80 columns."""
-        raise NotImplementedError
 
     def __rich__(self) -> Group:
         """Everything for a terminal; strings hold no markup."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -148,7 +149,7 @@ def texts_of(
     )
 
 
-class FirmwareModel:
+class FirmwareModel(ABC):
     """Numbers, names and habits of one firmware."""
 
     autopilot: int
@@ -224,34 +225,34 @@ class FirmwareModel:
         """What says how long after landing the motors stop; None where that is at once."""
         return None if mode in self.disarms_at_once else self.disarm_delay_after_landing
 
+    @abstractmethod
     def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
         """The parameter table at power-up; it has every `ParameterRole` that has no default."""
-        raise NotImplementedError
 
+    @abstractmethod
     def ground_lost(self, parameters: ParameterTable) -> GcsFailsafe | None:
         """What it does when its ground station falls silent; None if it flies on."""
-        raise NotImplementedError
 
+    @abstractmethod
     def fence_radius_m(self, parameters: ParameterTable) -> float:
         """Radius of the vehicle's own fence around home [m]; 0: it has none."""
-        raise NotImplementedError
 
+    @abstractmethod
     def mode_commanded(self, main: float, sub: float) -> int | None:
         """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE; None if they make no sense."""
-        raise NotImplementedError
 
+    @abstractmethod
     def base_mode(self, pilot: Pilot) -> int:
         """MAV_MODE_FLAG bits of a heartbeat."""
-        raise NotImplementedError
 
+    @abstractmethod
     def system_status(self, pilot: Pilot) -> int:
         """MAV_STATE of a heartbeat while no failsafe acts."""
-        raise NotImplementedError
 
+    @abstractmethod
     def sensors(self, pilot: Pilot) -> tuple[int, int, int]:
         """Bits of SYS_STATUS: what is present, enabled and healthy."""
-        raise NotImplementedError
 
+    @abstractmethod
     def mission_told(self, pilot: Pilot) -> tuple[int, int, int]:
         """``total``, ``mission_state`` (MISSION_STATE) and ``mission_mode`` of MISSION_CURRENT."""
-        raise NotImplementedError

@@ -30,6 +30,15 @@ class Wire(ByteLink):
         self.answers += self._flight.copter.receive(data, self._flight.now_s())
         return True
 
+    async def _open(self) -> None:
+        """It always is."""
+
+    def discard(self) -> None:
+        """Nothing waits in it."""
+
+    def _shut(self) -> None:
+        """It never is."""
+
 
 class Flight:
     """A vehicle behind a wire, in virtual time; is its own clock. Needs a running loop."""
