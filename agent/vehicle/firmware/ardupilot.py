@@ -10,6 +10,7 @@ https://ardupilot.org/dev/docs/copter-commands-in-guided-mode.html
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from agent.vehicle.firmware.failsafes import ARDUCOPTER_NAMES, Failsafes, arducopter_failsafes
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware, SpeedParameter
@@ -42,34 +43,36 @@ class ArduCopter(Firmware):
     """
 
     autopilot = 3
-    mode_names = {  # noqa: RUF012 - never written
-        (0,): "STABILIZE",
-        (1,): "ACRO",
-        (2,): "ALT_HOLD",
-        _AUTO: "AUTO",
-        _GUIDED: "GUIDED",
-        (5,): "LOITER",
-        _RTL: "RTL",
-        (7,): "CIRCLE",
-        _LAND: "LAND",
-        (11,): "DRIFT",
-        (13,): "SPORT",
-        (14,): "FLIP",
-        (15,): "AUTOTUNE",
-        (16,): "POSHOLD",
-        (17,): "BRAKE",
-        (18,): "THROW",
-        (19,): "AVOID_ADSB",
-        (20,): "GUIDED_NOGPS",
-        _SMART_RTL: "SMART_RTL",
-        (22,): "FLOWHOLD",
-        (23,): "FOLLOW",
-        (24,): "ZIGZAG",
-        (25,): "SYSTEMID",
-        (26,): "AUTOROTATE",
-        _AUTO_RTL: "AUTO_RTL",
-        (28,): "TURTLE",
-    }
+    mode_names = MappingProxyType(
+        {
+            (0,): "STABILIZE",
+            (1,): "ACRO",
+            (2,): "ALT_HOLD",
+            _AUTO: "AUTO",
+            _GUIDED: "GUIDED",
+            (5,): "LOITER",
+            _RTL: "RTL",
+            (7,): "CIRCLE",
+            _LAND: "LAND",
+            (11,): "DRIFT",
+            (13,): "SPORT",
+            (14,): "FLIP",
+            (15,): "AUTOTUNE",
+            (16,): "POSHOLD",
+            (17,): "BRAKE",
+            (18,): "THROW",
+            (19,): "AVOID_ADSB",
+            (20,): "GUIDED_NOGPS",
+            _SMART_RTL: "SMART_RTL",
+            (22,): "FLOWHOLD",
+            (23,): "FOLLOW",
+            (24,): "ZIGZAG",
+            (25,): "SYSTEMID",
+            (26,): "AUTOROTATE",
+            _AUTO_RTL: "AUTO_RTL",
+            (28,): "TURTLE",
+        }
+    )
     commanded_mode = _GUIDED
     commanded_mode_name = "GUIDED"
     commanded_by_choice = True

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from agent.vehicle.firmware.failsafes import PX4_NAMES, Failsafes, px4_failsafes
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware, Mode, SpeedParameter
@@ -45,26 +46,28 @@ class Px4Copter(Firmware):
     """The firmware of PX4's multicopters."""
 
     autopilot = 12
-    mode_names = {  # noqa: RUF012 - never written
-        (1, 0): "MANUAL",
-        (2, 0): "ALTCTL",
-        (3, 0): "POSCTL",
-        (3, 1): "POSCTL.ORBIT",
-        (3, 2): "POSCTL.SLOW",
-        (_AUTO, 1): "AUTO.READY",
-        _TAKEOFF: "AUTO.TAKEOFF",
-        _LOITER: "AUTO.LOITER",
-        _MISSION: "AUTO.MISSION",
-        _RTL: "AUTO.RTL",
-        _LAND: "AUTO.LAND",
-        (_AUTO, 8): "AUTO.FOLLOW",
-        _PRECLAND: "AUTO.PRECLAND",
-        (5, 0): "ACRO",
-        (6, 0): "OFFBOARD",
-        (7, 0): "STABILIZED",
-        (8, 0): "RATTITUDE",
-        (10, 0): "TERMINATION",
-    }
+    mode_names = MappingProxyType(
+        {
+            (1, 0): "MANUAL",
+            (2, 0): "ALTCTL",
+            (3, 0): "POSCTL",
+            (3, 1): "POSCTL.ORBIT",
+            (3, 2): "POSCTL.SLOW",
+            (_AUTO, 1): "AUTO.READY",
+            _TAKEOFF: "AUTO.TAKEOFF",
+            _LOITER: "AUTO.LOITER",
+            _MISSION: "AUTO.MISSION",
+            _RTL: "AUTO.RTL",
+            _LAND: "AUTO.LAND",
+            (_AUTO, 8): "AUTO.FOLLOW",
+            _PRECLAND: "AUTO.PRECLAND",
+            (5, 0): "ACRO",
+            (6, 0): "OFFBOARD",
+            (7, 0): "STABILIZED",
+            (8, 0): "RATTITUDE",
+            (10, 0): "TERMINATION",
+        }
+    )
     commanded_mode = _LOITER
     commanded_mode_name = "AUTO.LOITER (Hold)"
     """Called Hold by ground stations."""
