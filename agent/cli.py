@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from agent.vehicle.config import CommandStyle
-from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.runtime.log import LogFormat, LogLevel
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import (
     CheckOption,
     LifelineOption,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from swarm.runtime.store import Memory, Store
 
 
-@with_connection_options
+@with_options
 def agent(
     mission: MissionOption,
     uav: Annotated[str, typer.Option("--uav", metavar="ID", help="UAV this agent flies.")],

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coordinator.planner.options import method_names, online_method_names
-from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.log import LogFormat, LogLevel
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import (
     CheckOption,
     JsonOption,
@@ -213,7 +214,7 @@ def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float
         signal.signal(signal.SIGINT, before)
 
 
-@with_connection_options
+@with_options
 def coordinator(
     scenario: ScenarioArgument,
     method: Annotated[

@@ -1,88 +1,22 @@
-"""Options of the commands that fly missions, so that they look alike, and their report.
-
-A group of options is a dataclass whose fields are made by `option`. A command has one parameter
-of that class and is decorated with `with_options`; on the command line it has the options of the
-fields instead.
-"""
+"""Options of the commands that fly missions, so that they look alike, and their report."""
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from coordinator.planner.options import online_method_names
 from coordinator.recording.options import check_new_recording
+from swarm.runtime.option_groups import option
 from swarm.runtime.options import complete_from
 
 if TYPE_CHECKING:
     from coordinator.terminal.report import MissionReport
     from sim.world.uncertainty import Uncertainty
     from swarm.model import Mission
-
-_OPTION = "option"
-
-
-def option(default: object, *names: str, **settings: Any) -> Any:
-    """A field of a group, as `typer.Option`; its default is shown unless it is None."""
-    return _field(default, typer.Option(*names, **settings, show_default=default is not None))
-
-
-def argument(default: object, **settings: Any) -> Any:
-    """The same for an argument."""
-    return _field(default, typer.Argument(**settings, show_default=default is not None))
-
-
-def _field(default: object, parameter: Any) -> Any:
-    return field(default=default, metadata={_OPTION: parameter})
-
-
-def option_of(group: type, name: str) -> Any:
-    """One option of a group, for a command that has no other of it."""
-    return next(each.metadata[_OPTION] for each in fields(group) if each.name == name)
-
-
-def with_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Give a command the options of every group that is a parameter of it."""
-    own = inspect.signature(command, eval_str=True).parameters
-    groups: dict[str, Any] = {
-        name: each.annotation for name, each in own.items() if is_dataclass(each.annotation)
-    }
-
-    @functools.wraps(command)
-    def run(**given: Any) -> int:
-        for name, group in groups.items():
-            given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
-        return command(**given)
-
-    parameters: list[inspect.Parameter] = []
-    for name, parameter in own.items():
-        if name in groups:
-            parameters += _parameters(groups[name])
-        else:
-            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
-    run.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]  # functions have one
-    run.__annotations__ = {each.name: each.annotation for each in parameters} | {"return": int}
-    del run.__wrapped__  # or its own signature would be read
-    return run
-
-
-def _parameters(group: Any) -> list[inspect.Parameter]:
-    hints = get_type_hints(group)
-    return [
-        inspect.Parameter(
-            each.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=each.default,
-            annotation=Annotated[hints[each.name], each.metadata[_OPTION]],
-        )
-        for each in fields(group)
-    ]
 
 
 def _number(names: str, most: float, metavar: str, text: str) -> Any:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.runtime.errors import BusError, Fault, InputError
 from swarm.runtime.log import LogFormat, LogLevel
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import (
     CheckOption,
     JsonOption,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from swarm.bus.port import Bus
 
 
-@with_connection_options
+@with_options
 def dashboard(
     mission: SomeMissionOption = None,
     host: Annotated[

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coordinator.operator.completion import complete_uav
-from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.runtime.errors import Fault, InputError, SwarmError
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import JsonOption, SomeMissionOption, SpeedupOption
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ TimeoutOption = Annotated[
 def _of_one_uav(kind: str, help_text: str) -> Callable[..., int]:
     """The command that says ``kind`` to one UAV."""
 
-    @with_connection_options
+    @with_options
     def command(
         uav: UavArgument,
         reason: ReasonOption = "",
@@ -105,7 +106,7 @@ return_home = _of_one_uav(
 )
 
 
-@with_connection_options
+@with_options
 def start(
     without: Annotated[
         str,
@@ -141,7 +142,7 @@ def start(
     return _submit(StartRequest(without, reason), reach, "--without", json=json)
 
 
-@with_connection_options
+@with_options
 def abort(
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask on a terminal.")] = False,
     reason: ReasonOption = "",
@@ -224,7 +225,7 @@ AltOption = Annotated[
 
 
 @task.command("add", help=_ADD_HELP, short_help="Add a task.")
-@with_connection_options
+@with_options
 def add(
     name: Annotated[
         str | None, typer.Argument(metavar="ID", help="Default: the next free one.")
@@ -284,7 +285,7 @@ def add(
 
 
 @task.command("withdraw", help=_WITHDRAW_HELP, short_help="Take a task off the board.")
-@with_connection_options
+@with_options
 def withdraw(
     name: Annotated[str, typer.Argument(metavar="ID", help="Id of the task.")],
     reason: ReasonOption = "",

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import JsonOption, SomeMissionOption, SpeedupOption
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ LEFT_S = 5.0
 """Wall time after which a mission whose UAVs have all left is over."""
 
 
-@with_connection_options
+@with_options
 def record(
     file: NewFileArgument,
     mission: SomeMissionOption = None,

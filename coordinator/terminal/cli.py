@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.runtime.errors import SwarmError
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import JsonOption, SomeMissionOption, SpeedupOption
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ PATIENCE_S = 4.0
 """How long to wait when looking once, unless told otherwise [wall s]."""
 
 
-@with_connection_options
+@with_options
 def status(
     mission: SomeMissionOption = None,
     watch: Annotated[

@@ -19,7 +19,8 @@ from sim.bench.command_line import (
     show,
     size_of,
 )
-from sim.options import ChanceOptions, option_of
+from sim.options import ChanceOptions
+from swarm.runtime.option_groups import option_of
 from swarm.runtime.options import JsonOption, SeedOption, SpeedupOption
 from swarm.scenario.files import resolve_scenario
 

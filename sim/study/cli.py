@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from sim.options import ChanceOptions, with_options
+from sim.options import ChanceOptions
 from sim.study.options import StudyOutput, StudyRequest
 from swarm.runtime.errors import SwarmError
 from swarm.runtime.extras import require_extra
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import JsonOption
 
 if TYPE_CHECKING:

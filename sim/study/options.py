@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from sim.options import argument, option
 from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.option_groups import argument, option
 
 
 @dataclass(frozen=True, slots=True)

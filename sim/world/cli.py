@@ -15,10 +15,10 @@ from sim.options import (
     ReportOption,
     check_flight,
     print_report,
-    with_options,
     with_reattempts,
 )
 from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import JsonOption, OptionalScenarioArgument, SeedOption
 
 if TYPE_CHECKING:

@@ -1,21 +1,19 @@
 """The options by which every command finds the bus, in one place.
 
 A command has one parameter ``seat: ConnectionOptions = DEFAULT_CONNECTION`` and is decorated
-with `with_connection_options`; on the command line it has the options of the fields of
+with `with_options`; on the command line it has the options of the fields of
 `ConnectionOptions` instead.
 """
 
 from __future__ import annotations
 
-import functools
-import inspect
 import os
 import re
 import socket
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields, replace
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING
 
 from swarm.bus.config import DEFAULT_ROUTER, bus_config
 from swarm.protocol.timing import LinkKind, LinkPreset, preset
@@ -39,7 +37,6 @@ RUN = "run"
 """What `--bus` is told for a run of this machine; ``run:PID`` for one of several."""
 _DIAL_S = 0.1
 _TCP = re.compile(r"(?:tcp|tls)/(\[[^\]]+\]|[^:]+):(\d+)")
-_PARAMETER = "seat"
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,35 +180,3 @@ def accepts(endpoint: str) -> bool:
     except OSError:
         return False
     return True
-
-
-def with_connection_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Give a command that has a parameter ``seat`` the options of `ConnectionOptions`."""
-    names = tuple(field.name for field in fields(ConnectionOptions))
-
-    @functools.wraps(command)
-    def run(*args: Any, **given: Any) -> int:
-        seat = ConnectionOptions(**{name: given.pop(name) for name in names if name in given})
-        return command(*args, seat=seat, **given)
-
-    hints = get_type_hints(ConnectionOptions, include_extras=True)
-    options = [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=field.default,
-            annotation=hints[field.name],
-        )
-        for field in fields(ConnectionOptions)
-    ]
-    parameters: list[inspect.Parameter] = []
-    own = inspect.signature(command, eval_str=True).parameters
-    for parameter in own.values():
-        if parameter.name == _PARAMETER:
-            parameters += options
-        else:
-            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
-    run.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]  # functions have one
-    run.__annotations__ = {each.name: each.annotation for each in parameters} | {"return": int}
-    del run.__wrapped__  # or its own signature would be read
-    return run

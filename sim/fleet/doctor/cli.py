@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
+from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import JsonOption, OptionalScenarioArgument
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ _DEFAULT_UAVS = 3
 """Fleet for which the machine is judged without a scenario."""
 
 
-@with_connection_options
+@with_options
 def doctor(
     scenario: OptionalScenarioArgument = None,
     mission: Annotated[

@@ -20,11 +20,12 @@ from swarm.bus.config import (
     bus_config,
     is_loopback,
 )
-from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions, with_connection_options
+from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.identity import Identity, Role, load_identity
 from swarm.identity.founding import found_authority
 from swarm.runtime.clock import unix_s
 from swarm.runtime.errors import InputError
+from swarm.runtime.option_groups import with_options
 
 HERE = "tcp/127.0.0.1:7447"
 AWAY = "tcp/192.168.1.2:7447"
@@ -139,7 +140,7 @@ def run(*arguments: str, roles: tuple[Role, ...] = ()) -> list[BusConfig]:
     app = typer.Typer()
 
     @app.command()
-    @with_connection_options
+    @with_options
     def command(
         name: str,
         seat: ConnectionOptions = DEFAULT_CONNECTION,
@@ -157,7 +158,7 @@ def run(*arguments: str, roles: tuple[Role, ...] = ()) -> list[BusConfig]:
         again = typer.Typer()
 
         @again.command()
-        @with_connection_options
+        @with_options
         def command(seat: ConnectionOptions = DEFAULT_CONNECTION) -> int:
             other.append(seat.config())
             return 0
