@@ -308,7 +308,9 @@ def _run() -> NoReturn:
         if not isinstance(end.code, int):
             raise
         status = end.code
-    threading._shutdown()  # type: ignore[attr-defined]  # noqa: SLF001 - as the interpreter does
+    # As the interpreter does, and there is no public name for either: executors end their threads
+    # in the first, and a bus that is still open closes in the second, lest others wait for it.
+    threading._shutdown()  # type: ignore[attr-defined]  # noqa: SLF001
     atexit._run_exitfuncs()  # noqa: SLF001
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError, AttributeError):  # closed, or never there
