@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import asynccontextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 
 import pytest
 
 from swarm.bus.admission import MOST_STRANGERS, TOO_MANY_NAMES
 from swarm.bus.port import Query, Sample, TokenGone, TokenSeen
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.events import (
     Ask,
@@ -26,14 +23,10 @@ from swarm.protocol.events import (
     PeerSeen,
     Publish,
     PublishLast,
-    Save,
     SnapshotsReceived,
-    Stop,
     Tick,
 )
-from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import Message, MissionPhase, PlanEpoch, Snapshot
-from swarm.protocol.sync import decode_digest, encode_digest
+from swarm.protocol.messages import Message, Snapshot
 from swarm.runtime.errors import BusError
 from swarm.runtime.shell import Shell, join_mission
 from tests.support.builders import (
@@ -49,9 +42,19 @@ from tests.support.builders import (
     uav,
 )
 from tests.support.memory_bus import MemoryBus, MemoryNetwork
+from tests.support.scripted_shell import (
+    CLAIM,
+    END,
+    KEYS,
+    SNAPSHOT,
+    Action,
+    Own,
+    ScriptedCore,
+    as_event,
+    at_work,
+)
 from tests.support.shell_play import HandClock, play, take_until, until
 
-KEYS = KeySpace(MISSION)
 REGISTERS = [
     message(COORDINATOR, brief(uav("u0"), uav("u1"))),
     message(COORDINATOR, epoch("u0", "u1")),
@@ -60,114 +63,6 @@ REGISTERS = [
     message("u1", done("t0")),
 ]
 IDS = [type(said.body).__name__ for said in REGISTERS]
-CLAIM = message("u1", held("t0", 1.0))
-SNAPSHOT = Snapshot(MISSION, "u0", 1, 7.0, (message("u0", held("t1", 2.0)),))
-END = Stop("enough")
-
-
-@dataclass(frozen=True, slots=True)
-class Own:
-    """An action that only this kind of process knows."""
-
-    name: str
-
-
-Action = CommonAction | Own
-React = Callable[[CommonEvent], Sequence[Action]]
-
-
-class ScriptedCore:
-    """Remembers what it heard; answers by a function, and ends on `Stop`."""
-
-    def __init__(self, react: React | None = None, first: Sequence[Action] = ()) -> None:
-        self.heard: list[CommonEvent] = []
-        self.instants_s: list[float] = []
-        self.deadline_s: float | None = None
-        self._react = react
-        self._first = first
-
-    def start(self, now_s: float) -> Sequence[Action]:
-        return self._first
-
-    def step(self, event: CommonEvent, now_s: float) -> Sequence[Action]:
-        self.heard.append(event)
-        self.instants_s.append(now_s)
-        if isinstance(event, Tick):
-            self.deadline_s = None
-        if event == END:
-            return [Finish(0)]
-        return () if self._react is None else self._react(event)
-
-    def next_deadline_s(self) -> float | None:
-        return self.deadline_s
-
-
-@dataclass(slots=True)
-class Played:
-    """One shell at work beside another seat."""
-
-    shell: Shell[CommonEvent, Action]
-    running: asyncio.Task[int]
-    network: MemoryNetwork
-    seat: MemoryBus
-    other: MemoryBus
-    clock: HandClock
-    own: list[str]
-
-    async def end(self) -> int:
-        self.shell.step(END)
-        return await self.running
-
-
-def as_event(fact: CommonEvent) -> CommonEvent:
-    return fact
-
-
-@asynccontextmanager
-async def at_work(
-    core: ScriptedCore,
-    *,
-    execute: Callable[[Action], None] | None = None,
-    answers: bool = True,
-    snapshot: Snapshot = SNAPSHOT,
-    known: Mapping[str, int] | None = None,
-    left_out: Callable[[], int] = int,
-    save: Callable[[float], None] | None = None,
-    capacity: int = 4096,
-) -> AsyncIterator[Played]:
-    """A shell that runs ``core`` on the seat of u0, seen from the seat of u1."""
-    network = MemoryNetwork()
-    other = network.join("u1")
-    seat = network.join("u0", inbox_capacity=capacity)
-    join_mission(other, MISSION, "u1", status=True)
-    join_mission(seat, MISSION, "u0", status=True)
-    clock, own = HandClock(), list[str]()
-
-    def remember(action: Action) -> None:
-        assert isinstance(action, Own)
-        own.append(action.name)
-
-    shell: Shell[CommonEvent, Action] = Shell(
-        core,
-        seat,
-        clock,
-        mission=MISSION,
-        name="u0",
-        from_bus=as_event,
-        execute=execute or remember,
-        snapshot=(lambda _: snapshot) if answers else None,
-        known=lambda: known or {},
-        left_out=left_out,
-        save=save,
-    )
-    running = asyncio.create_task(shell.run())
-    try:
-        yield Played(shell, running, network, seat, other, clock, own)
-    finally:
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-        seat.close()
-        other.close()
 
 
 @pytest.mark.parametrize("said", REGISTERS, ids=IDS)
@@ -344,185 +239,6 @@ def test_tokens_that_are_no_writers_of_the_mission_are_nobody(key: str) -> None:
     play(scenario)
 
 
-def test_queries_are_answered_with_the_cores_snapshot() -> None:
-    async def scenario() -> None:
-        async with at_work(ScriptedCore()) as played:
-            (answer,) = await played.other.query(KEYS.state("*"), timeout_s=5.0)
-
-            assert Codec(MISSION).decode_snapshot(answer.key, answer.payload) == SNAPSHOT
-
-    play(scenario)
-
-
-def test_an_answer_leaves_out_what_the_asker_knows() -> None:
-    async def scenario() -> None:
-        async with at_work(ScriptedCore(), known={"u0": 7}) as played:
-            known = encode_digest({"u0": 7})
-            (answer,) = await played.other.query(KEYS.state("*"), known, timeout_s=5.0)
-
-            shortened = Codec(MISSION).decode_snapshot(answer.key, answer.payload)
-            assert shortened == replace(SNAPSHOT, messages=())
-
-    play(scenario)
-
-
-def test_a_question_with_a_malformed_digest_is_counted_and_not_answered() -> None:
-    async def scenario() -> None:
-        async with at_work(ScriptedCore()) as played:
-            asked = played.other.query(KEYS.state("*"), b"nonsense", timeout_s=0.05)
-            assert await asked == ()
-            assert played.shell.dropped == {"malformed": 1}
-
-    play(scenario)
-
-
-def test_a_snapshot_too_large_is_answered_in_part_and_reported(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    names = [f"{n:064d}" for n in range(14_000)]
-    epochs = [
-        message(
-            COORDINATOR, PlanEpoch(1, MissionPhase.RUNNING, "greedy", tuple(names), 0.0, "", {})
-        )
-    ]
-    snapshot = Snapshot(MISSION, "u0", 1, 7.0, (*epochs * 6, CLAIM, *SNAPSHOT.messages))
-
-    async def scenario() -> None:
-        async with at_work(ScriptedCore(), snapshot=snapshot) as played:
-            (answer,) = await played.other.query(KEYS.state("*"), timeout_s=5.0)
-
-            shortened = Codec(MISSION).decode_snapshot(answer.key, answer.payload)
-            assert shortened is not None
-            assert shortened.messages[0] == SNAPSHOT.messages[0]
-            assert 2 <= len(shortened.messages) < len(snapshot.messages)
-
-    play(scenario)
-    assert "no room for all registers" in "".join(capsys.readouterr())
-
-
-def test_a_process_without_a_snapshot_answers_nothing() -> None:
-    async def scenario() -> None:
-        core = ScriptedCore()
-        async with at_work(core, answers=False) as played:
-            assert await played.other.query(KEYS.state("*"), timeout_s=0.01) == ()
-            assert await played.end() == 0
-
-    play(scenario)
-
-
-def test_a_question_ends_in_all_good_answers() -> None:
-    async def scenario() -> None:
-        core = ScriptedCore(first=[Ask()])
-        async with at_work(core) as played:
-            third = played.network.join("u2")
-            third.serve(KEYS.state("u2"))
-            good = Snapshot(MISSION, "u1", 1, None, (CLAIM,))
-
-            def answer(bus: MemoryBus, payload: bytes) -> None:
-                for event in bus.inbox.take():
-                    reply = getattr(event, "reply", None)
-                    if reply is not None:
-                        reply(payload)
-
-            def answered() -> bool:
-                answer(played.other, encode(good))
-                answer(third, b"nonsense")
-                return any(isinstance(fact, SnapshotsReceived) for fact in core.heard)
-
-            await until(answered, "learning")
-            third.close()
-
-            assert SnapshotsReceived((good,)) in core.heard
-            assert played.shell.dropped == {"malformed": 1}
-
-    play(scenario)
-
-
-def test_mission_time_in_an_answer_does_not_age_while_others_are_waited_for() -> None:
-    async def scenario() -> None:
-        core = ScriptedCore(first=[Ask()])
-        async with at_work(core) as played:
-            late = played.network.join("u2")
-            late.serve(KEYS.state("u2"))
-            answers: list[float | None] = []
-
-            def reply(bus: MemoryBus, name: str) -> bool:
-                for event in bus.inbox.take():
-                    if isinstance(event, Query):
-                        event.reply(encode(Snapshot(MISSION, name, 1, 100.0, ())))
-                        return True
-                return False
-
-            def learned() -> bool:
-                for fact in core.heard:
-                    if isinstance(fact, SnapshotsReceived):
-                        answers.extend(snapshot.mission_s for snapshot in fact.snapshots)
-                return bool(answers)
-
-            await until(lambda: reply(played.other, "u1"), "asking u1")
-            for _ in range(100):
-                await asyncio.sleep(0)
-            played.clock.time_s += 4.0
-            await until(lambda: reply(late, "u2"), "asking u2")
-            await until(learned, "learning")
-            late.close()
-
-            early_s, late_s = answers
-            assert early_s is not None
-            assert late_s is not None
-            assert 100.0 <= late_s < early_s <= 104.0
-
-    play(scenario)
-
-
-def test_a_question_tells_what_the_core_knows_but_for_the_own_registers() -> None:
-    """Who answers in the own name is a twin, or remembers an earlier life: that must be heard."""
-
-    async def scenario() -> None:
-        core = ScriptedCore(first=[Ask()])
-        async with at_work(core, known={"u0": 1, "u1": 2, COORDINATOR: 3}) as played:
-            queries: list[Query] = []
-
-            def asked() -> bool:
-                taken = played.other.inbox.take()
-                queries.extend(event for event in taken if isinstance(event, Query))
-                return bool(queries)
-
-            await until(asked, "being asked")
-            assert decode_digest(queries[0].payload) == {"u1": 2, COORDINATOR: 3}
-
-    play(scenario)
-
-
-def test_memory_is_kept_when_the_core_wishes_it() -> None:
-    async def scenario() -> None:
-        kept: list[float] = []
-        core = ScriptedCore(first=[Save()])
-        async with at_work(core, save=kept.append) as played:
-            await until(lambda: kept == [0.0], "saving")
-            assert await played.end() == 0
-
-    play(scenario)
-
-
-def test_a_process_that_keeps_nothing_goes_on_when_told_to() -> None:
-    async def scenario() -> None:
-        async with at_work(ScriptedCore(first=[Save()])) as played:
-            assert await played.end() == 0
-
-    play(scenario)
-
-
-def test_a_question_that_nobody_hears_ends_in_no_answers() -> None:
-    async def scenario() -> None:
-        core = ScriptedCore(first=[Ask()])
-        async with at_work(core) as played:
-            played.network.cut("u0")
-            await until(lambda: SnapshotsReceived(()) in core.heard, "learning nothing")
-
-    play(scenario)
-
-
 def test_messages_go_out_on_their_keys() -> None:
     own = [message("u0", held("t0", 1.0)), message("u0", done("t0")), message("u0", status())]
 
@@ -573,16 +289,6 @@ def test_what_was_wanted_beside_the_finish_is_still_done_and_nothing_after_it() 
 
             assert played.own == ["before", "beside"]
             assert PeerSeen("u9") not in core.heard
-
-    play(scenario)
-
-
-def test_a_question_under_way_does_not_outlive_the_run() -> None:
-    async def scenario() -> None:
-        async with at_work(ScriptedCore(first=[Ask(), Ask()])) as played:
-            await until(lambda: len(asyncio.all_tasks()) == 5, "asking")
-            assert await played.end() == 0
-            assert len(asyncio.all_tasks()) == 1
 
     play(scenario)
 
