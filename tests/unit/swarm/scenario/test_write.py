@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.runtime.errors import InputError
 from swarm.scenario import format_scenario, parse_scenario
-from tests.unit.swarm.scenario.test_read import VALID, faults
+from tests.support.small_scenario import VALID, faults
 
 IDS = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,15}", fullmatch=True)
 KINDS = st.none() | st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20)
