@@ -100,7 +100,7 @@ def case(seed: int, *lines: str) -> Case:
     return replace(drawn, schedule=parse_schedule(lines, "the test", names, tasks))
 
 
-@pytest.mark.parametrize("seed", seeds(1, 4))
+@pytest.mark.parametrize("seed", seeds(2, 4))
 def test_all_fly_as_without_the_liar(seed: int) -> None:
     honest, lied_to = Flight(case(seed), lies=False), Flight(case(seed))
 
@@ -129,7 +129,7 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize("seed", seeds(1, 4))
+@pytest.mark.parametrize("seed", seeds(2, 4))
 def test_whatever_else_goes_wrong_no_invariant_breaks(seed: int) -> None:
     verdict = Flight(case(seed, *FAULTS)).verdict
 
@@ -137,7 +137,7 @@ def test_whatever_else_goes_wrong_no_invariant_breaks(seed: int) -> None:
     assert verdict.world.mission_state.result().open == ()
 
 
-@pytest.mark.parametrize("seed", seeds(1, 4))
+@pytest.mark.parametrize("seed", seeds(2, 4))
 def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None:
     """Its token and its words count no longer, so it is as good as lost; what it had done by
     then stays done."""
@@ -171,7 +171,7 @@ def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None
     assert networks[0].ear.dropped["signer unknown"] > 0
 
 
-@pytest.mark.parametrize("seed", seeds(1, 4))
+@pytest.mark.parametrize("seed", seeds(2, 4))
 def test_who_gets_new_keys_is_heard_whatever_a_thief_of_the_old_ones_has_said(seed: int) -> None:
     """Such as the largest stamps there are, above which nobody can speak under the same keys."""
     flown = case(seed, f"5 crash {LIAR} for 3 with none")
@@ -222,7 +222,7 @@ class Storm(RoughNetwork):
             self.lost += 1
 
 
-@pytest.mark.parametrize("seed", seeds(1, 4))
+@pytest.mark.parametrize("seed", seeds(2, 4))
 def test_what_a_limit_keeps_out_comes_back_by_repetition_and_questions(seed: int) -> None:
     networks: list[Storm] = []
 

@@ -14,7 +14,7 @@ from sim.faults.soak import Breach, first_breach, shrunk
 from tests.support.seeds import seeds
 
 BLOCK = 20
-QUICK, BLOCKS = 3, 15
+QUICK, BLOCKS = 4, 15
 """Blocks of every run of the tests, and of those of the night."""
 
 
