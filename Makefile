@@ -54,7 +54,7 @@ test-computed: $(VENV)/.installed-dev
 	status=$$?; cat $(COMPUTED); exit $$status
 
 test-processes: $(VENV)/.installed-dev browser
-	$(BIN)/python -m pytest -n 4 --dist worksteal $(TESTED) tests/contract tests/process tests/sitl
+	$(BIN)/python -m pytest -n 6 --dist worksteal $(TESTED) tests/contract tests/process tests/sitl
 
 # The dashboard is tested in a real browser: Chromium under one of these names.
 CHROMIUM := chromium chromium-browser google-chrome
