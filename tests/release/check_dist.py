@@ -37,7 +37,7 @@ from tests.release.bill import install
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("agent", "coordinator", "sim", "swarm")
-TESTED = ("agent", "swarm/allocation", "swarm/protocol", "swarm/protocol")
+TESTED = ("agent", "swarm/allocation", "swarm/protocol")
 """Unit tests that need nothing but what is installed, and a few packages."""
 TEST_PACKAGES = ("hypothesis", "jsonschema", "pytest", "pytest-timeout")
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-import agent
 from agent.core.states import (
     FROM_OUTSIDE,
     STATUS_PHASE,
@@ -18,7 +17,7 @@ from agent.core.states import (
     Trigger,
 )
 
-README = Path(agent.__file__).with_name("README.md").read_text(encoding="utf-8")
+README = (Path(__file__).parents[4] / "agent" / "README.md").read_text(encoding="utf-8")
 PAIRS = [(state, trigger) for state in AgentState for trigger in Trigger]
 
 Edge = tuple[AgentState, Trigger, AgentState]
