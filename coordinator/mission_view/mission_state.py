@@ -59,7 +59,7 @@ class MissionState:
 
     def __init__(self, mission: Mission, timing: Timing, *, explains: bool = False) -> None:
         self.plan: Plan | None = None
-        """The offline plan; set by whoever knows it."""
+        """The offline plan, once somebody who knows it has told; see `take_plan`."""
         self.replica = Replica()
         self.board = TaskBoard(self.replica, mission.name)
         self.present: set[str] = set()
@@ -94,6 +94,15 @@ class MissionState:
         self._stall_detector = StallDetector(timing.pause_s)
         self._asking = QuestionTimer(timing.ask_gap_s)
         self._ask_at_s = 0.0
+
+    def take_plan(self, plan: Plan) -> None:
+        """The coordinator has planned. What it plans on the way is in the epochs.
+
+        The word of the first plan may come after the word that the mission runs: one comes from
+        the coordinator's output, the other over the bus.
+        """
+        if self.plan is None or self.phase is MissionPhase.PREPARING:
+            self.plan = plan
 
     def start(self, now_s: float) -> list[CommonAction]:
         """Ask what has happened so far."""

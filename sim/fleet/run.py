@@ -155,9 +155,7 @@ class Run:
         )
 
     def _hear_plan(self, said: dict[str, Any]) -> None:
-        # What is planned later, on the way, is in the epochs.
-        if self.mission_state.phase is MissionPhase.PREPARING:
-            self.mission_state.plan = plan_from_json(said)
+        self.mission_state.take_plan(plan_from_json(said))
 
     def _hear_log(self, name: str, line: str) -> None:
         """Write down what the processes log, besides."""

@@ -186,15 +186,19 @@ def _plan(words: Sequence[str], folder: Path) -> dict[str, Any]:
 def _test(python: Path, unpacked: Path, rooms: Path) -> None:
     """Run tests of the source distribution against what is installed."""
     bench = rooms / "bench"
-    shutil.copytree(unpacked, bench, ignore=lambda folder, _: _packages(Path(folder), unpacked))
+    shutil.copytree(unpacked, bench, ignore=lambda *listed: _code(unpacked, *listed))
     _pip(python, *TEST_PACKAGES)
     words = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider"]
     words += [f"tests/unit/{part}" for part in TESTED]
     _well(f"tests of the source distribution: {_run(words, bench).strip().splitlines()[-1]}")
 
 
-def _packages(folder: Path, unpacked: Path) -> tuple[str, ...]:
-    return PACKAGES if folder == unpacked else ()
+def _code(unpacked: Path, folder: str, names: list[str]) -> list[str]:
+    """What of a folder belongs to a package and is no page: that is installed already."""
+    parts = Path(folder).relative_to(unpacked).parts
+    if not parts or parts[0] not in PACKAGES:
+        return []
+    return [name for name in names if Path(folder, name).is_file() and not name.endswith(".md")]
 
 
 def _installed(python: Path) -> set[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coordinator.mission_view.mission_state import MissionState
+from swarm.model import Plan
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (
     Ask,
@@ -52,6 +53,27 @@ def test_before_anything_was_heard_everything_is_open() -> None:
 
     assert result.open == ("t0", "t1", "popup")
     assert (result.executed_objective, result.makespan_s, result.epochs) == (0.0, 0.0, 0)
+
+
+def plan_worth(objective: float) -> Plan:
+    return Plan(MISSION, "greedy", {}, objective, {}, ("u0", "u1"), None, 1, 0.0, 0)
+
+
+def test_the_first_plan_counts_however_late_the_word_of_it_comes() -> None:
+    """It comes on another way than the word that the mission runs, and may be overtaken."""
+    observer = Onlooker().running()
+    observer.mission_state.take_plan(plan_worth(5.0))
+    observer.mission_state.take_plan(plan_worth(3.0))  # made on the way
+
+    assert observer.mission_state.plan == plan_worth(5.0)
+
+
+def test_before_the_start_the_newest_plan_counts() -> None:
+    observer = Onlooker()
+    observer.mission_state.take_plan(plan_worth(5.0))
+    observer.mission_state.take_plan(plan_worth(3.0))
+
+    assert observer.mission_state.plan == plan_worth(3.0)
 
 
 def test_a_second_visit_is_counted_and_worth_nothing() -> None:
