@@ -56,7 +56,7 @@ def test_before_anything_was_heard_everything_is_open() -> None:
 
 
 def plan_worth(objective: float) -> Plan:
-    return Plan(MISSION, "greedy", {}, objective, {}, ("u0", "u1"), None, 1, 0.0, 0)
+    return Plan(MISSION, "greedy", {}, objective, {}, None, None, 1, 0.0, 0)
 
 
 def test_the_first_plan_counts_however_late_the_word_of_it_comes() -> None:
