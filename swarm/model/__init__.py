@@ -1,8 +1,23 @@
 """Frozen data of a mission and its invariants; no files, no wire, no decisions."""
 
 from swarm.model.frames import Origin
-from swarm.model.ids import TaskId, UavId, valid_id
-from swarm.model.mission import Mission, Task, Uav
+from swarm.model.ids import BaseId, TaskId, UavId, ZoneId, valid_id
+from swarm.model.mission import Base, Mission, Task, Uav
 from swarm.model.plan import Evaluation, Plan
+from swarm.model.zones import Zone
 
-__all__ = ["Evaluation", "Mission", "Origin", "Plan", "Task", "TaskId", "Uav", "UavId", "valid_id"]
+__all__ = [
+    "Base",
+    "BaseId",
+    "Evaluation",
+    "Mission",
+    "Origin",
+    "Plan",
+    "Task",
+    "TaskId",
+    "Uav",
+    "UavId",
+    "Zone",
+    "ZoneId",
+    "valid_id",
+]

@@ -1,4 +1,4 @@
-"""Identifiers of UAVs and tasks; each is one chunk of a bus key."""
+"""Identifiers of UAVs, tasks, bases and zones; each is one chunk of a bus key."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Final, NewType
 
 UavId = NewType("UavId", str)
 TaskId = NewType("TaskId", str)
+BaseId = NewType("BaseId", str)
+ZoneId = NewType("ZoneId", str)
 
 AUTHORITY = "authority"
 """Name of the mission authority among the writers on the bus; it signs the roster."""

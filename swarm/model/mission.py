@@ -1,4 +1,4 @@
-"""A mission: its UAVs, its tasks, its horizon and its defaults."""
+"""A mission: its UAVs, its tasks, its bases and zones, its horizon and its defaults."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from swarm.model.frames import Origin
-from swarm.model.ids import RESERVED, TaskId, UavId, require_id
+from swarm.model.ids import RESERVED, BaseId, TaskId, UavId, require_id
+from swarm.model.zones import Zone
+
+PointEnu = tuple[float, float, float]
+"""East, north, up [m from the mission origin]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Uav:
-    """Where a UAV starts, how fast it cruises and how well it does what.
+    """Where a UAV starts, how it flies, how long, and how well it does what.
 
     Raises:
-        ValueError: an id, position, speed or probability is out of range.
+        ValueError: an id, position, speed, duration, share or probability is out of range.
     """
 
     id: UavId
@@ -28,6 +32,16 @@ class Uav:
     survival: Mapping[str, float] = field(default_factory=dict)
     """Probability of surviving the task, by task id or task kind; the id wins."""
     kind: str | None = None
+    acceleration_m_s2: float | None = None
+    """With which it takes up speed and brakes [m/s²]; > 0; None: speeds change at once."""
+    airspeed_m_s: float | None = None
+    """Speed through the air [m/s]; > 0; None: wind has no effect."""
+    endurance_s: float | None = None
+    """Airborne time that a full battery gives [s]; > 0; None: endless."""
+    reserve_frac: float = 0.2
+    """Share of the endurance that is never planned with; within 0..1."""
+    charge_frac: float = 1.0
+    """Charge of the battery at mission time 0; within 0..1."""
 
     def __post_init__(self) -> None:
         require_id(self.id, "UAV id")
@@ -38,8 +52,41 @@ class Uav:
         require_point(self.position_enu_m, f"position of UAV {self.id}")
         if not (math.isfinite(self.speed_m_s) and self.speed_m_s > 0.0):
             raise ValueError(f"speed of UAV {self.id} must be > 0 m/s, not {self.speed_m_s}")
+        for name in ("acceleration_m_s2", "airspeed_m_s", "endurance_s"):
+            number = getattr(self, name)
+            if number is not None and not (math.isfinite(number) and number > 0.0):
+                raise ValueError(f"{name} of UAV {self.id} must be > 0, not {number}")
+        for name in ("reserve_frac", "charge_frac"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                share = getattr(self, name)
+                raise ValueError(f"{name} of UAV {self.id} must be within 0..1, not {share}")
         require_probabilities(self.success, f"success of UAV {self.id}")
         require_probabilities(self.survival, f"survival of UAV {self.id}")
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """Where UAVs land to have their batteries swapped.
+
+    Raises:
+        ValueError: an id, position, duration or number is out of range.
+    """
+
+    id: BaseId
+    position_enu_m: PointEnu
+    """Place [m; east, north, up from the mission origin]."""
+    swap_s: float = 0.0
+    """From touch-down to ready [s]; >= 0."""
+    slots: int | None = None
+    """UAVs served at a time; >= 1; None: no limit."""
+
+    def __post_init__(self) -> None:
+        require_id(self.id, "base id")
+        require_point(self.position_enu_m, f"position of base {self.id}")
+        if not (math.isfinite(self.swap_s) and self.swap_s >= 0.0):
+            raise ValueError(f"swap_s of base {self.id} must be >= 0, not {self.swap_s}")
+        if self.slots is not None and self.slots < 1:
+            raise ValueError(f"slots of base {self.id} must be >= 1, not {self.slots}")
 
 
 def require_point(point_enu_m: tuple[float, ...], what: str) -> None:
@@ -57,15 +104,15 @@ def require_probabilities(table: Mapping[str, float], what: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A place to visit and what the visit is worth.
+    """A place to visit, or a line to fly along, and what that is worth.
 
     Raises:
-        ValueError: an id, position, value or duration is out of range.
+        ValueError: an id, position, value or time is out of range, or a line has one point.
     """
 
     id: TaskId
-    position_enu_m: tuple[float, float, float]
-    """Place [m; east, north, up from the mission origin]."""
+    position_enu_m: PointEnu
+    """Place [m; east, north, up from the mission origin]; of a line its first point."""
     value: float
     """m_i of eq. 1; >= 0."""
     service_s: float = 0.0
@@ -73,14 +120,40 @@ class Task:
     kind: str | None = None
     appears_s: float = 0.0
     """Mission time before which nobody knows the task [s]; > 0 marks a pop-up."""
+    due_s: float | None = None
+    """Mission time by which it ends, or it is worth nothing [s]; in the place of D in eq. 1. It may
+    be left out. None: it is to be done, whenever that is."""
+    opens_s: float = 0.0
+    """Mission time before which work on the spot does not begin [s]; >= 0."""
+    closes_s: float | None = None
+    """Mission time after which work on the spot does not begin [s]; None: never too late."""
+    path_enu_m: tuple[PointEnu, ...] = ()
+    """Points of the line [m; as for the place], flown from one end to the other, whichever way is
+    better; empty of a place."""
+    height_m: float | None = None
+    """Where it is flown [m above the origin]; None: in the UAV's own layer above the place."""
 
     def __post_init__(self) -> None:
         require_id(self.id, "task id")
         require_point(self.position_enu_m, f"position of task {self.id}")
-        for name in ("value", "service_s", "appears_s"):
+        for point_enu_m in self.path_enu_m:
+            require_point(point_enu_m, f"path of task {self.id}")
+        if self.path_enu_m and (
+            len(self.path_enu_m) < 2 or self.path_enu_m[0] != self.position_enu_m
+        ):
+            raise ValueError(
+                f"path of task {self.id} must have two points or more, the first its position"
+            )
+        for name in ("value", "service_s", "appears_s", "opens_s"):
             number = getattr(self, name)
             if not (math.isfinite(number) and number >= 0.0):
                 raise ValueError(f"{name} of task {self.id} must be >= 0, not {number}")
+        for name in ("due_s", "closes_s"):
+            number = getattr(self, name)
+            if number is not None and not (math.isfinite(number) and number >= 0.0):
+                raise ValueError(f"{name} of task {self.id} must be >= 0, not {number}")
+        if self.height_m is not None and not math.isfinite(self.height_m):
+            raise ValueError(f"height_m of task {self.id} must be finite, not {self.height_m}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +173,14 @@ class Mission:
     survival_default: float = 1.0
     reattempt_failed: bool = False
     origin: Origin | None = None
+    bases: tuple[Base, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    wind_enu_m_s: tuple[float, float] = (0.0, 0.0)
+    """Steady wind by where it blows to [m/s; east, north]."""
+    zone_margin_m: float = 0.0
+    """Paths stay that far away from zones [m]; >= 0."""
+    band_m: tuple[float, float] | None = None
+    """Heights above the ground that may be used [m]; None: each UAV in its own layer."""
 
     def __post_init__(self) -> None:
         require_id(self.name, "mission name")
@@ -111,9 +192,45 @@ class Mission:
         for what, ids in (
             ("UAV", [uav.id for uav in self.uavs]),
             ("task", [task.id for task in self.tasks]),
+            ("base", [base.id for base in self.bases]),
+            ("zone", [zone.id for zone in self.zones]),
         ):
             if len(set(ids)) != len(ids):
                 raise ValueError(f"{what} ids must differ: {ids}")
+        if not all(math.isfinite(speed_m_s) for speed_m_s in self.wind_enu_m_s):
+            raise ValueError(f"wind must be two finite numbers [m/s], not {self.wind_enu_m_s}")
+        wind_m_s = math.hypot(*self.wind_enu_m_s)
+        for uav in self.uavs:
+            if uav.airspeed_m_s is not None and uav.airspeed_m_s <= wind_m_s:
+                raise ValueError(
+                    f"airspeed_m_s of UAV {uav.id} must be more than the wind's {wind_m_s:g} m/s, "
+                    f"not {uav.airspeed_m_s:g}"
+                )
+        if not (math.isfinite(self.zone_margin_m) and self.zone_margin_m >= 0.0):
+            raise ValueError(f"zone_margin_m must be >= 0, not {self.zone_margin_m}")
+        if self.band_m is not None and not 0.0 <= self.band_m[0] < self.band_m[1] < math.inf:
+            raise ValueError(f"band_m must be two growing heights >= 0, not {self.band_m}")
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """What it has beyond the paper's mission, by the keys of a scenario file."""
+        of_uavs = ("acceleration_m_s2", "airspeed_m_s", "endurance_s")
+        found = [key for key in of_uavs if any(getattr(uav, key) is not None for uav in self.uavs)]
+        of_tasks = {
+            "due_s": lambda task: task.due_s is not None,
+            "opens_s": lambda task: task.opens_s > 0.0,
+            "closes_s": lambda task: task.closes_s is not None,
+            "path_m": lambda task: bool(task.path_enu_m),
+            "height_m": lambda task: task.height_m is not None,
+        }
+        found += [key for key, has in of_tasks.items() if any(map(has, self.tasks))]
+        of_mission = {
+            "wind_m_s": any(self.wind_enu_m_s),
+            "base": self.bases,
+            "zone": self.zones,
+            "band_m": self.band_m is not None,
+        }
+        return (*found, *(key for key, has in of_mission.items() if has))
 
     def success(self, uav: Uav, task: Task) -> float:
         """p: probability that ``uav`` succeeds at ``task``; 0 means it never tries."""

@@ -9,14 +9,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, NewType
+from typing import TYPE_CHECKING
 
-from swarm.model.ids import require_id
+from swarm.model.ids import ZoneId, require_id
 
 if TYPE_CHECKING:
     import shapely
-
-ZoneId = NewType("ZoneId", str)
 
 Corner = tuple[float, float]
 """East and north [m; mission origin]."""

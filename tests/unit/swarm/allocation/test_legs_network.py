@@ -8,7 +8,8 @@ import numpy.typing as npt
 import pytest
 
 from swarm.allocation.legs import Airspace, FlightModel, LegNetwork
-from swarm.model.zones import Zone, ZoneId
+from swarm.model.ids import ZoneId
+from swarm.model.zones import Zone
 from tests.support.plain_paths import random_zones
 from tests.support.problems import random_problem
 

@@ -7,7 +7,8 @@ import numpy.typing as npt
 import pytest
 
 from swarm.allocation.legs import PathPlanner
-from swarm.model.zones import Corner, Zone, ZoneId
+from swarm.model.ids import ZoneId
+from swarm.model.zones import Corner, Zone
 from tests.support.plain_paths import PlainZones, random_zones
 
 FloatArray = npt.NDArray[np.float64]

@@ -5,7 +5,8 @@ import re
 
 import pytest
 
-from swarm.model.zones import Corner, Zone, ZoneId
+from swarm.model.ids import ZoneId
+from swarm.model.zones import Corner, Zone
 
 SQUARE: tuple[Corner, ...] = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 HOLE: tuple[Corner, ...] = ((2.0, 2.0), (4.0, 2.0), (3.0, 4.0))
