@@ -113,10 +113,11 @@ def plan(
     from coordinator.planner.plan import make_plan
     from coordinator.planner.plan_report import plan_as_json, plan_table
     from swarm.runtime.process import EXIT_INTERRUPTED
-    from swarm.scenario import load_scenario
+    from swarm.scenario import load_scenario, require_plain
 
     _check_plan_options(method, plot, firmware)
     mission = load_scenario(scenario)
+    require_plain(mission, "swarm plan")
     if (warning := height_warning(mission, FlightLayers())) is not None:
         print(f"warning: {warning}", file=sys.stderr)
     if export is not None:
@@ -317,12 +318,13 @@ def coordinator(
     from swarm.runtime.clock import ScaledClock, incarnation
     from swarm.runtime.log import configure_logging, get_logger, identify
     from swarm.runtime.store import Store
-    from swarm.scenario import load_scenario
+    from swarm.scenario import load_scenario, require_plain
 
     configure_logging(log_level, log_format)
     check_online_method(method)
     network = seat.network
     mission = load_scenario(scenario)
+    require_plain(mission, "swarm coordinator")
     config = seat.config(mission=mission.name, roles=(Role.COORDINATOR,))
     timing = network.timing.scaled(speedup)
     timing = replace(timing, hover_s=hover_s * max(1.0, speedup))

@@ -158,6 +158,9 @@ def plan(
         ValueError: there is no such method, or a number is out of range.
         SwarmError: ``"exact"`` was asked of a mission that is too large for it.
     """
+    from swarm.scenario import require_plain
+
+    require_plain(mission, "swarm.plan")
     made: Plan = _implementation("plan")(
         mission, method, seed=seed, time_limit_s=time_limit_s, bound=bound
     )
@@ -176,7 +179,9 @@ def evaluate(mission: Mission, routes: Mapping[UavId, Sequence[TaskId]]) -> Eval
     """
     from swarm.allocation.objective import evaluate as value
     from swarm.allocation.problem import Problem
+    from swarm.scenario import require_plain
 
+    require_plain(mission, "swarm.evaluate")
     problem = Problem.from_mission(mission)
     columns = {task: column for column, task in enumerate(problem.task_ids)}
     if unknown := [uav for uav in routes if uav not in problem.uav_ids]:
@@ -217,6 +222,9 @@ def simulate(
         ValueError: no fleet can fly by that, or a number is out of range.
         SwarmError: the recording cannot be written.
     """
+    from swarm.scenario import require_plain
+
+    require_plain(mission, "swarm.simulate")
     flown: Flight = _implementation("simulate")(
         mission,
         policy,

@@ -156,9 +156,10 @@ def autopilot(
     from swarm.model import UavId
     from swarm.runtime.errors import Fault, InputError
     from swarm.runtime.process import run_until_stopped
-    from swarm.scenario import load_scenario
+    from swarm.scenario import load_scenario, require_plain
 
     mission = load_scenario(scenario)
+    require_plain(mission, "swarm autopilot")
     configure_logging(log_level, log_format, mission=mission.name)
     known = [member.id for member in mission.uavs]
     unknown = [name for name in uav or () if name not in known]

@@ -204,12 +204,13 @@ def _sources(
 ) -> list[tuple[str, MissionSource]]:
     """Cases by name, the scenario first."""
     from sim.bench.solvers import MissionSource
-    from swarm.scenario import load_scenario
+    from swarm.scenario import load_scenario, require_plain
 
     found: list[tuple[str, MissionSource]] = []
     if scenario is not None:
-        name = load_scenario(scenario).name
-        found.append((name, MissionSource(scenario=str(scenario.resolve()))))
+        mission = load_scenario(scenario)
+        require_plain(mission, "swarm bench")
+        found.append((mission.name, MissionSource(scenario=str(scenario.resolve()))))
     if scenario is None or sizes is not None:
         for n_uav, n_task in each("--sizes", sizes or default, size_of):
             found.append((f"{n_uav}×{n_task}", MissionSource(n_uav=n_uav, n_task=n_task)))

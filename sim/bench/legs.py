@@ -149,9 +149,10 @@ def legs(
     from dataclasses import asdict
     from json import dumps
 
-    from swarm.scenario import load_scenario
+    from swarm.scenario import load_scenario, require_plain
 
     mission = load_scenario(scenario)
+    require_plain(mission, "swarm bench legs")
     flown = [leg for path in runs for leg in legs_flown(mission, load_run(path), str(path))]
     times = leg_times(flown, acceleration_m_s2)
     if json:

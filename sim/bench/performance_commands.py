@@ -83,10 +83,11 @@ def turnaround(
     from sim.fleet.firmware import SitlFirmware
     from sim.fleet.layout import BusKind
     from sim.fleet.passthrough import PassthroughOptions, parse_command_styles
-    from swarm.scenario import load_scenario
+    from swarm.scenario import load_scenario, require_plain
 
     path = scenario or resolve_scenario("valley-survey")
     mission = load_scenario(path)
+    require_plain(mission, "swarm bench")
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, None, os.environ)
     options = launch_options(

@@ -198,13 +198,14 @@ def secure(
     """
     from sim.bench.security import SecureSettings, measure_secure
     from sim.fleet.autopilots import SimulatedAutopilots
-    from swarm.scenario import load_scenario
+    from swarm.scenario import load_scenario, require_plain
 
     if flood_hz > 0.0 and bus != "router":
         problem = "the hostile agent is a router's client"
         raise InputError(Fault("--flood-hz", f"{flood_hz:g}", problem, "give 0 with --bus mesh"))
     path = scenario or resolve_scenario("valley-survey")
     mission = load_scenario(path)
+    require_plain(mission, "swarm bench")
     options = launch_options(
         path,
         len(mission.uavs),

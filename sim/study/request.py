@@ -21,7 +21,7 @@ from sim.study.options import StudyRequest
 from sim.study.policies.roster import PolicyRoster
 from sim.study.study_file import DEFAULT_TRIALS, MOST_TASKS, MOST_UAVS, load_study
 from swarm.runtime.errors import Fault, InputError
-from swarm.scenario import load_scenario, shipped_scenarios
+from swarm.scenario import load_scenario, require_plain, shipped_scenarios
 from swarm.scenario.files import read_bytes
 from swarm.scenario.findings import close_match, printable
 from swarm.scenario.read import parse_toml
@@ -84,6 +84,7 @@ def _base(asked: StudyRequest, roster: PolicyRoster) -> Study:
             )
             raise InputError(fault)
         mission = load_scenario(path)
+        require_plain(mission, "swarm study")
         return _plain(mission.name, SameMission(mission), roster)
     study = load_study(path, roster)
     if missions is None:

@@ -25,7 +25,7 @@ from sim.study.policies.roster import PolicyRoster
 from sim.world.uncertainty import Uncertainty
 from swarm.model.ids import ID_RULE
 from swarm.runtime.errors import InputError
-from swarm.scenario import load_scenario, resolve_scenario
+from swarm.scenario import load_scenario, require_plain, resolve_scenario
 from swarm.scenario.files import read_bytes
 from swarm.scenario.findings import Document, Finding, close_match, faults_of, printable, shown
 from swarm.scenario.read import parse_toml
@@ -184,9 +184,9 @@ def _missions(table: Any, folder: Path) -> SameMission | RandomMissions:
     if "random" in table:
         return RandomMissions(**table["random"])
     beside = folder / table["scenario"]
-    return SameMission(
-        load_scenario(beside if beside.is_file() else resolve_scenario(table["scenario"]))
-    )
+    mission = load_scenario(beside if beside.is_file() else resolve_scenario(table["scenario"]))
+    require_plain(mission, "swarm study")
+    return SameMission(mission)
 
 
 # -- rules between several places ---------------------------------------------------------

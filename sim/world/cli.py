@@ -92,11 +92,12 @@ def simulate(
     from coordinator.terminal.report import MissionReport
     from sim.world.simulation import recording_simulation, simulate_mission
     from sim.world.uncertainty import Uncertainty
-    from swarm.scenario import load_scenario
+    from swarm.scenario import load_scenario, require_plain
 
     check_flight(method, report, record)
     uncertainty = chance.changed(Uncertainty())
     mission = with_reattempts(load_scenario(scenario), reattempt=chance.reattempt)
+    require_plain(mission, "swarm simulate")
     if faults is not None:
         if record is not None:
             problem, remedy = "does not go with --faults", "leave one of them out"

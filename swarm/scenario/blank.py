@@ -15,7 +15,7 @@ from pydantic_core import PydanticUndefined
 
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.scenario.draft import PAD_SPACING_M, horizon_for
-from swarm.scenario.shapes import SCHEMA, MissionTable, OriginTable, Scenario, TaskTable, UavTable
+from swarm.scenario.shapes import MissionTable, OriginTable, Scenario, TaskTable, UavTable
 from swarm.scenario.write import toml_lines, toml_place, toml_value
 
 _SPEED_M_S = 8.0
@@ -156,7 +156,7 @@ def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
         "examples. Every fault of this file is told by:  swarm plan FILE"
     )
     yield ""
-    top = {"schema": SCHEMA, "name": mission.name}
+    top = {"schema": 1, "name": mission.name}
     yield from _explained("", top)
     if not mission.tasks:
         yield "task = []  # none yet: an operator adds them (swarm task add), or tables follow"
@@ -209,7 +209,7 @@ def _explained(table: str, given: Mapping[str, object]) -> Iterator[str]:
             about += f" Default: {toml_value(default)}."
         yield from _wrapped(about)
         if key in given:
-            yield f"{key} = {SCHEMA if key == 'schema' else toml_value(given[key])}"
+            yield f"{key} = {1 if key == 'schema' else toml_value(given[key])}"
         elif (table, key) in _EXAMPLES:
             yield f"# {key} = {_EXAMPLES[table, key]}"
         else:

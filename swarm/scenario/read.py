@@ -14,15 +14,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
-from swarm.model.frames import enu_from_wgs84
+from swarm.model import Mission
 from swarm.runtime.errors import Fault, InputError
-from swarm.scenario.checks import check, origin_of
+from swarm.scenario.checks import check
+from swarm.scenario.conversion import mission_of
 from swarm.scenario.files import decode, read_bytes
 from swarm.scenario.findings import Document, Finding, faults_of, printable
+from swarm.scenario.places import origin_of
 
 if TYPE_CHECKING:
-    from swarm.scenario.shapes import Scenario, TaskTable, UavTable
     from swarm.scenario.task_files import TaskFile
 
 _WHAT = "scenario file"
@@ -96,7 +96,7 @@ def build_mission(document: Document, source: str, tasks: TaskFile | None = None
     scenario, findings = validate(document)
     findings += check(document)
     if scenario is not None and not findings:
-        return _mission(scenario)
+        return mission_of(scenario)
     first = len(own) if isinstance(own, list) else 0
     here = [finding for finding in findings if not _from_file(finding, first)]
     faults = faults_of(document, source, here)
@@ -152,49 +152,3 @@ def _syntax_fault(message: str, text: str, source: str) -> Fault:
     problem = printable(problem[:1].lower() + problem[1:])
     place = f"line {line}, column {column}"
     return Fault(source, place, f"is not TOML: {problem}", "correct it as TOML")
-
-
-def _mission(scenario: Scenario) -> Mission:
-    origin = None
-    if (table := scenario.origin) is not None:
-        origin = Origin(table.lat_deg, table.lon_deg, table.alt_m)
-    return Mission(
-        name=scenario.name,
-        horizon_s=scenario.mission.horizon_s,
-        uavs=tuple(
-            Uav(
-                id=UavId(uav.id),
-                position_enu_m=_point_enu_m(uav, origin),
-                speed_m_s=uav.speed_m_s,
-                success=uav.success,
-                survival=uav.survival,
-                kind=uav.kind,
-            )
-            for uav in scenario.uav
-        ),
-        tasks=tuple(
-            Task(
-                id=TaskId(task.id),
-                position_enu_m=_point_enu_m(task, origin),
-                value=task.value,
-                service_s=task.service_s,
-                kind=task.kind,
-                appears_s=task.appears_s,
-            )
-            for task in scenario.task
-        ),
-        success_default=scenario.mission.success_default,
-        survival_default=scenario.mission.survival_default,
-        reattempt_failed=scenario.mission.reattempt_failed,
-        origin=origin,
-    )
-
-
-def _point_enu_m(table: UavTable | TaskTable, origin: Origin | None) -> tuple[float, float, float]:
-    if table.position_m is not None:
-        east_m, north_m, *up_m = table.position_m
-        return east_m, north_m, up_m[0] if up_m else 0.0
-    if origin is None or table.lat_deg is None or table.lon_deg is None:
-        raise ValueError("a table without a position has passed the checks")
-    alt_m = origin.alt_m if table.alt_m is None else table.alt_m
-    return enu_from_wgs84(origin, table.lat_deg, table.lon_deg, alt_m)

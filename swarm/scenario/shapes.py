@@ -1,5 +1,7 @@
 """Shapes, types and ranges of a scenario file, and what to say when they are wrong.
 
+The tables are those of schema 2, of which a file of schema 1 uses a part (swarm.scenario.edition).
+
 The upper limits are far beyond any aircraft; they keep every product of eq. 1
 finite, so that a misplaced exponent is named here and not met as an infinite J.
 """
@@ -12,6 +14,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from swarm.model.ids import ID_RULE
+from swarm.scenario.edition import EDITIONS, edition_faults, without_later
 from swarm.scenario.findings import Document, Finding
 from swarm.scenario.validation import (
     PROBABILITY,
@@ -24,8 +27,6 @@ from swarm.scenario.validation import (
     wrong,
 )
 
-SCHEMA = 1
-"""The version of the format that is read and written."""
 _SLOWEST_M_S = 1e-6
 
 
@@ -34,6 +35,41 @@ def _require_speed(speed_m_s: float) -> float:
         least = "> 0" if speed_m_s <= 0.0 else f">= {_SLOWEST_M_S:g}"
         raise wrong("{} is not " + least)
     return speed_m_s
+
+
+def _require_share(share: float) -> float:
+    if not 0.0 <= share <= 1.0:
+        raise wrong("{} is not within 0..1")
+    return share
+
+
+def _require_wind(wind_m_s: list[float]) -> list[float]:
+    if len(wind_m_s) != 2:
+        raise wrong(f"has {len(wind_m_s)} instead of 2 numbers")
+    return wind_m_s
+
+
+def _require_band(band_m: list[float]) -> list[float]:
+    if len(band_m) != 2:
+        raise wrong(f"has {len(band_m)} instead of 2 numbers")
+    if band_m[0] >= band_m[1]:
+        raise wrong(f"does not grow from {band_m[0]:g} to {band_m[1]:g}")
+    return band_m
+
+
+def _require_line(points: list[list[float]]) -> list[list[float]]:
+    if len(points) < 2:
+        raise wrong(f"has {len(points)} point{'s'[len(points) :]} instead of 2 or more")
+    return points
+
+
+def _require_degrees(point_deg: list[float]) -> list[float]:
+    if len(point_deg) != 2:
+        raise wrong(f"has {len(point_deg)} instead of 2 numbers")
+    lat_deg, lon_deg = point_deg
+    if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
+        raise wrong(f"{lat_deg:g}, {lon_deg:g} is no latitude and longitude")
+    return point_deg
 
 
 def _require_point(point_m: list[float]) -> list[float]:
@@ -55,6 +91,11 @@ _Latitude = Annotated[float, Field(ge=-90.0, le=90.0)]
 _Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
 _Altitude = Annotated[float, Field(ge=-1e5, le=1e5)]
 _Point = Annotated[list[_Metres], AfterValidator(_require_point)]
+_Degrees = Annotated[list[float], AfterValidator(_require_degrees)]
+_Speed = Annotated[float, Field(le=1e6), AfterValidator(_require_speed)]
+_Share = Annotated[float, AfterValidator(_require_share)]
+_WindSpeed = Annotated[float, Field(ge=-1e6, le=1e6)]
+_Height = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
 class MissionTable(StrictTable):
@@ -64,6 +105,9 @@ class MissionTable(StrictTable):
     success_default: Probability = 1.0
     survival_default: Probability = 1.0
     reattempt_failed: bool = False
+    wind_m_s: Annotated[list[_WindSpeed], AfterValidator(_require_wind)] | None = None
+    zone_margin_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    band_m: Annotated[list[_Height], AfterValidator(_require_band)] | None = None
 
 
 class OriginTable(StrictTable):
@@ -85,10 +129,35 @@ class UavTable(_Placed):
     """``[[uav]]``."""
 
     id: Id
-    speed_m_s: Annotated[float, Field(le=1e6), AfterValidator(_require_speed)]
+    speed_m_s: _Speed
     success: dict[str, Probability] = Field(default_factory=dict)
     survival: dict[str, Probability] = Field(default_factory=dict)
     kind: _Kind | None = None
+    acceleration_m_s2: _Speed | None = None
+    airspeed_m_s: _Speed | None = None
+    endurance_s: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+    reserve_frac: _Share = 0.2
+    charge_frac: _Share = 1.0
+
+
+class BaseTable(_Placed):
+    """``[[base]]``."""
+
+    id: Id
+    swap_s: _Seconds = 0.0
+    slots: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+
+
+class ZoneTable(StrictTable):
+    """``[[zone]]``."""
+
+    id: Id
+    polygon_m: list[_Point] | None = None
+    polygon: list[_Degrees] | None = None
+    holes_m: list[list[_Point]] = Field(default_factory=list)
+    floor_m: _Metres | None = None
+    ceiling_m: _Metres | None = None
+    inclusive: bool = False
 
 
 class TaskTable(_Placed):
@@ -99,16 +168,24 @@ class TaskTable(_Placed):
     service_s: _Seconds = 0.0
     kind: _Kind | None = None
     appears_s: _Seconds = 0.0
+    due_s: _Seconds | None = None
+    opens_s: _Seconds = 0.0
+    closes_s: _Seconds | None = None
+    path_m: Annotated[list[_Point], AfterValidator(_require_line)] | None = None
+    path: Annotated[list[_Degrees], AfterValidator(_require_line)] | None = None
+    height_m: _Metres | None = None
 
 
 class Scenario(StrictTable):
     """A whole file."""
 
-    version: Annotated[int, known_schema(SCHEMA)] = Field(alias="schema")
+    version: Annotated[int, known_schema(*EDITIONS)] = Field(alias="schema")
     name: Id
     mission: MissionTable
     origin: OriginTable | None = None
     uav: Annotated[list[UavTable], AfterValidator(_require_fleet)]
+    base: list[BaseTable] = Field(default_factory=list)
+    zone: list[ZoneTable] = Field(default_factory=list)
     task: list[TaskTable]
     tasks_from: Annotated[str, Field(min_length=1)] | None = None
 
@@ -118,14 +195,20 @@ _TABLES: Mapping[tuple[str, ...], TableShape] = {
     ("mission",): TableShape.of("[mission]", MissionTable),
     ("origin",): TableShape.of("[origin]", OriginTable),
     ("uav",): TableShape.of("[[uav]]", UavTable),
+    ("base",): TableShape.of("[[base]]", BaseTable),
+    ("zone",): TableShape.of("[[zone]]", ZoneTable),
     ("task",): TableShape.of("[[task]]", TaskTable),
 }
 
 _LATITUDE = "a latitude within -90..90 [deg]"
 _LONGITUDE = "a longitude within -180..180 [deg]"
 _ALTITUDE = "a height above mean sea level within -1e5..1e5 [m], such as 488.0"
+_SECONDS = "a number >= 0 and <= 1e9 [s]"
+_SHARE = "a share within 0..1"
+_CORNERS = "corners [[east, north], …], each within -1e7..1e7 [m]"
+_HEIGHT = "a height above the origin within -1e7..1e7 [m]"
 _RIGHT: Mapping[tuple[str, ...], str] = {
-    ("schema",): f"schema = {SCHEMA}",
+    ("schema",): "schema = 1 or schema = 2",
     ("name",): f'an id of {ID_RULE}, such as name = "survey-1"',
     ("mission",): "a table [mission] with at least horizon_s",
     ("origin",): "a table [origin] with lat_deg, lon_deg and alt_m",
@@ -136,6 +219,9 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("mission", "success_default"): PROBABILITY,
     ("mission", "survival_default"): PROBABILITY,
     ("mission", "reattempt_failed"): "true or false",
+    ("mission", "wind_m_s"): "[east, north], where the wind blows to, such as [3.0, -1.0] [m/s]",
+    ("mission", "zone_margin_m"): "a distance >= 0 and <= 1e6 [m]",
+    ("mission", "band_m"): "[lowest, highest], heights >= 0 and <= 1e6 [m], such as [30.0, 110.0]",
     ("origin", "lat_deg"): "a latitude within -89..89 [deg]",
     ("origin", "lon_deg"): _LONGITUDE,
     ("origin", "alt_m"): _ALTITUDE,
@@ -146,14 +232,37 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("uav", "success", "*"): PROBABILITY,
     ("uav", "survival", "*"): PROBABILITY,
     ("uav", "kind"): "a word of 1 to 64 characters",
+    ("uav", "acceleration_m_s2"): "a number > 0 and <= 1e6 [m/s²], such as 2.5",
+    ("uav", "airspeed_m_s"): "a speed through the air > 0 and <= 1e6 [m/s], such as 12.0",
+    ("uav", "endurance_s"): "a number > 0 and <= 1e9 [s], such as endurance_s = 1200.0",
+    ("uav", "reserve_frac"): _SHARE,
+    ("uav", "charge_frac"): _SHARE,
+    ("base",): "one table [[base]] per base",
+    ("base", "id"): f"an id of {ID_RULE}",
+    ("base", "swap_s"): _SECONDS,
+    ("base", "slots"): "an integer >= 1, or leave it out for no limit",
+    ("zone",): "one table [[zone]] per zone",
+    ("zone", "id"): f"an id of {ID_RULE}",
+    ("zone", "polygon_m"): _CORNERS,
+    ("zone", "polygon"): "corners [[lat_deg, lon_deg], …]",
+    ("zone", "holes_m"): f"an array of holes, each of {_CORNERS}",
+    ("zone", "floor_m"): _HEIGHT,
+    ("zone", "ceiling_m"): _HEIGHT,
+    ("zone", "inclusive"): "true or false",
     ("task", "id"): f"an id of {ID_RULE}",
     ("task", "value"): "a number >= 0 and <= 1e12, such as value = 5.0",
-    ("task", "service_s"): "a number >= 0 and <= 1e9 [s]",
+    ("task", "service_s"): _SECONDS,
     ("task", "kind"): "a word of 1 to 64 characters",
     ("task", "appears_s"): "a number >= 0 and <= 1e9 [s]; 0 if known from the start",
+    ("task", "due_s"): _SECONDS,
+    ("task", "opens_s"): _SECONDS,
+    ("task", "closes_s"): _SECONDS,
+    ("task", "path_m"): "two points or more, [[east, north], …], each within -1e7..1e7 [m]",
+    ("task", "path"): "two points or more, [[lat_deg, lon_deg], …]",
+    ("task", "height_m"): _HEIGHT,
 } | {
     (table, key): right
-    for table in ("uav", "task")
+    for table in ("uav", "base", "task")
     for key, right in {
         "position_m": "[east, north] or [east, north, up], each within -1e7..1e7 [m]",
         "lat_deg": _LATITUDE,
@@ -165,4 +274,5 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
 
 def validate(document: Document) -> tuple[Scenario | None, list[Finding]]:
     """The scenario if every shape, type and range is right, and all findings otherwise."""
-    return validate_tables(Scenario, document, _TABLES, _RIGHT)
+    scenario, findings = validate_tables(Scenario, without_later(document), _TABLES, _RIGHT)
+    return scenario, [*findings, *edition_faults(document)]

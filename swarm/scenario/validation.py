@@ -48,11 +48,11 @@ Id = Annotated[str, AfterValidator(_require_id)]
 Probability = Annotated[float, AfterValidator(_require_probability)]
 
 
-def known_schema(known: int) -> AfterValidator:
-    """Accepts the one version ``known`` of a format."""
+def known_schema(*known: int) -> AfterValidator:
+    """Accepts the versions ``known`` of a format."""
 
     def check(version: int) -> int:
-        if version != known:
+        if version not in known:
             raise wrong("version {} of the format is not known")
         return version
 

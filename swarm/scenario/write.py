@@ -1,22 +1,24 @@
 """Write a mission as a scenario file that reads back as the same mission.
 
-Positions are written in local metres, numbers with all their digits.
+Positions are written in local metres, numbers with all their digits. A mission that schema 1 can
+hold is written in it, so that older releases read it.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, fields
 
-from swarm.model import Mission, Task, Uav
+from swarm.model import Base, Mission, Task, Uav, Zone
+from swarm.scenario.plain import nobody_can
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def format_scenario(mission: Mission) -> str:
-    """The text of a scenario file for ``mission``; defaults of UAVs and tasks are left out.
+    """The text of a scenario file for ``mission``, with defaults left out.
 
     A mission whose numbers pass the limits of the format (see
     swarm.scenario.shapes) is written all the same and refused when read.
@@ -25,15 +27,50 @@ def format_scenario(mission: Mission) -> str:
     if not mission.tasks:
         head["task"] = []
     rules = ("horizon_s", "success_default", "survival_default", "reattempt_failed")
-    blocks = [
-        ["schema = 1", *toml_lines(head)],
-        ["[mission]", *toml_lines({key: getattr(mission, key) for key in rules})],
-    ]
+    table = {key: getattr(mission, key) for key in rules} | _field_rules(mission)
+    uavs, tasks = [_uav(uav) for uav in mission.uavs], [_task(task) for task in mission.tasks]
+    zones = [_zone(zone) for zone in mission.zones]
+    schema = 1 if is_plain(mission) else 2
+    blocks = [[f"schema = {schema}", *toml_lines(head)], ["[mission]", *toml_lines(table)]]
     if mission.origin is not None:
         blocks.append(["[origin]", *toml_lines(asdict(mission.origin))])
-    blocks += [["[[uav]]", *toml_lines(_uav(uav))] for uav in mission.uavs]
-    blocks += [["[[task]]", *toml_lines(_task(task))] for task in mission.tasks]
+    blocks += [["[[uav]]", *toml_lines(uav)] for uav in uavs]
+    blocks += [["[[base]]", *_base_lines(base)] for base in mission.bases]
+    blocks += [["[[zone]]", *toml_lines(zone)] for zone in zones]
+    blocks += [["[[task]]", *toml_lines(task)] for task in tasks]
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def is_plain(mission: Mission) -> bool:
+    """Whether schema 1 can hold the mission: no word of schema 2, and somebody for every task."""
+    return not (
+        mission.bases
+        or mission.zones
+        or _field_rules(mission)
+        or any(_given(uav, _OF_UAV) for uav in mission.uavs)
+        or any(task.path_enu_m or _given(task, _OF_TASK) for task in mission.tasks)
+        or nobody_can(mission)
+    )
+
+
+_OF_UAV = ("acceleration_m_s2", "airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
+_OF_TASK = ("due_s", "opens_s", "closes_s", "height_m")
+
+
+def _given(item: Uav | Task, names: Sequence[str]) -> dict[str, object]:
+    """Those of ``names`` that are not as they are by default."""
+    defaults = {each.name: each.default for each in fields(item)}
+    values = {name: getattr(item, name) for name in names}
+    return {name: value for name, value in values.items() if value != defaults[name]}
+
+
+def _field_rules(mission: Mission) -> dict[str, object]:
+    more = {
+        "wind_m_s": list(mission.wind_enu_m_s) if any(mission.wind_enu_m_s) else None,
+        "zone_margin_m": mission.zone_margin_m or None,
+        "band_m": None if mission.band_m is None else list(mission.band_m),
+    }
+    return {key: value for key, value in more.items() if value is not None}
 
 
 def _uav(uav: Uav) -> dict[str, object]:
@@ -43,10 +80,36 @@ def _uav(uav: Uav) -> dict[str, object]:
         "position_m": toml_place(uav.position_enu_m),
         "speed_m_s": uav.speed_m_s,
         **{key: value for key, value in more.items() if value is not None},
+        **_given(uav, _OF_UAV),
+    }
+
+
+def _base_lines(base: Base) -> Iterator[str]:
+    yield from toml_lines({"id": base.id, "position_m": toml_place(base.position_enu_m)})
+    if base.swap_s:
+        yield from toml_lines({"swap_s": base.swap_s})
+    if base.slots is not None:
+        yield f"slots = {base.slots}"  # the one number of the format that is whole
+
+
+def _zone(zone: Zone) -> dict[str, object]:
+    more = {
+        "holes_m": [list(map(list, hole)) for hole in zone.holes_enu_m] or None,
+        "floor_m": zone.floor_m,
+        "ceiling_m": zone.ceiling_m,
+        "inclusive": zone.inclusive or None,
+    }
+    return {
+        "id": zone.id,
+        "polygon_m": list(map(list, zone.polygon_enu_m)),
+        **{key: value for key, value in more.items() if value is not None},
     }
 
 
 def _task(task: Task) -> dict[str, object]:
+    place: dict[str, object] = {"position_m": toml_place(task.position_enu_m)}
+    if task.path_enu_m:
+        place = {"path_m": list(map(toml_place, task.path_enu_m))}
     more = {
         "service_s": task.service_s or None,
         "kind": task.kind,
@@ -54,9 +117,10 @@ def _task(task: Task) -> dict[str, object]:
     }
     return {
         "id": task.id,
-        "position_m": toml_place(task.position_enu_m),
+        **place,
         "value": task.value,
         **{key: value for key, value in more.items() if value is not None},
+        **_given(task, _OF_TASK),
     }
 
 

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from swarm.model.zones import Corner, Zone, ZoneId
+from swarm.model.ids import ZoneId
+from swarm.model.zones import Corner, Zone
 
 FloatArray = npt.NDArray[np.float64]
 

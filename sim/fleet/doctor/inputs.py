@@ -14,13 +14,14 @@ from swarm.identity import Identity, Role, load_identity
 from swarm.identity.folder import shown_time
 from swarm.model import Mission
 from swarm.runtime.errors import InputError
-from swarm.scenario import load_scenario
+from swarm.scenario import load_scenario, require_plain
 
 
 def check_scenario(path: Path) -> tuple[Mission | None, list[CheckFinding]]:
     """The mission, if the file is sound, and what is to be said of it."""
     try:
         mission = load_scenario(path)
+        require_plain(mission, "swarm doctor")
     except InputError as error:
         return None, [
             fails("scenario", f"{fault.source}: {fault.place}: {fault.problem}", fault.remedy)

@@ -13,27 +13,31 @@ VALUE = "give a number >= 0 and <= 1e12, such as value = 5.0"
 HORIZON = "give a number > 0 and <= 1e9 [s], such as horizon_s = 600.0"
 SECONDS = "give a number >= 0 and <= 1e9 [s]"
 ALTITUDE = "give a height above mean sea level within -1e5..1e5 [m], such as 488.0"
-TOP_KEYS = "schema, name, mission, origin, uav, task, tasks_from"
-TASK_KEYS = "id, position_m, lat_deg, lon_deg, alt_m, value, service_s, kind, appears_s"
+SCHEMA = "give schema = 1 or schema = 2"
+TOP_KEYS = "schema, name, mission, origin, uav, base, zone, task, tasks_from"
+TASK_KEYS = (
+    "id, position_m, lat_deg, lon_deg, alt_m, value, service_s, kind, appears_s, "
+    "due_s, opens_s, closes_s, path_m, path, height_m"
+)
 
 # What is replaced in VALID, by what, and the lines it takes.
 WRONG: dict[str, tuple[str, str, list[str]]] = {
     # the file as a whole
-    "no schema": ("schema = 1\n", "", ["schema: is missing; give schema = 1"]),
+    "no schema": ("schema = 1\n", "", [f"schema: is missing; {SCHEMA}"]),
     "other schema": (
         "schema = 1",
-        "schema = 2",
-        ["schema: version 2 of the format is not known; give schema = 1"],
+        "schema = 3",
+        [f"schema: version 3 of the format is not known; {SCHEMA}"],
     ),
     "schema is no integer": (
         "schema = 1",
         'schema = "1"',
-        ["schema: '1' is not an integer; give schema = 1"],
+        [f"schema: '1' is not an integer; {SCHEMA}"],
     ),
     "schema is a boolean": (
         "schema = 1",
         "schema = true",
-        ["schema: true is not an integer; give schema = 1"],
+        [f"schema: true is not an integer; {SCHEMA}"],
     ),
     "no name": (
         'name = "small"\n',

@@ -1,0 +1,127 @@
+"""A scenario in which nothing is wrong becomes a mission: places in metres, data of the model.
+
+Leaves out: every check.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from swarm.model import Base, BaseId, Mission, Origin, Task, TaskId, Uav, UavId, Zone, ZoneId
+from swarm.model.frames import enu_from_wgs84
+
+if TYPE_CHECKING:
+    from swarm.scenario.shapes import BaseTable, Scenario, TaskTable, UavTable, ZoneTable
+
+_Point = tuple[float, float, float]
+
+
+def mission_of(scenario: Scenario) -> Mission:
+    """The mission that a checked ``scenario`` describes."""
+    origin = None
+    if (table := scenario.origin) is not None:
+        origin = Origin(table.lat_deg, table.lon_deg, table.alt_m)
+    rules = scenario.mission
+    east_m_s, north_m_s = rules.wind_m_s or (0.0, 0.0)
+    return Mission(
+        name=scenario.name,
+        horizon_s=rules.horizon_s,
+        uavs=tuple(_uav(uav, origin) for uav in scenario.uav),
+        tasks=tuple(_task(task, origin) for task in scenario.task),
+        success_default=rules.success_default,
+        survival_default=rules.survival_default,
+        reattempt_failed=rules.reattempt_failed,
+        origin=origin,
+        bases=tuple(_base(base, origin) for base in scenario.base),
+        zones=tuple(_zone(zone, origin) for zone in scenario.zone),
+        wind_enu_m_s=(east_m_s, north_m_s),
+        zone_margin_m=rules.zone_margin_m,
+        band_m=None if rules.band_m is None else (rules.band_m[0], rules.band_m[1]),
+    )
+
+
+def _uav(uav: UavTable, origin: Origin | None) -> Uav:
+    return Uav(
+        id=UavId(uav.id),
+        position_enu_m=_place_enu_m(uav, origin),
+        speed_m_s=uav.speed_m_s,
+        success=uav.success,
+        survival=uav.survival,
+        kind=uav.kind,
+        acceleration_m_s2=uav.acceleration_m_s2,
+        airspeed_m_s=uav.airspeed_m_s,
+        endurance_s=uav.endurance_s,
+        reserve_frac=uav.reserve_frac,
+        charge_frac=uav.charge_frac,
+    )
+
+
+def _base(base: BaseTable, origin: Origin | None) -> Base:
+    return Base(
+        id=BaseId(base.id),
+        position_enu_m=_place_enu_m(base, origin),
+        swap_s=base.swap_s,
+        slots=base.slots,
+    )
+
+
+def _zone(zone: ZoneTable, origin: Origin | None) -> Zone:
+    if zone.polygon_m is not None:
+        corners = [_point_enu_m(corner) for corner in zone.polygon_m]
+    else:
+        corners = _on_ground_enu_m(zone.polygon or (), origin)
+    return Zone(
+        id=ZoneId(zone.id),
+        polygon_enu_m=tuple(corner[:2] for corner in corners),
+        holes_enu_m=tuple(
+            tuple(_point_enu_m(corner)[:2] for corner in hole) for hole in zone.holes_m
+        ),
+        floor_m=zone.floor_m,
+        ceiling_m=zone.ceiling_m,
+        inclusive=zone.inclusive,
+    )
+
+
+def _task(task: TaskTable, origin: Origin | None) -> Task:
+    line: tuple[_Point, ...] = ()
+    if task.path_m is not None:
+        line = tuple(_point_enu_m(point) for point in task.path_m)
+    elif task.path is not None:
+        line = tuple(_on_ground_enu_m(task.path, origin))
+    return Task(
+        id=TaskId(task.id),
+        position_enu_m=line[0] if line else _place_enu_m(task, origin),
+        value=task.value,
+        service_s=task.service_s,
+        kind=task.kind,
+        appears_s=task.appears_s,
+        due_s=task.due_s,
+        opens_s=task.opens_s,
+        closes_s=task.closes_s,
+        path_enu_m=line,
+        height_m=task.height_m,
+    )
+
+
+def _place_enu_m(table: UavTable | BaseTable | TaskTable, origin: Origin | None) -> _Point:
+    if table.position_m is not None:
+        return _point_enu_m(table.position_m)
+    if origin is None or table.lat_deg is None or table.lon_deg is None:
+        raise ValueError("a table without a position has passed the checks")
+    alt_m = origin.alt_m if table.alt_m is None else table.alt_m
+    return enu_from_wgs84(origin, table.lat_deg, table.lon_deg, alt_m)
+
+
+def _point_enu_m(numbers: Sequence[float]) -> _Point:
+    east_m, north_m, *up_m = numbers
+    return east_m, north_m, up_m[0] if up_m else 0.0
+
+
+def _on_ground_enu_m(points_deg: Sequence[Sequence[float]], origin: Origin | None) -> list[_Point]:
+    """Points given by latitude and longitude alone, at the height of the origin."""
+    if origin is None:
+        raise ValueError("places in degrees without an origin have passed the checks")
+    return [
+        enu_from_wgs84(origin, lat_deg, lon_deg, origin.alt_m) for lat_deg, lon_deg in points_deg
+    ]
