@@ -15,7 +15,16 @@ from pydantic_core import PydanticUndefined
 
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.scenario.draft import PAD_SPACING_M, horizon_for
-from swarm.scenario.shapes import MissionTable, OriginTable, Scenario, TaskTable, UavTable
+from swarm.scenario.edition import EDITIONS
+from swarm.scenario.shapes import (
+    BaseTable,
+    MissionTable,
+    OriginTable,
+    Scenario,
+    TaskTable,
+    UavTable,
+    ZoneTable,
+)
 from swarm.scenario.write import toml_lines, toml_place, toml_value
 
 _SPEED_M_S = 8.0
@@ -34,7 +43,8 @@ _IN_DEGREES: Mapping[str, str] = {
 }
 _ABOUT: Mapping[str, Mapping[str, str]] = {
     "": {
-        "schema": "Version of this format.",
+        "schema": "Version of this format. A file of version 1 has nothing of wind, heights, energy, "
+        "bases, zones, windows and lines.",
         "name": "Name of the mission: what --mission and swarm status call it. Letters, digits, "
         "'_', '-' and '.'.",
         "tasks_from": "A file beside this one whose points are tasks, too: a QGroundControl .plan, "
@@ -42,6 +52,8 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "mission": "",
         "origin": "",
         "uav": "",
+        "base": "",
+        "zone": "",
         "task": "",
     },
     "mission": {
@@ -54,6 +66,11 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "says nothing else; S is the product over those before. Below 1, risky tasks come late.",
         "reattempt_failed": "Whether a task whose attempt failed opens again for everyone; "
         "otherwise it is closed as failed.",
+        "wind_m_s": "Steady wind by where it blows to [m/s east, m/s north]; UAVs with an "
+        "airspeed_m_s feel it. Absent: calm.",
+        "zone_margin_m": "Paths stay that far away from zones [m].",
+        "band_m": "Lowest and highest height above the ground that may be used [m]. Absent: each "
+        "UAV flies in a layer of its own.",
     },
     "origin": {
         "lat_deg": "Latitude and longitude (WGS84) of the place where position_m is [0, 0] [deg]. "
@@ -72,6 +89,32 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "success": "p by task id or by kind of task; an id goes before a kind.",
         "survival": "How likely it survives a task, by task id or by kind of task.",
         "kind": "What kind of UAV it is; for people.",
+        "acceleration_m_s2": "With which it takes up speed and brakes [m/s²]; a leg then takes "
+        "speed / acceleration longer. Absent: speeds change at once.",
+        "airspeed_m_s": "Speed through the air [m/s]; more than the wind's. Absent: wind has no "
+        "effect on it.",
+        "endurance_s": "Airborne time that a full battery gives [s]. Absent: endless.",
+        "reserve_frac": "Share of the endurance that is never planned with (0..1).",
+        "charge_frac": "Charge of the battery at the start of the mission (0..1).",
+    },
+    "base": {
+        "id": "Where batteries are swapped. A UAV's own start is such a place only if a base is "
+        "there.",
+        "position_m": "Where it is [m east, m north] of the origin; a third number is the height "
+        "above it.",
+        **_IN_DEGREES,
+        "swap_s": "From touch-down to ready [s].",
+        "slots": "How many UAVs it serves at a time. Absent: no limit.",
+    },
+    "zone": {
+        "id": "Where not to fly. Starts, bases and tasks lie outside of it.",
+        "polygon_m": "Corners round it [m east, m north], convex or not; lines between them do not "
+        "cross.",
+        "polygon": "Instead of polygon_m: corners by latitude and longitude [deg].",
+        "holes_m": "Holes in it, where one may fly: polygons as polygon_m.",
+        "floor_m": "Lowest height of it above the origin [m]. Absent: from the ground up.",
+        "ceiling_m": "Greatest height of it above the origin [m]. Absent: unlimited.",
+        "inclusive": "true: keeps out of all that is not inside, instead of what is.",
     },
     "task": {
         "id": "Name of the task: what reports and swarm task call it.",
@@ -84,6 +127,15 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "kind": "What kind of task it is; success and survival of UAVs may name it.",
         "appears_s": "When it becomes known [s of mission time]: later than 0 it is a pop-up that "
         "no plan made before the start knows of.",
+        "due_s": "When it ends at the latest [s of mission time]; it is worth "
+        "p · S · value · (due_s − t) then, and may be left out. Absent: it is to be done, whenever "
+        "that is.",
+        "opens_s": "Work on the spot begins not before [s of mission time].",
+        "closes_s": "Nor later [s of mission time]. Absent: never too late.",
+        "path_m": "Instead of position_m: a line flown from one end to the other, whichever way "
+        "is better; points as position_m.",
+        "path": "The same by latitude and longitude [deg].",
+        "height_m": "It is flown that high above the origin [m]. Absent: in the UAV's layer.",
     },
 }
 """What every field means, by table; empty for one that is explained with the one before."""
@@ -92,13 +144,33 @@ _TABLES: Mapping[str, type[BaseModel]] = {
     "mission": MissionTable,
     "origin": OriginTable,
     "uav": UavTable,
+    "base": BaseTable,
+    "zone": ZoneTable,
     "task": TaskTable,
 }
 _EXAMPLES: Mapping[tuple[str, str], str] = {
     ("", "tasks_from"): '"survey.plan"',
+    ("mission", "wind_m_s"): "[3.0, -1.0]",
+    ("mission", "zone_margin_m"): "5.0",
+    ("mission", "band_m"): "[30.0, 110.0]",
     ("uav", "lat_deg"): "47.397742",
     ("uav", "lon_deg"): "8.545594",
     ("uav", "alt_m"): "488.0",
+    ("uav", "acceleration_m_s2"): "2.5",
+    ("uav", "airspeed_m_s"): "12.0",
+    ("uav", "endurance_s"): "1200.0",
+    ("uav", "reserve_frac"): "0.2",
+    ("uav", "charge_frac"): "1.0",
+    ("base", "lat_deg"): "47.397742",
+    ("base", "lon_deg"): "8.545594",
+    ("base", "alt_m"): "488.0",
+    ("base", "swap_s"): "120.0",
+    ("base", "slots"): "2",
+    ("zone", "polygon"): "[[47.399, 8.549], [47.399, 8.55], [47.4, 8.549]]",
+    ("zone", "holes_m"): "[[[310.0, 210.0], [330.0, 210.0], [310.0, 230.0]]]",
+    ("zone", "floor_m"): "0.0",
+    ("zone", "ceiling_m"): "120.0",
+    ("zone", "inclusive"): "false",
     ("uav", "success"): "{ t1 = 0.9 }",
     ("uav", "survival"): "{ t1 = 0.99 }",
     ("uav", "kind"): '"quad"',
@@ -108,8 +180,20 @@ _EXAMPLES: Mapping[tuple[str, str], str] = {
     ("task", "service_s"): "5.0",
     ("task", "kind"): '"inspect"',
     ("task", "appears_s"): "60.0",
+    ("task", "due_s"): "300.0",
+    ("task", "opens_s"): "60.0",
+    ("task", "closes_s"): "240.0",
+    ("task", "path_m"): "[[0.0, 60.0], [200.0, 60.0]]",
+    ("task", "path"): "[[47.398, 8.546], [47.398, 8.549]]",
+    ("task", "height_m"): "60.0",
 }
 """Values of fields that may be left out, as they could be."""
+_ENTRIES: Mapping[str, Mapping[str, object]] = {
+    "base": {"id": "b1", "position_m": [0.0, -20.0]},
+    "zone": {"id": "z1", "polygon_m": [[300.0, 200.0], [400.0, 200.0], [300.0, 300.0]]},
+    "task": {"id": "t1", "position_m": [60.0, 0.0], "value": 1.0},
+}
+"""Tables that the file may have none of, as they could be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +240,7 @@ def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
         "examples. Every fault of this file is told by:  swarm plan FILE"
     )
     yield ""
-    top = {"schema": 1, "name": mission.name}
+    top = {"schema": EDITIONS[-1], "name": mission.name}
     yield from _explained("", top)
     if not mission.tasks:
         yield "task = []  # none yet: an operator adds them (swarm task add), or tables follow"
@@ -172,6 +256,8 @@ def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
             "speed_m_s": uav.speed_m_s,
         }
         yield from _entry("uav", given, explained=number == 0)
+    yield from _commented("base")
+    yield from _commented("zone")
     for number, task in enumerate(mission.tasks):
         given = {
             "id": task.id,
@@ -180,10 +266,14 @@ def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
         }
         yield from _entry("task", given, explained=number == 0)
     if not mission.tasks:
-        yield "# [[task]]"
-        example = {"id": "t1", "position_m": [60.0, 0.0], "value": 1.0}
-        for line in _explained("task", example):
-            yield line if line.startswith("#") else f"# {line}".rstrip()
+        yield from _commented("task")
+
+
+def _commented(table: str) -> Iterator[str]:
+    """A table as it could be, all of it in comments."""
+    yield f"# [[{table}]]"
+    for line in _explained(table, _ENTRIES[table]):
+        yield line if not line or line.startswith("#") else f"# {line}"
 
 
 def _entry(table: str, given: Mapping[str, object], *, explained: bool) -> Iterator[str]:
@@ -205,11 +295,11 @@ def _explained(table: str, given: Mapping[str, object]) -> Iterator[str]:
             continue  # a table of its own, below
         about = _ABOUT[table][key]
         default = keys[key].get_default(call_default_factory=True)
-        if default not in (PydanticUndefined, None, {}):
+        if default not in (PydanticUndefined, None, {}, []):
             about += f" Default: {toml_value(default)}."
         yield from _wrapped(about)
         if key in given:
-            yield f"{key} = {1 if key == 'schema' else toml_value(given[key])}"
+            yield f"{key} = {given[key] if key == 'schema' else toml_value(given[key])}"
         elif (table, key) in _EXAMPLES:
             yield f"# {key} = {_EXAMPLES[table, key]}"
         else:

@@ -8,6 +8,7 @@ ceiling. Like all checks these read the parsed document and pass over what has t
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -27,6 +28,8 @@ from swarm.scenario.places import (
 
 _GREATEST_MARGIN_M = 1e6
 _NAMELESS = ZoneId("z")
+_LONG = re.compile(r"-?\d+\.\d{4,}")
+"""Numbers of more digits than a person wants to read."""
 _SIMPLE = "give three corners or more, round a simple polygon"
 
 
@@ -102,8 +105,9 @@ def _problem_of(ring: Sequence[FlatPoint], holes: Iterable[Sequence[FlatPoint]] 
     try:
         Zone(_NAMELESS, tuple(ring), tuple(map(tuple, holes)))
     except ValueError as error:
-        # "polygon of zone z crosses …", "holes of zone z: a hole …"
-        return str(error).partition(f" of zone {_NAMELESS}")[2].lstrip(": ")
+        # "polygon of zone z crosses …", "holes of zone z: a hole …", "… encloses nothing: [corners]"
+        words = str(error).partition(f" of zone {_NAMELESS}")[2].lstrip(": ")
+        return _LONG.sub(lambda found: f"{float(found[0]):g}", words.partition(": [")[0])
     return None
 
 

@@ -185,7 +185,9 @@ def _in_metres(point: object) -> FlatPoint | None:
 
 def _in_degrees(frame: Origin, lat: object, lon: object) -> FlatPoint | None:
     lat_deg, lon_deg = number_of(lat), number_of(lon)
-    if lat_deg is None or lon_deg is None or _too_far(frame, lat_deg, lon_deg):
+    if lat_deg is None or lon_deg is None or abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+        return None
+    if _too_far(frame, lat_deg, lon_deg):
         return None
     return enu_from_wgs84(frame, lat_deg, lon_deg, frame.alt_m)[:2]
 

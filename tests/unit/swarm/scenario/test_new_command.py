@@ -14,7 +14,15 @@ from swarm.model import Origin
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.scenario import blank, format_scenario, load_scenario, parse_scenario
 from swarm.scenario.blank import Blank, blank_scenario
-from swarm.scenario.shapes import MissionTable, OriginTable, Scenario, TaskTable, UavTable
+from swarm.scenario.shapes import (
+    BaseTable,
+    MissionTable,
+    OriginTable,
+    Scenario,
+    TaskTable,
+    UavTable,
+    ZoneTable,
+)
 
 COMMANDS = {"new": EntryPoint("new", "swarm.scenario.cli:new", "peckorder.commands")}
 TABLES: dict[str, type[BaseModel]] = {
@@ -22,6 +30,8 @@ TABLES: dict[str, type[BaseModel]] = {
     "mission": MissionTable,
     "origin": OriginTable,
     "uav": UavTable,
+    "base": BaseTable,
+    "zone": ZoneTable,
     "task": TaskTable,
 }
 
@@ -40,6 +50,7 @@ def test_a_new_scenario_loads_without_a_change(tmp_path: Path) -> None:
     assert mission.origin == Origin(46.8, 9.7, 1100.0)
     assert len({task.position_enu_m for task in mission.tasks}) == 20
     assert parse_scenario(format_scenario(mission).encode(), "again.toml") == mission
+    assert mission.constraints == ()  # so that every command takes it
 
 
 @pytest.mark.parametrize(("uavs", "tasks"), [(1, 0), (1, 1), (3, 6), (40, 200)])
@@ -58,7 +69,7 @@ def test_fleets_of_any_size_stand_apart_and_reach_their_tasks_in_time(
 @pytest.mark.parametrize("tasks", [0, 2])
 def test_every_field_of_the_format_is_there_with_its_meaning(tasks: int) -> None:
     text = blank_scenario(Blank("field", 2, tasks, DEFAULT_ORIGIN))
-    at = {name: text.index(f"[{name}]") for name in ("mission", "origin", "uav", "task")}
+    at = {name: text.index(f"[{name}]") for name in list(TABLES)[1:]}
     begins = [0, *at.values(), len(text)]
     for (name, table), begin, end in zip(TABLES.items(), begins, begins[1:], strict=False):
         keys = {field.alias or key for key, field in table.model_fields.items()}
@@ -69,6 +80,7 @@ def test_every_field_of_the_format_is_there_with_its_meaning(tasks: int) -> None
 
 def test_fields_in_comments_are_right_when_they_are_taken_in() -> None:
     text = blank_scenario(Blank("field", 1, 1, DEFAULT_ORIGIN))
+    text = text[: text.index("# [[base]]")] + text[text.index("[[task]]") :]
     for key in ("success", "survival", "kind", "service_s", "appears_s"):
         text = re.sub(rf"^# ({key} = )", r"\1", text, flags=re.MULTILINE)
     (placed, count) = re.subn(r"^# ((lat|lon|alt)_\w+ = )", r"\1", text, flags=re.MULTILINE)
@@ -79,6 +91,28 @@ def test_fields_in_comments_are_right_when_they_are_taken_in() -> None:
         assert (mission.uavs[0].kind, mission.tasks[0].kind) == ("quad", "inspect")
         assert mission.tasks[0].appears_s == 60.0
     assert count == 6
+
+
+def test_bases_zones_and_windows_in_comments_are_right_when_they_are_taken_in() -> None:
+    text = blank_scenario(Blank("field", 1, 1, DEFAULT_ORIGIN))
+    commented = re.compile(r"^# (\w+ = |\[\[\w+\]\]$)", re.MULTILINE)
+    text = re.sub(
+        r"^# (lat_deg|lon_deg|alt_m|polygon|path|tasks_from) = .*\n", "", text, flags=re.MULTILINE
+    )
+    text = text.replace("position_m = [60.0, 0.0]\n", "")  # for the line that takes its place
+
+    mission = parse_scenario(commented.sub(r"\1", text).encode(), "field.toml")
+    (uav,), (base,), (zone,), (task,) = mission.uavs, mission.bases, mission.zones, mission.tasks
+    assert (uav.endurance_s, uav.acceleration_m_s2, uav.airspeed_m_s) == (1200.0, 2.5, 12.0)
+    assert (base.slots, base.swap_s) == (2, 120.0)
+    assert (zone.top_m, len(zone.holes_enu_m), zone.inclusive) == (120.0, 1, False)
+    assert (task.due_s, task.opens_s, task.closes_s, len(task.path_enu_m)) == (
+        300.0,
+        60.0,
+        240.0,
+        2,
+    )
+    assert (mission.band_m, mission.wind_enu_m_s) == ((30.0, 110.0), (3.0, -1.0))
 
 
 def test_what_is_there_is_never_overwritten(
