@@ -43,7 +43,7 @@ _IN_DEGREES: Mapping[str, str] = {
 }
 _ABOUT: Mapping[str, Mapping[str, str]] = {
     "": {
-        "schema": "Version of this format. A file of version 1 has nothing of wind, heights, energy, "
+        "schema": "Version of this format. One of version 1 has nothing of wind, heights, energy, "
         "bases, zones, windows and lines.",
         "name": "Name of the mission: what --mission and swarm status call it. Letters, digits, "
         "'_', '-' and '.'.",

@@ -105,7 +105,7 @@ def _problem_of(ring: Sequence[FlatPoint], holes: Iterable[Sequence[FlatPoint]] 
     try:
         Zone(_NAMELESS, tuple(ring), tuple(map(tuple, holes)))
     except ValueError as error:
-        # "polygon of zone z crosses …", "holes of zone z: a hole …", "… encloses nothing: [corners]"
+        # "polygon of zone z crosses …", "holes of zone z: a hole …", "… encloses nothing: [(…"
         words = str(error).partition(f" of zone {_NAMELESS}")[2].lstrip(": ")
         return _LONG.sub(lambda found: f"{float(found[0]):g}", words.partition(": [")[0])
     return None

@@ -257,7 +257,8 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         HOLES,
         "holes_m = [[[120, 120], [180, 180], [180, 120], [120, 170]]]",
         [
-            f'zone[0] "village".holes_m[0]: crosses or touches itself near (147.273, 147.273); {RING}'
+            'zone[0] "village".holes_m[0]: crosses or touches itself near (147.273, 147.273); '
+            + RING
         ],
     ),
     "hole outside": (
@@ -296,8 +297,8 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         "position_m = [5000.0, 0.0]",
         [
             (
-                "task[0] \"t1\".position_m: lies outside of zone 'county', the only place where to fly; "
-                "move it into the zone, or change the zone"
+                "task[0] \"t1\".position_m: lies outside of zone 'county', "
+                "the only place where to fly; move it into the zone, or change the zone"
             )
         ],
     ),
