@@ -1,0 +1,72 @@
+"""No command passes over a word of schema 2: those that do not heed it yet say so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import swarm
+from swarm.cli import main
+from swarm.runtime.errors import InputError
+from swarm.scenario import parse_scenario, require_plain
+from tests.unit.swarm.scenario.test_read import VALID as SCHEMA_1
+from tests.unit.swarm.scenario.test_schema_2_read import VALID as SCHEMA_2
+
+ALL = (
+    "acceleration_m_s2, airspeed_m_s, endurance_s, due_s, opens_s, closes_s, path_m, height_m, "
+    "wind_m_s, [[base]], [[zone]] and band_m"
+)
+COMMANDS: dict[str, list[str]] = {
+    "swarm plan": ["plan", "FILE"],
+    "swarm simulate": ["simulate", "FILE"],
+    "swarm run": ["run", "FILE"],
+    "swarm coordinator": ["coordinator", "FILE"],
+    "swarm autopilot": ["autopilot", "FILE"],
+    "swarm doctor": ["doctor", "FILE"],
+    "swarm study": ["study", "FILE", "--trials", "1"],
+    "swarm bench": ["bench", "plan", "FILE"],
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands_name_what_they_do_not_heed(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "field.toml"
+    path.write_text(SCHEMA_2)
+
+    status = main([word.replace("FILE", str(path)) for word in COMMANDS[command]])
+
+    told = capsys.readouterr()
+    line = f"{command}: does not heed {ALL} of mission field yet"
+    # The doctor looks at everything else as well and tells it in its table.
+    assert (status, line in told.err) == (2, True) or (command, status) == ("swarm doctor", 1)
+    assert command != "swarm doctor" or "does not heed" in told.out
+
+
+def test_python_names_it_too(tmp_path: Path) -> None:
+    path = tmp_path / "field.toml"
+    path.write_text(SCHEMA_2)
+    mission = swarm.load(path)
+
+    for does in (swarm.plan, swarm.simulate, lambda mission: swarm.evaluate(mission, {})):
+        with pytest.raises(swarm.SwarmError, match="does not heed acceleration_m_s2, .* yet"):
+            does(mission)
+
+
+def test_one_word_and_a_task_that_nobody_can_do_are_named() -> None:
+    plain = parse_scenario(SCHEMA_1.encode(), "s.toml")
+    calm = replace(plain, zone_margin_m=5.0, wind_enu_m_s=(0.0, 0.0))
+    require_plain(plain, "swarm plan")
+    require_plain(calm, "swarm plan")  # without zones it asks for nothing
+
+    with pytest.raises(InputError) as caught:
+        require_plain(replace(plain, wind_enu_m_s=(0.0, 1.0)), "swarm plan")
+    assert str(caught.value) == (
+        "swarm plan: does not heed wind_m_s of mission small yet; leave it out"
+    )
+    unable = replace(plain.uavs[1], success={"t2": 0.0, "t1": 0.0})
+    with pytest.raises(InputError, match="does not heed task t1, at which nobody can succeed of"):
+        require_plain(replace(plain, uavs=(unable,)), "swarm plan")
