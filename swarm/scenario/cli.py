@@ -98,6 +98,9 @@ def import_tasks(
         ),
     ] = 0.0,
     name: NameOption = None,
+    no_fence: Annotated[
+        bool, typer.Option("--no-fence", help="Leave the plan's geofence out.")
+    ] = False,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -112,12 +115,13 @@ def import_tasks(
     """Make a scenario of a plan's waypoints, or of GeoJSON or CSV.
 
     Reads QGroundControl plans and waypoint files, too. Every waypoint or point becomes a task,
-    also those within surveys and corridor scans; hold times become service times. Take-off,
-    landing, cameras and the like are left out, and told. The scenario is commented, to be looked
-    over and flown.
+    also those within surveys and corridor scans; hold times become service times. Polygons of the
+    geofence become zones. Take-off, landing, cameras and the like are left out, and told. The
+    scenario is commented, to be looked over and flown.
 
     A CSV has columns lat_deg, lon_deg and maybe alt_m, or east_m, north_m and maybe up_m, and
-    any of id, value, service_s, kind and appears_s; GeoJSON has the latter as properties.
+    any of id, value, service_s, kind, appears_s, due_s, opens_s and closes_s; GeoJSON has the
+    latter as properties.
 
     Examples:
         swarm import survey.plan --uavs 3 -o survey.toml && swarm run survey.toml
@@ -125,10 +129,14 @@ def import_tasks(
         swarm import trees.geojson --home 47.3977,8.5456,488 -o trees.toml
         swarm import grid.csv --uavs 10 -o grid.toml
     """
+    from dataclasses import replace
+
     from swarm.scenario.draft import DraftOptions, draft_scenario
     from swarm.scenario.task_files import read_task_file
 
     tasks = read_task_file(file, home=None if home is None else _origin(home), below_m=below_m)
+    if no_fence:
+        tasks = replace(tasks, zones=())
     named = _named(name, file)
     fleet = DraftOptions(named, uavs, speed_m_s, horizon_s, value, service_s)
     text = draft_scenario(tasks, fleet)
@@ -237,6 +245,8 @@ def _story(tasks: TaskFile, uavs: int, output: Path | None) -> str:
     """What has been made of the file, and how to go on."""
     count = len(tasks.entries)
     story = f"{tasks.source}: {count} task{'s'[: count - 1]} for {uavs} UAV{'s'[: uavs - 1]}"
+    if zones := len(tasks.zones):
+        story += f" and {zones} zone{'s'[: zones - 1]}"
     if tasks.left_out:
         parts = (f"{n} × {what}" if n > 1 else what for what, n in tasks.left_out.items())
         story += f"; left out: {', '.join(parts)}"

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from swarm.model import Mission
+from swarm.scenario.edition import edition_of
 from swarm.scenario.read import build_mission
 from swarm.scenario.task_files import TaskFile
 from swarm.scenario.task_files.task_file import TASK_KEYS
@@ -60,10 +61,11 @@ def draft_scenario(tasks: TaskFile, fleet: DraftOptions) -> str:
     ]
     mission = build_mission(
         {
-            "schema": 1,
+            "schema": 2,
             "name": fleet.name,
             "mission": {"horizon_s": fleet.horizon_s or _SHORTEST_HORIZON_S},
             "uav": uavs,
+            "zone": list(tasks.zones),
             "task": [],
         },
         tasks.source,
@@ -87,7 +89,7 @@ def horizon_for(mission: Mission) -> float:
         open_tasks[nearest] = False
         here = places[nearest]
     service_s = sum(task.service_s for task in mission.tasks)
-    latest_s = max((task.appears_s for task in mission.tasks), default=0.0)
+    latest_s = max((max(task.appears_s, task.opens_s) for task in mission.tasks), default=0.0)
     needed_s = length_m / uav.speed_m_s + service_s + latest_s
     return min(max(_SHORTEST_HORIZON_S, 10.0 * math.ceil(needed_s / 10.0)), _LONGEST_HORIZON_S)
 
@@ -98,7 +100,8 @@ def _lines(
     yield f"# Tasks of {tasks.source} ({len(tasks.entries)}) for a fleet of {fleet.uavs}."
     yield "# To look over: where the UAVs stand, how fast they fly, and what each task is worth."
     yield ""
-    yield "schema = 1"
+    words = {"task": [entry.table for entry in tasks.entries], "zone": list(tasks.zones)}
+    yield f"schema = {edition_of(words)}"
     yield f"name = {toml_string(fleet.name)}"
     yield ""
     yield "[mission]"
@@ -117,6 +120,12 @@ def _lines(
     for uav in uavs:
         yield "[[uav]]"
         yield from toml_lines(uav)
+        yield ""
+    if tasks.zones:
+        yield "# The geofence: where not to fly, or if inclusive the only place where to."
+    for zone in tasks.zones:
+        yield "[[zone]]"
+        yield from toml_lines(zone)
         yield ""
     yield from _about_heights(tasks)
     for number, entry in enumerate(tasks.entries):

@@ -24,7 +24,11 @@ def check_scenario(path: Path) -> tuple[Mission | None, list[CheckFinding]]:
         require_plain(mission, "swarm doctor")
     except InputError as error:
         return None, [
-            fails("scenario", f"{fault.source}: {fault.place}: {fault.problem}", fault.remedy)
+            fails(
+                "scenario",
+                ": ".join(filter(None, (fault.source, fault.place, fault.problem))),
+                fault.remedy,
+            )
             for fault in error.faults
         ]
     text = f"{mission.name}: {len(mission.uavs)} UAVs, {len(mission.tasks)} tasks"

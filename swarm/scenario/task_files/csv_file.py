@@ -1,9 +1,9 @@
 """Tables of tasks (``.csv``): one task a line, columns named in the first, in capitals or not.
 
 A place is lat_deg and lon_deg, with alt_m or without, or east_m and north_m,
-with up_m or without; id, value, service_s, kind and appears_s may be left out
-or empty. Cells are parted by comma, semicolon or tab, whatever the first line
-has. Leaves out: decimal commas.
+with up_m or without; id, value, service_s, kind, appears_s, due_s, opens_s and
+closes_s may be left out or empty. Cells are parted by comma, semicolon or tab,
+whatever the first line has. Leaves out: decimal commas.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Points of GeoJSON (RFC 7946) as tasks: id, value, service_s, kind and appears_s are properties.
+"""Points of GeoJSON (RFC 7946) as tasks.
 
-Names of properties may be in capitals; the third coordinate is the height above
-mean sea level. Leaves out: lines, polygons, and coordinates other than
-longitude and latitude.
+Properties are id, value, service_s, kind, appears_s, due_s, opens_s and closes_s; their names may
+be in capitals. The third coordinate is the height above mean sea level. Leaves out: lines,
+polygons, and coordinates other than longitude and latitude.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html.
 Of a complex item the mission items that QGroundControl has stored with it are
-taken; without them, the corners of its transects. Geofence, rally points, and what a vehicle
-does on the way (cameras, regions of interest) are left out.
+taken; without them, the corners of its transects. Polygons of the geofence are zones. Its
+circles, rally points, and what a vehicle does on the way (cameras, regions of interest) are left
+out.
 """
 
 from __future__ import annotations
@@ -60,6 +61,7 @@ def read_plan(text: str, request: ReadOptions) -> TaskFile:
                 items.append(item)
             else:
                 faults.append(item)
+    zones, unfenced = _fence(document)
     homeless = Fault(
         request.source,
         _HOME,
@@ -73,8 +75,25 @@ def read_plan(text: str, request: ReadOptions) -> TaskFile:
         home=home,
         speed_m_s=_speed_m_s(mission),
         below_m=below_m,
-        left_out=left_out_of(items) + landings,
+        left_out=left_out_of(items) + landings + unfenced,
+        zones=zones,
     )
+
+
+def _fence(document: Mapping[str, object]) -> tuple[list[Mapping[str, object]], Counter[str]]:
+    """Polygons of the geofence as zones, and how much of the rest of it there is."""
+    zones: list[Mapping[str, object]] = []
+    rest: Counter[str] = Counter()
+    fence = document.get("geoFence")
+    for _, value in _numbered("", member(fence, "polygons")):
+        corners, inclusion = member(value, "polygon"), member(value, "inclusion")
+        if not isinstance(corners, list) or not isinstance(inclusion, bool):
+            rest["geofence polygon"] += 1
+            continue
+        zone: dict[str, object] = {"id": f"fence{len(zones) + 1}", "polygon": corners}
+        zones.append(zone | ({"inclusive": True} if inclusion else {}))
+    rest.update("geofence circle" for _ in _numbered("", member(fence, "circles")))
+    return zones, rest
 
 
 def _mission(document: Mapping[str, object], source: str) -> Mapping[str, object]:

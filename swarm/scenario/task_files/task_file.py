@@ -60,7 +60,16 @@ def spelt_number(text: str) -> float | None:
         return None
 
 
-TASK_KEYS = ("id", "value", "service_s", "kind", "appears_s")
+TASK_KEYS = (
+    "id",
+    "value",
+    "service_s",
+    "kind",
+    "appears_s",
+    "due_s",
+    "opens_s",
+    "closes_s",
+)
 """Keys of a task that a file may give beside the place."""
 
 
@@ -93,7 +102,9 @@ class TaskFile:
     below_m: float | None = None
     """How far every task lies below its waypoint [m]; None where the file has no waypoints."""
     left_out: Mapping[str, int] = field(default_factory=dict)
-    """What the file holds besides tasks, and how many of each."""
+    """What the file holds besides tasks and zones, and how many of each."""
+    zones: tuple[Mapping[str, object], ...] = ()
+    """Keys and values as in tables ``[[zone]]``; `swarm import` takes them, tasks_from does not."""
 
     @property
     def in_degrees(self) -> bool:
@@ -126,6 +137,7 @@ def gather(
     speed_m_s: float | None = None,
     below_m: float | None = None,
     left_out: Mapping[str, int] | None = None,
+    zones: Iterable[Mapping[str, object]] = (),
 ) -> TaskFile:
     """The task file of what was ``found``; tasks without an id are numbered t1, t2, ….
 
@@ -153,4 +165,6 @@ def gather(
         faults.append(Fault(request.source, "", "holds no task", nothing))
     if faults:
         raise InputError(*faults)
-    return TaskFile(request.source, tuple(entries), home, speed_m_s, below_m, left_out or {})
+    return TaskFile(
+        request.source, tuple(entries), home, speed_m_s, below_m, left_out or {}, tuple(zones)
+    )

@@ -52,7 +52,7 @@ def test_python_names_it_too(tmp_path: Path) -> None:
     mission = swarm.load(path)
 
     for does in (swarm.plan, swarm.simulate, lambda mission: swarm.evaluate(mission, {})):
-        with pytest.raises(swarm.SwarmError, match="does not heed acceleration_m_s2, .* yet"):
+        with pytest.raises(swarm.SwarmError, match="does not heed acceleration_m_s2, "):
             does(mission)
 
 
