@@ -124,17 +124,22 @@ def outline_m(
     entry: Mapping[str, object], outline: Outline, frame: Origin | None
 ) -> list[FlatPoint] | None:
     """Where one table has its chain of points; None if that cannot be told of all of them."""
-    if outline.metres in entry:
-        points = [_in_metres(point) for point in _list(entry[outline.metres])]
-    else:
-        points = [
-            _in_degrees(frame, *point)
-            if frame is not None and isinstance(point, list) and len(point) == 2
-            else None
-            for point in _list(entry.get(outline.degrees))
-        ]
-    known = [point for point in points if point is not None]
-    return known if known and len(known) == len(points) else None
+    in_metres = outline.metres in entry
+    chain = entry.get(outline.metres if in_metres else outline.degrees)
+    if not isinstance(chain, list):
+        return None
+    points_m: list[FlatPoint] = []
+    for point in chain:
+        if in_metres:
+            point_m = _in_metres(point)
+        elif frame is not None and isinstance(point, list) and len(point) == 2:
+            point_m = _in_degrees(frame, *point)
+        else:
+            point_m = None
+        if point_m is None:
+            return None
+        points_m.append(point_m)
+    return points_m
 
 
 def _beside_line(path: Path, entry: Mapping[str, object]) -> Iterator[Finding]:

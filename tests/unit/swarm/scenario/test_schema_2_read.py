@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from pydantic import BaseModel
 
 from swarm.model import Base, BaseId, Origin, ZoneId
 from swarm.model.frames import enu_from_wgs84
@@ -501,7 +502,7 @@ def test_every_key_is_of_one_edition() -> None:
         "task": {"id", "position_m", "lat_deg", "lon_deg", "alt_m", "value", "service_s"}
         | {"kind", "appears_s"},
     }
-    tables = {
+    tables: dict[str, type[BaseModel]] = {
         "mission": shapes.MissionTable,
         "uav": shapes.UavTable,
         "task": shapes.TaskTable,

@@ -142,7 +142,7 @@ _WORDS = st.sampled_from(
         "t1",
     ]
 )
-_VALUES = st.recursive(
+VALUES = st.recursive(
     st.booleans()
     | st.integers()
     | st.just(10**400)
@@ -155,16 +155,16 @@ _VALUES = st.recursive(
 )
 
 
-def _toml(value: object) -> str:
+def toml_of(value: object) -> str:
     match value:
         case bool():
             return str(value).lower()
         case str():
             return '"' + "".join(f"\\U{ord(c):08x}" for c in value) + '"'
         case list():
-            return "[" + ", ".join(map(_toml, value)) + "]"
+            return "[" + ", ".join(map(toml_of, value)) + "]"
         case dict():
-            return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
+            return "{" + ", ".join(f"{key} = {toml_of(item)}" for key, item in value.items()) + "}"
         case float():
             return repr(value)
         case int():
@@ -173,9 +173,9 @@ def _toml(value: object) -> str:
             return str(value)
 
 
-@given(st.dictionaries(_WORDS, _VALUES, max_size=6))
+@given(st.dictionaries(_WORDS, VALUES, max_size=6))
 def test_any_toml_gives_a_mission_or_faults_of_one_line_each(document: dict[str, object]) -> None:
-    text = "".join(f"{key} = {_toml(value)}\n" for key, value in document.items())
+    text = "".join(f"{key} = {toml_of(value)}\n" for key, value in document.items())
     lines = faults(text)
 
     assert all(line.startswith("s.toml: ") and "; " in line for line in lines)
@@ -185,15 +185,15 @@ def test_any_toml_gives_a_mission_or_faults_of_one_line_each(document: dict[str,
 def test_any_damage_to_a_valid_file_gives_a_mission_or_faults(data: st.DataObject) -> None:
     lines = VALID.splitlines(keepends=True)
     line = data.draw(st.integers(0, len(lines) - 1))
-    value = data.draw(_VALUES)
+    value = data.draw(VALUES)
     match data.draw(st.sampled_from(["drop", "value", "key", "cut", "swap"])):
         case "drop":
             del lines[line]
         case "value":
-            lines[line] = f"{lines[line].partition('=')[0].strip()} = {_toml(value)}\n"
+            lines[line] = f"{lines[line].partition('=')[0].strip()} = {toml_of(value)}\n"
         case "key":
             key = data.draw(st.text(string.ascii_letters + "_", min_size=1, max_size=9))
-            lines.insert(line, f"{key} = {_toml(value)}\n")
+            lines.insert(line, f"{key} = {toml_of(value)}\n")
         case "cut":
             lines[line] = lines[line][: data.draw(st.integers(0, len(lines[line])))]
         case "swap":
