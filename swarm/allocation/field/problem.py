@@ -7,14 +7,13 @@ ends of the tasks. Rows are UAVs, columns are tasks, in the order of the ids.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from swarm.kernels._kernels import KernelField
-from swarm.model import BaseId, Mission, TaskId, UavId
+from swarm.model import BaseId, TaskId, UavId
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
