@@ -106,7 +106,8 @@ def plan(
 
     from json import dumps
 
-    from coordinator.core.publication import FlightLayers, height_warning
+    from coordinator.core.publication import height_warning
+    from swarm.model.layers import FlightLayers
     from coordinator.export import require_origin
     from coordinator.planner.exact import ProblemTooLargeError
     from coordinator.planner.options import BOUND_S, after_time, bound_frac, first_of
@@ -306,7 +307,8 @@ def coordinator(
         swarm coordinator valley-survey --dashboard 8080
     """
     from coordinator.core.active import CoordinatorCore
-    from coordinator.core.publication import FlightLayers, height_warning
+    from coordinator.core.publication import height_warning
+    from swarm.model.layers import FlightLayers
     from coordinator.daemon import CoordinatorProcess
     from coordinator.dashboard.access import parse_serve_address
     from coordinator.dashboard.supervisor import supervised_dashboard

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from enum import Enum
 from pathlib import Path
 
-from coordinator.core.publication import FlightLayers
+from swarm.model.layers import FlightLayers
 from swarm.model import Mission, Origin, Plan, Task, Uav
 from swarm.model.frames import wgs84_from_enu
 from swarm.runtime.errors import Fault, InputError

@@ -27,7 +27,8 @@ from coordinator.core.lifecycle import (
     Replanned,
     Withdraw,
 )
-from coordinator.core.publication import FlightLayers, RegisterAnnouncer
+from coordinator.core.publication import RegisterAnnouncer
+from swarm.model.layers import FlightLayers
 from coordinator.core.stages import MissionStage, StagedMission
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR

@@ -9,11 +9,12 @@ more.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from swarm.model import Mission, Origin, Task
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.model.ids import COORDINATOR
+from swarm.model.layers import FlightLayers
 from swarm.protocol.board import TaskBoard, TaskState
 from swarm.protocol.events import LogLine, Publish
 from swarm.protocol.messages import (
@@ -33,28 +34,6 @@ from swarm.protocol.timing import Timing
 HIGHEST_M = 120.0
 """Above it unmanned aircraft need a permit of their own in the EU, Britain and Switzerland; 122 m
 (400 ft) in the USA."""
-
-
-@dataclass(frozen=True, slots=True)
-class FlightLayers:
-    """Heights at which the UAVs fly, each its own.
-
-    Raises:
-        ValueError: a height is not positive.
-    """
-
-    lowest_m: float = 10.0
-    """Height of the first UAV's layer above the places it visits [m]."""
-    spacing_m: float = 3.0
-    """Distance between neighbouring layers [m]."""
-
-    def __post_init__(self) -> None:
-        if not (self.lowest_m > 0.0 and self.spacing_m >= 0.0):
-            raise ValueError(f"layers need lowest_m > 0 and spacing_m >= 0, not {self}")
-
-    def layer_m(self, index: int) -> float:
-        """Layer of the UAV with that place in the scenario [m]."""
-        return self.lowest_m + index * self.spacing_m
 
 
 def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> MissionConfig:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coordinator.core.publication import FlightLayers, mission_config_of, task_entry_of
+from coordinator.core.publication import mission_config_of, task_entry_of
+from swarm.model.layers import FlightLayers
 from swarm.bus.port import Bus
 from swarm.model import Mission, UavId
 from swarm.model.ids import COORDINATOR

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from agent.vehicle.config import CommandStyle, parse_forward
 from agent.vehicle.signing import load_signing_key, signing_key_of
-from coordinator.core.publication import FlightLayers
+from swarm.model.layers import FlightLayers
 from sim.autopilot.options import faults_by_uav
 from sim.fleet.autopilots import Autopilots, SimulatedAutopilots
 from swarm.model import Mission

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Self, TextIO
 
 from rich.console import Console
 
-from coordinator.core.publication import FlightLayers, height_warning
+from coordinator.core.publication import height_warning
+from swarm.model.layers import FlightLayers
 from coordinator.terminal.live_view import LiveView
 from coordinator.terminal.report import MissionReport
 from sim.fleet.layout import LaunchOptions

@@ -33,7 +33,7 @@ from coordinator.core.lifecycle import (
     TakeSeat,
     Withdraw,
 )
-from coordinator.core.publication import FlightLayers
+from swarm.model.layers import FlightLayers
 from coordinator.core.standby import StandbyCore
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.operator.commands import CommandRequest

@@ -37,6 +37,7 @@ struct FieldProblem {
     const double* line_s;             // (n_kind, n_task, 2) along the task, forwards and backwards
     const std::int32_t* enter;        // (n_task, 2) node where it begins, forwards and backwards
     const double* home_s;             // (n_uav, n_node) to the nearest of the bases and its own start
+    const std::int32_t* home;         // (n_uav, n_node) which that is: a base, or -1 for the start
     const std::uint8_t* is_line;      // (n_task,) whether the direction matters
     const double* service_s;          // (n_task,)
     const double* opens_s;            // (n_task,)

@@ -10,4 +10,5 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_exact(module);
     peckorder::bind_rollout(module);
     peckorder::bind_routes(module);
+    peckorder::bind_field(module);
 }

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from coordinator.core.active import CoordinatorCore
 from coordinator.core.lifecycle import CoordinatorAction, CoordinatorEvent, MakePlan, PlanMade
-from coordinator.core.publication import FlightLayers
+from swarm.model.layers import FlightLayers
 from swarm.model import Mission, Plan, UavId
 from swarm.protocol.events import (
     Ask,

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from coordinator.core.publication import FlightLayers, height_warning
+from coordinator.core.publication import height_warning
+from swarm.model.layers import FlightLayers
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 from swarm.identity import Identity, Role, load_identity
 from swarm.identity.folder import shown_time

@@ -12,7 +12,7 @@ from functools import partial
 import pytest
 
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.publication import FlightLayers
+from swarm.model.layers import FlightLayers
 from coordinator.daemon import run_coordinator
 from coordinator.planner.options import ShouldStop
 from swarm.bus.port import BusEvent, Sample

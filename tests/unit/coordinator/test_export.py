@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.core.publication import FlightLayers
+from swarm.model.layers import FlightLayers
 from coordinator.export import ExportFirmware, uav_plan, write_plans
 from coordinator.planner.plan import make_plan
 from swarm.cli import main

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coordinator.core.lifecycle import PlanFailed, PlanMade, Withdraw
-from coordinator.core.publication import FlightLayers
+from swarm.model.layers import FlightLayers
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.core.publication import FlightLayers, height_warning
+from coordinator.core.publication import height_warning
+from swarm.model.layers import FlightLayers
 from swarm.cli import main
 from swarm.model import Mission, Uav, UavId
 from swarm.scenario.write import format_scenario

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.core.publication import FlightLayers
+from swarm.model.layers import FlightLayers
 from sim.fleet.passthrough import Fence, PassthroughOptions, fence_around
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario, shipped_scenarios

@@ -1,0 +1,6 @@
+"""Allocation with the field's constraints: energy, windows, due times, lines, bases, zones, wind."""
+
+from swarm.allocation.field.problem import FieldProblem
+from swarm.allocation.field.state import FieldState
+
+__all__ = ["FieldProblem", "FieldState"]

@@ -1,0 +1,216 @@
+"""Legs, lines and ways home of a mission's UAVs, as the tables of `FieldProblem`.
+
+Nodes are the starts of the UAVs, then the bases, then the ends of the tasks: a place has one node,
+a line one for each end. UAVs that fly alike, and whose zones concern them alike, share a table.
+Leaves out: the paths themselves and how long they take (swarm.allocation.legs).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.allocation.legs import Airspace, FlightModel, LegNetwork
+from swarm.model import Base, Mission, Task, Uav
+from swarm.model.layers import FlightLayers
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int32]
+
+START = -1
+"""In the place of a base: the UAV's own start."""
+
+
+class FieldNetwork:
+    """All that is between the nodes of a mission, UAV by UAV.
+
+    Args:
+        mission: gives bases, zones with their margin, wind and band.
+        uavs: rows.
+        tasks: columns.
+        layers_m: (n_uav,) heights of the UAVs' layers [m]; when None, as a coordinator flies them
+            by default, by their places in the mission, else in ``uavs``.
+
+    Raises:
+        ValueError: there is not one layer for each UAV.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        uavs: Sequence[Uav],
+        tasks: Sequence[Task],
+        layers_m: Sequence[float] | None = None,
+    ) -> None:
+        if layers_m is not None and len(layers_m) != len(uavs):
+            raise ValueError(f"layers_m must have a height for each of {len(uavs)} UAVs")
+        self._layers_m = (
+            _layers_m(mission, uavs) if layers_m is None else list(map(float, layers_m))
+        )
+        self._band_m = mission.band_m
+        self._airspace = Airspace(mission.zones, mission.zone_margin_m)
+        self.node_enu_m, self.enter, self._in_layer = _nodes(uavs, mission.bases, tasks)
+        networks: dict[bytes, LegNetwork] = {}
+        kinds: dict[tuple[FlightModel, bytes], int] = {}
+        kind, self._kinds = [], list[tuple[FlightModel, LegNetwork]]()
+        for uav, layer_m in zip(uavs, self._layers_m, strict=True):
+            model = _model(uav, mission.wind_enu_m_s)
+            low_m, high_m = self._heights_m(layer_m)
+            sides = self._sides(low_m, high_m)
+            if sides not in networks:
+                networks[sides] = LegNetwork(self._airspace, self.node_enu_m, low_m, high_m)
+            if (model, sides) not in kinds:
+                kinds[model, sides] = len(kinds)
+                self._kinds.append((model, networks[sides]))
+            kind.append(kinds[model, sides])
+        self.kind: IntArray = np.array(kind, dtype=np.int32)
+        """(n_uav,) row of the tables of legs."""
+        self.leg_s: FloatArray = self._leg_s()
+        """(n_kind, n_node, n_node) times of legs [s]."""
+        self.line_s: FloatArray = np.zeros((len(kinds), len(tasks), 2))
+        """(n_kind, n_task, 2) times along lines, forwards and backwards [s]."""
+        for row, (model, _) in enumerate(self._kinds):
+            _add_lines_s(model, tasks, self.line_s[row])
+        self.home_s, self.home = self._homes(len(mission.bases))
+
+    def legs_from_s(
+        self, uav: int, place_enu_m: Sequence[float] | FloatArray, flown_m: float | None = None
+    ) -> FloatArray:
+        """(n_node,) times of ``uav`` from anywhere to every node [s]; infinite: no way.
+
+        Args:
+            uav: its row.
+            place_enu_m: (3,) place [m; ENU], its height as tasks give theirs, without the layer.
+            flown_m: height there [m above the origin]; in the UAV's layer above it when None.
+        """
+        model, network = self._kinds[self.kind[uav]]
+        place_m, low_m, high_m = self._placed(uav, place_enu_m, flown_m)
+        times_s: FloatArray = network.legs_from(place_m, low_m, high_m).times_s(model)[0]
+        return times_s
+
+    def corners_m(self, uav: int, begin: int, end: int) -> FloatArray | None:
+        """(k, 3) places [m; ENU] of the leg between two nodes, both included; None: no way."""
+        _, network = self._kinds[self.kind[uav]]
+        return network.legs.corners_m(begin, end)
+
+    def corners_from_m(
+        self,
+        uav: int,
+        place_enu_m: Sequence[float] | FloatArray,
+        end: int,
+        flown_m: float | None = None,
+    ) -> FloatArray | None:
+        """The same from anywhere, as `legs_from_s` has it, to a node."""
+        _, network = self._kinds[self.kind[uav]]
+        return network.legs_from(*self._placed(uav, place_enu_m, flown_m)).corners_m(0, end)
+
+    def _placed(
+        self, uav: int, place_enu_m: Sequence[float] | FloatArray, flown_m: float | None
+    ) -> tuple[FloatArray, float, float]:
+        place_m = np.asarray(place_enu_m, dtype=np.float64).reshape(1, 3)
+        if self._band_m is not None:
+            return place_m, *self._band_m
+        height_m = float(place_m[0, 2]) + self._layers_m[uav] if flown_m is None else flown_m
+        return place_m, height_m, height_m
+
+    def _heights_m(self, layer_m: float) -> tuple[FloatArray, FloatArray]:
+        """(n_node,) lowest and greatest heights that a UAV may use there [m above the origin]."""
+        up_m = self.node_enu_m[:, 2]
+        if self._band_m is not None:
+            low_m, high_m = self._band_m
+            return np.full_like(up_m, low_m), np.full_like(up_m, high_m)
+        flown_m = np.where(self._in_layer, up_m + layer_m, up_m)
+        return flown_m, flown_m
+
+    def _sides(self, low_m: FloatArray, high_m: FloatArray) -> bytes:
+        """On which sides of all zones' floors and ceilings the nodes lie."""
+        zones = self._airspace.zones
+        below = low_m[:, None] < np.array([zone.top_m for zone in zones])
+        above = high_m[:, None] > np.array([zone.bottom_m for zone in zones])
+        return below.tobytes() + above.tobytes()
+
+    def _leg_s(self) -> FloatArray:
+        n_node = len(self.node_enu_m)
+        tables_s = [network.legs.times_s(model) for model, network in self._kinds]
+        if len(tables_s) == 1:  # the largest array of all is not copied
+            return tables_s[0][None]
+        return np.array(tables_s).reshape(-1, n_node, n_node)
+
+    def _homes(self, n_base: int) -> tuple[FloatArray, IntArray]:
+        """(n_uav, n_node) times to the nearest base or own start [s], and which that is.
+
+        Of those that are as near the start goes first, then the mission's order.
+        """
+        n_uav, n_node = len(self.kind), len(self.node_enu_m)
+        home_s = np.empty((n_uav, n_node))
+        home = np.empty((n_uav, n_node), dtype=np.int32)
+        for uav in range(n_uav):
+            ends = [uav, *range(n_uav, n_uav + n_base)]
+            to_s = self.leg_s[self.kind[uav]][:, ends]
+            nearest = to_s.argmin(axis=1)
+            home[uav] = nearest + START
+            home_s[uav] = to_s[np.arange(n_node), nearest]
+        return home_s, home
+
+
+def _layers_m(mission: Mission, uavs: Sequence[Uav]) -> list[float]:
+    layers = FlightLayers()
+    places = {uav.id: index for index, uav in enumerate(mission.uavs)}
+    return [layers.layer_m(places.get(uav.id, row)) for row, uav in enumerate(uavs)]
+
+
+def _nodes(
+    uavs: Sequence[Uav], bases: Sequence[Base], tasks: Sequence[Task]
+) -> tuple[FloatArray, IntArray, npt.NDArray[np.bool_]]:
+    """(n_node, 3) places [m], (n_task, 2) nodes, (n_node,) whether UAVs keep to their layers there.
+
+    Heights of places are those that the mission gives.
+    """
+    places = [uav.position_enu_m for uav in uavs] + [base.position_enu_m for base in bases]
+    in_layer = [True] * len(places)
+    enter = []
+    for task in tasks:
+        ends = _points(task)[:: max(1, len(task.path_enu_m) - 1)]
+        enter.append((len(places), len(places) + len(ends) - 1))
+        places += ends
+        in_layer += [task.height_m is None] * len(ends)
+    return (
+        np.array(places, dtype=np.float64).reshape(-1, 3),
+        np.array(enter, dtype=np.int32).reshape(-1, 2),
+        np.array(in_layer, dtype=np.bool_),
+    )
+
+
+def _points(task: Task) -> list[tuple[float, float, float]]:
+    """Where a task is flown, a place as one point; height_m goes before what points say."""
+    points = list(task.path_enu_m) or [task.position_enu_m]
+    if task.height_m is None:
+        return points
+    return [(east_m, north_m, task.height_m) for east_m, north_m, _ in points]
+
+
+def _model(uav: Uav, wind_enu_m_s: tuple[float, float]) -> FlightModel:
+    airspeed_m_s, speed_m_s = uav.airspeed_m_s, uav.speed_m_s
+    if airspeed_m_s is None:
+        return FlightModel(speed_m_s, uav.acceleration_m_s2)
+    if not any(wind_enu_m_s):  # in calm air direction is no matter
+        return FlightModel(min(speed_m_s, airspeed_m_s), uav.acceleration_m_s2)
+    return FlightModel(speed_m_s, uav.acceleration_m_s2, airspeed_m_s, wind_enu_m_s)
+
+
+def _add_lines_s(model: FlightModel, tasks: Sequence[Task], line_s: FloatArray) -> None:
+    """Set the (n_task, 2) times of those tasks that are lines [s]."""
+    straight = [index for index, task in enumerate(tasks) if len(task.path_enu_m) == 2]
+    for index, task in enumerate(tasks):
+        if len(task.path_enu_m) > 2:
+            path_m = np.array(_points(task), dtype=np.float64)
+            line_s[index] = model.path_s(path_m), model.path_s(path_m[::-1])
+            if not model.heeds_direction:  # sums of pieces may differ in their last bit
+                line_s[index, 1] = line_s[index, 0]
+    if straight:
+        ends_m = np.array([_points(tasks[index]) for index in straight], dtype=np.float64)
+        offset_m = (ends_m[:, 1] - ends_m[:, 0]).T
+        line_s[straight, 0] = model.straight_s(offset_m)
+        line_s[straight, 1] = model.straight_s(-offset_m)

@@ -1,0 +1,27 @@
+"""Heights at which the UAVs of a mission fly, if its file names none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLayers:
+    """Heights at which the UAVs fly, each its own.
+
+    Raises:
+        ValueError: a height is not positive.
+    """
+
+    lowest_m: float = 10.0
+    """Height of the first UAV's layer above the places it visits [m]."""
+    spacing_m: float = 3.0
+    """Distance between neighbouring layers [m]."""
+
+    def __post_init__(self) -> None:
+        if not (self.lowest_m > 0.0 and self.spacing_m >= 0.0):
+            raise ValueError(f"layers need lowest_m > 0 and spacing_m >= 0, not {self}")
+
+    def layer_m(self, index: int) -> float:
+        """Layer of the UAV with that place in the scenario [m]."""
+        return self.lowest_m + index * self.spacing_m
