@@ -107,12 +107,12 @@ def plan(
     from json import dumps
 
     from coordinator.core.publication import height_warning
-    from swarm.model.layers import FlightLayers
     from coordinator.export import require_origin
     from coordinator.planner.exact import ProblemTooLargeError
     from coordinator.planner.options import BOUND_S, after_time, bound_frac, first_of
     from coordinator.planner.plan import make_plan
     from coordinator.planner.plan_report import plan_as_json, plan_table
+    from swarm.model.layers import FlightLayers
     from swarm.runtime.process import EXIT_INTERRUPTED
     from swarm.scenario import load_scenario, require_plain
 
@@ -308,7 +308,6 @@ def coordinator(
     """
     from coordinator.core.active import CoordinatorCore
     from coordinator.core.publication import height_warning
-    from swarm.model.layers import FlightLayers
     from coordinator.daemon import CoordinatorProcess
     from coordinator.dashboard.access import parse_serve_address
     from coordinator.dashboard.supervisor import supervised_dashboard
@@ -316,6 +315,7 @@ def coordinator(
     from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.identity import Role
     from swarm.model.ids import COORDINATOR
+    from swarm.model.layers import FlightLayers
     from swarm.protocol.seal import seal_of
     from swarm.runtime.clock import ScaledClock, incarnation
     from swarm.runtime.log import configure_logging, get_logger, identify

@@ -15,9 +15,9 @@ from collections.abc import Iterator, Sequence
 from enum import Enum
 from pathlib import Path
 
-from swarm.model.layers import FlightLayers
 from swarm.model import Mission, Origin, Plan, Task, Uav
 from swarm.model.frames import wgs84_from_enu
+from swarm.model.layers import FlightLayers
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.task_files.mission_items import MavCommand, MavFrame
 from swarm.scenario.task_files.plan_file import LAYER_KEY

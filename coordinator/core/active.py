@@ -28,10 +28,10 @@ from coordinator.core.lifecycle import (
     Withdraw,
 )
 from coordinator.core.publication import RegisterAnnouncer
-from swarm.model.layers import FlightLayers
 from coordinator.core.stages import MissionStage, StagedMission
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
+from swarm.model.layers import FlightLayers
 from swarm.protocol.events import (
     Ask,
     KeysReplaced,

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coordinator.core.publication import mission_config_of, task_entry_of
-from swarm.model.layers import FlightLayers
 from swarm.bus.port import Bus
 from swarm.model import Mission, UavId
 from swarm.model.ids import COORDINATOR
+from swarm.model.layers import FlightLayers
 from swarm.protocol.encoding import encode
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Body, MissionPhase, PlanEpoch

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from agent.vehicle.config import CommandStyle, parse_forward
 from agent.vehicle.signing import load_signing_key, signing_key_of
-from swarm.model.layers import FlightLayers
 from sim.autopilot.options import faults_by_uav
 from sim.fleet.autopilots import Autopilots, SimulatedAutopilots
 from swarm.model import Mission
+from swarm.model.layers import FlightLayers
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
 _RADIUS_FACTOR = 1.2

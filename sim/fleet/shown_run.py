@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Self, TextIO
 from rich.console import Console
 
 from coordinator.core.publication import height_warning
-from swarm.model.layers import FlightLayers
 from coordinator.terminal.live_view import LiveView
 from coordinator.terminal.report import MissionReport
 from sim.fleet.layout import LaunchOptions
@@ -24,6 +23,7 @@ from sim.fleet.run import fly
 from sim.fleet.security import security_of
 from sim.options import print_report
 from swarm.model import Mission
+from swarm.model.layers import FlightLayers
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import Fault, InputError
 

@@ -33,7 +33,6 @@ from coordinator.core.lifecycle import (
     TakeSeat,
     Withdraw,
 )
-from swarm.model.layers import FlightLayers
 from coordinator.core.standby import StandbyCore
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.operator.commands import CommandRequest
@@ -51,6 +50,7 @@ from sim.world.settings import (
 from sim.world.vehicles import IdealVehicle, SimulatedVehicle
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
+from swarm.model.layers import FlightLayers
 from swarm.protocol.events import Ask, Finish, LogLine, Publish, PublishLast, Save
 from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.timing import Timing

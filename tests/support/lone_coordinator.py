@@ -8,8 +8,8 @@ from typing import TypeVar
 
 from coordinator.core.active import CoordinatorCore
 from coordinator.core.lifecycle import CoordinatorAction, CoordinatorEvent, MakePlan, PlanMade
-from swarm.model.layers import FlightLayers
 from swarm.model import Mission, Plan, UavId
+from swarm.model.layers import FlightLayers
 from swarm.protocol.events import (
     Ask,
     Finish,

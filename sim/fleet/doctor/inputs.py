@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coordinator.core.publication import height_warning
-from swarm.model.layers import FlightLayers
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 from swarm.identity import Identity, Role, load_identity
 from swarm.identity.folder import shown_time
 from swarm.model import Mission
+from swarm.model.layers import FlightLayers
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario, require_plain
 

@@ -1,4 +1,4 @@
-"""Allocation with the field's constraints: energy, windows, due times, lines, bases, zones, wind."""
+"""Allocation with the field's constraints: energy, windows, due times, lines, zones, wind."""
 
 from swarm.allocation.field.problem import FieldProblem
 from swarm.allocation.field.state import FieldState

@@ -54,7 +54,8 @@ class FieldNetwork:
         self.node_enu_m, self.enter, self._in_layer = _nodes(uavs, mission.bases, tasks)
         networks: dict[bytes, LegNetwork] = {}
         kinds: dict[tuple[FlightModel, bytes], int] = {}
-        kind, self._kinds = [], list[tuple[FlightModel, LegNetwork]]()
+        kind = []
+        self._kinds: list[tuple[FlightModel, LegNetwork]] = []
         for uav, layer_m in zip(uavs, self._layers_m, strict=True):
             model = _model(uav, mission.wind_enu_m_s)
             low_m, high_m = self._heights_m(layer_m)
@@ -85,14 +86,14 @@ class FieldNetwork:
             place_enu_m: (3,) place [m; ENU], its height as tasks give theirs, without the layer.
             flown_m: height there [m above the origin]; in the UAV's layer above it when None.
         """
-        model, network = self._kinds[self.kind[uav]]
+        model, network = self._kind_of(uav)
         place_m, low_m, high_m = self._placed(uav, place_enu_m, flown_m)
         times_s: FloatArray = network.legs_from(place_m, low_m, high_m).times_s(model)[0]
         return times_s
 
     def corners_m(self, uav: int, begin: int, end: int) -> FloatArray | None:
         """(k, 3) places [m; ENU] of the leg between two nodes, both included; None: no way."""
-        _, network = self._kinds[self.kind[uav]]
+        _, network = self._kind_of(uav)
         return network.legs.corners_m(begin, end)
 
     def corners_from_m(
@@ -103,8 +104,11 @@ class FieldNetwork:
         flown_m: float | None = None,
     ) -> FloatArray | None:
         """The same from anywhere, as `legs_from_s` has it, to a node."""
-        _, network = self._kinds[self.kind[uav]]
+        _, network = self._kind_of(uav)
         return network.legs_from(*self._placed(uav, place_enu_m, flown_m)).corners_m(0, end)
+
+    def _kind_of(self, uav: int) -> tuple[FlightModel, LegNetwork]:
+        return self._kinds[int(self.kind[uav])]
 
     def _placed(
         self, uav: int, place_enu_m: Sequence[float] | FloatArray, flown_m: float | None

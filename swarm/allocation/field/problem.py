@@ -1,8 +1,8 @@
 """The field's problem as arrays: windows, due times, lines, energy, bases, and legs as tables.
 
-What a plain `swarm.allocation.Problem` is for the paper's missions, this is for all others: validated
-once, read by every rule, search and proof. Nodes are the starts of the UAVs, then the bases, then the
-ends of the tasks. Rows are UAVs, columns are tasks, in the order of the ids.
+What a plain `swarm.allocation.Problem` is for the paper's missions, this is for all others:
+validated once, read by every rule, search and proof. Nodes are the starts of the UAVs, then the
+bases, then the ends of the tasks. Rows are UAVs, columns are tasks, in the order of the ids.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class FieldProblem:
                 raise ValueError(f"{name} must differ from each other: {list(ids)}")
             object.__setattr__(self, name, ids)
         for name, (dtype, n_axes) in (*_ARRAYS.items(), ("first_s", (np.float64, 1))):
-            array = converted(name, getattr(self, name), dtype, n_axes)
+            array: npt.NDArray[np.generic] = converted(name, getattr(self, name), dtype, n_axes)
             # Tables of legs are large, and nobody else has them.
             self._freeze(name, array.view() if name == "leg_s" else array.copy())
         for name, ids, n in (

@@ -12,12 +12,12 @@ from functools import partial
 import pytest
 
 from coordinator.core.active import CoordinatorCore
-from swarm.model.layers import FlightLayers
 from coordinator.daemon import run_coordinator
 from coordinator.planner.options import ShouldStop
 from swarm.bus.port import BusEvent, Sample
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
+from swarm.model.layers import FlightLayers
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.key_space import KeySpace

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm.model.layers import FlightLayers
 from coordinator.export import ExportFirmware, uav_plan, write_plans
 from coordinator.planner.plan import make_plan
 from swarm.cli import main
 from swarm.model import Mission, Origin, Plan, Task, TaskId, Uav, UavId
 from swarm.model.frames import enu_from_wgs84
+from swarm.model.layers import FlightLayers
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import InputError
 from swarm.scenario.task_files import read_task_file

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from coordinator.core.lifecycle import PlanFailed, PlanMade, Withdraw
-from swarm.model.layers import FlightLayers
 from swarm.model.ids import COORDINATOR
+from swarm.model.layers import FlightLayers
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.events import (

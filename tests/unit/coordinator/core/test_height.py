@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from coordinator.core.publication import height_warning
-from swarm.model.layers import FlightLayers
 from swarm.cli import main
 from swarm.model import Mission, Uav, UavId
+from swarm.model.layers import FlightLayers
 from swarm.scenario.write import format_scenario
 from tests.support.builders import mission, task
 

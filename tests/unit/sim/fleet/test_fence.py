@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from swarm.model.layers import FlightLayers
 from sim.fleet.passthrough import Fence, PassthroughOptions, fence_around
+from swarm.model.layers import FlightLayers
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario, shipped_scenarios
 from tests.support.builders import mission, task, uav
