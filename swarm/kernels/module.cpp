@@ -11,4 +11,5 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_rollout(module);
     peckorder::bind_routes(module);
     peckorder::bind_field(module);
+    peckorder::bind_field_team(module);
 }

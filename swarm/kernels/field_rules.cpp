@@ -1,0 +1,321 @@
+// Teams that decide item by item; see field_rules.hpp.
+#include "field_rules.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace peckorder {
+
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr int kStepsPerTask = 2;  // of some ten nanoseconds, to look at one
+
+}  // namespace
+
+void BaseTraffic::reset(const FieldProblem& problem, const FieldTeam& team) {
+    at_.assign(problem.n_uav, At{});
+    held_.assign(problem.n_base, 0);
+    limit_.assign(problem.n_base, 0);
+    for (int base = 0; base < problem.n_base; ++base) {
+        const int slots = problem.slots[base];
+        if (slots < problem.n_uav) limit_[base] = slots;  // more are as good as no limit
+    }
+    for (int uav = 0; uav < problem.n_uav; ++uav) {
+        const int base = team.landed_at[uav];
+        if (base < 0 || !limited(base)) continue;
+        hold(uav, base, team.active[uav] ? team.free_s[uav] : kNever);
+    }
+}
+
+void BaseTraffic::approach(int uav, int base, const Arrival& arrival, double sortie_end_s) {
+    at_[uav] = At{Stage::kApproaching, base, 0.0, arrival, sortie_end_s};
+}
+
+void BaseTraffic::hold(int uav, int base, double until_s) {
+    at_[uav] = At{Stage::kHolding, base, until_s, Arrival{}, 0.0};
+    ++held_[base];
+}
+
+void BaseTraffic::leave(int uav) {
+    --held_[at_[uav].base];
+    at_[uav].stage = Stage::kElsewhere;
+}
+
+double BaseTraffic::begin_s(const FieldProblem& problem, int base, const Arrival& arrival) {
+    if (!limited(base)) return arrival.arrive_s;
+    slot_s_.assign(limit_[base], -kNever);
+    const auto slot = [&]() -> double& {
+        return *std::min_element(slot_s_.begin(), slot_s_.end());
+    };
+    ahead_.clear();
+    for (int uav = 0; uav < problem.n_uav; ++uav) {
+        const At& other = at_[uav];
+        if (other.stage == Stage::kElsewhere || other.base != base) continue;
+        if (other.stage == Stage::kHolding) {
+            double& slot_s = slot();
+            slot_s = std::max(slot_s, other.until_s);
+        } else if (other.arrival < arrival) {
+            ahead_.push_back(uav);
+        }
+    }
+    std::sort(ahead_.begin(), ahead_.end(),
+              [&](int a, int b) { return at_[a].arrival < at_[b].arrival; });
+    for (const int uav : ahead_) {
+        double& slot_s = slot();
+        const double begin_s = std::max(at_[uav].arrival.arrive_s, slot_s);
+        if (begin_s <= at_[uav].sortie_end_s + kToleranceS) slot_s = begin_s + problem.swap_s[base];
+    }
+    return std::max(arrival.arrive_s, slot());
+}
+
+FieldChoice FieldDecider::decide(FieldRule, const FieldView& view, BaseTraffic& traffic) {
+    const FieldChoice choice = greedy(view);
+    return choice.home ? base(view, traffic) : choice;
+}
+
+FieldChoice FieldDecider::greedy(const FieldView& view) const {
+    const FieldProblem& problem = view.problem;
+    FieldChoice best;
+    for (const int task : view.open) {
+        FieldChoice found;  // the better direction of this task
+        for (int backwards = 0; backwards <= problem.is_line[task]; ++backwards) {
+            const Item item = item_of_task(task, backwards);
+            Progress progress = view.progress;
+            Times times;
+            if (do_task(problem, view.uav, item, progress, times) != Refusal::kNone) continue;
+            const double weight = problem.weight[problem.at(view.uav, task)];
+            const double score =
+                (view.progress.survived * weight) * (problem.until_s[task] - times.end_s);
+            if (found.home || score > found.score) {
+                found = {false, item, true, false, score, 0.0, times};
+            }
+        }
+        if (found.home) continue;
+        if (best.home || found.score > best.score) {
+            found.has_second = !best.home;
+            found.second = best.score;
+            best = found;
+        } else if (!best.has_second || found.score > best.second) {
+            best.has_second = true;
+            best.second = found.score;
+        }
+    }
+    return best;
+}
+
+// Whether it could do a task next.
+bool FieldDecider::opens_any(const FieldView& view, const Progress& progress) const {
+    for (const int task : view.open) {
+        for (int backwards = 0; backwards <= view.problem.is_line[task]; ++backwards) {
+            Progress after = progress;
+            Times times;
+            const Item item = item_of_task(task, backwards);
+            if (do_task(view.problem, view.uav, item, after, times) == Refusal::kNone) return true;
+        }
+    }
+    return false;
+}
+
+// The base where it is ready earliest of those after which it could do a task; if there is none, the
+// first on the way to such a one over others.
+FieldChoice FieldDecider::base(const FieldView& view, BaseTraffic& traffic) {
+    const FieldProblem& problem = view.problem;
+    if (view.open.empty() || problem.full_s[view.uav] == kNever) return {};
+    labels_.assign(problem.n_base, Label{});
+    const auto reach = [&](const Progress& from, int to, Progress& progress, Times& times) {
+        progress = from;
+        const double arrive_s = arrival_s(problem, to, from);
+        if (arrive_s == kNever) return false;
+        const double begin_s = traffic.begin_s(problem, to, {arrive_s, view.rank, view.uav});
+        return begin_s < kNever && swap_battery(problem, view.uav, to, begin_s, progress, times) ==
+                                       Refusal::kNone;
+    };
+    const auto chosen = [&](int first_base, const Times& times) {
+        return FieldChoice{false, item_of_base(first_base), false, false, 0.0, 0.0, times};
+    };
+    int nearest = -1;
+    for (int base = 0; base < problem.n_base; ++base) {
+        Label& label = labels_[base];
+        if (base == view.here) {
+            label.settled = true;  // there it stands already, as well off as it can be
+            continue;
+        }
+        label.first_base = base;
+        label.reached = reach(view.progress, base, label.progress, label.first);
+        if (!label.reached) continue;
+        if (nearest >= 0 && labels_[nearest].progress.time_s <= label.progress.time_s) continue;
+        if (opens_any(view, label.progress)) nearest = base;
+    }
+    if (nearest >= 0) return chosen(nearest, labels_[nearest].first);
+    while (true) {  // Dijkstra's: being ready earlier is never worse
+        int next = -1;
+        for (int base = 0; base < problem.n_base; ++base) {
+            const Label& label = labels_[base];
+            if (!label.reached || label.settled) continue;
+            if (next < 0 || label.progress.time_s < labels_[next].progress.time_s) next = base;
+        }
+        if (next < 0) return {};
+        Label& label = labels_[next];
+        label.settled = true;
+        if (label.first_base != next && opens_any(view, label.progress)) {
+            return chosen(label.first_base, label.first);
+        }
+        for (int base = 0; base < problem.n_base; ++base) {
+            Label& other = labels_[base];
+            Progress progress;
+            Times times;
+            if (other.settled || !reach(label.progress, base, progress, times)) continue;
+            if (other.reached && other.progress.time_s <= progress.time_s) continue;
+            other = {progress, label.first, label.first_base, true, false};
+        }
+    }
+}
+
+bool FieldRun::later(const Event& a, const Event& b) {
+    if (a.time_s != b.time_s) return a.time_s > b.time_s;
+    if (a.kind != b.kind) return a.kind > b.kind;
+    if (a.rank != b.rank) return a.rank > b.rank;
+    return a.uav > b.uav;
+}
+
+void FieldRun::push(double time_s, Kind kind, int uav) {
+    events_.push_back({time_s, kind, rank_[uav], uav});
+    std::push_heap(events_.begin(), events_.end(), later);
+}
+
+void FieldRun::run(const FieldProblem& problem, const FieldTeam& team, FieldRule rule,
+                   Watch& watch) {
+    most_items_.assign(problem.n_uav, std::numeric_limits<int>::max());
+    do {
+        once(problem, team, rule, watch);
+    } while (shortened());
+}
+
+// Whether someone flew to a base in vain; from there on it visits no more.
+bool FieldRun::shortened() {
+    bool any = false;
+    for (std::size_t uav = 0; uav < uavs_.size(); ++uav) {
+        if (uavs_[uav].n_since_task == 0) continue;
+        most_items_[uav] = uavs_[uav].n_item - uavs_[uav].n_since_task;
+        any = true;
+    }
+    return any;
+}
+
+void FieldRun::once(const FieldProblem& problem, const FieldTeam& team, FieldRule rule,
+                    Watch& watch) {
+    rank_ = team.rank;
+    open_.clear();
+    for (int task = 0; task < problem.n_task; ++task) {
+        if (team.open[task]) open_.push_back(task);
+    }
+    traffic_.reset(problem, team);
+    waiting_.resize(problem.n_base);
+    for (std::vector<int>& waiting : waiting_) waiting.clear();
+    uavs_.clear();
+    events_.clear();
+    decisions_.clear();
+    for (int uav = 0; uav < problem.n_uav; ++uav) {
+        uavs_.push_back({team.begin(problem, uav), 0, 0, team.landed_at[uav]});
+        if (team.active[uav] && team.free_s[uav] < kNever) {
+            push(team.free_s[uav], Kind::kDecision, uav);
+        }
+    }
+    while (!events_.empty()) {
+        std::pop_heap(events_.begin(), events_.end(), later);
+        const Event event = events_.back();
+        events_.pop_back();
+        if (event.kind == Kind::kRelease) {
+            release(problem, event.uav);
+        } else if (event.kind == Kind::kDecision) {
+            decide(problem, rule, event.uav, watch);
+        } else {
+            const int base = uavs_[event.uav].base;
+            if (traffic_.any_free(base)) {
+                touch_down(problem, event.uav, event.time_s);
+            } else {
+                waiting_[base].push_back(event.uav);
+            }
+        }
+    }
+}
+
+void FieldRun::decide(const FieldProblem& problem, FieldRule rule, int uav, Watch& watch) {
+    Uav& self = uavs_[uav];
+    const double now_s = self.progress.time_s;
+    const int here = self.progress.landed ? self.base : -1;
+    FieldChoice choice;
+    const auto steps = static_cast<std::int64_t>(open_.size()) * kStepsPerTask;
+    if (!watch.stops_after(steps)) {
+        choice = decider_.decide(rule, {problem, open_, uav, rank_[uav], self.progress, here},
+                                 traffic_);
+    }
+    // As many swaps in a row as there are bases lead everywhere.
+    const bool no_more_swaps =
+        self.n_item >= most_items_[uav] || self.n_since_task >= problem.n_base;
+    if (!choice.home && is_base(choice.item) && no_more_swaps) choice = {};
+    const bool holds = here >= 0 && traffic_.limited(here);
+    if (choice.home) {
+        if (holds) release(problem, uav);
+        return;
+    }
+    decisions_.push_back({uav, now_s, choice});
+    ++self.n_item;
+    if (!is_base(choice.item)) {
+        const int task = task_of(choice.item);
+        do_task(problem, uav, choice.item, self.progress, choice.times);
+        self.n_since_task = 0;
+        open_.erase(std::lower_bound(open_.begin(), open_.end(), task));
+        push(self.progress.time_s, Kind::kDecision, uav);
+        if (!holds) return;
+        if (choice.times.depart_s > now_s) {
+            traffic_.stays(uav, choice.times.depart_s);
+            push(choice.times.depart_s, Kind::kRelease, uav);
+        } else {
+            release(problem, uav);
+        }
+        return;
+    }
+    if (holds) release(problem, uav);
+    ++self.n_since_task;
+    self.base = base_of(choice.item);
+    const double arrive_s = arrival_s(problem, self.base, self.progress);
+    if (!traffic_.limited(self.base)) {
+        touch_down(problem, uav, arrive_s);
+        return;
+    }
+    const double sortie_end_s = self.progress.landed ? self.progress.time_s + problem.full_s[uav]
+                                                     : self.progress.sortie_end_s;
+    traffic_.approach(uav, self.base, {arrive_s, rank_[uav], uav}, sortie_end_s);
+    push(arrive_s, Kind::kArrival, uav);
+}
+
+// A slot is free for it; if that is too late for its energy it has gone home instead.
+void FieldRun::touch_down(const FieldProblem& problem, int uav, double begin_s) {
+    Uav& self = uavs_[uav];
+    Times times;
+    const Refusal refusal = swap_battery(problem, uav, self.base, begin_s, self.progress, times);
+    if (traffic_.limited(self.base)) {
+        if (refusal != Refusal::kNone) {
+            traffic_.give_up(uav);
+        } else {
+            traffic_.hold(uav, self.base, self.progress.time_s);
+        }
+    }
+    if (refusal == Refusal::kNone) push(self.progress.time_s, Kind::kDecision, uav);
+}
+
+void FieldRun::release(const FieldProblem& problem, int uav) {
+    const int base = traffic_.base_of_holder(uav);
+    const double now_s = traffic_.until_s(uav);
+    traffic_.leave(uav);
+    std::vector<int>& waiting = waiting_[base];
+    while (!waiting.empty() && traffic_.any_free(base)) {
+        const int next = waiting.front();
+        waiting.erase(waiting.begin());
+        touch_down(problem, next, now_s);
+    }
+}
+
+}  // namespace peckorder
