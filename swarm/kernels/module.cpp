@@ -11,5 +11,6 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_rollout(module);
     peckorder::bind_routes(module);
     peckorder::bind_field(module);
+    peckorder::bind_field_exact(module);
     peckorder::bind_field_team(module);
 }

@@ -1,0 +1,180 @@
+"""The proven optimum of the field's problem for small teams, and the best lists of one UAV.
+
+Items of a list: task k from its first point on is 2k, from its last point on 2k + 1; base b is
+-1 - b. Comparison everywhere: (fewest tasks without due_s left out, then largest J).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.kernels import _kernels
+from swarm.kernels._kernels import KernelField
+from swarm.kernels.lower_level import default_threads
+
+MOST_TASKS: int = _kernels.MOST_FIELD_TASKS
+"""Tasks the solver takes."""
+
+
+class TeamAsArrays(Protocol):
+    """Where a team stands: swarm.allocation.field.FieldState."""
+
+    @property
+    def free_s(self) -> npt.NDArray[np.float64]:
+        """(n_uav,) when it is free [s]; infinite: it takes no decision."""
+
+    @property
+    def sortie_end_s(self) -> npt.NDArray[np.float64]:
+        """(n_uav,) when it has landed at the latest [s]."""
+
+    @property
+    def first_s(self) -> npt.NDArray[np.float64]:
+        """(n_uav, n_node) times of legs from where it is then [s]."""
+
+    @property
+    def survived(self) -> npt.NDArray[np.float64]:
+        """(n_uav,) S of eq. 1 of its next task."""
+
+    @property
+    def active(self) -> npt.NDArray[np.bool_]:
+        """(n_uav,) whether it takes part."""
+
+    @property
+    def open(self) -> npt.NDArray[np.bool_]:
+        """(n_task,) whether somebody may take the task."""
+
+    @property
+    def landed_at(self) -> npt.NDArray[np.int32]:
+        """(n_uav,) base at which it stands, or -1."""
+
+    @property
+    def rank(self) -> npt.NDArray[np.int64]:
+        """(n_uav,) place in the sequence."""
+
+
+class ProofOutcome(Enum):
+    """How an exact search ended."""
+
+    PROVEN = 0
+    STOPPED = 1
+    TOO_LARGE = 2
+
+
+@dataclass(frozen=True, slots=True)
+class FieldLists:
+    """The best lists that were found."""
+
+    outcome: ProofOutcome
+    """Whether they are proven to be the best."""
+    n_left_out: int
+    """Open tasks without due_s that are on no list."""
+    objective: float
+    """J of the lists from the state on [value·s]."""
+    lists: tuple[tuple[int, ...], ...]
+    """Items of each UAV."""
+
+
+@dataclass(frozen=True, slots=True)
+class OwnFieldList:
+    """The best list of one UAV as if it were alone."""
+
+    outcome: ProofOutcome
+    """Only one that is proven is of use."""
+    n_left_out: int
+    """Open tasks without due_s that it is capable of and that are not on it."""
+    objective: float
+    """J of the list from the state on [value·s]."""
+    items: tuple[int, ...]
+    """What it holds."""
+
+
+def optimum(
+    problem: KernelField,
+    team: TeamAsArrays,
+    *,
+    known: Sequence[Sequence[int]] = (),
+    threads: int | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> FieldLists | None:
+    """The best lists of a team from where it stands on, slots included.
+
+    The same with any number of threads. Several visits to bases in a row are at most as many as
+    there are bases.
+
+    Args:
+        problem: what it is about.
+        team: where it stands.
+        known: lists to be better than, one of each UAV; of no matter where they can't be flown.
+        threads: as many as there are processors when None.
+        should_stop: asked every few milliseconds whether to give up.
+
+    Returns:
+        The best that was found, not proven where it was told to stop or grew too large; None where
+        that was before anything was found.
+
+    Raises:
+        ValueError: an argument is not what it must be.
+    """
+    count = default_threads() if threads is None else threads
+    outcome, found, n_left_out, objective, lists = _kernels.field_optimum(
+        problem, _as_tuple(team), [list(items) for items in known], count, should_stop
+    )
+    if not found:
+        return None
+    items = tuple(tuple(own) for own in lists)
+    return FieldLists(ProofOutcome(outcome), n_left_out, objective, items)
+
+
+def best_list(
+    problem: KernelField,
+    team: TeamAsArrays,
+    uav: int,
+    *,
+    should_stop: Callable[[], bool] | None = None,
+) -> OwnFieldList:
+    """The best list of one UAV over all open tasks, as if it were alone; slots are no concern.
+
+    Args:
+        problem: what it is about.
+        team: where it stands.
+        uav: whose list.
+        should_stop: asked every few milliseconds whether to give up.
+
+    Raises:
+        ValueError: an argument is not what it must be, or it is capable of more than
+            `MOST_TASKS` open tasks.
+    """
+    outcome, n_left_out, objective, items = _kernels.field_best_list(
+        problem, _as_tuple(team), uav, should_stop
+    )
+    return OwnFieldList(ProofOutcome(outcome), n_left_out, objective, tuple(items))
+
+
+def can_do_alone(problem: KernelField, team: TeamAsArrays) -> npt.NDArray[np.bool_]:
+    """Whether a UAV could do a task as its only one, with as many swaps as it takes.
+
+    Every slot is taken to be free. Who takes no part can do nothing.
+
+    Returns:
+        (n_uav, n_task).
+    """
+    return _kernels.field_can_do_alone(problem, _as_tuple(team))
+
+
+def _as_tuple(team: TeamAsArrays) -> tuple[Any, ...]:
+    return (
+        team.free_s,
+        team.sortie_end_s,
+        team.first_s,
+        team.survived,
+        team.active,
+        team.open,
+        team.landed_at,
+        team.rank,
+    )
