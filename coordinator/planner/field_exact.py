@@ -1,8 +1,8 @@
 """The exact optimum of the field's problem for small missions.
 
-What one UAV can do with every set of tasks, then the division of the tasks among the UAVs, then, where
-bases have few slots, which lists go together (`swarm.kernels.field_exact`). Tasks with due_s may be
-left out; of the others as few as can be.
+What one UAV can do with every set of tasks, then the division of the tasks among the UAVs, then,
+where bases have few slots, which lists go together (`swarm.kernels.field_exact`). Tasks with due_s
+may be left out; of the others as few as can be.
 """
 
 from __future__ import annotations
@@ -28,10 +28,8 @@ class TooManyListsError(ProblemTooLargeError):
 
     def __init__(self, n_uav: int, n_task: int) -> None:
         super().__init__(n_uav, n_task, MAX_FIELD_TASKS, float("inf"), _LIMIT_S)
-        self.args = (
-            f"{n_uav} UAVs × {n_task} tasks are too many to prove the optimum: their partial lists "
-            "take more memory than there may be",
-        )
+        why = "their partial lists take more memory than there may be"
+        self.args = (f"{n_uav} UAVs × {n_task} tasks are too many to prove the optimum: {why}",)
 
 
 @dataclass(frozen=True, slots=True)
