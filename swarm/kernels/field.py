@@ -1,8 +1,8 @@
 """Schedules of whole teams with the field's constraints, by lists or by a rule.
 
-An item of a list is 2k for task k from its first point on, 2k + 1 from its last point on, and -1 - b
-for base b. In what follows ``team`` says where the team stands and is left unchanged. A wrong shape
-or number raises a ValueError that names its argument.
+An item of a list is 2k for task k from its first point on, 2k + 1 from its last point on, and
+-1 - b for base b. In what follows ``team`` says where the team stands and is left unchanged. A wrong
+shape or number raises a ValueError that names its argument.
 """
 
 from __future__ import annotations
@@ -49,21 +49,36 @@ class FieldTeamArrays(Protocol):
     """Where the team stands, as `swarm.allocation.field.FieldState` explains it, which is one."""
 
     @property
-    def free_s(self) -> _Floats: ...
+    def free_s(self) -> _Floats:
+        """(n_uav,) when it is free to depart [s]."""
+
     @property
-    def sortie_end_s(self) -> _Floats: ...
+    def sortie_end_s(self) -> _Floats:
+        """(n_uav,) when it has landed at the latest [s]."""
+
     @property
-    def first_s(self) -> _Floats: ...
+    def first_s(self) -> _Floats:
+        """(n_uav, n_node) legs from where it is then [s]."""
+
     @property
-    def survived(self) -> _Floats: ...
+    def survived(self) -> _Floats:
+        """(n_uav,) S of eq. 1 of its next task."""
+
     @property
-    def active(self) -> _Bools: ...
+    def active(self) -> _Bools:
+        """(n_uav,) whether it takes part."""
+
     @property
-    def open(self) -> _Bools: ...
+    def open(self) -> _Bools:
+        """(n_task,) whether somebody may take the task."""
+
     @property
-    def landed_at(self) -> _Ints: ...
+    def landed_at(self) -> _Ints:
+        """(n_uav,) base at which it stands ready, or -1."""
+
     @property
-    def rank(self) -> _Ranks: ...
+    def rank(self) -> _Ranks:
+        """(n_uav,) place in the sequence."""
 
 
 class FlownLists(NamedTuple):
