@@ -1,8 +1,8 @@
 """Schedules of whole teams with the field's constraints, by lists or by a rule.
 
 An item of a list is 2k for task k from its first point on, 2k + 1 from its last point on, and
--1 - b for base b. In what follows ``team`` says where the team stands and is left unchanged. A wrong
-shape or number raises a ValueError that names its argument.
+-1 - b for base b. In what follows ``team`` says where the team stands and is left unchanged. A
+wrong shape or number raises a ValueError that names its argument.
 """
 
 from __future__ import annotations
