@@ -1,0 +1,595 @@
+#include "field_search.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include "parallel.hpp"
+
+namespace peckorder {
+
+namespace {
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kMostNear = 64;
+constexpr int kLanes = 2;
+constexpr double kMeanTorn = 8.0, kLongestString = 8.0;
+constexpr double kSplitShare = 0.5, kSplitDepth = 0.3;
+constexpr double kListBlink = 0.02;
+constexpr int kMostOut = 12;  // tasks on no list that are tried besides those torn out
+constexpr double kHottest = 1.0, kColdest = 0.003;
+constexpr double kPrize = 100.0;  // of the scale, in the annealing; the best is compared exactly
+}  // namespace
+
+FieldLane::FieldLane(const FieldProblem& problem, const FieldTeam& team, std::uint64_t seed)
+    : problem_(problem),
+      team_(team),
+      random_(seed),
+      solver_(problem, team, last_version_),
+      flight_(problem, team),
+      stays_(problem, team, last_version_),
+      lists_(problem.n_uav),
+      value_(problem.n_uav, 0.0),
+      near_(problem.n_task),
+      able_(problem.n_task),
+      weight_(problem.n_task, 0.0),
+      list_of_(problem.n_task, -1),
+      place_out_(problem.n_task, -1),
+      known_(static_cast<std::size_t>(problem.n_uav) * problem.n_task),
+      is_touched_(problem.n_uav, 0),
+      copies_(problem.n_uav),
+      stays_before_(stays_),
+      best_(problem.n_uav) {
+    for (int base = 0; base < problem.n_base; ++base) any_limited_ |= stays_.limited(base);
+    for (int uav = 0; uav < problem.n_uav; ++uav) {
+        lists_[uav].uav = uav;
+        solver_.solve(lists_[uav], stays_, 0);
+        if (team.active[uav]) uavs_.push_back(uav);
+        any_swaps_ |= problem.n_base > 0 && std::isfinite(problem.full_s[uav]);
+    }
+    find_doable();
+    find_near();
+    for (const int task : tasks_) {
+        place_out_[task] = static_cast<int>(out_.size());
+        out_.push_back(task);
+    }
+    std::sort(tasks_.begin(), tasks_.end(), [&](int a, int b) {
+        const bool wanted_a = problem_.required[a], wanted_b = problem_.required[b];
+        if (wanted_a != wanted_b) return wanted_a;
+        return weight_[a] != weight_[b] ? weight_[a] > weight_[b] : a < b;
+    });
+    best_worth_ = worth();
+}
+
+void FieldLane::find_doable() {
+    bool ignored = false;
+    for (int task = 0; task < problem_.n_task; ++task) {
+        if (!team_.open[task]) continue;
+        for (const int uav : uavs_) {
+            if (!problem_.capable[problem_.at(uav, task)]) continue;
+            if (solver_.value_with(lists_[uav], stays_, 0, task, ignored) == -kInfinity) continue;
+            able_[task].push_back(uav);
+            weight_[task] = std::max(weight_[task], problem_.weight[problem_.at(uav, task)]);
+        }
+        if (!able_[task].empty()) tasks_.push_back(task);
+    }
+}
+
+void FieldLane::find_near() {
+    std::vector<std::pair<double, int>> order;
+    double sum = 0.0;
+    for (const int task : tasks_) {
+        const int uav = able_[task].front();
+        const Item forwards = item_of_task(task, 0);
+        const double* from_s = problem_.legs_from(uav, problem_.leave_node(forwards));
+        const double* back_s = problem_.legs_from(uav, problem_.enter_node(forwards));
+        order.clear();
+        for (const int other : tasks_) {
+            if (other == task) continue;
+            const Item item = item_of_task(other, 0);
+            const int enter = problem_.enter_node(item), leave = problem_.leave_node(item);
+            const double leg_s = std::min(std::min(from_s[enter], from_s[leave]),
+                                          std::min(back_s[enter], back_s[leave]));
+            order.emplace_back(leg_s, other);
+        }
+        const std::size_t kept = std::min<std::size_t>(kMostNear, order.size());
+        std::partial_sort(order.begin(), order.begin() + kept, order.end());
+        for (std::size_t k = 0; k < kept; ++k) near_[task].push_back(order[k].second);
+        double leg_s = kept == 0 ? 0.0 : order[std::min<std::size_t>(2, kept - 1)].first;
+        if (!std::isfinite(leg_s)) leg_s = 0.0;
+        const double line_s = problem_.line_time_s(uav, forwards);
+        sum += weight_[task] * (leg_s + problem_.service_s[task] + (std::isfinite(line_s) ? line_s : 0.0));
+    }
+    scale_ = tasks_.empty() ? 0.0 : sum / static_cast<double>(tasks_.size());
+    prize_ = kPrize * scale_;
+}
+
+void FieldLane::load(const ItemLists& lists) {
+    for (const int task : tasks_) move(task, -1, false);
+    for (const int uav : uavs_) {
+        FieldList& list = lists_[uav];
+        list.order.clear();
+        for (const Item item : lists[uav]) {
+            if (is_base(item)) continue;
+            const int task = task_of(item);
+            const std::vector<int>& able = able_[task];
+            if (!std::binary_search(able.begin(), able.end(), uav) || list_of_[task] >= 0) continue;
+            list.order.push_back(item);
+            move(task, uav, false);
+        }
+        settle(uav, 0);
+    }
+    // The very lists that were given, if they can be flown as they are.
+    std::vector<std::vector<Item>> solved(problem_.n_uav);
+    for (const int uav : uavs_) {
+        solved[uav] = lists_[uav].items;
+        std::size_t n_task = 0;
+        for (const Item item : lists[uav]) n_task += !is_base(item);
+        if (n_task == lists_[uav].order.size()) lists_[uav].items = lists[uav];
+    }
+    std::size_t failed_at = 0;
+    const auto chain = [&](const FieldList& list) {
+        Progress progress = team_.begin(problem_, list.uav);
+        Times times;
+        for (const Item item : list.items) {
+            if (do_item(problem_, list.uav, item, progress, times) != Refusal::kNone)
+                return -kInfinity;
+        }
+        return progress.value;
+    };
+    bool flies = true;
+    for (const int uav : uavs_) {
+        const bool together = TeamFlight::takes_part(team_, stays_, lists_[uav]);
+        value_[uav] = together ? 0.0 : chain(lists_[uav]);
+        flies = flies && value_[uav] > -kInfinity;
+    }
+    if (flies && flight_.fly(lists_, stays_, value_, failed_at) < 0) {
+        note_best(worth());
+    } else {
+        for (const int uav : uavs_) lists_[uav].items = solved[uav];
+        fly_together();
+        note_best(worth());
+    }
+    touched_.clear();
+    std::fill(is_touched_.begin(), is_touched_.end(), 0);
+    moved_.clear();
+    placed_ = 0;
+}
+
+Worth FieldLane::worth() const {
+    Worth now;
+    for (const int task : out_) now.left_out += problem_.required[task];
+    for (const int uav : uavs_) now.value += value_[uav];
+    return now;
+}
+
+void FieldLane::note_best(const Worth& now) {
+    if (!(now > best_worth_)) return;
+    best_worth_ = now;
+    for (const int uav : uavs_) best_[uav] = lists_[uav].items;
+}
+
+void FieldLane::touch(int uav) {
+    if (is_touched_[uav]) return;
+    is_touched_[uav] = 1;
+    copies_[touched_.size()] = lists_[uav];
+    touched_.push_back(uav);
+}
+
+void FieldLane::move(int task, int uav, bool noted) {
+    const int before = list_of_[task];
+    if (before == uav) return;
+    if (noted) moved_.emplace_back(task, before);
+    list_of_[task] = uav;
+    if (uav < 0) {
+        place_out_[task] = static_cast<int>(out_.size());
+        out_.push_back(task);
+    } else if (before < 0) {
+        const int last = out_.back();
+        out_[place_out_[task]] = last;
+        place_out_[last] = place_out_[task];
+        place_out_[task] = -1;
+        out_.pop_back();
+    }
+}
+
+void FieldLane::undo() {
+    for (std::size_t k = moved_.size(); k-- > 0;) move(moved_[k].first, moved_[k].second, false);
+    for (std::size_t k = 0; k < touched_.size(); ++k)
+        std::swap(lists_[touched_[k]], copies_[k]);
+    value_ = value_before_;
+    if (any_limited_) stays_ = stays_before_;
+}
+
+// Solve a list whose tasks changed from number `kept` on; what can't be done any more is taken out.
+void FieldLane::settle(int uav, std::size_t kept, double overlooks) {
+    FieldList& list = lists_[uav];
+    while (!solver_.solve(list, stays_, kept, &random_, overlooks)) {
+        const std::size_t failed = list.offsets.size() - 3;
+        const int task = task_of(list.order[failed]);
+        list.order.erase(list.order.begin() + static_cast<std::ptrdiff_t>(failed));
+        move(task, -1);
+        torn_.push_back(task);
+        kept = std::min(kept, failed);
+        overlooks = 0.0;
+    }
+    value_[uav] = list.value;
+    believe_stays(uav);
+}
+
+// The stays of a list as its labels believe.
+void FieldLane::believe_stays(int uav) {
+    if (!any_limited_) return;
+    const FieldList& list = lists_[uav];
+    std::vector<Stay> stays;
+    if (TeamFlight::takes_part(team_, stays_, list)) {
+        Progress progress = team_.begin(problem_, uav);
+        int base = team_.landed_at[uav];
+        double arrived_s = -kInfinity;
+        for (const Item item : list.items) {
+            Times times;
+            double arrive_s = 0.0;
+            if (is_base(item)) {
+                arrive_s = arrival_s(problem_, base_of(item), progress);
+                double begin_s = arrive_s;
+                if (stays_.limited(base_of(item)))
+                    begin_s = stays_.begin_s(base_of(item), uav, arrive_s);
+                if (swap_battery(problem_, uav, base_of(item), begin_s, progress, times) !=
+                    Refusal::kNone)
+                    break;
+            } else if (do_task(problem_, uav, item, progress, times) != Refusal::kNone) {
+                break;
+            }
+            if (base >= 0 && stays_.limited(base)) stays.push_back({base, arrived_s, times.depart_s});
+            base = is_base(item) ? base_of(item) : -1;
+            arrived_s = arrive_s;
+        }
+    }
+    stays_.set(uav, stays);
+}
+
+void FieldLane::fly_together() {
+    for (const int uav : uavs_) {
+        if (TeamFlight::takes_part(team_, stays_, lists_[uav])) continue;
+        value_[uav] = lists_[uav].value;
+        stays_.set(uav, {});
+    }
+    std::size_t failed_at = 0;
+    for (int uav; (uav = flight_.fly(lists_, stays_, value_, failed_at)) >= 0;) {
+        touch(uav);
+        FieldList& list = lists_[uav];
+        std::size_t number = 0;
+        for (std::size_t k = 0; k < failed_at; ++k) number += !is_base(list.items[k]);
+        number = std::min(number, list.order.size() - 1);
+        const int task = task_of(list.order[number]);
+        list.order.erase(list.order.begin() + static_cast<std::ptrdiff_t>(number));
+        move(task, -1);
+        settle(uav, number);
+    }
+}
+
+void FieldLane::remove(int uav, std::size_t from, std::size_t count) {
+    FieldList& list = lists_[uav];
+    const auto first = list.order.begin() + static_cast<std::ptrdiff_t>(from);
+    for (std::size_t k = 0; k < count; ++k) {
+        const int task = task_of(first[static_cast<std::ptrdiff_t>(k)]);
+        torn_.push_back(task);
+        move(task, -1);
+    }
+    list.order.erase(first, first + static_cast<std::ptrdiff_t>(count));
+    settle(uav, from);
+}
+
+void FieldLane::ruin() {
+    const double kind = random_.uniform();
+    if (any_swaps_ && kind < 0.08) {
+        swap_anew();
+    } else if (kind < 0.16) {
+        exchange_tails();
+    } else if (kind < 0.26) {
+        tear_random();
+    } else if (kind < 0.32) {
+        tear_list();
+    } else {
+        tear_strings();
+    }
+}
+
+void FieldLane::tear_strings() {
+    int seed = tasks_[random_.below(static_cast<int>(tasks_.size()))];
+    if (!out_.empty() && random_.uniform() < 0.2)
+        seed = out_[random_.below(static_cast<int>(out_.size()))];
+    std::size_t busy = 0;
+    for (const int uav : uavs_) busy += !lists_[uav].order.empty();
+    const double mean = static_cast<double>(tasks_.size() - out_.size()) /
+                        static_cast<double>(std::max<std::size_t>(1, busy));
+    const double longest = std::min(kLongestString, std::max(1.0, mean));
+    const double most = std::max(1.0, 4.0 * kMeanTorn / (1.0 + longest) - 1.0);
+    const int strings = 1 + static_cast<int>(random_.uniform() * most);
+    if (list_of_[seed] >= 0) tear(seed, longest);
+    for (const int task : near_[seed]) {
+        if (static_cast<int>(touched_.size()) >= strings) break;
+        if (list_of_[task] >= 0 && !is_touched_[list_of_[task]]) tear(task, longest);
+    }
+}
+
+// Take a string that holds `task` out of its list; sometimes keep some tasks inside the string.
+void FieldLane::tear(int task, double longest) {
+    const int uav = list_of_[task];
+    const std::vector<Item>& order = lists_[uav].order;
+    const int size = static_cast<int>(order.size());
+    const int length = 1 + static_cast<int>(random_.uniform() * std::min<double>(longest, size));
+    int kept = 0;
+    if (length > 1 && length < size && random_.uniform() < kSplitShare) {
+        kept = 1;
+        while (length + kept < size && random_.uniform() > kSplitDepth) ++kept;
+    }
+    const int span = std::min(size, length + kept);
+    int here = 0;
+    while (task_of(order[here]) != task) ++here;
+    const int low = std::max(0, here - span + 1), high = std::min(here, size - span);
+    const int begin = low + random_.below(high - low + 1);
+    const int gap = kept == 0 ? span : 1 + random_.below(span - kept);
+    touch(uav);
+    // The later part first, so that places of the earlier one stay; its list is solved anew twice.
+    if (span > gap + kept) remove(uav, begin + gap + kept, span - gap - kept);
+    const std::size_t left = lists_[uav].order.size();
+    if (static_cast<std::size_t>(begin) < left)
+        remove(uav, begin, std::min<std::size_t>(gap, left - begin));
+}
+
+void FieldLane::tear_random() {
+    const int most = std::min<int>(static_cast<int>(kMeanTorn), static_cast<int>(tasks_.size()));
+    const int count = 1 + random_.below(most);
+    for (int k = 0; k < count; ++k) {
+        const int task = tasks_[random_.below(static_cast<int>(tasks_.size()))];
+        const int uav = list_of_[task];
+        if (uav < 0) continue;
+        touch(uav);
+        const std::vector<Item>& order = lists_[uav].order;
+        std::size_t here = 0;
+        while (task_of(order[here]) != task) ++here;
+        remove(uav, here, 1);
+    }
+}
+
+// One list, or its end, and sometimes that of another UAV.
+void FieldLane::tear_list() {
+    const int lists = 1 + random_.below(2);
+    for (int k = 0; k < lists; ++k) {
+        const int uav = uavs_[random_.below(static_cast<int>(uavs_.size()))];
+        const std::size_t size = lists_[uav].order.size();
+        if (size == 0 || is_touched_[uav]) continue;
+        const std::size_t most = std::min<std::size_t>(size, 2 * static_cast<std::size_t>(kMeanTorn));
+        const std::size_t count =
+            random_.uniform() < 0.5 ? most : 1 + random_.below(static_cast<int>(most));
+        touch(uav);
+        remove(uav, size - count, count);
+    }
+}
+
+// Two lists go on with each other's ends from near tasks on.
+void FieldLane::exchange_tails() {
+    const int task = tasks_[random_.below(static_cast<int>(tasks_.size()))];
+    const int one = list_of_[task];
+    if (one < 0 || near_[task].empty()) return;
+    const int few = std::min<int>(12, static_cast<int>(near_[task].size()));
+    const int other_task = near_[task][random_.below(few)];
+    const int other = list_of_[other_task];
+    if (other < 0 || other == one) return;
+    const auto place = [&](int uav, int wanted) {
+        std::size_t here = 0;
+        while (task_of(lists_[uav].order[here]) != wanted) ++here;
+        return here;
+    };
+    const std::size_t at = place(one, task) + static_cast<std::size_t>(random_.below(2));
+    const std::size_t at_other = place(other, other_task) + static_cast<std::size_t>(random_.below(2));
+    touch(one);
+    touch(other);
+    std::vector<Item>& a = lists_[one].order;
+    std::vector<Item>& b = lists_[other].order;
+    std::vector<Item> tail(a.begin() + static_cast<std::ptrdiff_t>(at), a.end());
+    a.resize(at);
+    a.insert(a.end(), b.begin() + static_cast<std::ptrdiff_t>(at_other), b.end());
+    b.resize(at_other);
+    b.insert(b.end(), tail.begin(), tail.end());
+    for (std::size_t k = at; k < a.size(); ++k) move(task_of(a[k]), one);
+    for (std::size_t k = at_other; k < b.size(); ++k) move(task_of(b[k]), other);
+    settle(one, at);
+    settle(other, at_other);
+}
+
+// Some lists choose their base visits anew one after the other, now and then overlooking some.
+void FieldLane::swap_anew() {
+    const int lists = 1 + random_.below(std::min<int>(3, static_cast<int>(uavs_.size())));
+    for (int k = 0; k < lists; ++k) {
+        const int uav = uavs_[random_.below(static_cast<int>(uavs_.size()))];
+        if (lists_[uav].order.empty() || is_touched_[uav]) continue;
+        touch(uav);
+        stays_.set(uav, {});
+    }
+    const double overlooks = random_.uniform() < 0.5 ? 0.25 : 0.0;
+    for (std::size_t k = 0; k < touched_.size(); ++k) settle(touched_[k], 0, overlooks);
+}
+
+FieldLane::Insertion FieldLane::best_place(int uav, int task) {
+    FieldList& list = lists_[uav];
+    if (any_limited_) solver_.refresh(list, stays_);
+    Known& known = known_[problem_.at(uav, task)];
+    if (known.list == list.version && (!known.meets_slots || known.stays == stays_.version()))
+        return known.best;
+    known.list = list.version;
+    known.stays = stays_.version();
+    known.meets_slots = list.meets_slots;
+    known.best = {-kInfinity, 0};
+    if (list.value == -kInfinity) return known.best;
+    for (std::size_t place = 0; place <= list.order.size(); ++place) {
+        const double gain =
+            solver_.value_with(list, stays_, place, task, known.meets_slots) - list.value;
+        if (gain > known.best.gain) known.best = {gain, place};
+    }
+    return known.best;
+}
+
+void FieldLane::insert(int uav, std::size_t place, int task) {
+    touch(uav);
+    FieldList& list = lists_[uav];
+    list.order.insert(list.order.begin() + static_cast<std::ptrdiff_t>(place), item_of_task(task, 0));
+    move(task, uav);
+    const std::size_t before = torn_.size();
+    settle(uav, place);
+    torn_.resize(before);  // what had to give way stays out for now
+}
+
+bool FieldLane::put_back(int task) {
+    double best = problem_.required[task] ? -kInfinity : 0.0;
+    int best_uav = -1;
+    std::size_t best_at = 0;
+    for (const int uav : able_[task]) {
+        if (random_.uniform() < kListBlink) continue;
+        const Insertion insertion = best_place(uav, task);
+        if (insertion.gain > best) {
+            best = insertion.gain;
+            best_uav = uav;
+            best_at = insertion.place;
+        }
+    }
+    if (best_uav < 0) return false;
+    insert(best_uav, best_at, task);
+    return true;
+}
+
+// In which order tasks are put back: order_.
+void FieldLane::arrange() {
+    const int kind = random_.below(8);
+    const bool required_first = random_.uniform() < 0.7;
+    order_.clear();
+    for (const int task : torn_) {
+        double key = random_.uniform();
+        if (kind >= 2 && kind < 5) key = -weight_[task] * (0.5 + 0.5 * key);
+        if (kind == 5 || kind == 6) {
+            const double latest_s = std::min(problem_.closes_s[task], problem_.due_s[task]);
+            key = std::isfinite(latest_s) ? latest_s : 1e8 + key;
+        }
+        if (kind == 7) key = static_cast<double>(able_[task].size()) + key;
+        if (required_first && !problem_.required[task]) key += 1e9;
+        order_.emplace_back(key, task);
+    }
+    std::sort(order_.begin(), order_.end());
+}
+
+void FieldLane::recreate() {
+    // Those that were out before: some of them.
+    const int others = std::min<int>(kMostOut, static_cast<int>(out_.size()));
+    for (int k = 0; k < others; ++k)
+        torn_.push_back(others == static_cast<int>(out_.size())
+                            ? out_[k]
+                            : out_[random_.below(static_cast<int>(out_.size()))]);
+    std::sort(torn_.begin(), torn_.end());
+    torn_.erase(std::unique(torn_.begin(), torn_.end()), torn_.end());
+    arrange();
+    if (random_.uniform() < 0.1) {
+        put_back_by_regret();
+        return;
+    }
+    for (const auto& [key, task] : order_)
+        if (list_of_[task] < 0) put_back(task);
+}
+
+// Next the task that loses most if it can't have its best list.
+void FieldLane::put_back_by_regret() {
+    while (!order_.empty()) {
+        double most = -kInfinity;
+        std::size_t next = order_.size();
+        for (std::size_t k = 0; k < order_.size(); ++k) {
+            const int task = order_[k].second;
+            double first = problem_.required[task] ? -prize_ : 0.0, second = first;
+            bool any = false;
+            for (const int uav : able_[task]) {
+                const double gain = best_place(uav, task).gain;
+                any = any || gain > -kInfinity;
+                if (gain > first) {
+                    second = first;
+                    first = gain;
+                } else if (gain > second) {
+                    second = gain;
+                }
+            }
+            if (any && first - second > most) {
+                most = first - second;
+                next = k;
+            }
+        }
+        if (next == order_.size()) return;
+        const int task = order_[next].second;
+        order_.erase(order_.begin() + static_cast<std::ptrdiff_t>(next));
+        if (list_of_[task] < 0) put_back(task);
+    }
+}
+
+void FieldLane::iterate(double temperature) {
+    if (tasks_.empty() || uavs_.empty()) return;
+    torn_.clear();
+    moved_.clear();
+    for (const int uav : touched_) is_touched_[uav] = 0;
+    touched_.clear();
+    value_before_ = value_;
+    if (any_limited_) stays_before_ = stays_;
+    const Worth before = worth();
+    while (placed_ < tasks_.size() && list_of_[tasks_[placed_]] >= 0) ++placed_;
+    if (placed_ < tasks_.size()) {
+        put_back(tasks_[placed_++]);
+    } else {
+        ruin();
+        recreate();
+    }
+    fly_together();
+    const Worth now = worth();
+    const double gain =
+        (now.value - before.value) - prize_ * static_cast<double>(now.left_out - before.left_out);
+    const bool accepted =
+        gain > -temperature * random_.exponential() || (now > best_worth_);
+    if (accepted) {
+        note_best(now);
+    } else {
+        undo();
+    }
+}
+
+FieldSearch::FieldSearch(const FieldProblem& problem, const FieldTeam& team,
+                         const ItemLists& lists, std::uint64_t seed) {
+    Random random(seed);
+    for (int lane = 0; lane < kLanes; ++lane) {
+        lanes_.push_back(std::make_unique<FieldLane>(problem, team, random.bits()));
+        lanes_.back()->load(lists);
+    }
+    best_ = lanes_.front()->best();
+    best_worth_ = lanes_.front()->best_worth();
+}
+
+void FieldSearch::round(long iterations, double heat, int threads, Watch& watch) {
+    const double cold = 1.0 - std::min(1.0, std::max(0.0, heat));
+    double temperature = kHottest * lanes_.front()->scale();
+    for (int k = 0; k < 64; ++k)
+        if (k < cold * 64.0) temperature *= 0.9132;  // its 64th power is 0.003
+    parallel_for(lanes_.size(), threads, 1, [&] {
+        return [&](std::size_t number) {
+            FieldLane& lane = *lanes_[number];
+            for (long k = 0; k < iterations; ++k) {
+                const std::int64_t before = lane.steps();
+                lane.iterate(temperature);
+                if (watch.stops_after(2 * (lane.steps() - before) + 50)) return;
+            }
+        };
+    });
+    for (const auto& lane : lanes_) {
+        if (!(lane->best_worth() > best_worth_)) continue;
+        best_worth_ = lane->best_worth();
+        best_ = lane->best();
+    }
+}
+
+void FieldSearch::gather() {
+    for (const auto& lane : lanes_)
+        if (best_worth_ > lane->best_worth()) lane->load(best_);
+}
+
+}  // namespace peckorder
