@@ -42,7 +42,7 @@ FieldLane::FieldLane(const FieldProblem& problem, const FieldTeam& team, std::ui
     for (int uav = 0; uav < problem.n_uav; ++uav) {
         lists_[uav].uav = uav;
         solver_.solve(lists_[uav], stays_, 0);
-        if (team.active[uav]) uavs_.push_back(uav);
+        if (team.active[uav] && std::isfinite(team.free_s[uav])) uavs_.push_back(uav);
         any_swaps_ |= problem.n_base > 0 && std::isfinite(problem.full_s[uav]);
     }
     find_doable();

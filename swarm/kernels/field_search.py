@@ -1,0 +1,212 @@
+"""Search for good lists of a whole team under the field's constraints, from any state it is in.
+
+Large-neighbourhood search with annealing (slack induction by string removals, Christiaens and
+Vanden Berghe 2020, doi:10.1287/trsc.2019.0914) on orders of tasks; where batteries are swapped and
+which way lines are flown follows from an order by label-setting. Lists are compared by (fewest
+required tasks left out, then largest J), all of them flown together as slots make them wait.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.kernels import _kernels
+from swarm.kernels._kernels import KernelField
+
+_MAX_SEED = 2**64 - 1
+_SLICES = 64
+"""At least so many steps of cooling, if that leaves each some iterations."""
+_MOST_IN_SLICE = 500
+_FEWEST_IN_SLICE = 10
+_COOL_START = 0.3
+"""Heat while it is unknown how long the search will be."""
+_GATHER_FRACS = (0.5, 0.8)
+"""Of the search, when all lanes go on from the best lists."""
+_ITERATIONS_FOR_FULL_HEAT = 400.0
+"""Per task; the annealing of a shorter search begins cooler, by the fourth root."""
+
+
+class TeamRows(Protocol):
+    """Where the team stands (swarm.allocation.field.FieldState)."""
+
+    @property
+    def free_s(self) -> npt.NDArray[np.float64]:
+        """(n_uav,) when it is free to depart [s]."""
+        ...
+
+    @property
+    def sortie_end_s(self) -> npt.NDArray[np.float64]:
+        """(n_uav,) when it has landed at the latest [s]."""
+        ...
+
+    @property
+    def first_s(self) -> npt.NDArray[np.float64]:
+        """(n_uav, n_node) legs from where it is then [s]."""
+        ...
+
+    @property
+    def survived(self) -> npt.NDArray[np.float64]:
+        """(n_uav,) S of eq. 1 so far."""
+        ...
+
+    @property
+    def active(self) -> npt.NDArray[np.bool_]:
+        """(n_uav,) whether it may be given tasks."""
+        ...
+
+    @property
+    def open(self) -> npt.NDArray[np.bool_]:
+        """(n_task,) tasks that may be put on lists."""
+        ...
+
+    @property
+    def landed_at(self) -> npt.NDArray[np.int32]:
+        """(n_uav,) base where it stands ready, or -1."""
+        ...
+
+    @property
+    def rank(self) -> npt.NDArray[np.int64]:
+        """(n_uav,) place in the sequence."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class FieldLists:
+    """What a search found."""
+
+    lists: tuple[tuple[int, ...], ...]
+    """Items per UAV: 2k for task k forwards, 2k + 1 backwards, -1 - b for base b."""
+    n_left_out: int
+    """Required tasks on no list that some UAV could do as its only one."""
+    objective: float
+    """J of eq. 1 of all lists flown together [value·s]."""
+    iterations: int
+    """Removals and re-insertions tried."""
+
+
+def optimise_lists(
+    problem: KernelField,
+    team: TeamRows,
+    *,
+    seed: int = 0,
+    iterations: int | None = None,
+    spent_frac: Callable[[int], float] | None = None,
+    lists: Sequence[Sequence[int]] | None = None,
+    progress: Callable[[int, float], None] | None = None,
+    threads: int | None = None,
+) -> FieldLists:
+    """Lists of items for every UAV that is active; never worse than those it begins with.
+
+    With ``iterations`` the result follows from the arguments alone, with any number of threads.
+    With ``spent_frac`` it depends on how much work fits into what is spent.
+
+    Args:
+        problem: the mission's arrays.
+        team: its state.
+        seed: 0..2**64 - 1.
+        iterations: removals and re-insertions in all; >= 0. Give this or ``spent_frac``.
+        spent_frac: given the iterations so far, the share of the time or work that is spent; the
+            annealing cools along it and ends at 1. What it says of 0 iterations is spent by time
+            alone, or by whoever wants an end, and is asked every few milliseconds.
+        lists: to begin with; tasks that are not open or can't be done there are dropped.
+        progress: told the iterations so far and the best J after each slice.
+        threads: at most this many; as many as there are processors when None.
+
+    Raises:
+        ValueError: names the argument that is wrong.
+    """
+    if (iterations is None) == (spent_frac is None):
+        raise ValueError("iterations or spent_frac must be given, and not both")
+    if iterations is not None and iterations < 0:
+        raise ValueError(f"iterations must be >= 0, not {iterations}")
+    if not 0 <= seed <= _MAX_SEED:
+        raise ValueError(f"seed must be within 0..2**64 - 1, not {seed}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be >= 1, not {threads}")
+    n_uav = len(team.active)
+    begin = [()] * n_uav if lists is None else lists
+    search = _kernels.FieldListSearch(
+        problem,
+        team.free_s,
+        team.sortie_end_s,
+        team.first_s,
+        team.survived,
+        team.active,
+        team.open,
+        team.landed_at,
+        team.rank,
+        *_flat(begin, n_uav),
+        seed,
+    )
+    kernel_threads = (os.cpu_count() or 1) if threads is None else threads
+    done = _anneal(search, int(np.sum(team.open)), iterations, spent_frac, progress, kernel_threads)
+    n_left_out, objective = search.best_worth()
+    flat, offsets = search.best()
+    items = flat.tolist()
+    found = tuple(tuple(items[a:b]) for a, b in pairwise(offsets.tolist()))
+    return FieldLists(found, n_left_out, objective, done)
+
+
+def _anneal(
+    search: _kernels.FieldListSearch,
+    n_task: int,
+    iterations: int | None,
+    spent_frac: Callable[[int], float] | None,
+    progress: Callable[[int, float], None] | None,
+    threads: int,
+) -> int:
+    """Cool until all is spent; the iterations made."""
+    lanes = search.n_lane()
+    gathers = list(_GATHER_FRACS)
+    done = 0
+
+    def over() -> bool:
+        return spent_frac is not None and not float(spent_frac(0)) < 1.0
+
+    while True:
+        if spent_frac is not None:
+            spent = float(spent_frac(done))
+        else:
+            spent = done / iterations if iterations else 1.0
+        if not spent < 1.0:
+            return done
+        if gathers and spent >= gathers[0]:
+            gathers.pop(0)
+            search.gather()
+        total = iterations if iterations is not None else done / spent if spent > 0.0 else 0.0
+        now = max(_FEWEST_IN_SLICE, min(_MOST_IN_SLICE, int(total / lanes / _SLICES)))
+        if iterations is not None:
+            now = min(now, -(-(iterations - done) // lanes))
+        search.round(now, _heat(max(0.0, spent), total, n_task), threads, over)
+        done += now * lanes
+        if progress is not None:
+            progress(done, search.best_worth()[1])
+
+
+def _heat(spent_frac: float, total: float, n_task: int) -> float:
+    """Cool along what is spent, from a heat that a run of ``total`` iterations can afford."""
+    if total == 0.0:
+        return _COOL_START
+    # Two square roots, not a power: their floats are the same everywhere.
+    share = total / max(1, n_task) / _ITERATIONS_FOR_FULL_HEAT
+    return min(1.0, math.sqrt(math.sqrt(share))) * (1.0 - spent_frac)
+
+
+def _flat(
+    lists: Sequence[Sequence[int]], n_uav: int
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int64]]:
+    """Lists end to end, and where each begins."""
+    if len(lists) != n_uav:
+        raise ValueError(f"lists must hold {n_uav} lists, not {len(lists)}")
+    flat = np.array([item for items in lists for item in items], dtype=np.int32)
+    offsets = np.zeros(n_uav + 1, dtype=np.int64)
+    np.cumsum([len(items) for items in lists], out=offsets[1:])
+    return flat, offsets
