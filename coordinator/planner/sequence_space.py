@@ -37,12 +37,14 @@ def has_plain_first_round(problem: Problem, state: TeamState, uavs: Sequence) ->
 def twins(problem: Problem, state: TeamState, uavs: Sequence) -> dict[int, Sequence]:
     """For each UAV all that equal it in every respect, itself included, ascending."""
     classes: dict[bytes, list[int]] = {}
+    accelerations_m_s2 = problem.acceleration_m_s2
     for uav in uavs:
         traits = (
             state.free_s[uav],
             state.survived[uav],
             *state.place_enu_m[uav],
             problem.speed_m_s[uav],
+            np.inf if accelerations_m_s2 is None else accelerations_m_s2[uav],
             *problem.success[uav],
             *problem.survival[uav],
         )

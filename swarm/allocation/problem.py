@@ -69,6 +69,9 @@ class Problem:
     """(n_uav, n_task) probability of surviving the task, within 0..1."""
     horizon_s: float
     """D [s]; > 0."""
+    acceleration_m_s2: FloatArray | None = None
+    """(n_uav,) to and from cruise speed [m/s²]; > 0; infinite where speed changes at once. None: of
+    all."""
     kernel: KernelProblem = field(init=False, repr=False)
     """The same, prepared for the compiled kernels, which check all numbers."""
     capable: BoolArray = field(init=False, repr=False)
@@ -90,8 +93,15 @@ class Problem:
             if len(getattr(self, name)) != n:  # all other shapes are held against these two
                 raise ValueError(f"{name} must have shape {(n,)}, not {getattr(self, name).shape}")
         object.__setattr__(self, "horizon_s", float(self.horizon_s))
+        if (given := self.acceleration_m_s2) is not None:
+            numbers = converted("acceleration_m_s2", given, np.float64, 1).copy()
+            self._freeze("acceleration_m_s2", numbers)
         arrays = {name: getattr(self, name) for name in _COLUMNS}
-        kernel = KernelProblem(**arrays, horizon_s=self.horizon_s)
+        kernel = KernelProblem(
+            **arrays, horizon_s=self.horizon_s, acceleration_m_s2=self.acceleration_m_s2
+        )
+        if self.acceleration_m_s2 is not None and np.isinf(self.acceleration_m_s2).all():
+            object.__setattr__(self, "acceleration_m_s2", None)  # told apart once, not at each leg
         object.__setattr__(self, "kernel", kernel)
         object.__setattr__(self, "capable", kernel.capable)
         object.__setattr__(self, "weight", kernel.weight)
@@ -123,6 +133,7 @@ class Problem:
             start_enu_m=np.array([u.position_enu_m for u in rows], float).reshape(-1, 3),
             speed_m_s=np.array([u.speed_m_s for u in rows], float),
             horizon_s=mission.horizon_s,
+            acceleration_m_s2=_accelerations_m_s2(rows),
             **_of_tasks(mission, rows, columns),
         )
 
@@ -157,8 +168,8 @@ class Problem:
     def travel_s(self, uav: int, place_enu_m: FloatArray) -> FloatArray:
         """(n_task,) flight times of ``uav`` from a (3,) place [m; ENU] to every task [s].
 
-        Straight at cruise speed: `straight_m` / speed, rounded by itself, so that every
-        implementation of the same formula finds the same floats.
+        Straight: `rest_to_rest_s` over `straight_m`, rounded as written there, so that every
+        implementation of the same formulas finds the same floats.
         """
         return self._flown_s(uav, self._task_columns_m - place_enu_m[:, None])
 
@@ -189,9 +200,11 @@ class Problem:
         return self._flown_s(uavs, (places_m - from_m).T)
 
     def _flown_s(self, uav: int | IntArray, offset_m: FloatArray) -> FloatArray:
-        travel_s = straight_m(offset_m)
-        travel_s /= self.speed_m_s[uav]
-        return travel_s
+        length_m, speed_m_s = straight_m(offset_m), self.speed_m_s[uav]
+        if self.acceleration_m_s2 is None:
+            length_m /= speed_m_s
+            return length_m
+        return rest_to_rest_s(length_m, speed_m_s, self.acceleration_m_s2[uav])
 
     def _freeze(self, name: str, array: npt.NDArray[np.generic]) -> None:
         array.setflags(write=False)
@@ -199,15 +212,43 @@ class Problem:
 
 
 def straight_m(offset_m: FloatArray) -> FloatArray:
-    """(...) lengths of (3, ...) offsets, east, north and up, which are used up [m].
+    """(...) lengths of (3, ...) offsets, east, north and up [m].
 
-    sqrt(dx² + dy² + dz²), with each operation rounded by itself and in this order.
+    sqrt((dx² + dy²) + dz²), with each operation rounded by itself and in this order.
     """
-    offset_m *= offset_m
-    square_m2 = offset_m[0] + offset_m[1]
-    square_m2 += offset_m[2]
+    squares_m2 = offset_m * offset_m
+    square_m2 = squares_m2[0] + squares_m2[1]
+    square_m2 += squares_m2[2]
     length_m: FloatArray = np.sqrt(square_m2)
     return length_m
+
+
+def rest_to_rest_s(
+    length_m: FloatArray, speed_m_s: FloatArray | float, acceleration_m_s2: FloatArray | float
+) -> FloatArray:
+    """(...) times over (...) lengths [m], from rest to rest [s].
+
+    d/v + v/a if d >= v²/a, which is long enough to reach v, else 2·√(d/a); d/v at infinite a. Each
+    operation is rounded by itself. Concave in d and 0 at 0, so a way round is never quicker.
+
+    Args:
+        length_m: d.
+        speed_m_s: v, one each or of all [m/s]; 0: it can't be flown, unless the length is 0.
+        acceleration_m_s2: a, one each or of all [m/s²].
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at_speed_s = np.where(length_m == 0.0, 0.0, length_m / speed_m_s)
+        cruising_s = at_speed_s + speed_m_s / acceleration_m_s2
+        never_at_speed_s = 2.0 * np.sqrt(length_m / acceleration_m_s2)
+        both_m = (speed_m_s * speed_m_s) / acceleration_m_s2
+    return np.where(length_m >= both_m, cruising_s, never_at_speed_s)
+
+
+def _accelerations_m_s2(uavs: Sequence[Uav]) -> FloatArray | None:
+    given = [uav.acceleration_m_s2 for uav in uavs]
+    if all(number is None for number in given):
+        return None
+    return np.array([np.inf if number is None else number for number in given])
 
 
 def _of_tasks(

@@ -37,6 +37,10 @@ class KernelProblem:
             dict(shape=(None, None), order="C", device="cpu", writable=False),
         ],
         horizon_s: float,
+        acceleration_m_s2: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ]
+        | None = None,
     ) -> None: ...
     @property
     def n_uav(self) -> int: ...

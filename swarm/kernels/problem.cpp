@@ -1,9 +1,12 @@
 // The prepared mission and its checks; see problem.hpp.
 #include "problem.hpp"
 
+#include <nanobind/stl/optional.h>
+
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "arrays.hpp"
@@ -27,7 +30,12 @@ Problem::Problem(const MissionArrays& arrays)
       speed_m_s_(arrays.speed_m_s, arrays.speed_m_s + n_uav_),
       value_(arrays.value, arrays.value + n_task_),
       service_s_(arrays.service_s, arrays.service_s + n_task_) {
-    for (const double speed_m_s : speed_m_s_) pace_s_m_.push_back(1.0 / speed_m_s);
+    for (int uav = 0; uav < n_uav_; ++uav) {
+        const double* const given_m_s2 = arrays.acceleration_m_s2;
+        pace_s_m_.push_back(1.0 / speed_m_s_[uav]);
+        ramps_.push_back(given_m_s2 ? Ramps(speed_m_s_[uav], given_m_s2[uav]) : Ramps());
+        at_once_ = at_once_ && ramps_.back().at_once();
+    }
     by_uav_ = table();
     // Through local pointers: for all the compiler knows, a byte that is stored in a table could be
     // one of this object, whose members it would read anew for every cell.
@@ -63,10 +71,19 @@ std::vector<double> Problem::legs_s(int uav, const std::vector<int>& tasks) cons
     return legs_s;
 }
 
-int Problem::fastest(const std::vector<int>& uavs) const {
-    int fastest = -1;
+std::vector<int> Problem::fastest(const std::vector<int>& uavs) const {
+    const auto as_fast = [this](int a, int b) {
+        return pace_s_m_[a] <= pace_s_m_[b] &&
+               ramps_[a].acceleration_m_s2 >= ramps_[b].acceleration_m_s2;
+    };
+    std::vector<int> fastest;
     for (const int uav : uavs) {
-        if (fastest < 0 || pace_s_m_[uav] < pace_s_m_[fastest]) fastest = uav;
+        if (std::any_of(fastest.begin(), fastest.end(), [&](int f) { return as_fast(f, uav); }))
+            continue;
+        fastest.erase(std::remove_if(fastest.begin(), fastest.end(),
+                                     [&](int f) { return as_fast(uav, f); }),
+                      fastest.end());
+        fastest.push_back(uav);
     }
     return fastest;
 }
@@ -163,7 +180,8 @@ void require_all(const char* name, const Array& array, double low, double high,
 // The only place where numbers of a mission are checked, whoever makes a problem.
 MissionArrays checked(const GivenTable& start_enu_m, const GivenTable& task_enu_m,
                       const Given& speed_m_s, const Given& value, const Given& service_s,
-                      const GivenTable& success, const GivenTable& survival, double horizon_s) {
+                      const GivenTable& success, const GivenTable& survival, double horizon_s,
+                      const std::optional<Given>& acceleration_m_s2) {
     const std::size_t n_uav = speed_m_s.shape(0), n_task = value.shape(0);
     if (n_uav > 100'000 || n_task > 1'000'000) refuse("speed_m_s or value is too long");
     require_shape("start_enu_m", start_enu_m, {n_uav, 3});
@@ -179,10 +197,15 @@ MissionArrays checked(const GivenTable& start_enu_m, const GivenTable& task_enu_
     require_all("success", success, 0.0, 1.0, "within 0..1");
     require_all("survival", survival, 0.0, 1.0, "within 0..1");
     require_within("horizon_s", horizon_s, kLeast, kMost, "> 0 and finite");
+    if (acceleration_m_s2) {
+        require_shape("acceleration_m_s2", *acceleration_m_s2, {n_uav});
+        require_all("acceleration_m_s2", *acceleration_m_s2, kLeast,
+                    std::numeric_limits<double>::infinity(), "> 0");
+    }
     return {static_cast<int>(n_uav), static_cast<int>(n_task), start_enu_m.data(),
             task_enu_m.data(),       speed_m_s.data(),         value.data(),
             service_s.data(),        success.data(),           survival.data(),
-            horizon_s};
+            horizon_s,               acceleration_m_s2 ? acceleration_m_s2->data() : nullptr};
 }
 
 // What a problem keeps, for reading.
@@ -202,14 +225,16 @@ void bind_problem(nb::module_& module) {
             "__init__",
             [](Problem* self, const GivenTable& start_enu_m, const GivenTable& task_enu_m,
                const Given& speed_m_s, const Given& value, const Given& service_s,
-               const GivenTable& success, const GivenTable& survival, double horizon_s) {
+               const GivenTable& success, const GivenTable& survival, double horizon_s,
+               const std::optional<Given>& acceleration_m_s2) {
                 new (self) Problem(checked(start_enu_m, task_enu_m, speed_m_s, value, service_s,
-                                           success, survival, horizon_s));
+                                           success, survival, horizon_s, acceleration_m_s2));
             },
             nb::arg("start_enu_m").noconvert(), nb::arg("task_enu_m").noconvert(),
             nb::arg("speed_m_s").noconvert(), nb::arg("value").noconvert(),
             nb::arg("service_s").noconvert(), nb::arg("success").noconvert(),
-            nb::arg("survival").noconvert(), nb::arg("horizon_s"))
+            nb::arg("survival").noconvert(), nb::arg("horizon_s"),
+            nb::arg("acceleration_m_s2").noconvert() = nb::none())
         .def_prop_ro("n_uav", &Problem::n_uav)
         .def_prop_ro("n_task", &Problem::n_task)
         .def_prop_ro("horizon_s", &Problem::horizon_s)

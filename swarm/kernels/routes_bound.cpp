@@ -318,12 +318,12 @@ double priced_list(const Problem& problem, const Start& start, int uav, const Pr
 }  // namespace
 
 std::vector<double> shortest_legs_s(const Problem& problem, const Start& start) {
-  const int fastest = problem.fastest(active_uavs(start));
+  const std::vector<int> fastest = problem.fastest(active_uavs(start));
   std::vector<double> shortest_s(problem.n_task(), kInfinite);
-  if (fastest < 0) return shortest_s;
-  for (int a = 0; a < problem.n_task(); ++a)
-    for (int b = 0; b < problem.n_task(); ++b)
-      if (a != b) shortest_s[a] = std::min(shortest_s[a], problem.leg_s(fastest, a, b));
+  for (const int uav : fastest)
+    for (int a = 0; a < problem.n_task(); ++a)
+      for (int b = 0; b < problem.n_task(); ++b)
+        if (a != b) shortest_s[a] = std::min(shortest_s[a], problem.leg_s(uav, a, b));
   return shortest_s;
 }
 

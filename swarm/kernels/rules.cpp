@@ -50,12 +50,13 @@ Size argmax(const std::vector<double>& values, Size n) {
 }
 
 // Told that no two arrays overlap, compilers do two tasks or more at once.
-void score_all(Size n, const double* PECKORDER_RESTRICT x_m, const double* PECKORDER_RESTRICT y_m,
-               const double* PECKORDER_RESTRICT z_m, const double* PECKORDER_RESTRICT service_s,
-               const double* PECKORDER_RESTRICT weight, const Decider& decider,
-               const Problem& problem, double* PECKORDER_RESTRICT completion_s,
-               double* PECKORDER_RESTRICT score) {
-    const LegsFrom legs = problem.legs_from(decider.uav, decider.place_m);
+template <typename Legs>
+void score_along(const Legs legs, Size n, const double* PECKORDER_RESTRICT x_m,
+                 const double* PECKORDER_RESTRICT y_m, const double* PECKORDER_RESTRICT z_m,
+                 const double* PECKORDER_RESTRICT service_s,
+                 const double* PECKORDER_RESTRICT weight, const Decider& decider,
+                 const Problem& problem, double* PECKORDER_RESTRICT completion_s,
+                 double* PECKORDER_RESTRICT score) {
     const double free_s = decider.free_s, survived = decider.survived;
     const double horizon_s = problem.horizon_s();
     for (Size i = 0; i < n; ++i) {
@@ -63,6 +64,15 @@ void score_all(Size n, const double* PECKORDER_RESTRICT x_m, const double* PECKO
         completion_s[i] = time_s;
         score[i] = (horizon_s - time_s) * (survived * weight[i]);
     }
+}
+
+void score_all(Size n, const double* x_m, const double* y_m, const double* z_m,
+               const double* service_s, const double* weight, const Decider& decider,
+               const Problem& problem, double* completion_s, double* score) {
+    problem.with_legs_from(decider.uav, decider.place_m, [&](const auto& legs) {
+        score_along(legs, n, x_m, y_m, z_m, service_s, weight, decider, problem, completion_s,
+                    score);
+    });
 }
 
 // -infinity if there is no other.
@@ -298,6 +308,8 @@ std::vector<std::pair<int, double>> Workspace::valued(const Choice& choice, Size
 }
 
 // Theorem 5: p̄ <= (1 − λ)/(2 − λ), and some tour that begins greedily is worth its first task.
+// Of legs the proof uses only that no task is complete later than by way of another, so it covers
+// acceleration, too: see Ramps.
 bool Workspace::certificate(const Problem& problem, const Decider& decider, Size best,
                             double second) {
     const Size n = tasks_->size();

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from swarm.allocation import Problem
@@ -62,16 +64,27 @@ def random_problem(
 
 
 def any_problem(seed: int, n_uav: int, n_task: int) -> Problem:
-    """A random problem of a random kind: certain or deadly, everybody able or not."""
+    """A random problem of a random kind: certain or deadly, all able or not, all quick or not."""
     rng = np.random.default_rng(seed)
     lowest = float(rng.choice([0.0, 0.5, 1.0]))
-    return random_problem(
+    problem = random_problem(
         rng,
         n_uav,
         n_task,
         lowest_survival=lowest,
         incapable_frac=float(rng.choice([0.0, 0.3])),
     )
+    return with_acceleration(problem, seed) if seed % 2 else problem
+
+
+def with_acceleration(problem: Problem, seed: int) -> Problem:
+    """``problem`` with UAVs most of which take their time to change speed, some far too long.
+
+    At 2 to 6 m/s legs of up to 17 m are then of both kinds.
+    """
+    rng = np.random.default_rng([seed, 1])
+    choices = np.array([0.1, 1.0, 3.0, np.inf])
+    return replace(problem, acceleration_m_s2=rng.choice(choices, problem.n_uav))
 
 
 def paper_problem(rng: np.random.Generator) -> Problem:

@@ -206,8 +206,19 @@ def _arrive(
     there = [float(c) for c in problem.task_enu_m[task]]
     east_m, north_m, up_m = (there[axis] - place[axis] for axis in range(3))
     distance_m = math.sqrt(east_m * east_m + north_m * north_m + up_m * up_m)
-    travel_s = distance_m / float(problem.speed_m_s[uav])
+    travel_s = _flown_s(problem, uav, distance_m)
     return free_s + travel_s + float(problem.service_s[task]), there
+
+
+def _flown_s(problem: Problem, uav: int, distance_m: float) -> float:
+    """Time over that distance from rest to rest [s]."""
+    v_m_s = float(problem.speed_m_s[uav])
+    if problem.acceleration_m_s2 is None:
+        return distance_m / v_m_s
+    a_m_s2 = float(problem.acceleration_m_s2[uav])
+    if distance_m < v_m_s * v_m_s / a_m_s2:
+        return 2.0 * math.sqrt(distance_m / a_m_s2)
+    return distance_m / v_m_s + v_m_s / a_m_s2
 
 
 def _tour_value(

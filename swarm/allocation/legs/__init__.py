@@ -3,8 +3,8 @@
 Nothing else knows either. Leaves out: what is on the spot (service, lines) and energy.
 """
 
-from swarm.allocation.legs.flight import FlightModel, straight_m
+from swarm.allocation.legs.flight import FlightModel
 from swarm.allocation.legs.network import Airspace, LegNetwork, Legs
 from swarm.allocation.legs.planner import PathPlanner
 
-__all__ = ["Airspace", "FlightModel", "LegNetwork", "Legs", "PathPlanner", "straight_m"]
+__all__ = ["Airspace", "FlightModel", "LegNetwork", "Legs", "PathPlanner"]

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from swarm.allocation.problem import rest_to_rest_s, straight_m
+
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -87,15 +89,8 @@ class FlightModel:
         if speed_m_s is None and self.acceleration_m_s2 is None:
             return length_m / self.speed_m_s
         v_m_s = self.speed_m_s if speed_m_s is None else speed_m_s
-        with np.errstate(divide="ignore", invalid="ignore"):
-            flown_s = np.where(length_m == 0.0, 0.0, length_m / v_m_s)
-            if self.acceleration_m_s2 is None:
-                return flown_s
-            a_m_s2 = self.acceleration_m_s2
-            cruising_s = flown_s + v_m_s / a_m_s2
-            never_at_speed_s = 2.0 * np.sqrt(length_m / a_m_s2)
-        long_enough = length_m >= (v_m_s * v_m_s) / a_m_s2
-        return np.where(long_enough, cruising_s, never_at_speed_s)
+        a_m_s2 = np.inf if self.acceleration_m_s2 is None else self.acceleration_m_s2
+        return rest_to_rest_s(length_m, v_m_s, a_m_s2)
 
     def even_s(self, length_m: FloatArray, slow_s: FloatArray) -> FloatArray:
         """(...) times over paths of (...) lengths [m], flown evenly [s].
@@ -126,13 +121,3 @@ class FlightModel:
             own_m_s = np.sqrt(self.airspeed_m_s * self.airspeed_m_s - aside_m2_s2)
             over_m_s = np.minimum(self.speed_m_s, along_m_s + own_m_s)
         return np.where(over_m_s > 0.0, over_m_s, 0.0)  # nan: more wind across than airspeed
-
-
-def straight_m(offset_m: FloatArray) -> FloatArray:
-    """(...) lengths of (3, ...) offsets, east, north and up [m].
-
-    sqrt((dx² + dy²) + dz²), with each operation rounded by itself and in this order.
-    """
-    east_m, north_m, up_m = offset_m
-    length_m: FloatArray = np.sqrt((east_m * east_m + north_m * north_m) + up_m * up_m)
-    return length_m

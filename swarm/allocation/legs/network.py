@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from swarm.allocation.legs.arcs import Arcs
-from swarm.allocation.legs.flight import FlightModel, straight_m
+from swarm.allocation.legs.flight import FlightModel
 from swarm.allocation.legs.planner import PathPlanner, Paths, Piece, Targets
 from swarm.allocation.legs.reach import Hop
 from swarm.allocation.legs.tangents import arc_of, sense_of
+from swarm.allocation.problem import straight_m
 from swarm.model.zones import Zone
 
 FloatArray = npt.NDArray[np.float64]

@@ -71,6 +71,7 @@ def grid_problem(seed: int, n_uav: int, n_task: int) -> Problem:
         success=np.full((n_uav, n_task), 0.5),
         survival=np.ones((n_uav, n_task)),
         horizon_s=9.0,
+        acceleration_m_s2=random.choice([0.5, np.inf], n_uav) if seed % 2 else None,
     )
 
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import Problem, TeamState, rank_of, rule_by_name
-from tests.support.problems import line_of_tasks, random_problem
+from tests.support.problems import line_of_tasks, random_problem, with_acceleration
 
 
 def lookahead_choice(problem: Problem) -> int:
@@ -16,8 +16,7 @@ def lookahead_choice(problem: Problem) -> int:
     for tour in permutations(range(problem.n_task)):
         free_s, survived, place, value = 0.0, 1.0, problem.start_enu_m[0], 0.0
         for task in tour:
-            distance_m = float(np.linalg.norm(problem.task_enu_m[task] - place))
-            free_s += distance_m / float(problem.speed_m_s[0]) + float(problem.service_s[task])
+            free_s += float(problem.travel_s(0, place)[task]) + float(problem.service_s[task])
             value += survived * float(problem.weight[0, task]) * (problem.horizon_s - free_s)
             survived *= float(problem.survival[0, task])
             place = problem.task_enu_m[task]
@@ -38,9 +37,10 @@ def certified(problem: Problem) -> tuple[bool, int]:
     n_task=st.integers(1, 5),
     highest=st.floats(0.0, 0.6),
     horizon_s=st.sampled_from([1.0, 3.0, 8.0, 50.0]),
+    accelerates=st.booleans(),
 )
 def test_certified_greedy_choice_is_the_lookahead_choice(
-    seed: int, n_task: int, highest: float, horizon_s: float
+    seed: int, n_task: int, highest: float, horizon_s: float, accelerates: bool
 ) -> None:
     problem = random_problem(
         np.random.default_rng(seed),
@@ -50,6 +50,8 @@ def test_certified_greedy_choice_is_the_lookahead_choice(
         highest_survival=highest,
         horizon_s=horizon_s,
     )
+    if accelerates:
+        problem = with_acceleration(problem, seed)
 
     certificate, task = certified(problem)
 

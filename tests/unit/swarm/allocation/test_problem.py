@@ -1,14 +1,26 @@
 from __future__ import annotations
 
+import math
+import pickle
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from swarm.allocation import Problem
-from swarm.model import Task, TaskId
-from tests.support.problems import random_problem, table_1, table_1_mission
+from swarm.allocation import Problem, TeamState
+from swarm.allocation.rules import team_at_start
+from swarm.kernels.lower_level import GREEDY, decide
+from swarm.kernels.routes_bound import shortest_legs_s
+from swarm.model import Task, TaskId, UavId
+from tests.support.problems import (
+    random_problem,
+    table_1,
+    table_1_mission,
+    with_acceleration,
+)
 
 
 def arguments() -> dict[str, Any]:
@@ -95,6 +107,10 @@ def test_pop_ups_are_columns_unless_left_out_by_the_caller() -> None:
         ("success", np.full((2, 3), 1.1)),
         ("success", np.full((3, 2), 0.5)),
         ("survival", np.full((2, 3), -0.1)),
+        ("acceleration_m_s2", np.ones(3)),
+        ("acceleration_m_s2", np.array([1.0, 0.0])),
+        ("acceleration_m_s2", np.array([1.0, -1.0])),
+        ("acceleration_m_s2", np.array([1.0, np.nan])),
         ("horizon_s", 0.0),
         ("horizon_s", float("nan")),
         ("uav_ids", ("a", "a")),
@@ -122,3 +138,105 @@ def test_travel_time_is_the_distance_in_three_dimensions_over_the_speed() -> Non
 
     assert travel_s[0] == 12.0 / 5.0
     assert travel_s[1] == pytest.approx(np.sqrt(1.0 + 64.0 + 144.0) / 5.0)
+
+
+# -- Acceleration ---------------------------------------------------------------------------------
+
+
+def plain_leg_s(length_m: float, speed_m_s: float, acceleration_m_s2: float) -> float:
+    """From rest to rest, by the formula and a float at a time."""
+    if length_m >= (speed_m_s * speed_m_s) / acceleration_m_s2:
+        return length_m / speed_m_s + speed_m_s / acceleration_m_s2
+    return 2.0 * math.sqrt(length_m / acceleration_m_s2)
+
+
+@settings(deadline=None, max_examples=50)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_every_way_to_ask_for_a_leg_gives_the_same_float(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    problem = with_acceleration(random_problem(rng, 4, 6), seed)
+    accelerations_m_s2 = problem.acceleration_m_s2
+    if accelerations_m_s2 is None:  # infinite ones only
+        accelerations_m_s2 = np.full(4, np.inf)
+    state = TeamState.at_start(problem)
+    for uav in range(4):
+        offset_m = problem.task_enu_m - problem.start_enu_m[uav]
+        plain_s = [
+            plain_leg_s(
+                math.sqrt((east_m * east_m + north_m * north_m) + up_m * up_m),
+                float(problem.speed_m_s[uav]),
+                float(accelerations_m_s2[uav]),
+            )
+            for east_m, north_m, up_m in offset_m.tolist()
+        ]
+        between_s = problem.travel_between_s(uav)
+        route = rng.permutation(6)
+        along_s = problem.travel_along_s(uav, problem.start_enu_m[uav], route)
+        lists: list[list[int]] = [[], [], [], []]
+        lists[uav] = route.tolist()
+
+        assert problem.travel_s(uav, problem.start_enu_m[uav]).tolist() == plain_s
+        assert along_s[0] == plain_s[route[0]]
+        assert along_s[1:].tolist() == between_s[route[:-1], route[1:]].tolist()
+        assert problem.travel_by_lists_s(lists, problem.start_enu_m).tolist() == along_s.tolist()
+        for task in np.flatnonzero(problem.capable[uav]):
+            state.open[:] = np.arange(6) == task
+            compiled = decide(problem.kernel, state, uav, GREEDY)
+            assert compiled is not None
+            assert compiled[3] == (0.0 + plain_s[task]) + problem.service_s[task]
+
+
+@settings(deadline=None, max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_no_way_round_is_quicker(seed: int) -> None:
+    problem = with_acceleration(random_problem(np.random.default_rng(seed), 2, 8), seed)
+
+    for uav in range(2):
+        direct_s = problem.travel_between_s(uav)
+        round_s = direct_s[:, :, None] + direct_s[None, :, :]  # from, by way of, to
+
+        assert (direct_s[:, None, :] <= round_s + 1e-9).all()
+
+
+def test_a_mission_without_accelerations_is_plain_and_so_is_one_of_infinite_ones() -> None:
+    plain = table_1()
+    at_once = replace(plain, acceleration_m_s2=np.full(3, np.inf))
+
+    assert plain.acceleration_m_s2 is at_once.acceleration_m_s2 is None
+
+
+def test_a_mission_tells_of_accelerations_uav_by_uav() -> None:
+    mission = table_1_mission()
+    mission = replace(
+        mission, uavs=(replace(mission.uavs[0], acceleration_m_s2=2.0), *mission.uavs[1:])
+    )
+    problem = Problem.from_mission(mission)
+    other = Problem.from_mission(mission, tasks=mission.tasks[2:]).with_tasks(
+        mission, mission.tasks, [-1, -1, 0, 1, 2, 3, 4, 5]
+    )
+
+    for each in (problem, other, pickle.loads(pickle.dumps(problem))):
+        assert each.acceleration_m_s2 is not None
+        assert each.acceleration_m_s2.tolist() == [2.0, np.inf, np.inf]
+        assert each.travel_between_s(0).tolist() == problem.travel_between_s(0).tolist()
+    assert problem.travel_between_s(1).tolist() == table_1().travel_between_s(1).tolist()
+
+
+def test_who_is_fastest_depends_on_the_leg_where_one_speeds_up_and_one_cruises_best() -> None:
+    problem = Problem(
+        uav_ids=(UavId("racer"), UavId("truck")),
+        task_ids=tuple(TaskId(f"t{place}") for place in range(3)),
+        start_enu_m=np.zeros((2, 3)),
+        task_enu_m=np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [101.0, 0.0, 0.0]]),
+        speed_m_s=np.array([5.0, 20.0]),
+        value=np.ones(3),
+        service_s=np.zeros(3),
+        success=np.ones((2, 3)),
+        survival=np.ones((2, 3)),
+        horizon_s=100.0,
+        acceleration_m_s2=np.array([np.inf, 4.0]),
+    )
+
+    shortest_s = shortest_legs_s(team_at_start(problem))
+
+    assert shortest_s.tolist() == pytest.approx([1.0 / 5.0, 1.0 / 5.0, 100.0 / 20.0 + 5.0])

@@ -94,6 +94,7 @@ def test_local_search_ends_where_no_move_gains(seed: int, n_uav: int, n_task: in
     assert worth >= team_worth(problem, state, begin) - 1e-9
     idle = [list(lists[u]) for u in range(n_uav)]
     active = np.flatnonzero(state.active)
+    accelerations_m_s2 = problem.acceleration_m_s2
     part = Problem(
         uav_ids=tuple(problem.uav_ids[u] for u in active),
         task_ids=problem.task_ids,
@@ -105,6 +106,7 @@ def test_local_search_ends_where_no_move_gains(seed: int, n_uav: int, n_task: in
         success=problem.success[active],
         survival=problem.survival[active],
         horizon_s=problem.horizon_s,
+        acceleration_m_s2=None if accelerations_m_s2 is None else accelerations_m_s2[active],
     )
     team = TeamState(
         state.free_s[active],
