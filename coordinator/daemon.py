@@ -107,6 +107,10 @@ async def run_coordinator(
     planner = BackgroundPlanner(make_plan, shell.step, shell.fail)
     watches = isinstance(core, StandbyCore)
     join_mission(bus, mission.name, None if watches else COORDINATOR, status=False)
+    if (
+        mission.constraints and not watches
+    ):  # agents of earlier releases cannot read it, which shows there alone
+        bus.subscribe(KeySpace(mission.name).status("*"), latest=True)
     try:
         return await shell.run()
     finally:

@@ -27,6 +27,8 @@ class Prepare:
     left_in_air: bool = False
     """An earlier life of this agent had it in the air: one that stands on the ground now came
     down with nobody watching, and is not started."""
+    acceleration_m_s2: float | None = None
+    """To and from cruise speed, as the mission is planned; None: it does not say."""
 
 
 @dataclass(frozen=True, slots=True)

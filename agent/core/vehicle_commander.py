@@ -161,6 +161,7 @@ class VehicleCommander(AgentPart):
             resume=self._mission_view.said_to_run or self._left_in_air,
             ground_up_m=me.position_enu_m[2],
             left_in_air=self._left_in_air,
+            acceleration_m_s2=me.acceleration_m_s2,
         )
         self._order(order)
 

@@ -32,6 +32,7 @@ from coordinator.core.stages import MissionStage, StagedMission
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
 from swarm.model.layers import FlightLayers
+from swarm.protocol.codec import UNKNOWN_VERSION
 from swarm.protocol.events import (
     Ask,
     KeysReplaced,
@@ -48,7 +49,7 @@ from swarm.protocol.membership import Membership
 from swarm.protocol.messages import Message, Snapshot, StartWithout, TaskEdit
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import StallDetector, Timing, earliest
-from swarm.protocol.uav_messages import Claim, ClaimPhase
+from swarm.protocol.uav_messages import Claim, ClaimPhase, Status, StatusPhase
 
 
 class CoordinatorCore:
@@ -93,6 +94,7 @@ class CoordinatorCore:
             start_timeout_s=start_timeout_s,
         )
         self._stall_detector = StallDetector(timing.pause_s)
+        self._too_old: set[str] = set()
         self._actions: list[CoordinatorAction] = []
         self._saved: object = None
 
@@ -206,8 +208,21 @@ class CoordinatorCore:
         elif news and isinstance(body, StartWithout):
             told: dict[str, object] = {"uav": body.uav, "reason": body.reason}
             self._actions.append(LogLine("the operator starts without it", told))
+        elif isinstance(body, Status):
+            self._refuse_older(message.writer, body)
         if self.stage is MissionStage.BRIEFED and self._mission.gate.is_forestalled:
             self._state_query.want(now_s, before_deciding=True)
+
+    def _refuse_older(self, uav: str, status: Status) -> None:
+        """Say once of an agent that it cannot read this mission's brief, and so takes no part."""
+        asked = self._mission.asks_for
+        waits = status.phase is StatusPhase.LEARNING and status.dropped.get(UNKNOWN_VERSION, 0) > 0
+        if not waits or not asked or uav in self._too_old:
+            return
+        self._too_old.add(uav)
+        told: dict[str, object] = {"uav": uav, "asks_for": ", ".join(asked)}
+        told["remedy"] = "install this release there, or start without it"
+        self._actions.append(LogLine("its release is too old for this mission", told))
 
     def _overhear(self, message: Message, now_s: float) -> None:
         """Words from this seat that are not its own: another process is there, or has been.

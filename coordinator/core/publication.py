@@ -55,6 +55,7 @@ def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> Missi
                 survival=dict(uav.survival),
                 kind=uav.kind,
                 layer_m=layers.layer_m(index),
+                acceleration_m_s2=uav.acceleration_m_s2,
             )
             for index, uav in enumerate(mission.uavs)
         ),

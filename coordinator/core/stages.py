@@ -114,6 +114,11 @@ class StagedMission:
         """When it leaves a mission that has ended, unless agents are there then."""
 
     @property
+    def asks_for(self) -> tuple[str, ...]:
+        """What releases before this one cannot read of it, by the keys of a scenario file."""
+        return self._mission.constraints
+
+    @property
     def is_over(self) -> bool:
         """Whether the process ends."""
         return self.stage in (MissionStage.DONE, MissionStage.LEFT)

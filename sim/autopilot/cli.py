@@ -79,7 +79,7 @@ def autopilot(
             "--acceleration-m-s2",
             min=0.01,
             metavar="A",
-            help="Greatest acceleration [m/s²]; default: speeds change in no time.",
+            help="Greatest acceleration [m/s²]; default: the scenario's, else at once.",
         ),
     ] = None,
     wind_m_s: Annotated[

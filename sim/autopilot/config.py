@@ -154,6 +154,7 @@ class Physics:
     """
 
     acceleration_m_s2: float | None = None
+    """Of all; None: of each what the scenario says."""
     wind_enu_m_s: tuple[float, float] = (0.0, 0.0)
     """East and north, where the wind blows to [m/s]."""
     gust_m_s: float = 0.0
@@ -192,6 +193,7 @@ def fleet_of(
         ValueError: the mission has no UAV of that id, or the physics are out of range.
     """
     physics = physics or Physics()
+    given_m_s2 = physics.acceleration_m_s2
     places = {uav.id: place for place, uav in enumerate(mission.uavs)}
     members = []
     for number, wanted in enumerate(places if uavs is None else uavs):
@@ -208,7 +210,7 @@ def fleet_of(
             endurance_s=physics.endurance_s,
             battery_failsafe=physics.battery_failsafe,
             position_failsafe_s=physics.position_failsafe_s,
-            acceleration_m_s2=physics.acceleration_m_s2,
+            acceleration_m_s2=uav.acceleration_m_s2 if given_m_s2 is None else given_m_s2,
             wind=physics.wind(place),
         )
         members.append(FleetMember(uav.id, config))

@@ -17,6 +17,7 @@ from sim.faults.message_log import Violation
 from sim.faults.planted_bugs import BUGS
 from sim.faults.schedule import Disturbance, DisturbanceKind, format_schedule, parse_schedule
 from sim.world.engine import EventQueue, LocalClock, stream
+from sim.world.motion import flown_s
 from sim.world.network import NetworkConditions, Topology
 from sim.world.rough_network import RoughNetwork
 from sim.world.settings import Planner, WorldSettings
@@ -29,6 +30,8 @@ from swarm.runtime.errors import Fault, InputError
 
 MOST_UAVS: Final = 6
 MOST_TASKS: Final = 15
+FIRST_WITH_ACCELERATION: Final = 1_000_000
+"""Of the seeds; missions of those before stay as they were."""
 TIMING: Final = Timing(status_s=2.0)
 """The defaults, with a calmer status: nothing but the count of steps depends on it here."""
 CLOCK_PPM: Final = 100.0
@@ -169,10 +172,12 @@ def limit_s(case: Case) -> float:
     starts = [uav.position_enu_m for uav in mission.uavs]
     places = np.array([*starts, *(task.position_enu_m for task in mission.tasks)])
     across_m = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
-    speed_m_s = slow * min(uav.speed_m_s for uav in mission.uavs)
+    across_s = max(
+        flown_s(across_m, slow * uav.speed_m_s, uav.acceleration_m_s2) for uav in mission.uavs
+    )
     appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
-    work_s = sum(task.service_s + across_m / speed_m_s for task in mission.tasks)
-    work_s += sum(each.kind is DisturbanceKind.ADD for each in case.schedule) * across_m / speed_m_s
+    work_s = sum(task.service_s + across_s for task in mission.tasks)
+    work_s += sum(each.kind is DisturbanceKind.ADD for each in case.schedule) * across_s
     if any(each.kind is DisturbanceKind.HOLD for each in case.schedule):
         last_s += OPERATOR_PATIENCE_S
     waits_s = TIMING.abandon_s + TIMING.stalemate_s + 2.0 * TIMING.reconsider_s + 60.0
@@ -223,8 +228,11 @@ def parse_case(lines: Iterable[str], source: str) -> Case:
 
 @lru_cache(maxsize=64)
 def _random_mission(seed: int, uavs: int, tasks: int, popups: int) -> Mission:
-    """Drawn as the largest of its seed, so that a smaller one is a part of the larger."""
-    rng = stream(seed, "mission")
+    """Drawn as the largest of its seed, so that a smaller one is a part of the larger.
+
+    From `FIRST_WITH_ACCELERATION` on most UAVs take their time to change speed.
+    """
+    rng, more_rng = stream(seed, "mission"), stream(seed, "acceleration")
     fleet = []
     for number in range(MOST_UAVS):
         success = {kind: float(rng.uniform(0.3, 1.0)) for kind in KINDS_OF_TASK}
@@ -232,7 +240,10 @@ def _random_mission(seed: int, uavs: int, tasks: int, popups: int) -> Mission:
             success[str(rng.choice(KINDS_OF_TASK))] = 0.0
         survival = {kind: float(rng.uniform(0.8, 1.0)) for kind in KINDS_OF_TASK}
         start, speed_m_s = _point(rng, AREA_M / 3.0), float(rng.uniform(4.0, 15.0))
-        fleet.append(Uav(UavId(f"u{number}"), start, speed_m_s, success, survival))
+        uav = Uav(UavId(f"u{number}"), start, speed_m_s, success, survival)
+        if seed >= FIRST_WITH_ACCELERATION and more_rng.random() < 0.7:
+            uav = replace(uav, acceleration_m_s2=float(more_rng.uniform(0.5, 5.0)))
+        fleet.append(uav)
     board = []
     for number in range(MOST_TASKS):
         appears_s = float(rng.uniform(1.0, 25.0))

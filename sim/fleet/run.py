@@ -20,6 +20,7 @@ from coordinator.planner.plan_report import plan_from_json
 from sim.fleet.child_process import ChildFailedError, ChildProcess
 from sim.fleet.launcher import Launcher, OnLog, Through
 from sim.fleet.layout import DASHBOARD, LaunchOptions
+from sim.world.motion import flown_s
 from swarm.bus.local_runs import announced
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.model import Mission, Plan
@@ -223,11 +224,12 @@ class Run:
         flown = self.mission_state.mission  # with what the operator has added to it
         latest_s = max((task.appears_s for task in flown.tasks), default=0.0)
         planned_s = max(plan.completion_s.values(), default=0.0)
-        slowest_m_s = min(uav.speed_m_s for uav in flown.uavs)
         for task in flown.tasks:
             if task.id not in plan.completion_s:
                 away_m = max(math.dist(task.position_enu_m, u.position_enu_m) for u in flown.uavs)
-                planned_s += task.service_s + away_m / slowest_m_s
+                planned_s += task.service_s + max(
+                    flown_s(away_m, u.speed_m_s, u.acceleration_m_s2) for u in flown.uavs
+                )
         return self._zero_s + latest_s + PATIENCE * planned_s + patience_s
 
 

@@ -22,6 +22,10 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
+from swarm.allocation.problem import rest_to_rest_s
+
 Point = tuple[float, float, float]
 """East, north, up [m] of a place, or [m/s] of a velocity, in the mission's local frame."""
 
@@ -82,8 +86,19 @@ class Motion(Protocol):
         ...
 
 
+def flown_s(length_m: float, speed_m_s: float, acceleration_m_s2: float | None) -> float:
+    """Time of a leg as plans have it, from rest to rest [s]; None: speed changes at once."""
+    if acceleration_m_s2 is None:
+        return length_m / speed_m_s
+    return float(rest_to_rest_s(np.asarray(length_m), speed_m_s, acceleration_m_s2))
+
+
 class IdealMotion:
-    """Straight to the target at the ordered speed, stopping and turning in no time."""
+    """Straight to the target at the ordered speed, stopping and turning in no time.
+
+    With an acceleration it sets off from rest and brakes to rest, as plans have it, so that it
+    arrives when they say; only where it is told to go elsewhere on its way it stops in no time.
+    """
 
     def __init__(self, start_enu_m: Point) -> None:
         self.target_enu_m = start_enu_m
@@ -92,6 +107,8 @@ class IdealMotion:
         """When the last ordered target is reached [s], also if that is past."""
         self._start_enu_m = start_enu_m
         self._leaves_s = 0.0
+        self._ramps: _Ramps | None = None
+        """Of the way with acceleration."""
 
     def position_enu_m(self, now_s: float) -> Point:
         """Place at that instant [m]; the target exactly from the arrival on."""
@@ -100,6 +117,9 @@ class IdealMotion:
         if now_s <= self._leaves_s:
             return self._start_enu_m
         flown_frac = (now_s - self._leaves_s) / (self.arrives_s - self._leaves_s)
+        if self._ramps is not None:
+            duration_s = self._ramps.duration_s
+            flown_frac = self._ramps.flown_m(flown_frac * duration_s) / self._ramps.length_m
         return between(self._start_enu_m, self.target_enu_m, flown_frac)
 
     def velocity_enu_m_s(self, now_s: float) -> Point:
@@ -107,11 +127,21 @@ class IdealMotion:
         if self.arrives_s is None or not self._leaves_s <= now_s < self.arrives_s:
             return _AT_REST
         duration_s = self.arrives_s - self._leaves_s
-        east_m, north_m, up_m = minus(self.target_enu_m, self._start_enu_m)
+        way_m = minus(self.target_enu_m, self._start_enu_m)
+        if self._ramps is not None:
+            speed_m_s = self._ramps.speed_m_s(now_s - self._leaves_s)
+            return _scaled(way_m, speed_m_s / self._ramps.length_m)
+        east_m, north_m, up_m = way_m
         return east_m / duration_s, north_m / duration_s, up_m / duration_s
 
-    def fly_to(self, target_enu_m: Point, speed_m_s: float, now_s: float) -> None:
-        """Leave for ``target_enu_m`` at once.
+    def fly_to(
+        self,
+        target_enu_m: Point,
+        speed_m_s: float,
+        now_s: float,
+        acceleration_m_s2: float | None = None,
+    ) -> None:
+        """Leave for ``target_enu_m`` at once; with an acceleration, from rest to rest.
 
         Raises:
             ValueError: the speed is not positive and finite.
@@ -119,7 +149,12 @@ class IdealMotion:
         _check_speed(speed_m_s)
         self._start_enu_m, self._leaves_s = self.position_enu_m(now_s), now_s
         self.target_enu_m = target_enu_m
-        self.arrives_s = now_s + math.dist(self._start_enu_m, target_enu_m) / speed_m_s
+        length_m = math.dist(self._start_enu_m, target_enu_m)
+        self.arrives_s = now_s + flown_s(length_m, speed_m_s, acceleration_m_s2)
+        self._ramps = None
+        if acceleration_m_s2 is not None:
+            ramps = _ramps(length_m, 0.0, speed_m_s, acceleration_m_s2, acceleration_m_s2)
+            self._ramps = ramps if ramps.length_m > 0.0 else None
 
     def stop(self, now_s: float) -> None:
         """Stay where the vehicle is."""
@@ -153,6 +188,11 @@ class _Ramps:
     def duration_s(self) -> float:
         """When the vehicle is at rest [s]."""
         return self.braking_s + self.cruise_m_s / self.brake_m_s2
+
+    @property
+    def length_m(self) -> float:
+        """Way flown in all [m]."""
+        return self.flown_m(self.duration_s)
 
     def speed_m_s(self, at_s: float) -> float:
         """Speed after a time [m/s]."""

@@ -19,6 +19,7 @@ from agent.core.agent_core import AgentCore
 from agent.core.interface import GoTo, VehicleReport
 from coordinator.mission_view.mission_state import MissionState
 from sim.world.engine import EventQueue, Process
+from sim.world.motion import flown_s
 from sim.world.network import IdealNetwork, Network, NetworkConditions, Topology
 from sim.world.outcome import Tally
 from sim.world.rough_network import RoughNetwork
@@ -292,8 +293,11 @@ def _limit_s(fate: Realization, timing: Timing) -> float:
     places = [uav.position_enu_m for uav in mission.uavs]
     places += [task.position_enu_m for task in mission.tasks]
     across_m = float(np.linalg.norm(np.ptp(np.array(places), axis=0))) if places else 0.0
-    slowest_m_s = min((uav.speed_m_s for uav in mission.uavs), default=1.0)
-    work_s = sum(task.service_s + across_m / slowest_m_s for task in mission.tasks)
+    slowest_s = max(
+        (flown_s(across_m, uav.speed_m_s, uav.acceleration_m_s2) for uav in mission.uavs),
+        default=across_m,
+    )
+    work_s = sum(task.service_s + slowest_s for task in mission.tasks)
     appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
     waits_s = timing.abandon_s + timing.stalemate_s + timing.linger_s + 2.0 * timing.silence_s
     return _START_S + appears_s + 4.0 * work_s + 10.0 * waits_s

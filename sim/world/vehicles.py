@@ -27,7 +27,7 @@ from agent.core.interface import (
     VehicleReport,
 )
 from sim.world.engine import EventQueue
-from sim.world.motion import IdealMotion, Point, between, minus, plus
+from sim.world.motion import IdealMotion, Point, between, flown_s, minus, plus
 from sim.world.uncertainty import Realization
 from swarm.model import UavId
 
@@ -68,6 +68,7 @@ class IdealVehicle:
         self._takeoff_s = takeoff_s
         self._motion: IdealMotion | None = None
         self._speed_m_s = 1.0
+        self._acceleration_m_s2: float | None = None
         self._orders = 0
 
     def order(self, order: VehicleOrder, ready: VehicleReport) -> None:
@@ -90,13 +91,14 @@ class IdealVehicle:
 
     def _fly(self, motion: IdealMotion, order: GoTo) -> None:
         speed_m_s = self._speed_m_s * self.speed_frac
-        motion.fly_to(order.position_enu_m, speed_m_s, self._queue.now_s())
+        now_s = self._queue.now_s()
+        motion.fly_to(order.position_enu_m, speed_m_s, now_s, self._acceleration_m_s2)
         if motion.arrives_s is not None:
             self._later(motion.arrives_s, Arrived(order.leg))
 
     def _prepare(self, order: Prepare, ready: VehicleReport) -> None:
         now_s, motion = self._queue.now_s(), self._motion
-        self._speed_m_s = order.speed_m_s
+        self._speed_m_s, self._acceleration_m_s2 = order.speed_m_s, order.acceleration_m_s2
         if motion is None:
             self._motion = IdealMotion(order.position_enu_m)
             self._later(now_s + self._takeoff_s, ready)
@@ -104,7 +106,7 @@ class IdealVehicle:
             self._later(now_s, self._telemetry(motion))
             self._later(now_s, ready)
         else:
-            motion.fly_to(order.position_enu_m, self._speed_m_s, now_s)
+            motion.fly_to(order.position_enu_m, self._speed_m_s, now_s, self._acceleration_m_s2)
             self._later(max(now_s, motion.arrives_s or now_s), ready)
 
     def leave(self) -> None:
@@ -170,10 +172,12 @@ class StochasticVehicle(IdealVehicle):
         name = None if task is None else task.id
         true_m_s = self.speed_frac * self._fate.speed_m_s(self._uav, name, here, there)
         length_m, believed_m = math.dist(here, there), math.dist(believed, order.position_enu_m)
-        arrives_s = now_s + length_m / true_m_s
+        true_m_s2 = self._uav.acceleration_m_s2
+        arrives_s = now_s + flown_s(length_m, true_m_s, true_m_s2)
         # It believes to cover the way it believes in, in the time it really takes.
         shown = believed_m / length_m if believed_m and length_m else 1.0
-        motion.fly_to(order.position_enu_m, true_m_s * shown, now_s)
+        shown_m_s2 = None if true_m_s2 is None else true_m_s2 * shown
+        motion.fly_to(order.position_enu_m, true_m_s * shown, now_s, shown_m_s2)
         self._way_s = now_s, arrives_s
         if task is not None and not self._fate.succeeds(self._uav, task, order.attempt):
             self._later(arrives_s, AttemptFailed(order.leg))

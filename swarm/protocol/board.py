@@ -210,6 +210,7 @@ def _uav_of(entry: UavSpec) -> Uav:
         success=entry.success,
         survival=entry.survival,
         kind=entry.kind,
+        acceleration_m_s2=entry.acceleration_m_s2,
     )
 
 

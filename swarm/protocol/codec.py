@@ -11,6 +11,10 @@ repeats the message; a newer one puts the field's wire default in the place of w
 one left out. A kind of message that a release does not know is dropped and counted. Only what
 cannot be mixed so (a field that goes or changes its meaning, a new word in an enumeration)
 makes `SCHEMA_VERSION` grow, and then neither release hears the other.
+
+**What must not be passed over.** A statement that tells of what the field asks for, such as a
+UAV's acceleration, says `FIELD_VERSION`: a release that does not heed it drops and counts that
+statement alone, and so knows no mission, instead of flying it by other times of legs.
 """
 
 from __future__ import annotations
@@ -42,6 +46,7 @@ from swarm.protocol.encoding import (
 from swarm.protocol.fields import LATEST_S, MAX_COUNT
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import (
+    FIELD_VERSION,
     SCHEMA_VERSION,
     Body,
     Message,
@@ -73,6 +78,7 @@ from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 IN_SEALED_ANSWER: Final = 64
 """Arrays and maps of an answer in which all registers but the roster are envelopes."""
 SIGNED_HERE: Final = "signed, but no keys here"
+UNKNOWN_VERSION: Final = "unknown version"
 
 WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {}
 """By kind, what a field means that an older release does not say; of fields that were added
@@ -298,7 +304,8 @@ class Codec:
         if not isinstance(parts, tuple) or len(parts) < 6:
             raise UnacceptableError("malformed")
         version, mission, writer, incarnation, mission_s, registers = parts[:6]
-        self._require_ours(version, mission, writer)
+        _require(version == SCHEMA_VERSION, UNKNOWN_VERSION)
+        self._require_ours(mission, writer)
         _require(key == self._keys.state(writer), "said on another's key")
         _require(type(incarnation) is int and 0 <= incarnation <= MAX_COUNT, "malformed")
         known = isinstance(mission_s, float) and abs(mission_s) <= LATEST_S
@@ -310,7 +317,8 @@ class Codec:
         if not isinstance(parts, tuple) or len(parts) < 7:
             raise UnacceptableError("malformed")
         version, mission, writer, incarnation, counter, kind, fields = parts[:7]
-        self._require_ours(version, mission, writer)
+        _require(version in (SCHEMA_VERSION, FIELD_VERSION), UNKNOWN_VERSION)
+        self._require_ours(mission, writer)
         if not isinstance(kind, str) or kind not in KINDS:
             raise UnacceptableError("unknown kind")
         if not isinstance(fields, dict):
@@ -326,8 +334,7 @@ class Codec:
         _require(_may_say(writer, body), "said on another's key")
         return Message(mission, writer, stamp, body)
 
-    def _require_ours(self, version: object, mission: object, writer: object) -> None:
-        _require(version == SCHEMA_VERSION, "unknown version")
+    def _require_ours(self, mission: object, writer: object) -> None:
         _require(mission == self._mission, "another mission")
         _require(isinstance(writer, str) and valid_id(writer), "malformed")
 

@@ -14,6 +14,7 @@ from typing import Final
 import msgpack
 
 from swarm.protocol.messages import (
+    FIELD_VERSION,
     SCHEMA_VERSION,
     Body,
     Message,
@@ -53,6 +54,9 @@ FIELDS: Final[dict[type, tuple[str, ...]]] = {
     for part in (*KINDS.values(), UavSpec, ChoiceBasis, Candidate)
 }
 """Of everything that a message is made of."""
+SINCE_FIELD: Final[dict[type, frozenset[str]]] = {UavSpec: frozenset({"acceleration_m_s2"})}
+"""Fields that came with `FIELD_VERSION`; left out where they are None, so that a statement that has
+none of them is to the last byte what every release understands."""
 LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
 
 
@@ -103,17 +107,28 @@ def fit(
 
 
 def _message_bytes(message: Message) -> bytes:
-    parts = [
-        SCHEMA_VERSION,
+    version = SCHEMA_VERSION
+
+    def fields_of(part: object) -> dict[str, object]:
+        nonlocal version
+        told = {name: getattr(part, name) for name in FIELDS[type(part)]}
+        for name in SINCE_FIELD.get(type(part), ()):
+            if told[name] is None:
+                del told[name]
+            else:
+                version = FIELD_VERSION
+        return told
+
+    body: bytes = msgpack.packb(message.body, default=fields_of)
+    head = (
+        version,
         message.mission,
         message.writer,
         message.stamp.incarnation,
         message.stamp.counter,
         NAMES[type(message.body)],
-        message.body,
-    ]
-    packed: bytes = msgpack.packb(parts, default=_fields_of)
-    return packed
+    )
+    return _array([*map(msgpack.packb, head), body])
 
 
 def snapshot_bytes(snapshot: Snapshot, registers: Sequence[bytes]) -> bytes:
@@ -140,11 +155,6 @@ def _remembered(message: Message) -> bytes:
         return encode(message)
     packed: bytes = msgpack.packb(message.envelope)
     return packed
-
-
-def _fields_of(part: object) -> dict[str, object]:
-    """A body, or a dataclass within one, by the names of its fields."""
-    return {name: getattr(part, name) for name in FIELDS[type(part)]}
 
 
 BYTES_EACH: Final = 8

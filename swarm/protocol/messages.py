@@ -19,6 +19,7 @@ from swarm.model import Origin
 from swarm.model.ids import AUTHORITY, FLEET, RESERVED
 from swarm.protocol.fields import (
     MAX_COUNT,
+    Acceleration,
     Checked,
     Count,
     Duration,
@@ -38,6 +39,8 @@ from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 
 SCHEMA_VERSION = 1
 """Grows only with what releases before cannot be mixed with; see swarm.protocol.codec."""
+FIELD_VERSION = 2
+"""Of statements that tell of what the field asks for, which releases before must not pass over."""
 LONGEST_ROSTER = 1 << 20
 """Characters of a signed roster."""
 
@@ -69,6 +72,8 @@ class UavSpec(Checked):
     kind: Id | None
     layer_m: Metres
     """Height layer this UAV flies at [m], added to every place it flies to."""
+    acceleration_m_s2: Acceleration | None = None
+    """None: its speed changes at once."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,8 @@ from swarm.model.mission import chances
 from swarm.runtime.errors import Fault, InputError
 
 _TABLES = {"base": "[[base]]", "zone": "[[zone]]"}
+_HEEDED = frozenset({"acceleration_m_s2"})
+"""What every command does by now."""
 
 
 def require_plain(mission: Mission, command: str) -> None:
@@ -21,7 +23,7 @@ def require_plain(mission: Mission, command: str) -> None:
     Raises:
         InputError: one line, with every key that the command does not heed.
     """
-    asked = [_TABLES.get(key, key) for key in mission.constraints]
+    asked = [_TABLES.get(key, key) for key in mission.constraints if key not in _HEEDED]
     asked += [f"task {task.id}, at which nobody can succeed" for task in nobody_can(mission)[:1]]
     if asked:
         words = " and ".join([", ".join(asked[:-1]), asked[-1]] if asked[1:] else asked)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.support.builders import with_accelerations
 from tests.support.fleet_builders import WatchedWorld, plan_for, random_mission
 from tests.support.seeds import seeds
 
@@ -19,13 +20,21 @@ def test_lookahead_lists_are_executed_as_planned(seed: int) -> None:
     executed_lists_equal_the_offline_plan("lookahead", seed, 4, 9)
 
 
+@pytest.mark.parametrize("method", ["greedy", "lookahead"])
+@pytest.mark.parametrize("seed", seeds(10, 40))
+def test_lists_of_uavs_that_speed_up_slowly_are_executed_as_planned(seed: int, method: str) -> None:
+    executed_lists_equal_the_offline_plan(method, seed, 4, 9, accelerates=True)
+
+
 def executed_lists_equal_the_offline_plan(
-    method: str, seed: int, most_uavs: int, most_tasks: int
+    method: str, seed: int, most_uavs: int, most_tasks: int, *, accelerates: bool = False
 ) -> None:
     rng = np.random.default_rng([seed, most_tasks])
     n_uav = int(rng.integers(1, most_uavs + 1))
     n_task = int(rng.integers(1, most_tasks + 1))
     mission = random_mission(rng, n_uav=n_uav, n_task=n_task)
+    if accelerates:
+        mission = with_accelerations(mission, rng)
     plan = plan_for(mission, method, seed)
     world = WatchedWorld(mission, lambda *_: plan, method=method, seed=seed)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from sim.faults.case import format_case
+from sim.faults.case import FIRST_WITH_ACCELERATION, format_case
 from sim.faults.generator import random_case
 from sim.faults.schedule import DisturbanceKind
 from sim.faults.soak import Breach, first_breach, shrunk
@@ -29,6 +29,14 @@ def told(breach: Breach | None) -> str:
 @pytest.mark.parametrize("block", seeds(QUICK, BLOCKS))
 def test_every_kind_of_fault_is_survived(block: int) -> None:
     breach = first_breach(range(block * BLOCK, (block + 1) * BLOCK), tuple(DisturbanceKind))
+
+    assert told(breach) == ""
+
+
+@pytest.mark.parametrize("block", seeds(1, 5))
+def test_every_kind_of_fault_is_survived_by_uavs_that_speed_up_slowly(block: int) -> None:
+    first = FIRST_WITH_ACCELERATION + block * BLOCK
+    breach = first_breach(range(first, first + BLOCK), tuple(DisturbanceKind))
 
     assert told(breach) == ""
 

@@ -79,6 +79,7 @@ def brief(*uavs: Uav, reattempt_failed: bool = False, layer_m: float = 10.0) -> 
                 dict(u.survival),
                 u.kind,
                 layer_m,
+                u.acceleration_m_s2,
             )
             for u in uavs
         ),
@@ -245,3 +246,9 @@ def random_mission(
         success_default=float(defaults[0]),
         survival_default=float(defaults[1]),
     )
+
+
+def with_accelerations(flown: Mission, rng: np.random.Generator) -> Mission:
+    """``flown`` by UAVs of which all but the last take their time to change speed."""
+    slow = [replace(u, acceleration_m_s2=float(rng.uniform(0.1, 3.0))) for u in flown.uavs]
+    return replace(flown, uavs=(*slow[:-1], flown.uavs[-1]))

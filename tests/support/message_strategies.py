@@ -46,7 +46,17 @@ counts = st.integers(0, MAX_COUNT)
 notes = st.text(max_size=20) | st.just("x" * 200)
 stamps = st.builds(Stamp, counts, counts)
 
-fleets = st.builds(UavSpec, uav_ids, points, positives, tables, tables, st.none() | ids, numbers)
+fleets = st.builds(
+    UavSpec,
+    uav_ids,
+    points,
+    positives,
+    tables,
+    tables,
+    st.none() | ids,
+    numbers,
+    st.none() | positives,
+)
 origins = st.tuples(st.floats(-89, 89), st.floats(-180, 180), numbers)
 briefs = st.builds(
     MissionConfig,

@@ -19,7 +19,9 @@ It may turn off on the way, towards other tasks, and however it turns its veloci
 the realization lets it fly in that direction at the greatest speed of all its legs. With a wind
 these velocities form a convex set around 0 (two balls' common part), so by the triangle inequality
 no detour is faster than the straight leg at that speed. Without variation from leg to leg that is
-the leg as it is really flown; with it the bound is that much too generous.
+the leg as it is really flown; with it the bound is that much too generous. So it is where UAVs take
+their time to change speed: who turns off on its way stops there in no time, and may so have flown
+at full speed throughout, which is all that is counted on here.
 
 **The bound.** So no value exceeds the largest sum of worths over disjoint lists of tasks, one list
 per UAV, so timed and worth so much, where UAVs wait as they like. How prices of tasks bound that

@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 
 from sim.study.policies.situation import Dispatcher, TeamLeg, TeamNews, TeamSituation, as_point
-from sim.world.motion import between
+from sim.world.motion import between, flown_s
 from sim.world.outcome import FlightOutcome, TaskVisit
 from sim.world.uncertainty import Realization
 from swarm.allocation import Problem, TeamState, rank_of
@@ -247,7 +247,8 @@ class _TeamFlight:
         start, true_start = as_point(state.place_enu_m[uav]), self._true_enu_m[uav]
         stop = self._fate.stop_enu_m(who.id, what)
         speed_m_s = self._fate.speed_m_s(who, what.id, true_start, stop)
-        arrives_s = now_s + float(straight_m(np.subtract(stop, true_start))) / speed_m_s
+        length_m = float(straight_m(np.subtract(stop, true_start)))
+        arrives_s = now_s + flown_s(length_m, speed_m_s, who.acceleration_m_s2)
         travel_s = float(problem.travel_s(uav, state.place_enu_m[uav])[task])
         leg = TeamLeg(
             task=task,

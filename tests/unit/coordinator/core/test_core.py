@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,7 @@ from swarm.protocol.events import (
 )
 from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch, Snapshot, TaskEntry
 from swarm.protocol.timing import Timing
+from swarm.protocol.uav_messages import StatusPhase
 from tests.support.builders import (
     IDLE,
     MISSION,
@@ -31,6 +34,7 @@ from tests.support.builders import (
     held,
     message,
     mission,
+    status,
     task,
     uav,
 )
@@ -77,6 +81,24 @@ def test_all_it_says_can_be_read() -> None:
     for action in coordinator.log:
         if hasattr(action, "message"):
             assert codec.decode(action.message.key, encode(action.message)) == action.message
+
+
+def test_it_says_once_of_an_agent_that_its_release_is_too_old_for_the_mission() -> None:
+    slow = replace(U0, acceleration_m_s2=2.5)
+    deaf = replace(status(StatusPhase.LEARNING), dropped={"unknown version": 3})
+    coordinator = LoneCoordinator(mission([slow, U1], [T0]))
+    (brief,) = said(coordinator.log, MissionConfig)
+    coordinator.see("u0", "u1")
+    coordinator.hear("u0", status(StatusPhase.LEARNING))
+    coordinator.hear("u1", deaf)
+    coordinator.hear("u1", deaf)
+    plain = LoneCoordinator(TRIO)
+    plain.hear("u1", deaf)
+
+    assert [fleet.acceleration_m_s2 for fleet in brief.uavs] == [2.5, None]
+    (line,) = [line for line in notes(coordinator.log) if "too old" in line.text]
+    assert (line.fields["uav"], line.fields["asks_for"]) == ("u1", "acceleration_m_s2")
+    assert not [line for line in notes(plain.log) if "too old" in line.text]
 
 
 def test_it_starts_as_soon_as_all_are_airborne_and_the_plan_is_made() -> None:

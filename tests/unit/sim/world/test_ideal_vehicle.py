@@ -57,6 +57,20 @@ def test_a_new_target_takes_the_place_of_the_old_one_from_where_it_is() -> None:
     assert flight.reports[1:] == [(4.0, Arrived(2))]
 
 
+def test_with_an_acceleration_it_speeds_up_and_brakes_on_each_leg() -> None:
+    flight = Flight()
+    flight.vehicle.order(replace(PREPARE, acceleration_m_s2=2.0), VehicleReady())
+    flight.queue.at(10.0, lambda: flight.fly(1, 100.0))
+    flight.queue.run(11.0)
+    speeding_up = flight.vehicle.telemetry()
+    flight.queue.at(25.0, lambda: flight.fly(2, 82.0))
+    flight.queue.run(100.0)
+
+    assert speeding_up == Telemetry((1.0, 0.0, 10.0), (2.0, 0.0, 0.0), None)
+    arrivals = [(25.0, Arrived(1)), (31.0, Arrived(2))]  # 10 + 10/1 + 10/2; 2·√(18/2)
+    assert [report for report in flight.reports if report[1] != VehicleReady()] == arrivals
+
+
 def test_sent_home_it_reports_home_and_no_arrival() -> None:
     flight = Flight()
     flight.fly(1, 50.0)

@@ -159,7 +159,7 @@ def test_of_a_snapshot_too_large_there_stays_what_fits_the_own_first(
 
 def test_bad_registers_in_a_snapshot_are_left_out_and_the_others_kept() -> None:
     parts = snapshot_parts(CLAIM, OUTCOME, BOARD)
-    parts[5][0][0] = 2
+    parts[5][0][0] = 3
     parts[5][1][6]["completed_s"] = math.nan
     parts[5] += ["nonsense", None, [], parts[5][2][:5]]
     codec = Codec(MISSION)

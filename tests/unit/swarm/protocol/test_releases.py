@@ -162,7 +162,7 @@ def test_what_a_newer_release_adds_counts_to_the_size() -> None:
     ("change", "reason"),
     [
         (lambda parts: parts.__setitem__(5, "formation"), "unknown kind"),
-        (lambda parts: parts.__setitem__(0, 2), "unknown version"),
+        (lambda parts: parts.__setitem__(0, 3), "unknown version"),
         (lambda parts: parts[6].update(phase="hovering"), "malformed"),
     ],
 )
@@ -183,3 +183,40 @@ def test_a_snapshot_may_have_more_parts() -> None:
     snapshot = Codec(MISSION).decode_snapshot(STATE, msgpack.packb([*parts, {"more": 1}]))
 
     assert snapshot == Snapshot(MISSION, "u1", 1, 1.0, (CLAIM,))
+
+
+# -- What must not be passed over -----------------------------------------------------------------
+
+
+def test_a_brief_without_accelerations_is_what_every_release_understands() -> None:
+    said = message("coordinator", brief(uav("u0")))
+    version, *_, body = msgpack.unpackb(encode(said))
+
+    assert version == 1
+    assert "acceleration_m_s2" not in body["uavs"][0]
+
+
+def test_a_brief_with_accelerations_says_another_version_and_comes_through() -> None:
+    slow = dataclasses.replace(uav("u0"), acceleration_m_s2=2.5)
+    said = message("coordinator", brief(slow, uav("u1")))
+    data = encode(said)
+    version, *_, body = msgpack.unpackb(data)
+
+    assert version == 2
+    assert body["uavs"][0]["acceleration_m_s2"] == 2.5
+    assert "acceleration_m_s2" not in body["uavs"][1]
+    assert heard(said, data) == said
+    snapshot = Snapshot(MISSION, "u1", 1, 1.0, (said, CLAIM))
+    assert msgpack.unpackb(encode(snapshot))[0] == 1  # who knows less still hears the rest of it
+    assert Codec(MISSION).decode_snapshot(STATE, encode(snapshot)) == snapshot
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, 1e9, float("nan"), "2.5", True])
+def test_an_acceleration_out_of_bounds_is_malformed(value: object) -> None:
+    said = message("coordinator", brief(uav("u0")))
+    parts: list[Any] = msgpack.unpackb(encode(said))
+    parts[6]["uavs"][0]["acceleration_m_s2"] = value
+    codec = Codec(MISSION)
+
+    assert codec.decode(said.key, msgpack.packb(parts)) is None
+    assert codec.dropped == {"malformed": 1}

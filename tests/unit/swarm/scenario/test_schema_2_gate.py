@@ -15,7 +15,7 @@ from tests.unit.swarm.scenario.test_read import VALID as SCHEMA_1
 from tests.unit.swarm.scenario.test_schema_2_read import VALID as SCHEMA_2
 
 ALL = (
-    "acceleration_m_s2, airspeed_m_s, endurance_s, due_s, opens_s, closes_s, path_m, height_m, "
+    "airspeed_m_s, endurance_s, due_s, opens_s, closes_s, path_m, height_m, "
     "wind_m_s, [[base]], [[zone]] and band_m"
 )
 COMMANDS: dict[str, list[str]] = {
@@ -52,7 +52,7 @@ def test_python_names_it_too(tmp_path: Path) -> None:
     mission = swarm.load(path)
 
     for does in (swarm.plan, swarm.simulate, lambda mission: swarm.evaluate(mission, {})):
-        with pytest.raises(swarm.SwarmError, match="does not heed acceleration_m_s2, "):
+        with pytest.raises(swarm.SwarmError, match="does not heed airspeed_m_s, "):
             does(mission)
 
 
