@@ -60,6 +60,7 @@ def random_mission(
 def mission_of(problem: Problem, name: str) -> Mission:
     """``problem`` as a mission of that name, all of whose tasks are known at the start."""
     starts_m, places_m = problem.start_enu_m.tolist(), problem.task_enu_m.tolist()
+    accelerations_m_s2 = problem.acceleration_m_s2
     ids = problem.task_ids
     return Mission(
         name=name,
@@ -71,6 +72,11 @@ def mission_of(problem: Problem, name: str) -> Mission:
                 speed_m_s=float(problem.speed_m_s[row]),
                 success=dict(zip(ids, problem.success[row].tolist(), strict=True)),
                 survival=dict(zip(ids, problem.survival[row].tolist(), strict=True)),
+                acceleration_m_s2=(
+                    None
+                    if accelerations_m_s2 is None or np.isinf(accelerations_m_s2[row])
+                    else float(accelerations_m_s2[row])
+                ),
             )
             for row, uav in enumerate(problem.uav_ids)
         ),

@@ -61,13 +61,14 @@ def test_with_an_acceleration_it_speeds_up_and_brakes_on_each_leg() -> None:
     flight = Flight()
     flight.vehicle.order(replace(PREPARE, acceleration_m_s2=2.0), VehicleReady())
     flight.queue.at(10.0, lambda: flight.fly(1, 100.0))
-    flight.queue.run(11.0)
-    speeding_up = flight.vehicle.telemetry()
-    flight.queue.at(25.0, lambda: flight.fly(2, 82.0))
+    seen: list[Telemetry | None] = []
+    flight.queue.at(11.0, lambda: seen.append(flight.vehicle.telemetry()))
+    flight.queue.at(30.0, lambda: flight.fly(2, 82.0))
     flight.queue.run(100.0)
 
+    (speeding_up,) = seen
     assert speeding_up == Telemetry((1.0, 0.0, 10.0), (2.0, 0.0, 0.0), None)
-    arrivals = [(25.0, Arrived(1)), (31.0, Arrived(2))]  # 10 + 10/1 + 10/2; 2·√(18/2)
+    arrivals = [(25.0, Arrived(1)), (36.0, Arrived(2))]  # 10 + 10/1 + 10/2; 2·√(18/2)
     assert [report for report in flight.reports if report[1] != VehicleReady()] == arrivals
 
 
