@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from sim.autopilot.config import fleet_of
+from sim.autopilot.config import Physics, fleet_of
 from sim.autopilot.options import Endpoint, Transport, parse_endpoint
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.model.frames import DEFAULT_ORIGIN
@@ -31,6 +33,16 @@ def test_vehicles_stand_at_the_starts_and_fly_as_fast_as_their_uavs() -> None:
     assert fleet[2].config.start_enu_m == (2.0, 2.0, 3.0)
     assert fleet[2].config.cruise_m_s == 6.0
     assert fleet[2].config.origin == DEFAULT_ORIGIN
+
+
+def test_vehicles_speed_up_as_the_scenario_says_unless_told_otherwise() -> None:
+    plain = mission()
+    slow = replace(plain.uavs[0], acceleration_m_s2=1.5)
+    flown = replace(plain, uavs=(slow, *plain.uavs[1:]))
+    told = fleet_of(flown, physics=Physics(acceleration_m_s2=4.0))
+
+    assert [m.config.acceleration_m_s2 for m in fleet_of(flown)] == [1.5, None, None]
+    assert [m.config.acceleration_m_s2 for m in told] == [4.0] * 3
 
 
 def test_selected_uavs_keep_their_system_ids_unless_told_otherwise() -> None:

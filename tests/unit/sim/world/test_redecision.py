@@ -16,6 +16,7 @@ from swarm.model import Mission
 from swarm.protocol.events import CommonEvent, MessageReceived
 from swarm.protocol.messages import Body, Message, TaskEntry
 from swarm.protocol.uav_messages import Choice, Outcome
+from tests.support.builders import with_accelerations
 from tests.support.fleet_builders import Ear, plan_for, random_mission
 
 
@@ -73,6 +74,15 @@ def test_every_choice_of_a_faultless_flight_comes_out_the_same(
 ) -> None:
     for seed in range(4):
         facts = heard(method, seed, most=most, popup_frac=popup_frac)
+
+        assert redecide(facts) == RedecisionResult(len(choices_in(facts)), (), 0)
+
+
+def test_choices_of_uavs_that_speed_up_slowly_come_out_the_same() -> None:
+    rng = np.random.default_rng(7)
+    mission = with_accelerations(random_mission(rng, n_uav=3, n_task=12, popup_frac=0.3), rng)
+    for method in ("greedy", "lookahead", "guided"):
+        facts = hear(mission, method, 1)
 
         assert redecide(facts) == RedecisionResult(len(choices_in(facts)), (), 0)
 

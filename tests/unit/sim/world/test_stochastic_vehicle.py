@@ -59,12 +59,18 @@ class Flight:
         return told
 
 
-def test_in_a_certain_world_it_flies_as_the_ideal_vehicle_to_the_last_bit() -> None:
+@pytest.mark.parametrize("acceleration_m_s2", [None, 3.0])
+def test_in_a_certain_world_it_flies_as_the_ideal_vehicle_to_the_last_bit(
+    acceleration_m_s2: float | None,
+) -> None:
     reports: list[tuple[float, VehicleReport]] = []
     queue = EventQueue()
     ideal = IdealVehicle(queue, lambda report: reports.append((queue.now_s(), report)))
-    ideal.order(Prepare((0.0, 0.0, LAYER_M), 10.0), VehicleReady())
-    fated = Flight(Uncertainty())
+    prepare = Prepare((0.0, 0.0, LAYER_M), 10.0, acceleration_m_s2=acceleration_m_s2)
+    ideal.order(prepare, VehicleReady())
+    (only,) = FLOWN.uavs
+    slow = replace(only, acceleration_m_s2=acceleration_m_s2)
+    fated = Flight(Uncertainty(), replace(FLOWN, uavs=(slow,)))
     places = [(50.1, 33.3), (80.7, -12.3), (0.1, 0.2)]
     for leg, (east_m, north_m) in enumerate(places):
         order = GoTo(leg, (east_m, north_m, LAYER_M))
@@ -162,3 +168,14 @@ def _same(flight: Flight) -> Flight:
     other = Flight(flight.fate.uncertainty)
     other.fly(1, "t0")
     return other
+
+
+def test_with_an_acceleration_it_believes_to_arrive_when_it_really_does() -> None:
+    slow = replace(FLOWN.uavs[0], acceleration_m_s2=2.0)
+    flight = Flight(Uncertainty(position_error_m=3.0), replace(FLOWN, uavs=(slow,)))
+    flight.fly(1, "t1")
+    stop = flight.fate.stop_enu_m(slow.id, flight.fate.mission.tasks[1])
+    true_m = math.dist((0.0, 0.0, 0.0), stop)
+
+    assert flight.arrival_s(1) == pytest.approx(true_m / 10.0 + 10.0 / 2.0)
+    assert flight.telemetry.position_enu_m == (80.0, 0.0, LAYER_M)
