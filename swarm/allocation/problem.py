@@ -200,7 +200,8 @@ class Problem:
         return self._flown_s(uavs, (places_m - from_m).T)
 
     def _flown_s(self, uav: int | IntArray, offset_m: FloatArray) -> FloatArray:
-        length_m, speed_m_s = straight_m(offset_m), self.speed_m_s[uav]
+        """Times over offsets, which are used up."""
+        length_m, speed_m_s = straight_m(offset_m, spoilt=offset_m), self.speed_m_s[uav]
         if self.acceleration_m_s2 is None:
             length_m /= speed_m_s
             return length_m
@@ -211,12 +212,13 @@ class Problem:
         object.__setattr__(self, name, array)
 
 
-def straight_m(offset_m: FloatArray) -> FloatArray:
+def straight_m(offset_m: FloatArray, spoilt: FloatArray | None = None) -> FloatArray:
     """(...) lengths of (3, ...) offsets, east, north and up [m].
 
-    sqrt((dx² + dy²) + dz²), with each operation rounded by itself and in this order.
+    sqrt((dx² + dy²) + dz²), with each operation rounded by itself and in this order. Squares are
+    written into ``spoilt``: offsets that nobody needs any more spare a large table of new memory.
     """
-    squares_m2 = offset_m * offset_m
+    squares_m2 = np.multiply(offset_m, offset_m, out=spoilt)
     square_m2 = squares_m2[0] + squares_m2[1]
     square_m2 += squares_m2[2]
     length_m: FloatArray = np.sqrt(square_m2)
