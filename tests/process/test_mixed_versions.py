@@ -18,6 +18,7 @@ import pytest
 import zenoh
 
 import swarm
+from coordinator.core.publication import FlightLayers, mission_config_of, task_entry_of
 from sim.fleet.faults.flood import long_mission
 from swarm.bus.config import DEFAULT_LEASE_S
 from swarm.bus.zenoh_session import session_config
@@ -112,6 +113,23 @@ def test_an_earlier_release_drops_and_counts_what_it_does_not_know(release: Path
     theirs = read_by(release, json.dumps([said, answered]))
 
     assert theirs == {"dropped": {"unknown kind": 2}, "registers": 1}
+
+
+def test_of_a_mission_with_accelerations_an_earlier_release_drops_the_brief_alone(
+    release: Path,
+) -> None:
+    mission = swarm.load(MISSION)
+    slow = replace(mission, uavs=tuple(replace(u, acceleration_m_s2=2.5) for u in mission.uavs))
+    config = mission_config_of(slow, FlightLayers(), run=1)
+    brief = Message(MISSION, COORDINATOR, Stamp(9, 1), config)
+    board = Message(MISSION, COORDINATOR, Stamp(9, 2), task_entry_of(slow.tasks[0], 0))
+    answer = encode(Snapshot(MISSION, COORDINATOR, 9, None, (brief, board)))
+    said = [(message.key, encode(message).hex()) for message in (brief, board)]
+    answered = [(KeySpace(MISSION).state(COORDINATOR), answer.hex())]
+
+    theirs = read_by(release, json.dumps([said, answered]))
+
+    assert theirs == {"dropped": {"unknown version": 2}, "registers": 1}
 
 
 @pytest.mark.parametrize("earlier", ["uav1", COORDINATOR])
