@@ -6,10 +6,10 @@ depend on how often they are asked for, and may be asked for in any order.
 With limited acceleration a leg from rest is a trapezoid of speed. A vehicle that already moves
 towards the target begins the trapezoid at its speed. One that moves elsewhere does two things at
 once: it brakes to the place where its velocity ends, and flies a trapezoid from there to the
-target, each with half of the acceleration. The sum of both is continuous in place and velocity,
-ends at rest at the target, never accelerates more than allowed and is never faster than the
-greater of the speed it had and the speed ordered: while both parts change speed, what one loses
-the other gains.
+target; of the acceleration each gets a share, by the speed it had and the speed ordered. The sum
+of both is continuous in place and velocity, ends at rest at the target, never accelerates more than
+allowed and is never faster than the greater of those speeds: from one to the other it changes
+evenly.
 
 Leaves out: wind (`sim.world.wind`), which stands behind `Motion` in `IdealMotion`'s place, limits
 of jerk, separate limits for climbing, attitude, and the ground, which a vehicle that turns round
@@ -165,6 +165,8 @@ class IdealMotion:
 _SAME_WAY = 1e-6
 """How exactly, as a share, a vehicle must move towards its target and have room to brake
 to be said to do so: it may be asked anew for what it does already."""
+_LEAST_SHARE = 0.01
+"""Of the acceleration, for either."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -360,14 +362,19 @@ class SmoothMotion:
         self, here: Point, velocity: Point, target_enu_m: Point, speed_m_s: float
     ) -> tuple[_Part, ...]:
         """The way of a vehicle that moves elsewhere than to its target."""
-        limit_m_s2, half_m_s2 = self._acceleration_m_s2, 0.5 * self._acceleration_m_s2
-        brake = _brake(velocity, half_m_s2)
+        limit_m_s2, first_m_s = self._acceleration_m_s2, math.hypot(*velocity)
+        # So it has stopped moving elsewhere when it is as fast as ordered. With equal shares one
+        # that had all but stopped would speed up half as fast as it can.
+        share = max(_LEAST_SHARE, min(1.0 - _LEAST_SHARE, first_m_s / (first_m_s + speed_m_s)))
+        braking_m_s2 = limit_m_s2 * share
+        left_m_s2 = limit_m_s2 - braking_m_s2
+        brake = _brake(velocity, braking_m_s2)
         if brake is None:
             raise ValueError("a vehicle at rest flies straight on")
         bend = plus(here, brake.end_m)
-        way = _part(bend, target_enu_m, 0.0, speed_m_s, half_m_s2, limit_m_s2)
+        way = _part(bend, target_enu_m, 0.0, speed_m_s, left_m_s2, limit_m_s2)
         if way and way[0].ramps.braking_s < brake.ramps.duration_s:
-            way = _part(bend, target_enu_m, 0.0, speed_m_s, half_m_s2, half_m_s2)
+            way = _part(bend, target_enu_m, 0.0, speed_m_s, left_m_s2, left_m_s2)
         return (brake, *way)
 
 

@@ -195,3 +195,14 @@ def test_asking_changes_nothing(instants_s: list[float]) -> None:
 
     assert first == [asked.position_enu_m(now_s) for now_s in instants_s]
     assert asked.position_enu_m(50.0) == unasked.position_enu_m(50.0)
+
+
+def test_what_is_left_of_a_speed_does_not_keep_it_from_speeding_up() -> None:
+    rested, all_but_rested = SmoothMotion(ORIGIN, 2.5), SmoothMotion(ORIGIN, 2.5)
+    all_but_rested.fly_to((0.0, 100.0, 0.0), 10.0, now_s=0.0)
+    all_but_rested.stop(0.1)  # at 0.25 m/s northwards
+    rested.fly_to((100.0, 0.0, 0.0), 10.0, now_s=0.1)
+    all_but_rested.fly_to((100.0, 0.0, 0.0), 10.0, now_s=0.1)
+
+    assert rested.arrives_s == pytest.approx(0.1 + 14.0)
+    assert all_but_rested.arrives_s == pytest.approx(0.1 + 14.0, abs=0.1)
