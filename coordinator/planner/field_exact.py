@@ -19,8 +19,10 @@ from swarm.kernels import field_exact as kernel
 MAX_FIELD_TASKS = kernel.MOST_TASKS
 """With more the subsets are too many."""
 _LIMIT_S = 60.0
-_LABEL_S = 2.5e-7
+_LABEL_S = 1e-7
 """Of one partial list, compared with others of its set."""
+_MOST_LABELS_S = 7.0
+"""Until the partial lists of one UAV fill their memory, and the proof is given up."""
 
 
 class TooManyListsError(ProblemTooLargeError):
@@ -48,22 +50,22 @@ class FieldPlanLists:
 def estimated_field_s(problem: FieldProblem, state: FieldState | None = None) -> float:
     """Rough upper estimate of the proof's duration on one core of 2020 [s]; inf when too large.
 
-    How many partial lists none is better than can only be guessed: bases, and openings still
-    ahead beside them, make many. Where slots are few nobody knows before.
+    How many partial lists there are that none is better than can only be guessed: most without
+    windows, fewer the more there are. Where slots are few nobody knows before how many lists have
+    to be flown together: the limit must end that.
     """
     state = FieldState.at_start(problem) if state is None else state
     decides = state.active & np.isfinite(state.free_s)
     n = int((problem.capable[decides] & state.open).any(axis=0).sum())
     if n > MAX_FIELD_TASKS:
         return float("inf")
+    n_decide = int(decides.sum())
     n_way = n + int(problem.is_line[state.open].sum())
     n_base = problem.n_base if bool(np.isfinite(problem.full_s[decides]).any()) else 0
-    waits = bool((problem.opens_s[state.open] > 0.0).any())
-    per_node = 1.0 + 0.15 * n * (n_base > 0) * (1.0 + 2.0 * waits)
-    few = bool(((problem.slots > 0) & (problem.slots < int(decides.sum()))).any()) and n_base > 0
-    labels = 2.0**n * n_way * (1.0 + n_base) * per_node
-    per_uav_s = labels * (n_way + n_base) * _LABEL_S * (3.0 if few else 1.0) + 3.0**n * 2e-9
-    return int(decides.sum()) * (per_uav_s + 1e-5)
+    labels = 2.0**n * n_way * (1.0 + n_base) * (1.0 + 0.15 * n * (n_base > 0))
+    own_s = min(labels * (n_way + n_base) * _LABEL_S, _MOST_LABELS_S)
+    few = n_base > 0 and bool(((problem.slots > 0) & (problem.slots < n_decide)).any())
+    return n_decide * (own_s + 3.0**n * 2e-9) * (2.5 if few else 1.0) + 1e-5
 
 
 def field_optimum_before(
@@ -97,9 +99,9 @@ def field_optimum_before(
     best = kernel.optimum(
         problem.kernel, state, known=known, threads=threads, should_stop=should_stop
     )
-    if best is not None and best.outcome is not kernel.ProofOutcome.TOO_LARGE:
-        proven = best.outcome is kernel.ProofOutcome.PROVEN
-        return FieldPlanLists(proven, best.objective, best.n_left_out, best.lists)
-    if best is not None or should_stop is None or not should_stop():
+    if best.outcome is kernel.ProofOutcome.TOO_LARGE:
         raise TooManyListsError(problem.n_uav, int(state.open.sum()))
-    return None
+    if not best.found:
+        return None
+    proven = best.outcome is kernel.ProofOutcome.PROVEN
+    return FieldPlanLists(proven, best.objective, best.n_left_out, best.lists)

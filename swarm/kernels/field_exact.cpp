@@ -31,6 +31,7 @@ using Size = std::size_t;
 constexpr double kRounding = 1e-9;  // J: so much better is better
 constexpr std::int64_t kSubsetsPerStep = 8;  // of a Watch
 constexpr Size kMostChoices = 1'000'000;     // lists of one UAV that are held at once
+constexpr int kMostAtOnce = 2;               // UAVs whose labels are held at once
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 int count_of(TaskSet set) {
@@ -293,7 +294,7 @@ class Proof {
             }
         }
         own.resize(questions_.size());
-        parallel_for(questions_.size(), std::min(threads_, 4), 1, [&] {
+        parallel_for(questions_.size(), std::min(threads_, kMostAtOnce), 1, [&] {
             return [&](Size j) {
                 own[j] = std::make_unique<OwnLists>(questions_[j], watch_);
             };

@@ -9,53 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelField
+from swarm.kernels.field import FieldTeamArrays
 from swarm.kernels.lower_level import default_threads
 
 MOST_TASKS: int = _kernels.MOST_FIELD_TASKS
 """Tasks the solver takes."""
-
-
-class TeamAsArrays(Protocol):
-    """Where a team stands: swarm.allocation.field.FieldState."""
-
-    @property
-    def free_s(self) -> npt.NDArray[np.float64]:
-        """(n_uav,) when it is free [s]; infinite: it takes no decision."""
-
-    @property
-    def sortie_end_s(self) -> npt.NDArray[np.float64]:
-        """(n_uav,) when it has landed at the latest [s]."""
-
-    @property
-    def first_s(self) -> npt.NDArray[np.float64]:
-        """(n_uav, n_node) times of legs from where it is then [s]."""
-
-    @property
-    def survived(self) -> npt.NDArray[np.float64]:
-        """(n_uav,) S of eq. 1 of its next task."""
-
-    @property
-    def active(self) -> npt.NDArray[np.bool_]:
-        """(n_uav,) whether it takes part."""
-
-    @property
-    def open(self) -> npt.NDArray[np.bool_]:
-        """(n_task,) whether somebody may take the task."""
-
-    @property
-    def landed_at(self) -> npt.NDArray[np.int32]:
-        """(n_uav,) base at which it stands, or -1."""
-
-    @property
-    def rank(self) -> npt.NDArray[np.int64]:
-        """(n_uav,) place in the sequence."""
 
 
 class ProofOutcome(Enum):
@@ -72,6 +37,8 @@ class FieldLists:
 
     outcome: ProofOutcome
     """Whether they are proven to be the best."""
+    found: bool
+    """Whether there are any; where not, nothing below means anything."""
     n_left_out: int
     """Open tasks without due_s that are on no list."""
     objective: float
@@ -96,12 +63,12 @@ class OwnFieldList:
 
 def optimum(
     problem: KernelField,
-    team: TeamAsArrays,
+    team: FieldTeamArrays,
     *,
     known: Sequence[Sequence[int]] = (),
     threads: int | None = None,
     should_stop: Callable[[], bool] | None = None,
-) -> FieldLists | None:
+) -> FieldLists:
     """The best lists of a team from where it stands on, slots included.
 
     The same with any number of threads. Several visits to bases in a row are at most as many as
@@ -115,8 +82,7 @@ def optimum(
         should_stop: asked every few milliseconds whether to give up.
 
     Returns:
-        The best that was found, not proven where it was told to stop or grew too large; None where
-        that was before anything was found.
+        The best that was found, not proven where it was told to stop or grew too large.
 
     Raises:
         ValueError: an argument is not what it must be.
@@ -125,15 +91,13 @@ def optimum(
     outcome, found, n_left_out, objective, lists = _kernels.field_optimum(
         problem, _as_tuple(team), [list(items) for items in known], count, should_stop
     )
-    if not found:
-        return None
     items = tuple(tuple(own) for own in lists)
-    return FieldLists(ProofOutcome(outcome), n_left_out, objective, items)
+    return FieldLists(ProofOutcome(outcome), found, n_left_out, objective, items)
 
 
 def best_list(
     problem: KernelField,
-    team: TeamAsArrays,
+    team: FieldTeamArrays,
     uav: int,
     *,
     should_stop: Callable[[], bool] | None = None,
@@ -156,7 +120,7 @@ def best_list(
     return OwnFieldList(ProofOutcome(outcome), n_left_out, objective, tuple(items))
 
 
-def can_do_alone(problem: KernelField, team: TeamAsArrays) -> npt.NDArray[np.bool_]:
+def can_do_alone(problem: KernelField, team: FieldTeamArrays) -> npt.NDArray[np.bool_]:
     """Whether a UAV could do a task as its only one, with as many swaps as it takes.
 
     Every slot is taken to be free. Who takes no part can do nothing.
@@ -167,7 +131,7 @@ def can_do_alone(problem: KernelField, team: TeamAsArrays) -> npt.NDArray[np.boo
     return _kernels.field_can_do_alone(problem, _as_tuple(team))
 
 
-def _as_tuple(team: TeamAsArrays) -> tuple[Any, ...]:
+def _as_tuple(team: FieldTeamArrays) -> tuple[Any, ...]:
     return (
         team.free_s,
         team.sortie_end_s,

@@ -137,6 +137,7 @@ class Labels {
     // Extends all labels of a set; the best of those that end with a task.
     std::uint32_t settle(TaskSet set) {
         queue_.clear();
+        settling_ = set;
         std::uint32_t best = kNone;
         if (set == 0) extend(kNone, set);
         for (int i = 0; i < n_; ++i) {
@@ -217,6 +218,7 @@ class Labels {
             if (dominates(other, made, set)) return kNone;
             if (dominates(made, other, set)) {
                 other.dead = true;
+                if (set != settling_) unused_.push_back(*link);  // nothing comes from it yet
                 *link = other.next;
             } else {
                 link = &other.next;
@@ -224,10 +226,17 @@ class Labels {
             ++looked;
         }
         watch_.stops_after(looked);
+        reached_[set] = 1;
+        if (!unused_.empty()) {
+            const std::uint32_t at = unused_.back();
+            unused_.pop_back();
+            *link = at;
+            labels_[at] = made;
+            return at;
+        }
         const auto at = static_cast<std::uint32_t>(labels_.size());
         *link = at;  // before the vector moves what it points into
         labels_.push_back(made);
-        reached_[set] = 1;
         return at;
     }
 
@@ -263,7 +272,9 @@ class Labels {
     std::vector<double> calm_air_s_;     // the same in the air
     std::vector<std::uint8_t> reached_;
     std::vector<std::uint32_t> heads_;
-    std::vector<std::uint32_t> queue_;
+    std::vector<std::uint32_t> queue_;   // landed labels of the set that is being settled
+    std::vector<std::uint32_t> unused_;  // places in `labels_`
+    TaskSet settling_ = 0;
     std::vector<Label> labels_;
 };
 

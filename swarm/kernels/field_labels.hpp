@@ -44,7 +44,7 @@ struct OwnQuestion {
 enum class Outcome : std::uint8_t { kProven, kStopped, kTooLarge };
 
 constexpr int kMostOwnTasks = 18;
-constexpr std::size_t kMostLabels = 6'000'000;  // of one UAV; 56 bytes each
+constexpr std::size_t kMostLabels = 6'000'000;  // of one UAV; 40 bytes each
 
 // One label's extension by one item; false where that can't be. `delayed`: behind a relaxed base.
 bool extend_relaxed(const OwnQuestion& question, Item item, bool& delayed, Progress& progress);
