@@ -23,10 +23,16 @@ _Ints = npt.NDArray[np.int32]
 _Ranks = npt.NDArray[np.int64]
 _Bools = npt.NDArray[np.bool_]
 
-FieldRuleCode = Literal[0]
+FieldRuleCode = Literal[0, 1]
 FIELD_GREEDY: FieldRuleCode = 0
 """The open task with the largest p·S·m·(until − end) among those that it can do next; else to a
 base, after which it could do one; else home."""
+FIELD_LOOKAHEAD: FieldRuleCode = 1
+"""The first item of the UAV's own best list over all open tasks, as if it were alone and every slot
+free: exact up to `EXACT_OWN_TASKS` tasks that it is capable of, beyond greedy's list improved by
+insertions and moves. Where that is a base without a slot in time it decides like greedy."""
+
+EXACT_OWN_TASKS = 10
 
 
 class FieldRefusal(IntEnum):
@@ -117,7 +123,7 @@ class FieldRuns(NamedTuple):
     """(k, 4) departure, arrival, beginning and end as known then [s]: at a base somebody whose
     decision comes later may be ahead."""
     scores: _Floats
-    """(k, 2) of the task and of the next best one [value·s]; NaN: there is none."""
+    """(k, 2) `FieldStep.score` and `FieldStep.second_score` [value·s]; NaN: there is none."""
 
     def lists(self, n_uav: int) -> list[list[int]]:
         """Items per UAV in order of execution."""
@@ -136,9 +142,9 @@ class FieldStep(NamedTuple):
     begin_s: float
     end_s: float
     score: float | None
-    """p·S·m·(until − end) of a task [value·s]; None of a base."""
+    """Greedy: p·S·m·(until − end) of a task, None of a base; lookahead: of its list [value·s]."""
     second_score: float | None
-    """Of the next best task [value·s]."""
+    """Greedy: of the next best task [value·s]."""
 
 
 def fly_lists(

@@ -4,12 +4,18 @@
 #include <algorithm>
 #include <limits>
 
+#include "field_lookahead.hpp"
+
 namespace peckorder {
 
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr int kStepsPerTask = 2;  // of some ten nanoseconds, to look at one
+
+// Of some ten nanoseconds, about as many as a decision takes.
+std::int64_t steps_of(FieldRule rule, std::size_t n_open) {
+    return static_cast<std::int64_t>(n_open) * (rule == FieldRule::kGreedy ? 2 : 10'000);
+}
 
 }  // namespace
 
@@ -26,6 +32,12 @@ void BaseTraffic::reset(const FieldProblem& problem, const FieldTeam& team) {
         if (base < 0 || !limited(base)) continue;
         hold(uav, base, team.active[uav] ? team.free_s[uav] : kNever);
     }
+}
+
+void BaseTraffic::reset(const FieldProblem& problem) {
+    at_.assign(problem.n_uav, At{});
+    held_.assign(problem.n_base, 0);
+    limit_.assign(problem.n_base, 0);
 }
 
 void BaseTraffic::approach(int uav, int base, const Arrival& arrival, double sortie_end_s) {
@@ -69,9 +81,67 @@ double BaseTraffic::begin_s(const FieldProblem& problem, int base, const Arrival
     return std::max(arrival.arrive_s, slot());
 }
 
-FieldChoice FieldDecider::decide(FieldRule, const FieldView& view, BaseTraffic& traffic) {
+FieldChoice FieldDecider::decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic,
+                                 bool may_swap) {
+    if (rule == FieldRule::kLookahead) return lookahead(view, traffic, may_swap);
+    return by_greedy(view, traffic, may_swap);
+}
+
+FieldChoice FieldDecider::by_greedy(const FieldView& view, BaseTraffic& traffic, bool may_swap) {
     const FieldChoice choice = greedy(view);
-    return choice.home ? base(view, traffic) : choice;
+    return choice.home && may_swap ? base(view, traffic) : choice;
+}
+
+// The first item of its own best list; where that is a base without a slot in time, greedy.
+FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic, bool may_swap) {
+    const FieldProblem& problem = view.problem;
+    FieldList begin_with;
+    if (able_for(problem, view.uav, view.open).size() > static_cast<std::size_t>(kExactOwnTasks)) {
+        begin_with = greedy_list(view, may_swap);
+    }
+    const OwnPlan plan =
+        own_plan(problem, view.uav, view.progress, view.here, view.open, may_swap, begin_with);
+    if (plan.list.empty()) return {};
+    FieldChoice choice{false, plan.list.front(), true, false, plan.value, 0.0, Times{}};
+    Progress progress = view.progress;
+    Refusal refusal = Refusal::kNone;
+    if (is_base(choice.item)) {
+        const int base = base_of(choice.item);
+        const double arrive_s = arrival_s(problem, base, progress);
+        const double begin_s = traffic.begin_s(problem, base, {arrive_s, view.rank, view.uav});
+        refusal = begin_s < kNever ? swap_battery(problem, view.uav, base, begin_s, progress,
+                                                  choice.times)
+                                   : Refusal::kEnergy;
+    } else {
+        refusal = do_task(problem, view.uav, choice.item, progress, choice.times);
+    }
+    return refusal == Refusal::kNone ? choice : by_greedy(view, traffic, true);
+}
+
+// What greedy would do next and next, alone.
+std::vector<Item> FieldDecider::greedy_list(const FieldView& view, bool may_swap) {
+    const FieldProblem& problem = view.problem;
+    nobody_.reset(problem);
+    std::vector<Item> list;
+    std::vector<int> open = view.open;
+    Progress progress = view.progress;
+    int here = view.here, n_since_task = 0;
+    while (!open.empty()) {
+        const FieldChoice choice =
+            by_greedy({problem, open, view.uav, view.rank, progress, here}, nobody_,
+                      may_swap && n_since_task < problem.n_base);
+        if (choice.home) break;
+        Times times;
+        if (do_item(problem, view.uav, choice.item, progress, times) != Refusal::kNone) break;
+        list.push_back(choice.item);
+        here = is_base(choice.item) ? base_of(choice.item) : -1;
+        n_since_task = is_base(choice.item) ? n_since_task + 1 : 0;
+        if (!is_base(choice.item)) {
+            open.erase(std::lower_bound(open.begin(), open.end(), task_of(choice.item)));
+        }
+    }
+    while (!list.empty() && is_base(list.back())) list.pop_back();
+    return list;
 }
 
 FieldChoice FieldDecider::greedy(const FieldView& view) const {
@@ -189,7 +259,14 @@ void FieldRun::run(const FieldProblem& problem, const FieldTeam& team, FieldRule
     most_items_.assign(problem.n_uav, std::numeric_limits<int>::max());
     do {
         once(problem, team, rule, watch);
-    } while (shortened());
+    } while (shortened() && !watch.stopped());
+    if (!watch.stopped()) return;
+    for (auto last = decisions_.end(); last != decisions_.begin();) {
+        Uav& self = uavs_[(--last)->uav];
+        if (self.n_since_task == 0) continue;
+        --self.n_since_task;  // a visit to a base that no task follows
+        last = decisions_.erase(last);
+    }
 }
 
 // Whether someone flew to a base in vain; from there on it visits no more.
@@ -245,16 +322,13 @@ void FieldRun::decide(const FieldProblem& problem, FieldRule rule, int uav, Watc
     Uav& self = uavs_[uav];
     const double now_s = self.progress.time_s;
     const int here = self.progress.landed ? self.base : -1;
-    FieldChoice choice;
-    const auto steps = static_cast<std::int64_t>(open_.size()) * kStepsPerTask;
-    if (!watch.stops_after(steps)) {
-        choice = decider_.decide(rule, {problem, open_, uav, rank_[uav], self.progress, here},
-                                 traffic_);
-    }
     // As many swaps in a row as there are bases lead everywhere.
-    const bool no_more_swaps =
-        self.n_item >= most_items_[uav] || self.n_since_task >= problem.n_base;
-    if (!choice.home && is_base(choice.item) && no_more_swaps) choice = {};
+    const bool may_swap = self.n_item < most_items_[uav] && self.n_since_task < problem.n_base;
+    FieldChoice choice;
+    if (!watch.stops_after(steps_of(rule, open_.size()))) {
+        choice = decider_.decide(rule, {problem, open_, uav, rank_[uav], self.progress, here},
+                                 traffic_, may_swap);
+    }
     const bool holds = here >= 0 && traffic_.limited(here);
     if (choice.home) {
         if (holds) release(problem, uav);

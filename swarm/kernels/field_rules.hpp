@@ -14,14 +14,15 @@
 
 namespace peckorder {
 
-enum class FieldRule : int { kGreedy = 0 };
+enum class FieldRule : int { kGreedy = 0, kLookahead = 1 };
 
 // What a UAV does next.
 struct FieldChoice {
     bool home = true;  // nothing more
     Item item = 0;
     bool has_score = false, has_second = false;  // scores are of tasks
-    double score = 0.0, second = 0.0;  // p·S·m·(until - end) of it, and of the next best task
+    double score = 0.0, second = 0.0;  // greedy: p·S·m·(until - end) of it, and of the next best
+                                       // task; lookahead: what the own list is worth
     Times times{};                     // of a base as far as others are known to wait there
 };
 
@@ -29,6 +30,7 @@ struct FieldChoice {
 class BaseTraffic {
  public:
     void reset(const FieldProblem& problem, const FieldTeam& team);
+    void reset(const FieldProblem& problem);  // every slot is free, always
     bool limited(int base) const { return limit_[base] > 0; }
     bool any_free(int base) const { return held_[base] < limit_[base]; }
 
@@ -74,9 +76,12 @@ struct FieldView {
 class FieldDecider {
  public:
     // By `rule`; may be infeasible only in as far as `traffic` turns out to be another.
-    FieldChoice decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic);
+    FieldChoice decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic, bool may_swap);
 
  private:
+    FieldChoice by_greedy(const FieldView& view, BaseTraffic& traffic, bool may_swap);
+    FieldChoice lookahead(const FieldView& view, BaseTraffic& traffic, bool may_swap);
+    std::vector<Item> greedy_list(const FieldView& view, bool may_swap);
     FieldChoice greedy(const FieldView& view) const;
     FieldChoice base(const FieldView& view, BaseTraffic& traffic);
     bool opens_any(const FieldView& view, const Progress& progress) const;
@@ -88,6 +93,7 @@ class FieldDecider {
         bool reached = false, settled = false;
     };
     std::vector<Label> labels_;  // (n_base,)
+    BaseTraffic nobody_;
 };
 
 struct FieldDecision {

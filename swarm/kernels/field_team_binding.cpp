@@ -22,7 +22,7 @@ using Size = std::size_t;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 FieldRule checked_rule(int code) {
-    if (code != 0) refuse("rule must be 0 (greedy)");
+    if (code != 0 && code != 1) refuse("rule must be 0 (greedy) or 1 (lookahead)");
     return static_cast<FieldRule>(code);
 }
 
@@ -143,7 +143,7 @@ std::optional<Fields> decide(const BoundField& field, const BoundFieldTeam& give
     const Progress progress = team.begin(problem, uav);
     FieldDecider decider;
     const FieldChoice choice = decider.decide(
-        rule, {problem, open, uav, team.rank[uav], progress, team.landed_at[uav]}, traffic);
+        rule, {problem, open, uav, team.rank[uav], progress, team.landed_at[uav]}, traffic, true);
     if (choice.home) return std::nullopt;
     const auto known = [](bool has, double score) {
         return has ? std::optional<double>(score) : std::nullopt;
