@@ -129,7 +129,7 @@ nb::ndarray<nb::numpy, const T, nb::ndim<1>> view(nb::handle owner, const void* 
 
 }  // namespace
 
-FieldTeam BoundFieldTeam::checked(const FieldProblem& problem) const {
+FieldTeam BoundFieldTeam::checked(const FieldProblem& problem, int decider) const {
     const Size n_uav = static_cast<Size>(problem.n_uav);
     require_shape("free_s", free_s, {n_uav});
     require_shape("sortie_end_s", sortie_end_s, {n_uav});
@@ -141,7 +141,15 @@ FieldTeam BoundFieldTeam::checked(const FieldProblem& problem) const {
     require_shape("rank", rank, {n_uav});
     require_numbers("free_s", free_s, -kMost, kEndless, "times, not NaN or -infinity");
     require_numbers("sortie_end_s", sortie_end_s, -kEndless, kEndless, "times, not NaN");
-    require_numbers("first_s", first_s, 0.0, kEndless, ">= 0, or infinite");
+    if (decider < 0) {
+        require_numbers("first_s", first_s, 0.0, kEndless, ">= 0, or infinite");
+    } else {
+        const Size n_node = first_s.shape(1);
+        const double* row = first_s.data() + static_cast<Size>(decider) * n_node;
+        for (Size node = 0; node < n_node; ++node) {
+            require_within("first_s", row[node], 0.0, kEndless, ">= 0, or infinite");
+        }
+    }
     require_numbers("survived", survived, 0.0, 1.0, "within 0..1");
     require_numbers("landed_at", landed_at, -1, problem.n_base - 1, "indices of bases, or -1");
     return {free_s.data(),    sortie_end_s.data(), first_s.data(),   survived.data(),

@@ -41,8 +41,8 @@ struct BoundFieldTeam {
     In<std::int32_t, 1> landed_at;
     In<std::int64_t, 1> rank;
 
-    // A view, once shapes and numbers are checked.
-    FieldTeam checked(const FieldProblem& problem) const;
+    // A view, once shapes and numbers are checked; legs only of who is to decide, if one is.
+    FieldTeam checked(const FieldProblem& problem, int decider = -1) const;
 };
 
 }  // namespace peckorder

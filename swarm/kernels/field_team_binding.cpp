@@ -132,7 +132,7 @@ std::optional<Fields> decide(const BoundField& field, const BoundFieldTeam& give
     const FieldProblem& problem = field.problem;
     const FieldRule rule = checked_rule(rule_code);
     if (uav < 0 || uav >= problem.n_uav) refuse("uav must be an index of a UAV");
-    const FieldTeam team = given.checked(problem);
+    const FieldTeam team = given.checked(problem, uav);
     if (!std::isfinite(team.free_s[uav])) return std::nullopt;
     std::vector<int> open;
     for (int task = 0; task < problem.n_task; ++task) {

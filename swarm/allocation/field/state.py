@@ -1,6 +1,6 @@
 """Where each UAV of a team stands between two decisions, with the field's constraints.
 
-Leaves out: what is on its list (swarm.allocation.field.schedule).
+Leaves out: what is on its list, and when it does it (swarm.kernels.field).
 """
 
 from __future__ import annotations

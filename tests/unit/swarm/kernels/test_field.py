@@ -292,7 +292,7 @@ def test_a_run_that_is_told_to_stop_leaves_the_rest() -> None:
         ("horizon_s", 0.0),
     ],
 )
-def test_wrong_numbers_are_refused_by_name(name: str, value: object) -> None:
+def test_wrong_numbers_are_refused_by_name(name: str, value: Any) -> None:
     problem = problem_of(made_up(1, "slots"))
 
     with pytest.raises(ValueError, match=name):
