@@ -14,9 +14,12 @@ constexpr int kLanes = 2;
 constexpr double kMeanTorn = 8.0, kLongestString = 8.0;
 constexpr double kSplitShare = 0.5, kSplitDepth = 0.3;
 constexpr double kListBlink = 0.02;
+constexpr double kOutShare = 0.3;  // of iterations while tasks are out, that make room for one
 constexpr int kMostOut = 12;  // tasks on no list that are tried besides those torn out
 constexpr double kHottest = 1.0, kColdest = 0.003;
-constexpr double kPrize = 100.0;  // of the scale, in the annealing; the best is compared exactly
+constexpr int kAlwaysPrecise = 16;  // up to so many tasks, and else in a share of iterations,
+constexpr double kPreciseShare = 0.3;  // what lists could take is asked anew as stays change
+constexpr double kPrize = 30.0;  // of the scale, in the annealing; the best is compared exactly
 }  // namespace
 
 FieldLane::FieldLane(const FieldProblem& problem, const FieldTeam& team, std::uint64_t seed)
@@ -280,7 +283,9 @@ void FieldLane::remove(int uav, std::size_t from, std::size_t count) {
 
 void FieldLane::ruin() {
     const double kind = random_.uniform();
-    if (any_swaps_ && kind < 0.08) {
+    if (!out_.empty() && random_.uniform() < kOutShare) {
+        tear_about(out_[random_.below(static_cast<int>(out_.size()))]);
+    } else if (any_swaps_ && kind < 0.08) {
         swap_anew();
     } else if (kind < 0.16) {
         exchange_tails();
@@ -351,6 +356,30 @@ void FieldLane::tear_random() {
     }
 }
 
+// Of some lists what is done when `task` could be.
+void FieldLane::tear_about(int task) {
+    const int lists = 1 + random_.below(3);
+    const double last_s = std::min(std::min(problem_.closes_s[task], problem_.due_s[task]),
+                                   problem_.horizon_s);
+    const double first_s = problem_.opens_s[task];
+    const double time_s = first_s + random_.uniform() * std::max(0.0, last_s - first_s);
+    const std::vector<int>& able = able_[task];
+    for (int k = 0; k < lists; ++k) {
+        const int uav = able[random_.below(static_cast<int>(able.size()))];
+        const FieldList& list = lists_[uav];
+        if (list.order.empty() || is_touched_[uav]) continue;
+        const std::size_t count = 1 + static_cast<std::size_t>(random_.below(3));
+        std::size_t here = 0;
+        while (here + 1 < list.order.size() && here + 2 < list.offsets.size() &&
+               list.labels[list.offsets[here + 1]].progress.time_s < time_s) {
+            ++here;
+        }
+        here -= std::min<std::size_t>(here, random_.below(2));
+        touch(uav);
+        remove(uav, here, std::min(count, list.order.size() - here));
+    }
+}
+
 // One list, or its end, and sometimes that of another UAV.
 void FieldLane::tear_list() {
     const int lists = 1 + random_.below(2);
@@ -412,10 +441,10 @@ void FieldLane::swap_anew() {
 
 FieldLane::Insertion FieldLane::best_place(int uav, int task) {
     FieldList& list = lists_[uav];
-    if (any_limited_) solver_.refresh(list, stays_);
+    if (precise_) solver_.refresh(list, stays_);
     Known& known = known_[problem_.at(uav, task)];
-    if (known.list == list.version && (!known.meets_slots || known.stays == stays_.version()))
-        return known.best;
+    const bool same = !precise_ || !known.meets_slots || known.stays == stays_.version();
+    if (known.list == list.version && same) return known.best;
     known.list = list.version;
     known.stays = stays_.version();
     known.meets_slots = list.meets_slots;
@@ -533,6 +562,8 @@ void FieldLane::iterate(double temperature) {
     touched_.clear();
     value_before_ = value_;
     if (any_limited_) stays_before_ = stays_;
+    precise_ = any_limited_ && (static_cast<int>(tasks_.size()) <= kAlwaysPrecise ||
+                                random_.uniform() < kPreciseShare);
     const Worth before = worth();
     while (placed_ < tasks_.size() && list_of_[tasks_[placed_]] >= 0) ++placed_;
     if (placed_ < tasks_.size()) {

@@ -64,6 +64,7 @@ class FieldLane {
     void tear(int task, double longest);
     void tear_random();
     void tear_list();
+    void tear_about(int task);
     void exchange_tails();
     void swap_anew();
     void recreate();
@@ -91,6 +92,7 @@ class FieldLane {
     Stays stays_;
     bool any_limited_ = false;
     bool any_swaps_ = false;
+    bool precise_ = false;  // in this iteration
 
     std::vector<FieldList> lists_;
     std::vector<double> value_;  // of the lists, flown together
