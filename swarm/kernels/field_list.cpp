@@ -207,8 +207,8 @@ bool ListSolver::solve(FieldList& list, const Stays& stays, std::size_t kept, Ra
     list.stays_version = stays.version();
     list.value = 0.0;
     if (list.order.empty()) return true;
-    if (list.offsets.size() != list.order.size() + 2 || list.offsets.back() == list.offsets.end()[-2])
-        return false;
+    const bool all = list.offsets.size() == list.order.size() + 2;
+    if (!all || list.offsets.back() == list.offsets.end()[-2]) return false;
     int best = list.offsets.end()[-2];
     for (int k = best; k < list.offsets.back(); ++k) {
         if (list.labels[k].progress.value > list.labels[best].progress.value) best = k;
@@ -251,8 +251,8 @@ bool TeamFlight::takes_part(const FieldTeam& team, const Stays& stays, const Fie
     });
 }
 
-// Up to the next base where it may have to wait, or to the end; `depart_s`: of its first item, if it
-// has done one.
+// Up to the next base where it may have to wait, or to the end; `depart_s`: of its first item, if
+// it has done one.
 bool TeamFlight::fly_on(const FieldList& list, const Stays& stays, Pilot& pilot,
                         double& depart_s) {
     pilot.waits = false;

@@ -20,8 +20,8 @@ struct Stay {
     double arrive_s, leave_s;
 };
 
-// Who holds slots when, as it is now believed. Whoever arrives waits for those that arrived earlier;
-// that it makes later ones wait is not seen here, but by `fly_together`.
+// Who holds slots when, as it is now believed. Who arrives waits for those that arrived earlier;
+// that it makes later ones wait is not seen here, but by TeamFlight.
 class Stays {
   public:
     Stays(const FieldProblem& problem, const FieldTeam& team, std::uint64_t& last_version)

@@ -2,8 +2,8 @@
 // constraints.
 //
 // Slack induction by string removals (Christiaens and Vanden Berghe 2020,
-// doi:10.1287/trsc.2019.0914): near tasks are torn out of a few lists and put back one by one where J
-// gains most; tasks may stay out. Lists are orders of tasks, in which field_list.hpp places base
+// doi:10.1287/trsc.2019.0914): near tasks are torn out of a few lists and put back one by one where
+// J gains most; tasks may stay out. Lists are orders of tasks, in which field_list.hpp places base
 // visits and directions; what a team is worth is said by all of its lists flown together.
 #pragma once
 
@@ -129,8 +129,8 @@ class FieldSearch {
     FieldSearch(const FieldProblem& problem, const FieldTeam& team, const ItemLists& lists,
                 std::uint64_t seed);
 
-    // So many iterations per lane; heat within 0..1, 1 at the beginning of the annealing. Ended early
-    // by the watch.
+    // So many iterations per lane; heat within 0..1, 1 at the beginning of the annealing. Ended
+    // early by the watch.
     void round(long iterations, double heat, int threads, Watch& watch);
 
     // Let every lane go on from the best lists.
