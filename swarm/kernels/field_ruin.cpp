@@ -8,7 +8,7 @@ namespace peckorder {
 namespace {
 constexpr double kMeanTorn = 8.0, kLongestString = 8.0;
 constexpr double kSplitShare = 0.5, kSplitDepth = 0.3;
-constexpr double kOutShare = 0.3;  // of iterations while tasks are out, that make room for one
+constexpr double kOutShare = 0.05;  // of iterations while tasks are out, that make room for one
 }  // namespace
 
 void FieldLane::ruin() {

@@ -16,7 +16,7 @@ constexpr int kMostOut = 12;  // tasks on no list that are tried besides those t
 constexpr double kHottest = 1.0;  // of the scale; at the end a 333rd of that
 constexpr int kAlwaysPrecise = 16;  // up to so many tasks, and else in a share of iterations,
 constexpr double kPreciseShare = 0.3;  // what lists could take is asked anew as stays change
-constexpr double kPrize = 30.0;  // of the scale, in the annealing; the best is compared exactly
+constexpr double kPrize = 100.0;  // of the scale, in the annealing; the best is compared exactly
 }  // namespace
 
 FieldLane::FieldLane(const FieldProblem& problem, const FieldTeam& team, std::uint64_t seed)
