@@ -18,11 +18,12 @@ import pytest
 import zenoh
 
 import swarm
-from coordinator.core.publication import FlightLayers, mission_config_of, task_entry_of
+from coordinator.core.publication import mission_config_of, task_entry_of
 from sim.fleet.faults.flood import long_mission
 from swarm.bus.config import DEFAULT_LEASE_S
 from swarm.bus.zenoh_session import session_config
 from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.model.layers import FlightLayers
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.key_space import KeySpace

@@ -7,7 +7,7 @@ import re
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.unit.swarm.scenario.test_read import faults
+from tests.support.small_scenario import faults
 from tests.unit.swarm.scenario.test_schema_2_read import VALID
 from tests.unit.swarm.scenario.test_write import VALUES, toml_of
 

@@ -11,7 +11,7 @@ import swarm
 from swarm.cli import main
 from swarm.runtime.errors import InputError
 from swarm.scenario import parse_scenario, require_plain
-from tests.unit.swarm.scenario.test_read import VALID as SCHEMA_1
+from tests.support.small_scenario import VALID as SCHEMA_1
 from tests.unit.swarm.scenario.test_schema_2_read import VALID as SCHEMA_2
 
 ALL = (

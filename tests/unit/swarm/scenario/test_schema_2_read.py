@@ -8,8 +8,8 @@ from pydantic import BaseModel
 from swarm.model import Base, BaseId, Origin, ZoneId
 from swarm.model.frames import enu_from_wgs84
 from swarm.scenario import edition, parse_scenario, shapes
-from tests.unit.swarm.scenario.test_read import VALID as SCHEMA_1
-from tests.unit.swarm.scenario.test_read import faults
+from tests.support.small_scenario import VALID as SCHEMA_1
+from tests.support.small_scenario import faults
 
 VALID = """\
 schema = 2

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId, Zone, ZoneId
 from swarm.scenario import format_scenario, parse_scenario
-from tests.unit.swarm.scenario.test_read import VALID as SCHEMA_1
-from tests.unit.swarm.scenario.test_read import faults
+from tests.support.small_scenario import VALID as SCHEMA_1
+from tests.support.small_scenario import faults
 from tests.unit.swarm.scenario.test_schema_2_read import VALID as SCHEMA_2
 from tests.unit.swarm.scenario.test_write import IDS, POINTS, SECONDS
 from tests.unit.swarm.scenario.test_write import missions as plain_missions
