@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from swarm.model import Mission, Plan, TaskId, UavId
+from coordinator.planner.schedule_report import SCHEDULE_COLUMNS, around, flown, reasons
+from swarm.model import Mission, Plan, TaskId, Uav, UavId
+from swarm.model.plan import LeftOut, ScheduleEntry
 from swarm.runtime.table import NONE, Column, ResultTable
 
 _LATE = "bold red"
@@ -17,9 +20,10 @@ _LATE = "bold red"
 def plan_as_json(plan: Plan) -> dict[str, object]:
     """The plan as `swarm plan --json` prints it, ready for `json.dumps`.
 
-    ``sequence`` is null for method ``exact``, which has none.
+    ``sequence`` is null for method ``exact``, which has none, but in the field, where it decides
+    who waits for a slot. Schedules and what is left out come with missions of schema 2 only.
     """
-    return {
+    said: dict[str, object] = {
         "scenario": plan.scenario,
         "method": plan.method,
         "objective": plan.objective,
@@ -34,6 +38,15 @@ def plan_as_json(plan: Plan) -> dict[str, object]:
         "bound": plan.bound,
         "basis": plan.basis,
     }
+    if plan.schedule is not None:
+        said["schedule"] = {
+            uav: [_entry_as_json(entry) for entry in entries]
+            for uav, entries in plan.schedule.items()
+        }
+        said["left_out"] = {task: reason.value for task, reason in plan.left_out.items()}
+        said["required_left_out"] = plan.required_left_out
+        said["fewest_left_out"] = plan.fewest_left_out
+    return said
 
 
 def plan_from_json(said: Mapping[str, Any]) -> Plan:
@@ -51,12 +64,57 @@ def plan_from_json(said: Mapping[str, Any]) -> Plan:
         elapsed_s=said["elapsed_s"],
         seed=said["seed"],
         bound=said["bound"],
+        schedule=_schedule_from_json(said.get("schedule")),
+        left_out={TaskId(task): LeftOut(why) for task, why in said.get("left_out", {}).items()},
+        required_left_out=said.get("required_left_out", 0),
+        fewest_left_out=said.get("fewest_left_out"),
     )
+
+
+def _entry_as_json(entry: ScheduleEntry) -> dict[str, object]:
+    return {
+        "go": entry.go,
+        "from_m": list(entry.from_enu_m),
+        "via_m": [list(corner) for corner in entry.via_enu_m],
+        "depart_s": entry.depart_s,
+        "arrive_s": entry.arrive_s,
+        "begin_s": entry.begin_s,
+        "end_s": entry.end_s,
+        "reversed": entry.is_reversed,
+    }
+
+
+def _schedule_from_json(
+    said: Mapping[str, Sequence[Mapping[str, Any]]] | None,
+) -> dict[UavId, tuple[ScheduleEntry, ...]] | None:
+    if said is None:
+        return None
+    return {
+        UavId(uav): tuple(
+            ScheduleEntry(
+                go=entry["go"],
+                from_enu_m=tuple(entry["from_m"]),
+                via_enu_m=tuple(tuple(corner) for corner in entry["via_m"]),
+                depart_s=entry["depart_s"],
+                arrive_s=entry["arrive_s"],
+                begin_s=entry["begin_s"],
+                end_s=entry["end_s"],
+                is_reversed=entry["reversed"],
+            )
+            for entry in entries
+        )
+        for uav, entries in said.items()
+    }
 
 
 def late_tasks(mission: Mission, plan: Plan) -> list[TaskId]:
     """Tasks completed after the horizon D, whose terms of J are negative, latest first."""
-    late = [task for task, time_s in plan.completion_s.items() if time_s > mission.horizon_s]
+    due = {task.id for task in mission.tasks if task.due_s is not None}
+    late = [
+        task
+        for task, time_s in plan.completion_s.items()
+        if time_s > mission.horizon_s and task not in due
+    ]
     return sorted(late, key=lambda task: -plan.completion_s[task])
 
 
@@ -67,15 +125,14 @@ def plan_table(mission: Mission, plan: Plan) -> RenderableType:
     heading = Text.assemble(
         (plan.scenario, "bold"),
         f" by {plan.method}: {len(known.uavs)} UAVs, {len(known.tasks)} tasks,"
-        f" horizon D = {mission.horizon_s:g} s",
+        f" horizon D = {mission.horizon_s:g} s{around(mission)}",
     )
+    if plan.schedule is None:
+        columns, says = _LIST_COLUMNS, partial(_stops, mission, plan)
+    else:
+        columns, says = SCHEDULE_COLUMNS, partial(flown, mission, plan)
     lists = ResultTable(
-        (
-            Column("UAV", words=True, style="bold"),
-            Column("tasks"),
-            Column("list, each task @ its completion in s", words=True),
-        ),
-        [(uav, len(route), _stops(mission, plan, route)) for uav, route in plan.routes.items()],
+        columns, [(uav.id, len(plan.routes[uav.id]), says(uav)) for uav in mission.uavs]
     )
     worth = ResultTable(
         (Column("", words=True, style="bold"), Column("", words=True)), _worth(mission, plan, late)
@@ -83,9 +140,16 @@ def plan_table(mission: Mission, plan: Plan) -> RenderableType:
     return Group(heading, "", lists, "", worth)
 
 
-def _stops(mission: Mission, plan: Plan, route: Sequence[TaskId]) -> Text:
+_LIST_COLUMNS = (
+    Column("UAV", words=True, style="bold"),
+    Column("tasks"),
+    Column("list, each task @ its completion in s", words=True),
+)
+
+
+def _stops(mission: Mission, plan: Plan, uav: Uav) -> Text:
     stops = Text()
-    for task in route:
+    for task in plan.routes[uav.id]:
         time_s = plan.completion_s[task]
         late = time_s > mission.horizon_s
         text = f"{task}@{_shown_s(time_s, mission.horizon_s)}{'!' if late else ''}"
@@ -103,6 +167,13 @@ def _worth(mission: Mission, plan: Plan, late: list[TaskId]) -> list[tuple[str, 
     else:
         gap = "" if plan.gap is None else f", gap {100.0 * plan.gap:.2f} %"
         rows.append(("optimum", f"{plan.optimum:.4f} value·s, proven{gap}"))
+    if plan.fewest_left_out is not None and plan.required_left_out > plan.fewest_left_out:
+        tasks = "task" if plan.required_left_out == 1 else "tasks"
+        least = f"{plan.fewest_left_out} in the optimum"
+        if plan.optimum is None:
+            least = f"at least {plan.fewest_left_out} in any plan"
+        text = f"{plan.required_left_out} required {tasks} left out, {least}"
+        rows.append(("", Text(text, style=_LATE)))
     if plan.sequence is not None:
         rows.append(("sequence", ", ".join(plan.sequence)))
     if late:
@@ -115,7 +186,9 @@ def _worth(mission: Mission, plan: Plan, late: list[TaskId]) -> list[tuple[str, 
         rows.append(("late", Text(text, style=_LATE)))
     known = mission.known_at_start()
     left_out = [task.id for task in known.tasks if task.id not in plan.completion_s]
-    if left_out:
+    if plan.schedule is not None:
+        rows += reasons(mission, plan.left_out)
+    elif left_out:
         text = f"on no list, for want of a capable UAV: {', '.join(left_out)}"
         rows.append(("left out", Text(text, style=_LATE)))
     pop_ups = len(mission.tasks) - len(known.tasks)

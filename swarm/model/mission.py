@@ -181,9 +181,13 @@ class Mission:
     """Paths stay that far away from zones [m]; >= 0."""
     band_m: tuple[float, float] | None = None
     """Heights above the ground that may be used [m]; None: each UAV in its own layer."""
+    schema: int = field(default=1, compare=False)
+    """Of the file that it is from; 2 whenever it has constraints. Plans of such tell schedules."""
 
     def __post_init__(self) -> None:
         require_id(self.name, "mission name")
+        if self.schema == 1 and self.constraints:
+            object.__setattr__(self, "schema", 2)
         if not (math.isfinite(self.horizon_s) and self.horizon_s > 0.0):
             raise ValueError(f"horizon_s must be > 0, not {self.horizon_s}")
         for name in ("success_default", "survival_default"):

@@ -38,6 +38,7 @@ def mission_of(scenario: Scenario) -> Mission:
         wind_enu_m_s=(east_m_s, north_m_s),
         zone_margin_m=rules.zone_margin_m,
         band_m=None if rules.band_m is None else (rules.band_m[0], rules.band_m[1]),
+        schema=scenario.version,
     )
 
 
