@@ -14,4 +14,5 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_field_exact(module);
     peckorder::bind_field_team(module);
     peckorder::bind_field_search(module);
+    peckorder::bind_field_alone(module);
 }
