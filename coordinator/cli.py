@@ -89,6 +89,7 @@ def plan(
 ) -> int:
     """Compute the priority sequence, and the task lists it leads to.
 
+    Of a scenario of schema 2 also the schedule: swaps, waits, ways home, and what is left out.
     Tasks that appear later are unknown to a plan. The same seed gives the same plan,
     unless --time-limit-s cuts the search short. That limit holds for all but drawing and exporting:
     reading, searching and the bound. Ctrl-C ends the search with the best so far.
@@ -98,6 +99,7 @@ def plan(
         swarm plan valley-survey --plot lists.png
         swarm plan valley-survey --method guided --export plans
         swarm plan table-1 --method exact --json
+        swarm plan reservoir-inspection --method guided --plot map.png
     """
     from swarm.runtime.clock import SystemClock
 
@@ -118,10 +120,10 @@ def plan(
 
     _check_plan_options(method, plot, firmware)
     mission = load_scenario(scenario)
-    require_plain(mission, "swarm plan")
     if (warning := height_warning(mission, FlightLayers())) is not None:
         print(f"warning: {warning}", file=sys.stderr)
     if export is not None:
+        require_plain(mission, "swarm plan --export")
         require_origin(mission, str(scenario))
     try:
         with _searching() as (interrupted, progress):

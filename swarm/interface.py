@@ -152,15 +152,14 @@ def plan(
         bound: where the optimum cannot be proven, spend some seconds on an upper bound on J.
 
     Returns:
-        Lists, times and J; ``optimum`` or ``bound`` say how good it is.
+        Lists, times and J; ``optimum`` or ``bound`` say how good it is. In the field also the
+        schedule, and what is left out.
 
     Raises:
         ValueError: there is no such method, or a number is out of range.
-        SwarmError: ``"exact"`` was asked of a mission that is too large for it.
+        SwarmError: ``"exact"`` was asked of a mission that is too large for it, or another method
+            does not heed what the mission asks for in the field.
     """
-    from swarm.scenario import require_plain
-
-    require_plain(mission, "swarm.plan")
     made: Plan = _implementation("plan")(
         mission, method, seed=seed, time_limit_s=time_limit_s, bound=bound
     )

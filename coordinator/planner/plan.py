@@ -13,6 +13,12 @@ import numpy as np
 
 from coordinator.planner.bound import upper_bound
 from coordinator.planner.exact import Optimum, estimated_s, optimum_before
+from coordinator.planner.field_plan import (
+    FieldRequest,
+    is_field,
+    make_field_plan,
+    with_schedule,
+)
 from coordinator.planner.options import (
     Limit,
     ShouldStop,
@@ -192,9 +198,13 @@ def make_plan(
     Raises:
         ValueError: there is no such method.
         ProblemTooLargeError: method ``exact`` on a mission too large for it.
+        InputError: the method does not heed what the mission asks for in the field.
     """
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
+    if is_field(mission):
+        limits = (seed, stop, progress, bound_s, bound_frac, threads, modest)
+        return make_field_plan(FieldRequest(mission, method, clock, *limits))
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop
@@ -208,7 +218,7 @@ def make_plan(
     if proven is None and bound_s is not None:
         bound_ends = first_of(after_time(clock, bound_s), ends)
         bound = upper_bound(problem, routes, bound_ends, threads=threads).objective
-    return Plan(
+    plan = Plan(
         scenario=mission.name,
         method=method if isinstance(method, str) else method.name,
         routes=_by_id(problem, routes),
@@ -224,6 +234,7 @@ def make_plan(
         seed=seed,
         bound=bound,
     )
+    return plan if mission.schema == 1 else with_schedule(plan, mission)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ ALL = (
     "wind_m_s, [[base]], [[zone]] and band_m"
 )
 COMMANDS: dict[str, list[str]] = {
-    "swarm plan": ["plan", "FILE"],
+    "swarm plan --export": ["plan", "FILE", "--export", "plans"],
     "swarm simulate": ["simulate", "FILE"],
     "swarm run": ["run", "FILE"],
     "swarm coordinator": ["coordinator", "FILE"],
@@ -51,7 +51,7 @@ def test_python_names_it_too(tmp_path: Path) -> None:
     path.write_text(SCHEMA_2)
     mission = swarm.load(path)
 
-    for does in (swarm.plan, swarm.simulate, lambda mission: swarm.evaluate(mission, {})):
+    for does in (swarm.simulate, lambda mission: swarm.evaluate(mission, {})):
         with pytest.raises(swarm.SwarmError, match="does not heed airspeed_m_s, "):
             does(mission)
 
