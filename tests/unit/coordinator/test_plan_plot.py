@@ -10,9 +10,15 @@ from matplotlib.figure import Figure
 
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import make_plan
-from coordinator.plot import Label, draw_plan, path_styles, place_labels, plan_figure
-from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
+from coordinator.plot import draw_plan, plan_figure
+from coordinator.plot.field import flown_m
+from coordinator.plot.labels import Label, place_labels
+from coordinator.plot.looks import path_styles
+from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId, Zone, ZoneId
+from swarm.model.plan import LeftOut, ScheduleEntry
 from swarm.runtime.clock import SystemClock
+from swarm.scenario import load_scenario
+from swarm.scenario.files import resolve_scenario
 from tests.support.problems import table_1_mission
 
 
@@ -119,3 +125,49 @@ def test_unknown_kind_of_picture_is_refused(tmp_path: Path) -> None:
 def test_single_place_and_empty_mission_can_be_drawn() -> None:
     for mission in (wide_mission(1, 0), wide_mission(0, 0), wide_mission(1, 1)):
         plan_figure(mission, plan_of(mission))
+
+
+def test_map_of_the_field_shows_zones_bases_lines_ways_home_and_what_is_left_out() -> None:
+    mission = load_scenario(resolve_scenario("reservoir-inspection"))
+    plan = plan_of(mission)
+    left = next(iter(plan.completion_s))
+    without = {task: time_s for task, time_s in plan.completion_s.items() if task != left}
+    routes = {uav: tuple(t for t in tasks if t != left) for uav, tasks in plan.routes.items()}
+    left_out = {**plan.left_out, left: LeftOut.ENERGY}
+    plan = replace(plan, routes=routes, left_out=left_out, completion_s=without)
+
+    figure = plan_figure(mission, plan)
+
+    found = texts(figure)
+    for name in ("village", "bird-island", "dam-yard", "boathouse", "ferry-pier\n180-300 s"):
+        assert name in found
+    for meaning in ("way home", "line to fly along", "base: batteries are swapped"):
+        assert meaning in found
+    assert "no flying, paths 20 m away" in found
+    assert any(text.startswith("left out: ") for text in found)
+    assert "wind 4.1 m/s" in found
+    assert len(figure.axes[0].patches) == 2 * len(mission.zones)  # and their margins
+    assert "in no list (appears later)" not in found
+
+
+def test_way_over_a_line_goes_on_along_it() -> None:
+    line = Task(
+        TaskId("road"), (0.0, 0.0, 0.0), 1.0, path_enu_m=((0.0, 0, 0), (9, 0, 0), (9, 9, 0))
+    )
+    entry = ScheduleEntry("road", (5.0, 20.0), ((9.0, 9.0),), 0.0, 1.0, 1.0, 2.0, is_reversed=True)
+
+    places_m = flown_m({line.id: line}, entry)
+
+    assert places_m.tolist() == [[5.0, 20.0], [9.0, 9.0], [9.0, 0.0], [0.0, 0.0]]
+
+
+def test_inclusive_zones_are_shaded_outside() -> None:
+    zone = Zone(
+        ZoneId("field"), ((-1.0, -1.0), (11.0, -1.0), (11.0, 11.0), (-1.0, 11.0)), inclusive=True
+    )
+    mission = replace(table_1_mission(), zones=(zone,))
+
+    figure = plan_figure(mission, plan_of(mission))
+
+    (patch,) = figure.axes[0].patches
+    assert len(patch.get_path().to_polygons()) == 2  # around the map, and the hole where to fly

@@ -19,7 +19,9 @@ from swarm.runtime.errors import InputError
 from swarm.scenario import format_scenario, load_scenario, parse_scenario
 from swarm.scenario.files import resolve_scenario, shipped_scenarios
 
-NAMES = ["meadow", "orchard", "table-1", "valley-popups", "valley-survey"]
+PLAIN = ["meadow", "orchard", "table-1", "valley-popups", "valley-survey"]
+"""Those of schema 1."""
+NAMES = sorted([*PLAIN, "reservoir-inspection"])
 
 
 def shipped(name: str) -> Mission:
@@ -139,7 +141,7 @@ def test_uavs_do_not_start_on_top_of_each_other_nor_of_a_task(name: str) -> None
         assert min(math.dist(a, b) for a, b in itertools.product(starts, places)) > 50.0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PLAIN)
 def test_no_greedy_plan_passes_the_horizon(name: str) -> None:
     problem = Problem.from_mission(shipped(name))
     sequence = range(problem.n_uav)
@@ -169,6 +171,25 @@ def test_survey_has_no_near_ties_in_its_best_sequence() -> None:
             state.apply(problem, replace(decision, completion_s=completion_s))
             routes[uav].append(decision.task)
         assert routes == planned
+
+
+def test_reservoir_has_all_that_limits_fleets_in_the_field() -> None:
+    mission = shipped("reservoir-inspection")
+
+    assert (len(mission.uavs), len(mission.bases), len(mission.zones)) == (3, 2, 2)
+    assert set(mission.constraints) == {
+        "acceleration_m_s2",
+        "airspeed_m_s",
+        "endurance_s",
+        "due_s",
+        "opens_s",
+        "closes_s",
+        "path_m",
+        "wind_m_s",
+        "base",
+        "zone",
+    }
+    assert any(base.slots == 1 for base in mission.bases)
 
 
 @pytest.mark.parametrize("name", NAMES)
