@@ -31,6 +31,7 @@ from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.problem import FloatArray
 from swarm.kernels.field import FIELD_GREEDY, FIELD_LOOKAHEAD, FieldRuleCode, FlownLists, fly_lists
 from swarm.model import Mission, Plan, TaskId
+from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError
 
@@ -40,8 +41,6 @@ FIELD_RULES: Mapping[str, FieldRuleCode] = {
 }
 """Rules that heed the field's constraints."""
 FIELD_METHODS = (*FIELD_RULES, "guided", "exact")
-_PLAIN_CONSTRAINTS: frozenset[str] = frozenset()
-"""Which the planner of the paper's missions heeds as well."""
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""
 _PROOF_FRAC = 0.5
@@ -68,7 +67,7 @@ class FieldRequest:
 
 def is_field(mission: Mission) -> bool:
     """Whether ``mission`` asks for more than the planner of the paper's missions heeds."""
-    return not _PLAIN_CONSTRAINTS.issuperset(mission.constraints)
+    return not PLAIN_CONSTRAINTS.issuperset(mission.constraints)
 
 
 def make_field_plan(asked: FieldRequest) -> Plan:

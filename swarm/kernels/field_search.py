@@ -79,7 +79,7 @@ class TeamRows(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class FieldLists:
+class SearchedLists:
     """What a search found."""
 
     lists: tuple[tuple[int, ...], ...]
@@ -102,7 +102,7 @@ def optimise_lists(
     lists: Sequence[Sequence[int]] | None = None,
     progress: Callable[[int, float], None] | None = None,
     threads: int | None = None,
-) -> FieldLists:
+) -> SearchedLists:
     """Lists of items for every UAV that is active; never worse than those it begins with.
 
     With ``iterations`` the result follows from the arguments alone, with any number of threads.
@@ -152,7 +152,7 @@ def optimise_lists(
     flat, offsets = search.best()
     items = flat.tolist()
     found = tuple(tuple(items[a:b]) for a, b in pairwise(offsets.tolist()))
-    return FieldLists(found, n_left_out, objective, done)
+    return SearchedLists(found, n_left_out, objective, done)
 
 
 def _anneal(

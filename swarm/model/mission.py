@@ -10,6 +10,9 @@ from swarm.model.frames import Origin
 from swarm.model.ids import RESERVED, BaseId, TaskId, UavId, require_id
 from swarm.model.zones import Zone
 
+PLAIN_CONSTRAINTS = frozenset({"acceleration_m_s2"})
+"""What `swarm.allocation.Problem` heeds; any other makes a mission one of the field."""
+
 PointEnu = tuple[float, float, float]
 """East, north, up [m from the mission origin]."""
 

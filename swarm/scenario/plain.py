@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from swarm.model import Mission, Task
-from swarm.model.mission import chances
+from swarm.model.mission import PLAIN_CONSTRAINTS, chances
 from swarm.runtime.errors import Fault, InputError
 
 _TABLES = {"base": "[[base]]", "zone": "[[zone]]"}
-_HEEDED = frozenset({"acceleration_m_s2"})
-"""What every command does by now."""
 
 
 def require_plain(mission: Mission, command: str) -> None:
@@ -23,7 +21,7 @@ def require_plain(mission: Mission, command: str) -> None:
     Raises:
         InputError: one line, with every key that the command does not heed.
     """
-    asked = [_TABLES.get(key, key) for key in mission.constraints if key not in _HEEDED]
+    asked = [_TABLES.get(key, key) for key in mission.constraints if key not in PLAIN_CONSTRAINTS]
     asked += [f"task {task.id}, at which nobody can succeed" for task in nobody_can(mission)[:1]]
     if asked:
         words = " and ".join([", ".join(asked[:-1]), asked[-1]] if asked[1:] else asked)
