@@ -82,7 +82,7 @@ def left_out(problem: FieldProblem, done: Sequence[int]) -> Mapping[TaskId, Left
     if not len(missing):
         return {}
     alone_s = earliest_alone(problem.kernel, problem.first_s)
-    somebody_can = np.isfinite(alone_s).any(axis=0).tolist()
+    somebody_can = np.any(np.isfinite(alone_s), axis=0)
     reasons = {}
     for task in missing.tolist():
         if not somebody_can[task]:

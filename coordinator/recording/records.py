@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, make_dataclass
+from dataclasses import asdict, dataclass, field, make_dataclass
 from functools import cache
 from typing import Annotated, Any, Final, Literal
 
@@ -132,6 +132,22 @@ class _Link:
 
 
 @dataclass(frozen=True, slots=True)
+class _EntrySaid:
+    """A leg of a schedule and what is done at its end, as `swarm plan --json` has it."""
+
+    __pydantic_config__ = _CHECKED
+
+    go: str
+    from_m: list[float]
+    via_m: list[list[float]]
+    depart_s: float
+    arrive_s: float
+    begin_s: float
+    end_s: float
+    reversed: bool
+
+
+@dataclass(frozen=True, slots=True)
 class _PlanSaid:
     """As `swarm plan --json` has it."""
 
@@ -150,6 +166,11 @@ class _PlanSaid:
     seed: int
     bound: float | None
     basis: str
+    schedule: dict[str, list[_EntrySaid]] | None = None
+    """Of missions of schema 2; so are the following."""
+    left_out: dict[str, str] = field(default_factory=dict)
+    required_left_out: int = 0
+    fewest_left_out: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,10 +305,18 @@ def encode(
             schema, shape = "peckorder.Moment", _Moment(now_s, "begun")
         case Plan():
             plan: dict[str, Any] = plan_as_json(what)
-            schema, shape = "peckorder.Plan", _Plan(now_s, _PlanSaid(**plan))
+            schema, shape = "peckorder.Plan", _Plan(now_s, _plan_said(plan))
         case _:
             return None
     return _line(topics_of(mission)[schema], schema, shape)
+
+
+def _plan_said(plan: dict[str, Any]) -> _PlanSaid:
+    legs: dict[str, Any] | None = plan.pop("schedule", None)
+    if legs is None:
+        return _PlanSaid(**plan)
+    schedule = {uav: [_EntrySaid(**leg) for leg in of_uav] for uav, of_uav in legs.items()}
+    return _PlanSaid(**plan, schedule=schedule)
 
 
 def _line(topic: str, schema: str, shape: Any) -> FileMessage:

@@ -28,8 +28,17 @@ MISSION = Mission(
 )
 
 
-def entry(go: str, *times_s: float, is_reversed: bool = False) -> ScheduleEntry:
-    return ScheduleEntry(go, (0.0, 0.0), ((1.0, 0.0),), *times_s, is_reversed)
+def entry(
+    go: str,
+    depart_s: float,
+    arrive_s: float,
+    begin_s: float,
+    end_s: float,
+    *,
+    is_reversed: bool = False,
+) -> ScheduleEntry:
+    via_m = ((1.0, 0.0),)
+    return ScheduleEntry(go, (0.0, 0.0), via_m, depart_s, arrive_s, begin_s, end_s, is_reversed)
 
 
 ENTRIES = (

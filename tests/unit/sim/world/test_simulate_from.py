@@ -9,9 +9,11 @@ import pytest
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.recording.flight_recorder import FileSink, FlightRecorder, virtual_ns
+from coordinator.recording.reader import read_recording
 from coordinator.recording.recorder import RecordingInfo
 from sim.world.settings import QUIET
 from swarm.cli import main
+from swarm.model import UavId
 from swarm.protocol.events import MessageReceived
 from swarm.protocol.messages import Message, Stamp
 from tests.support.builders import choice, mission
@@ -108,3 +110,25 @@ def test_a_file_that_is_no_recording_is_refused(
 
     assert main(["simulate", "--from", str(file)]) == 2
     assert str(file) in capsys.readouterr().err
+
+
+def test_a_flight_of_uavs_that_take_their_time_to_change_speed_is_recorded_with_its_schedule(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As every plan of schema 2 has one."""
+    scenario, file = tmp_path / "slow.toml", tmp_path / "slow.mcap"
+    scenario.write_text(
+        'schema = 2\nname = "slow"\n[mission]\nhorizon_s = 300.0\n'
+        '[[uav]]\nid = "u0"\nposition_m = [0.0, 0.0]\nspeed_m_s = 10.0\nacceleration_m_s2 = 2.5\n'
+        '[[task]]\nid = "t0"\nposition_m = [100.0, 0.0]\nvalue = 5.0\n'
+    )
+
+    assert main(["simulate", str(scenario), "--record", str(file), "--json"]) == 0
+    output = capsys.readouterr()
+    assert output.err == ""
+    told = json.loads(output.out)
+    assert told["executed_completion_s"] == {"t0": 14.0}
+    (plan,) = read_recording(file).plans
+    assert plan.plan.schedule is not None
+    assert [entry.go for entry in plan.plan.schedule[UavId("u0")]] == ["t0", "start"]
+    assert main(["simulate", "--from", str(file)]) == 0
