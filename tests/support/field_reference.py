@@ -224,30 +224,87 @@ def greedy_step(plain: PlainField, uav: int, stand: Stand, open_tasks: Sequence[
 
 
 def greedy_base(
-    plain: PlainField, uav: int, stand: Stand, here: int, open_tasks: Sequence[int]
+    plain: PlainField,
+    uav: int,
+    lists: Sequence[Sequence[int]],
+    here: int,
+    open_tasks: Sequence[int],
 ) -> int | None:
-    """The base to which greedy goes if it can do no task and every slot is free; None: none.
+    """The base to which greedy goes if it can do no task after what is on ``lists``; None: none.
 
     All ways over several bases are tried, and the one whose last is ready earliest is taken; one
-    base goes before several.
+    base goes before several. Others are known to do what is on their lists and no more.
     """
     bases = [base for base in range(plain.problem.n_base) if base != here]
     for n_swap in (1, len(bases)):
         found = []
         for count in range(1, n_swap + 1):
             for way in itertools.permutations(bases, count):
-                ready = _over(plain, uav, stand, way)
-                if ready is not None and greedy_step(plain, uav, ready, open_tasks) is not None:
-                    found.append((ready.time_s, way[-1], way[0]))
+                flown = plain.fly(with_more(lists, uav, [-1 - base for base in way]))[uav]
+                if flown.refusal is not FieldRefusal.NONE:
+                    continue
+                if greedy_step(plain, uav, flown.stand, open_tasks) is not None:
+                    found.append((flown.stand.time_s, way[-1], way[0]))
         if found:
             return min(found)[2]
     return None
 
 
-def _over(plain: PlainField, uav: int, stand: Stand, way: Sequence[int]) -> Stand | None:
-    for base in way:
-        step = plain.swap(uav, stand, base, plain.arrival_s(uav, stand, base))
-        if isinstance(step, FieldRefusal):
-            return None
-        stand = step[0]
-    return stand
+def with_more(
+    lists: Sequence[Sequence[int]], uav: int, items: Sequence[int]
+) -> list[Sequence[int]]:
+    """``lists`` with ``items`` at the end of one."""
+    return [[*own, *items] if row == uav else own for row, own in enumerate(lists)]
+
+
+def best_lists(plain: PlainField) -> tuple[int, float]:
+    """Required tasks left out by the best lists of all, and what those are worth.
+
+    All tasks on all lists in all orders and directions, and before each any bases in any order,
+    each at most once, but not the one at which the UAV stands.
+    """
+    problem = plain.problem
+    best = (problem.n_task + 1, 0.0)
+    for owners in itertools.product(range(-1, problem.n_uav), repeat=problem.n_task):
+        owned = [
+            [task for task, owner in enumerate(owners) if owner == uav]
+            for uav in range(problem.n_uav)
+        ]
+        n_left_out = sum(
+            bool(problem.required[task]) for task, owner in enumerate(owners) if owner < 0
+        )
+        if n_left_out > best[0]:
+            continue
+        for lists in itertools.product(*(_lists_of(plain, u, own) for u, own in enumerate(owned))):
+            flown = plain.fly(lists)
+            if all(one.refusal is FieldRefusal.NONE for one in flown):
+                best = min(best, (n_left_out, -sum(one.stand.value for one in flown)))
+    return best[0], -best[1]
+
+
+def _lists_of(plain: PlainField, uav: int, tasks: Sequence[int]) -> list[tuple[int, ...]]:
+    """All that can be flown while every slot is free, or that a wait for one might help."""
+    problem = plain.problem
+    few = problem.slots > 0
+    visits = [
+        way
+        for count in range(problem.n_base + 1)
+        for way in itertools.permutations(range(problem.n_base), count)
+    ]
+    found = []
+    for order in itertools.permutations(tasks):
+        ways = [(2 * task, 2 * task + 1)[: 1 + bool(problem.is_line[task])] for task in order]
+        for items in itertools.product(*ways):
+            for before in itertools.product(visits, repeat=len(order)):
+                own: list[int] = []
+                for way, item in zip(before, items, strict=True):
+                    own += [*(-1 - base for base in way), item]
+                at = int(plain.state.landed_at[uav])
+                if own and at >= 0 and own[0] == -1 - at:
+                    continue
+                alone: list[Sequence[int]] = [()] * problem.n_uav
+                if any(item < 0 and few[-1 - item] for item in own) or (
+                    plain.fly(with_more(alone, uav, own))[uav].refusal is FieldRefusal.NONE
+                ):
+                    found.append(tuple(own))
+    return found

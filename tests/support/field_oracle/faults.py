@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tests.support.field_oracle.geometry import Side, blocks, side_of
+from tests.support.field_oracle.geometry import Side, blocks, boxes_apart_m, side_of
 from tests.support.field_oracle.rounded import SLACK_M, distance_m
 from tests.support.field_oracle.scenario import FieldScenario, FieldZone, Point, Stop, read
 
@@ -87,6 +87,8 @@ def _forbids(zone: FieldZone, a: Point, b: Point, margin_m: float) -> bool:
         return blocks(zone, a, b)
     for ring in zone.rings:
         for c, d in zip(ring, [*ring[1:], ring[0]], strict=True):
+            if boxes_apart_m(a, b, c, d) > margin_m:
+                continue
             if distance_m(a, b, c, d) < margin_m - SLACK_M:
                 return True
     return side_of(a, zone.rings) is (Side.OUTSIDE if zone.inclusive else Side.INSIDE)

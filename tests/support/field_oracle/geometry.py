@@ -63,16 +63,27 @@ def straight_way(points: Sequence[Point]) -> Way:
 
 def side_of(point: Exact | Point, rings: Sequence[tuple[Point, ...]]) -> Side:
     """Where ``point`` lies of the polygon with that border and those holes."""
-    x, y = Fraction(point[0]), Fraction(point[1])
+    x, y = point
     inside = False
     for ring in rings:
-        for (ax, ay), (bx, by) in _edges(ring):
-            cross = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
-            within = min(ax, bx) <= x <= max(ax, bx) and min(ay, by) <= y <= max(ay, by)
-            if cross == 0 and within:
-                return Side.BORDER
+        for (ax, ay), (bx, by) in zip(ring, [*ring[1:], ring[0]], strict=True):
+            west, east = (ax, bx) if ax <= bx else (bx, ax)
             # The ray to the east crosses the edge: one end below or level with it, one above.
-            if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
+            crosses = (ay > y) != (by > y)
+            if x > east or (x < west and not crosses):
+                continue
+            if x < west:
+                inside = not inside
+                continue
+            within = ay <= y <= by or by <= y <= ay
+            if not within:
+                continue
+            # Only here fractions are called for.
+            rx, ry = Fraction(bx) - Fraction(ax), Fraction(by) - Fraction(ay)
+            qx, qy = Fraction(x) - Fraction(ax), Fraction(y) - Fraction(ay)
+            if rx * qy == ry * qx:
+                return Side.BORDER
+            if crosses and qx < qy * rx / ry:
                 inside = not inside
     return Side.INSIDE if inside else Side.OUTSIDE
 
@@ -82,12 +93,17 @@ def blocks(zone: FieldZone, a: Point, b: Point) -> bool:
     forbidden = Side.OUTSIDE if zone.inclusive else Side.INSIDE
     if not zone.inclusive and _apart(zone, a, b):
         return False
+    if side_of(a, zone.rings) is forbidden:
+        return True
+    if a == b:
+        return False
+    if side_of(b, zone.rings) is forbidden:
+        return True
     ax, ay = Fraction(a[0]), Fraction(a[1])
     rx, ry = Fraction(b[0]) - ax, Fraction(b[1]) - ay
     # Between two neighbouring meetings with the border the piece lies on one side of it.
-    shares = sorted({Fraction(0), Fraction(1), *_meetings(zone, (ax, ay), (rx, ry))})
-    probes = [Fraction(0), Fraction(1)]
-    probes += [(one + two) / 2 for one, two in itertools.pairwise(shares)]
+    shares = sorted({Fraction(0), Fraction(1), *_meetings(zone, a, b)})
+    probes = ((one + two) / 2 for one, two in itertools.pairwise(shares))
     return any(side_of((ax + t * rx, ay + t * ry), zone.rings) is forbidden for t in probes)
 
 
@@ -118,6 +134,20 @@ class StraightWays:
         if key not in self._sights:
             self._sights[key] = not any(blocks(zone, *key) for zone in self._zones)
         return self._sights[key]
+
+
+def boxes_apart_m(a: Point, b: Point, c: Point, d: Point) -> float:
+    """How far the boxes round two straight pieces are apart, east or north; 0 or less: not."""
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = a, b, c, d
+    if bx < ax:
+        ax, bx = bx, ax
+    if dx < cx:
+        cx, dx = dx, cx
+    if by < ay:
+        ay, by = by, ay
+    if dy < cy:
+        cy, dy = dy, cy
+    return max(ax - dx, cx - bx, ay - dy, cy - by)
 
 
 def shortest_chain(
@@ -168,10 +198,15 @@ def _apart(zone: FieldZone, a: Point, b: Point) -> bool:
     )
 
 
-def _meetings(zone: FieldZone, a: Exact, r: Exact) -> Iterable[Fraction]:
-    """Shares of the piece a + t·r, 0 <= t <= 1, at which it meets the border of ``zone``."""
+def _meetings(zone: FieldZone, start: Point, end: Point) -> Iterable[Fraction]:
+    """Shares t of the straight piece at which it meets the border of ``zone``, 0 <= t <= 1."""
+    a = Fraction(start[0]), Fraction(start[1])
+    r = Fraction(end[0]) - a[0], Fraction(end[1]) - a[1]
     for ring in zone.rings:
-        for (cx, cy), (dx, dy) in _edges(ring):
+        corners = zip(ring, [*ring[1:], ring[0]], strict=True)
+        for (one, two), ((cx, cy), (dx, dy)) in zip(corners, _edges(ring), strict=True):
+            if boxes_apart_m(start, end, one, two) > 0.0:
+                continue
             sx, sy = dx - cx, dy - cy
             qx, qy = cx - a[0], cy - a[1]
             turn = r[0] * sy - r[1] * sx

@@ -2,11 +2,13 @@
 
 They are dicts in the shape of the TOML (`as_toml` writes one). What DESIGN.md leaves open is kept
 out as far as it goes: no point lies in a zone at any height or on its border, no two UAVs or bases
-share a place, no zone just touches a height that is used.
+share a place, no zone just touches a height that is used. Every one is a file without faults.
 """
 
 from __future__ import annotations
 
+import copy
+import functools
 import random
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -18,6 +20,18 @@ Draft = dict[str, Any]
 
 SIDE_M = 400.0
 """Everything lies within a square of this side."""
+
+RAYS: Sequence[Point] = (
+    (1.0, 0.1),
+    (0.8, 0.7),
+    (0.1, 1.0),
+    (-0.7, 0.8),
+    (-1.0, -0.1),
+    (-0.6, -0.8),
+    (0.1, -1.0),
+    (0.7, -0.7),
+)
+"""Where corners of zones may lie from the middle, from the east on against the clock."""
 
 HEIGHTS_M = [(0.0, 120.0), (0.0, 11.5), (11.5, 40.5), (200.0, 300.0)]
 """Floors and ceilings: layers lie at 10 m, 13 m, … above places of whole metres."""
@@ -32,6 +46,11 @@ def made_up(seed: int, kind: str = "all", n_uavs: int = 2, n_tasks: int = 4) -> 
         n_uavs: so many UAVs.
         n_tasks: so many tasks.
     """
+    return copy.deepcopy(_made_up(seed, kind, n_uavs, n_tasks))
+
+
+@functools.cache
+def _made_up(seed: int, kind: str, n_uavs: int, n_tasks: int) -> Draft:
     for attempt in range(1000):
         rng = random.Random(f"{kind}-{seed}-{n_uavs}-{n_tasks}-{attempt}")
         draft = _plain(rng, f"made-up-{kind}-{seed}", n_uavs, n_tasks)
@@ -99,7 +118,7 @@ def _plain(rng: random.Random, name: str, n_uavs: int, n_tasks: int) -> Draft:
         tasks.append(task)
     for uav in uavs:
         table = {f"t{i + 1}": 0.9 for i in range(n_tasks) if rng.random() < 0.3}
-        if rng.random() < 0.3:
+        if rng.random() < 0.3 and any(task.get("kind") == "inspect" for task in tasks):
             table["inspect"] = 0.8
         if rng.random() < 0.2:
             table[f"t{rng.randint(1, n_tasks)}"] = 0.0
@@ -247,14 +266,21 @@ def _box(x: float, y: float, width_m: float, depth_m: float) -> list[list[float]
 def _star(rng: random.Random, middle: Sequence[float], reach_m: float) -> list[list[float]]:
     """A polygon that sees all its corners from ``middle``: convex or not, never crossing itself."""
     corners = []
-    rays: list[Point] = [(1.0, 0.1), (0.8, 0.7), (0.1, 1.0), (-0.7, 0.8), (-1.0, -0.1)]
-    rays += [(-0.6, -0.8), (0.1, -1.0), (0.7, -0.7)]
-    for east, north in sorted(rng.sample(rays, rng.randint(4, 7)), key=rays.index):
+    chosen: list[Point] = []
+    while not _surround(chosen):
+        chosen = sorted(rng.sample(RAYS, rng.randint(4, 7)), key=RAYS.index)
+    for east, north in chosen:
         length_m = rng.uniform(0.3, 1.0) * reach_m
         corners.append(
             [round(2 * x) / 2 for x in (middle[0] + east * length_m, middle[1] + north * length_m)]
         )
     return corners
+
+
+def _surround(rays: Sequence[Point]) -> bool:
+    """Whether each turns left to the next, by less than half a circle; if not, edges may cross."""
+    turns = zip(rays, [*rays[1:], *rays[:1]], strict=True)
+    return len(rays) > 0 and all(a[0] * b[1] - a[1] * b[0] > 0.0 for a, b in turns)
 
 
 ADD: Mapping[str, Callable[[random.Random, Draft], None]] = {

@@ -3,8 +3,8 @@
 Such a way is made of arcs round corners, with the margin as radius, and of straight pieces that
 touch them. Its length is exact but for rounding (`SLACK_M`). Where a chain of points is asked
 for, an arc is given by points on it every `STEP_RAD` at most: the chain is shorter than the arc
-by at most STEP_RAD² / 24 = 3e-6 of it. Pieces have the arc's true length and the direction in
-their middle.
+by at most STEP_RAD² / 24 = 3e-6 of it. Pieces have the arc's true length and directions such that
+the time of flight in wind is that of the arc.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from tests.support.field_oracle.geometry import (
     Piece,
     Side,
     Way,
+    boxes_apart_m,
     shortest_chain,
     side_of,
     straight_way,
@@ -27,6 +28,8 @@ from tests.support.field_oracle.scenario import FieldZone, Point
 SLACK_M = 1e-7
 """By so much a way may come nearer than the margin, since tangents are rounded."""
 STEP_RAD = math.radians(0.5)
+GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
+"""Where to look on a short arc, so that what is summed up of both is its integral (Gauss)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +102,11 @@ class RoundedWays:
         n = max(1, math.ceil(turn / STEP_RAD))
         points, pieces = [], []
         for index in range(n):
-            middle = one.angle_rad + sign * turn * (index + 0.5) / n
             end = one.angle_rad + sign * turn * (index + 1) / n
-            heading = (-sign * math.sin(middle), sign * math.cos(middle))
-            if turn > 0.0:
-                pieces.append(Piece(heading, self._margin_m * turn / n))
+            for share in GAUSS if turn > 0.0 else ():
+                angle = one.angle_rad + sign * turn * (index + share) / n
+                heading = (-sign * math.sin(angle), sign * math.cos(angle))
+                pieces.append(Piece(heading, self._margin_m * turn / (2 * n)))
             points.append(_on_circle(corner, self._margin_m, end))
         points[-1] = two.at
         return points, pieces
@@ -185,8 +188,9 @@ class RoundedWays:
     def _is_free(self, a: Point, b: Point) -> bool:
         """Whether the straight piece keeps the margin to every zone, each by itself."""
         nearest_m = self._margin_m - SLACK_M
-        if any(distance_m(a, b, c, d) < nearest_m for c, d in self._edges):
-            return False
+        for c, d in self._edges:
+            if boxes_apart_m(a, b, c, d) <= nearest_m and distance_m(a, b, c, d) < nearest_m:
+                return False
         # So near no border, so on one side of each.
         return all(
             side_of(a, zone.rings) is (Side.INSIDE if zone.inclusive else Side.OUTSIDE)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import tomllib
+from itertools import product
 from typing import Any
 
 import pytest
 
+from swarm.scenario import parse_scenario
 from tests.support.field_oracle.brute import best_plan
 from tests.support.field_oracle.faults import faults
 from tests.support.field_oracle.made_up import KINDS, as_toml, made_up
@@ -25,6 +27,17 @@ def test_toml_says_the_same(kind: str) -> None:
     told = tomllib.loads(as_toml(draft))
 
     assert read(told) == read(draft)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_one_is_a_file_without_faults(kind: str) -> None:
+    """Zones whose borders never cross themselves, chances of tasks and kinds that there are."""
+    for seed, n_uavs in product(range(8), (1, 2, 3)):
+        draft = made_up(seed, kind, n_uavs)
+
+        mission = parse_scenario(as_toml(draft).encode(), "made-up.toml")
+
+        assert len(mission.uavs) == n_uavs
 
 
 FREED: dict[str, dict[str, tuple[str, ...]]] = {

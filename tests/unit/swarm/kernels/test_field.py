@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import random
 from dataclasses import replace
 from typing import Any
@@ -11,7 +13,8 @@ import pytest
 
 from swarm.allocation.field import FieldProblem, FieldState
 from swarm.kernels import field
-from swarm.kernels.field import FIELD_GREEDY, FieldRefusal
+from swarm.kernels.field import FIELD_GREEDY, FIELD_LOOKAHEAD, FieldRefusal
+from tests.support.field_dilemmas import dilemma
 from tests.support.field_missions import mission_of
 from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.made_up import KINDS, made_up
@@ -19,6 +22,8 @@ from tests.support.field_oracle.scenario import read
 from tests.support.field_oracle.schedule import Swap, Work
 from tests.support.field_oracle.slots import fly_all
 from tests.support.field_reference import Flown, PlainField, greedy_base, greedy_step
+from tests.support.field_states import random_state
+from tests.support.seeds import seeds
 
 SEEDS = 10
 LISTS = 6
@@ -42,25 +47,6 @@ def random_lists(rng: random.Random, problem: FieldProblem) -> list[list[int]]:
                 items.append(base)
         items.append(2 * task + (rng.randrange(2) if problem.is_line[task] else 0))
     return lists
-
-
-def random_state(rng: random.Random, problem: FieldProblem) -> FieldState:
-    """In mid-mission: some fly somewhere, some stand at bases, some are out of it."""
-    n_uav = problem.n_uav
-    state = FieldState.at_start(problem, rng.sample(range(n_uav), n_uav))
-    for uav in range(n_uav):
-        state.free_s[uav] = rng.uniform(0.0, 60.0)
-        state.sortie_end_s[uav] = state.free_s[uav] + rng.uniform(0.0, 200.0)
-        state.survived[uav] = rng.uniform(0.5, 1.0)
-        state.active[uav] = rng.random() < 0.9
-        if problem.n_base and rng.random() < 0.4:
-            base = rng.randrange(problem.n_base)
-            state.landed_at[uav] = base
-            state.first_s[uav] = problem.leg_s[problem.kind[uav], n_uav + base]
-        else:
-            node = rng.randrange(problem.n_node)
-            state.first_s[uav] = problem.leg_s[problem.kind[uav], node] + rng.uniform(0.0, 9.0)
-    return state
 
 
 def assert_same(flown: field.FlownLists, plain: list[Flown], lists: list[list[int]]) -> None:
@@ -180,43 +166,90 @@ def twins(sequence: list[int], **first: float) -> tuple[FieldProblem, FieldState
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_greedy_takes_what_plain_loops_take(kind: str) -> None:
-    """Decision after decision, from the stands that the same loops lead to."""
     for seed in range(SEEDS):
         rng = random.Random(f"greedy-{seed}")
         problem = problem_of(made_up(seed, kind, n_uavs=3, n_tasks=6))
-        problem = replace(problem, slots=np.zeros(problem.n_base, dtype=np.int32))
-        state = FieldState.at_start(problem, rng.sample(range(3), 3))
-        runs = field.run_rule(problem.kernel, state, FIELD_GREEDY)
-        lists = runs.lists(problem.n_uav)
 
-        assert field.fly_lists(problem.kernel, state, lists).feasible
-        assert all(items[-1] >= 0 for items in lists if items)
-        plain = PlainField(problem, state)
-        stands = [plain.begin(uav) for uav in range(problem.n_uav)]
-        open_tasks = set(range(problem.n_task))
-        key = (-1.0, -1)
-        for uav, item, decided_s in zip(
-            runs.uavs.tolist(), runs.items.tolist(), runs.decided_s.tolist(), strict=True
-        ):
-            assert decided_s == stands[uav].time_s
-            assert (decided_s, int(state.rank[uav])) >= key
-            key = decided_s, int(state.rank[uav])
-            best = greedy_step(plain, uav, stands[uav], sorted(open_tasks))
-            if item < 0:
-                assert best is None
-                here = int(stands[uav].node or 0) - problem.n_uav if stands[uav].landed else -1
-                base = greedy_base(plain, uav, stands[uav], here, sorted(open_tasks))
-                assert base == -1 - item
-                arrive_s = plain.arrival_s(uav, stands[uav], -1 - item)
-                step = plain.swap(uav, stands[uav], -1 - item, arrive_s)
-            else:
-                assert best == item
-                open_tasks.remove(item // 2)
-                step = plain.task(uav, stands[uav], item)
-            assert not isinstance(step, FieldRefusal)
-            stands[uav] = step[0]
-        for uav in range(problem.n_uav):
-            assert greedy_step(plain, uav, stands[uav], sorted(open_tasks)) is None
+        check_greedy(problem, FieldState.at_start(problem, rng.sample(range(3), 3)))
+
+
+@pytest.mark.parametrize("seed", seeds(10, 300))
+def test_greedy_reckons_with_waits_for_slots_as_plain_loops_do(seed: int) -> None:
+    """Who is known to be ahead at a base stays there for its swap, or until it is to depart."""
+    for draft in (crowd(seed), dilemma(seed, 4, 8, slots=True)):
+        problem = problem_of(draft)
+        check_greedy(problem, FieldState.at_start(problem))
+        check_greedy(problem, random_state(random.Random(seed), problem))
+
+
+def test_waits_for_slots_that_greedy_reckons_with_are_many() -> None:
+    waits = 0
+    for seed in range(10):
+        problem = problem_of(crowd(seed))
+        runs = field.run_rule(problem.kernel, FieldState.at_start(problem), FIELD_GREEDY)
+        waits += int((runs.times_s[runs.items < 0, 2] > runs.times_s[runs.items < 0, 1]).sum())
+
+    assert waits >= 10
+
+
+def crowd(seed: int) -> dict[str, Any]:
+    """Five UAVs round a base with one slot that need it at about the same time, and can wait."""
+    rng = random.Random(f"crowd-{seed}")
+
+    def place(nearest_m: float, farthest_m: float) -> list[float]:
+        angle, reach_m = rng.uniform(0.0, math.tau), rng.uniform(nearest_m, farthest_m)
+        return [reach_m * math.cos(angle), reach_m * math.sin(angle)]
+
+    battery = {"endurance_s": 300.0, "reserve_frac": 0.0, "charge_frac": 0.09}
+    return {
+        "name": "crowd",
+        "mission": {"horizon_s": 600.0},
+        "uav": [
+            {"id": f"u{i}", "position_m": place(80.0, 120.0), "speed_m_s": 10.0} | battery
+            for i in range(5)
+        ],
+        "base": [
+            {"id": "b", "position_m": [0.0, 0.0], "swap_s": rng.uniform(2.0, 6.0), "slots": 1}
+        ],
+        "task": [
+            {"id": f"t{i}", "position_m": place(100.0, 180.0), "value": 1.0 + i, "opens_s": 9.0 * i}
+            for i in range(8)
+        ],
+    }
+
+
+def check_greedy(problem: FieldProblem, state: FieldState) -> None:
+    """Decision after decision, with the lists as they were then flown by plain loops."""
+    runs = field.run_rule(problem.kernel, state, FIELD_GREEDY)
+
+    assert field.fly_lists(problem.kernel, state, runs.lists(problem.n_uav)).feasible
+    assert all(items[-1] >= 0 for items in runs.lists(problem.n_uav) if items)
+    plain = PlainField(problem, state)
+    lists: list[list[int]] = [[] for _ in range(problem.n_uav)]
+    open_tasks = set(range(problem.n_task))
+    key = (-1.0, -1)
+    decisions = zip(runs.uavs, runs.items, runs.decided_s, runs.times_s.tolist(), strict=True)
+    for uav, item, decided_s, times_s in decisions:
+        stand = plain.fly(lists)[uav].stand
+        assert decided_s == stand.time_s
+        assert (decided_s, int(state.rank[uav])) >= key
+        key = decided_s, int(state.rank[uav])
+        best = greedy_step(plain, uav, stand, sorted(open_tasks))
+        if item < 0:
+            assert best is None
+            here = int(state.landed_at[uav])
+            if lists[uav]:
+                here = -1 - lists[uav][-1] if stand.landed else -1
+            base = greedy_base(plain, uav, lists, here, sorted(open_tasks))
+            assert base == -1 - item
+        else:
+            assert best == item
+            open_tasks.remove(item // 2)
+        lists[uav].append(int(item))
+        assert tuple(times_s) == plain.fly(lists)[uav].times[-1]
+    for uav, flown in enumerate(plain.fly(lists)):
+        if state.active[uav]:
+            assert greedy_step(plain, uav, flown.stand, sorted(open_tasks)) is None
 
 
 @pytest.mark.parametrize("kind", ["slots", "energy", "all"])
@@ -271,10 +304,35 @@ def test_greedy_swaps_twice_in_a_row_where_one_swap_does_not_do() -> None:
 
 
 def test_a_run_that_is_told_to_stop_leaves_the_rest() -> None:
-    problem = problem_of(made_up(0, "plain", n_uavs=2, n_tasks=6))
+    """It asks after so many decisions; what was decided until then is what is always decided."""
+    problem = problem_of(made_up(0, "acceleration", n_uavs=3, n_tasks=12))
     state = FieldState.at_start(problem)
+    whole = field.run_rule(problem.kernel, state, FIELD_LOOKAHEAD)
+    assert len(whole.items) == 12
 
-    assert len(field.run_rule(problem.kernel, state, FIELD_GREEDY, lambda: False).items) == 6
+    taken = [len(stopped_run(problem, state, after).items) for after in range(3)]
+
+    assert taken == sorted(set(taken))
+    assert 0 < taken[0] < taken[-1] < 12
+    for after, count in enumerate(taken):
+        assert stopped_run(problem, state, after).items.tolist() == whole.items[:count].tolist()
+
+
+@pytest.mark.parametrize("seed", seeds(4, 100))
+def test_lists_of_a_stopped_run_can_be_flown_and_end_with_tasks(seed: int) -> None:
+    problem = problem_of(dilemma(seed, 4, 7, slots=True))
+    state = FieldState.at_start(problem)
+    for after in range(6):
+        lists = stopped_run(problem, state, after).lists(problem.n_uav)
+
+        assert field.fly_lists(problem.kernel, state, lists).feasible
+        assert all(items[-1] >= 0 for items in lists if items)
+
+
+def stopped_run(problem: FieldProblem, state: FieldState, after: int) -> field.FieldRuns:
+    """What lookahead has decided when it is told to stop, having asked ``after`` times before."""
+    asked = itertools.count()
+    return field.run_rule(problem.kernel, state, FIELD_LOOKAHEAD, lambda: next(asked) >= after)
 
 
 @pytest.mark.parametrize(

@@ -8,33 +8,16 @@ import re
 from typing import Any
 
 import pytest
-import shapely
 
 from swarm.model import Mission, Task, Uav
 from swarm.runtime.errors import InputError
 from swarm.scenario import format_scenario, parse_scenario
 from tests.support.field_oracle import faults as oracle
-from tests.support.field_oracle import made_up as drafts
-from tests.support.field_oracle.made_up import KINDS, SIDE_M, Draft, as_toml
+from tests.support.field_oracle.made_up import KINDS, SIDE_M, Draft, as_toml, made_up
 from tests.support.field_oracle.scenario import FieldScenario, FieldTask, FieldUav, read
 
 Told = set[tuple[str, ...]]
 """Who is said to be wrong: a UAV; a place and a zone; a line and a zone."""
-
-
-def made_up(seed: int, kind: str, **sizes: int) -> Draft:
-    """A draft without what only the product refuses.
-
-    That is a chance by a kind that no task is of, and a polygon that crosses itself.
-    """
-    draft = drafts.made_up(seed, kind, **sizes)
-    if not all(shapely.LinearRing(zone["polygon_m"]).is_simple for zone in draft["zone"]):
-        return made_up(seed + 1000, kind, **sizes)
-    known = {task[key] for task in draft["task"] for key in ("id", "kind") if key in task}
-    for uav in draft["uav"]:
-        for table in ("success", "survival"):
-            uav[table] = {name: p for name, p in uav.get(table, {}).items() if name in known}
-    return draft
 
 
 def told_by_product(draft: Draft) -> Told:
