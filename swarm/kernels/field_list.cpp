@@ -40,20 +40,38 @@ void keep(std::vector<ListLabel>& labels, const ListLabel& label) {
     }
     labels.push_back(label);
 }
+
+// Its times and value, but for where it is on a list.
+OnList on_list(const FieldProblem& problem, int uav, int task) {
+    OnList on{};
+    on.work_s = problem.line_time_s(uav, item_of_task(task, 0));
+    if (problem.is_line[task])
+        on.work_s = std::min(on.work_s, problem.line_time_s(uav, item_of_task(task, 1)));
+    on.work_s += problem.service_s[task];
+    on.opens_s = problem.opens_s[task];
+    on.last_s = std::min(problem.closes_s[task], problem.due_s[task] - on.work_s);
+    on.until_s = problem.until_s[task];
+    return on;
+}
+
+// Of the labels after so many tasks.
+double earliest_s(const FieldList& list, std::size_t count) {
+    double time_s = kInfinity;
+    for (int k = list.offsets[count]; k < list.offsets[count + 1]; ++k)
+        time_s = std::min(time_s, list.labels[k].progress.time_s);
+    return time_s;
+}
 }  // namespace
 
 double Stays::begin_s(int base, int uav, double arrive_s) const {
+    const std::vector<Held>& held = at_[base];
+    const Arrival own{arrive_s, team_->rank[uav], uav};
+    auto end = std::lower_bound(held.begin(), held.end(), own, [](const Held& a, const Arrival& b) {
+        return a.arrival < b;
+    });
     leaves_s_.clear();
-    for (int other = 0; other < problem_->n_uav; ++other) {
-        if (other == uav) continue;
-        for (const Stay& stay : of_[other]) {
-            if (stay.base != base || stay.leave_s <= arrive_s || stay.arrive_s > arrive_s) continue;
-            if (stay.arrive_s == arrive_s &&
-                std::make_pair(team_->rank[other], other) > std::make_pair(team_->rank[uav], uav)) {
-                continue;
-            }
-            leaves_s_.push_back(stay.leave_s);
-        }
+    while (end != held.begin() && (--end)->latest_s > arrive_s) {
+        if (end->leave_s > arrive_s && end->arrival.uav != uav) leaves_s_.push_back(end->leave_s);
     }
     const std::size_t slots = static_cast<std::size_t>(problem_->slots[base]);
     if (leaves_s_.size() < slots) return arrive_s;
@@ -62,13 +80,35 @@ double Stays::begin_s(int base, int uav, double arrive_s) const {
 }
 
 void Stays::set(int uav, const std::vector<Stay>& stays) {
-    const std::vector<Stay>& old = of_[uav];
+    std::vector<Stay>& old = of_[uav];
     const auto same = [](const Stay& a, const Stay& b) {
         return a.base == b.base && a.arrive_s == b.arrive_s && a.leave_s == b.leave_s;
     };
     if (std::equal(old.begin(), old.end(), stays.begin(), stays.end(), same)) return;
-    of_[uav] = stays;
+    const std::int64_t rank = team_->rank[uav];
+    for (std::size_t base = 0; base < at_.size(); ++base) {
+        std::vector<Held>& held = at_[base];
+        const auto gone = std::remove_if(held.begin(), held.end(),
+                                         [&](const Held& a) { return a.arrival.uav == uav; });
+        bool changed = gone != held.end();
+        held.erase(gone, held.end());
+        for (const Stay& stay : stays) {
+            if (stay.base != static_cast<int>(base)) continue;
+            held.push_back({{stay.arrive_s, rank, uav}, stay.leave_s, 0.0});
+            changed = true;
+        }
+        if (changed) arrange(static_cast<int>(base));
+    }
+    old = stays;
     version_ = ++*last_version_;
+}
+
+void Stays::arrange(int base) {
+    std::vector<Held>& held = at_[base];
+    std::sort(held.begin(), held.end(),
+              [](const Held& a, const Held& b) { return a.arrival < b.arrival; });
+    double latest_s = -kInfinity;
+    for (Held& one : held) one.latest_s = latest_s = std::max(latest_s, one.leave_s);
 }
 
 bool ListSolver::hop(int uav, const Stays& stays, const Progress& from, int base,
@@ -79,6 +119,7 @@ bool ListSolver::hop(int uav, const Stays& stays, const Progress& from, int base
     if (stays.limited(base)) {
         meets_slots = true;
         begin_s = stays.begin_s(base, uav, begin_s);
+        if (!std::isfinite(begin_s)) return false;  // who stands there stays for good
     }
     ready = from;
     Times times;
@@ -165,19 +206,129 @@ void ListSolver::extend(int uav, const Stays& stays, const ListLabel* from, int 
     }
 }
 
+bool ListSolver::can_do(const FieldList& list, const Stays& stays, int task) {
+    bool ignored = false;
+    extend(list.uav, stays, list.labels.data(), 1, task, here_, ignored);
+    return !here_.empty();
+}
+
+// A place is valued in three steps, each ending it if the bound is not above the best gain so far:
+// by earliest times alone, with the labels after the new task, and with those after each task that
+// follows.
+Insertion ListSolver::best_place(FieldList& list, const Stays& stays, int task, double least,
+                                 bool& meets_slots) {
+    Insertion best;
+    if (list.value == -kInfinity) return best;
+    learn(list);
+    most_.clear();
+    for (std::size_t place = 0; place <= list.order.size(); ++place)
+        most_.push_back(most_with(list, place, task));
+    steps += static_cast<std::int64_t>(most_.size());
+    while (true) {
+        const auto next = std::max_element(most_.begin(), most_.end());
+        const double above = list.value + std::max(least, best.gain);
+        if (!(*next > above)) return best;
+        const std::size_t place = static_cast<std::size_t>(next - most_.begin());
+        *next = -kInfinity;
+        const double gain =
+            value_with(list, stays, place, task, above, meets_slots) - list.value;
+        if (gain > best.gain) best = {gain, place};
+    }
+}
+
+double ListSolver::least_leg_s(int uav, int from, int to) const {
+    double least_s = kInfinity;
+    for (int way = 0; way <= problem_.is_line[from]; ++way) {
+        const double* legs_s =
+            problem_.legs_from(uav, problem_.leave_node(item_of_task(from, way)));
+        for (int on = 0; on <= problem_.is_line[to]; ++on)
+            least_s = std::min(least_s, legs_s[problem_.enter_node(item_of_task(to, on))]);
+    }
+    return least_s;
+}
+
+void ListSolver::learn(FieldList& list) const {
+    if (list.known == list.version) return;
+    list.known = list.version;
+    const std::size_t count = list.order.size();
+    list.on.resize(count);
+    double rest = 0.0;
+    for (std::size_t k = count; k-- > 0;) {
+        const int task = task_of(list.order[k]);
+        OnList& on = list.on[k];
+        on = on_list(problem_, list.uav, task);
+        on.step_s = k == 0 ? 0.0 : least_leg_s(list.uav, task_of(list.order[k - 1]), task);
+        on.end_s = earliest_s(list, k + 1);
+        on.share = list.labels[list.offsets[k]].progress.survived *
+                   problem_.weight[problem_.at(list.uav, task)];
+        rest += on.share * (on.until_s - on.end_s);
+        on.rest = rest;
+    }
+}
+
+// What the tasks from number `from` on can be worth at most if the first one of them is flown to
+// so that it could begin at `time_s`, the chance to survive until then being so much less.
+double ListSolver::most_value(const FieldList& list, std::size_t from, double time_s,
+                              double survival) const {
+    double value = 0.0;
+    for (std::size_t k = from; k < list.order.size(); ++k) {
+        const OnList& on = list.on[k];
+        if (k > from) time_s += on.step_s;
+        const double begin_s = std::max(time_s, on.opens_s);
+        if (begin_s > on.last_s + kToleranceS) return -kInfinity;
+        time_s = begin_s + on.work_s;
+        if (time_s <= on.end_s) return value + survival * on.rest;
+        value += survival * on.share * (on.until_s - time_s);
+    }
+    return value;
+}
+
+// At most so much is the list worth with `task` at that place; -infinity: it can't be done there.
+double ListSolver::most_with(const FieldList& list, std::size_t place, int task) const {
+    const std::size_t pair = problem_.at(list.uav, task);
+    const OnList on = on_list(problem_, list.uav, task);
+    const int first = list.offsets[place], last = list.offsets[place + 1];
+    double begin_s = kInfinity, value = -kInfinity;
+    for (int k = first; k < last; ++k) {
+        const Progress& progress = list.labels[k].progress;
+        double leg_s = kInfinity;
+        for (int way = 0; way <= problem_.is_line[task]; ++way)
+            leg_s = std::min(leg_s, progress.legs_s[problem_.enter_node(item_of_task(task, way))]);
+        begin_s = std::min(begin_s, progress.time_s + leg_s);
+        value = std::max(value, progress.value);
+    }
+    begin_s = std::max(begin_s, on.opens_s);
+    if (begin_s > on.last_s + kToleranceS) return -kInfinity;
+    const double end_s = begin_s + on.work_s;
+    value += list.labels[first].progress.survived * problem_.weight[pair] * (on.until_s - end_s);
+    if (place == list.order.size()) return value;
+    const double next_s = end_s + least_leg_s(list.uav, task, task_of(list.order[place]));
+    return value + most_value(list, place, next_s, problem_.survival[pair]);
+}
+
+// The value with `task` at that place if it is above `least`; else -infinity.
 double ListSolver::value_with(const FieldList& list, const Stays& stays, std::size_t place,
-                              int task, bool& meets_slots) {
+                              int task, double least, bool& meets_slots) {
     const int first = list.offsets[place];
+    const double survival = problem_.survival[problem_.at(list.uav, task)];
     extend(list.uav, stays, list.labels.data() + first, list.offsets[place + 1] - first, task,
            here_, meets_slots);
-    for (std::size_t k = place; k < list.order.size() && !here_.empty(); ++k) {
-        extend(list.uav, stays, here_.data(), static_cast<int>(here_.size()),
-               task_of(list.order[k]), next_, meets_slots);
+    for (std::size_t k = place;; ++k) {
+        double best = -kInfinity, first_s = kInfinity;
+        for (const ListLabel& label : here_) {
+            best = std::max(best, label.progress.value);
+            first_s = std::min(first_s, label.progress.time_s);
+        }
+        if (k == list.order.size()) return best > least ? best : -kInfinity;
+        if (here_.empty()) return -kInfinity;
+        const int next = task_of(list.order[k]);
+        const double step_s =
+            k == place ? least_leg_s(list.uav, task, next) : list.on[k].step_s;
+        if (!(best + most_value(list, k, first_s + step_s, survival) > least)) return -kInfinity;
+        extend(list.uav, stays, here_.data(), static_cast<int>(here_.size()), next, next_,
+               meets_slots);
         std::swap(here_, next_);
     }
-    double best = -kInfinity;
-    for (const ListLabel& label : here_) best = std::max(best, label.progress.value);
-    return best;
 }
 
 bool ListSolver::solve(FieldList& list, const Stays& stays, std::size_t kept, Random* random,
@@ -240,95 +391,6 @@ void ListSolver::write_items(FieldList& list, const Stays& stays, int last) {
             list.items.push_back(item_of_base(base));
     }
     std::reverse(list.items.begin(), list.items.end());
-}
-
-bool TeamFlight::takes_part(const FieldTeam& team, const Stays& stays, const FieldList& list) {
-    if (list.items.empty()) return false;
-    const int begins = team.landed_at[list.uav];
-    if (begins >= 0 && stays.limited(begins)) return true;
-    return std::any_of(list.items.begin(), list.items.end(), [&](Item item) {
-        return is_base(item) && stays.limited(base_of(item));
-    });
-}
-
-// Up to the next base where it may have to wait, or to the end; `depart_s`: of its first item, if
-// it has done one.
-bool TeamFlight::fly_on(const FieldList& list, const Stays& stays, Pilot& pilot,
-                        double& depart_s) {
-    pilot.waits = false;
-    for (bool first = true; pilot.next < list.items.size(); ++pilot.next, first = false) {
-        const Item item = list.items[pilot.next];
-        if (is_base(item) && stays.limited(base_of(item))) {
-            pilot.arrive_s = arrival_s(problem_, base_of(item), pilot.progress);
-            if (first) depart_s = pilot.progress.time_s;
-            pilot.waits = true;
-            return true;
-        }
-        Times times;
-        if (do_item(problem_, list.uav, item, pilot.progress, times) != Refusal::kNone)
-            return false;
-        if (first) depart_s = times.depart_s;
-    }
-    return true;
-}
-
-int TeamFlight::fly(const std::vector<FieldList>& lists, Stays& stays, std::vector<double>& value,
-                    std::size_t& failed_at) {
-    for (int base = 0; base < problem_.n_base; ++base)
-        if (stays.limited(base)) free_s_[base].assign(problem_.slots[base], -kInfinity);
-    std::size_t count = 0;
-    for (const FieldList& list : lists) {
-        if (!takes_part(team_, stays, list)) continue;
-        Pilot& pilot = pilots_[count++];
-        pilot.uav = list.uav;
-        pilot.progress = team_.begin(problem_, list.uav);
-        pilot.next = 0;
-        pilot.stays.clear();
-        double depart_s = 0.0;
-        const bool flew = fly_on(list, stays, pilot, depart_s);
-        failed_at = pilot.next;
-        if (!flew) return list.uav;
-        const int begins = team_.landed_at[list.uav];
-        if (begins < 0 || !stays.limited(begins)) continue;
-        *std::min_element(free_s_[begins].begin(), free_s_[begins].end()) = depart_s;
-        pilot.stays.push_back({begins, -kInfinity, depart_s});
-    }
-    while (true) {
-        Pilot* first = nullptr;
-        for (std::size_t k = 0; k < count; ++k) {
-            Pilot& pilot = pilots_[k];
-            if (!pilot.waits) continue;
-            if (first == nullptr || pilot.arrive_s < first->arrive_s ||
-                (pilot.arrive_s == first->arrive_s &&
-                 team_.rank[pilot.uav] < team_.rank[first->uav])) {
-                first = &pilot;
-            }
-        }
-        if (first == nullptr) break;
-        const FieldList& list = lists[first->uav];
-        const int base = base_of(list.items[first->next]);
-        auto slot = std::min_element(free_s_[base].begin(), free_s_[base].end());
-        const double begin_s = std::max(first->arrive_s, *slot);
-        const double arrive_s = first->arrive_s;
-        Times times;
-        failed_at = first->next;
-        if (swap_battery(problem_, first->uav, base, begin_s, first->progress, times) !=
-            Refusal::kNone)
-            return first->uav;
-        ++first->next;
-        double leave_s = times.end_s;
-        const bool flew = fly_on(list, stays, *first, leave_s);
-        failed_at = first->next;
-        if (!flew) return first->uav;
-        *slot = leave_s;
-        first->stays.push_back({base, arrive_s, leave_s});
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-        value[pilots_[k].uav] = pilots_[k].progress.value;
-        stays.set(pilots_[k].uav, pilots_[k].stays);
-    }
-    failed_at = 0;
-    return -1;
 }
 
 }  // namespace peckorder

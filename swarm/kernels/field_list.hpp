@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "field.hpp"
+#include "field_team.hpp"
 #include "routes_random.hpp"
 
 namespace peckorder {
@@ -21,25 +21,35 @@ struct Stay {
 };
 
 // Who holds slots when, as it is now believed. Who arrives waits for those that arrived earlier;
-// that it makes later ones wait is not seen here, but by TeamFlight.
+// that it makes later ones wait is not seen here, but where all lists are flown together.
 class Stays {
   public:
     Stays(const FieldProblem& problem, const FieldTeam& team, std::uint64_t& last_version)
-        : problem_(&problem), team_(&team), last_version_(&last_version), of_(problem.n_uav) {}
+        : problem_(&problem),
+          team_(&team),
+          last_version_(&last_version),
+          of_(problem.n_uav),
+          at_(problem.n_base) {}
 
     bool limited(int base) const {
         return problem_->slots[base] > 0 && problem_->slots[base] < problem_->n_uav;
     }
     double begin_s(int base, int uav, double arrive_s) const;
     void set(int uav, const std::vector<Stay>& stays);
-    const std::vector<Stay>& of(int uav) const { return of_[uav]; }
     std::uint64_t version() const { return version_; }  // the same only if the stays are the same
 
   private:
+    struct Held {
+        Arrival arrival;
+        double leave_s, latest_s;  // when it leaves; when the last one of it and those before does
+    };
+    void arrange(int base);
+
     const FieldProblem* problem_;
     const FieldTeam* team_;
     std::uint64_t* last_version_;
     std::vector<std::vector<Stay>> of_;
+    std::vector<std::vector<Held>> at_;  // by base, in the order of arrival
     std::uint64_t version_ = 0;
     mutable std::vector<double> leaves_s_;
 };
@@ -49,6 +59,16 @@ struct ListLabel {
     std::int32_t parent;  // among the labels after the task before
     Item item;            // the task, in the direction in which it was done
     std::int32_t base;    // where the battery was swapped last since the task before; -1: nowhere
+};
+
+// What is known of a task on a list without its labels: bounds on what changes before it may give.
+struct OnList {
+    double end_s;      // the earliest end of its work
+    double step_s;     // at least so long from the task before
+    double work_s;     // at least so long along it, with its service
+    double opens_s, last_s;  // within these its work begins
+    double share, until_s;   // its value is share * (until_s - end)
+    double rest;       // the most that it and those after it are worth
 };
 
 struct FieldList {
@@ -61,6 +81,14 @@ struct FieldList {
     bool meets_slots = false;   // whether a limited base was thought of
     std::uint64_t version = 0;  // the same only if the order and the labels are the same
     std::uint64_t stays_version = 0;
+    std::vector<OnList> on;     // by task, if `known` is `version`
+    std::uint64_t known = 0;
+};
+
+// A task's best place on a list.
+struct Insertion {
+    double gain = -std::numeric_limits<double>::infinity();
+    std::size_t place = 0;
 };
 
 // Solves lists; has the room it needs to work.
@@ -79,9 +107,12 @@ class ListSolver {
     bool solve(FieldList& list, const Stays& stays, std::size_t kept, Random* random = nullptr,
                double overlooks = 0.0);
 
-    // The value of the list with `task` before its task number `place`; -infinity: can't be done.
-    double value_with(const FieldList& list, const Stays& stays, std::size_t place, int task,
-                      bool& meets_slots);
+    // Whether `task` can be done by a UAV alone; its list is empty.
+    bool can_do(const FieldList& list, const Stays& stays, int task);
+
+    // Where `task` gains most, if that is more than `least`; else any gain up to that may be told.
+    Insertion best_place(FieldList& list, const Stays& stays, int task, double least,
+                         bool& meets_slots);
 
     // The same list under other stays: its labels and value anew, but no other bases.
     void refresh(FieldList& list, const Stays& stays);
@@ -94,6 +125,12 @@ class ListSolver {
         return problem_.n_base > 0 && std::isfinite(problem_.full_s[uav]) &&
                problem_.full_s[uav] > 0.0;
     }
+    void learn(FieldList& list) const;
+    double least_leg_s(int uav, int from, int to) const;
+    double most_value(const FieldList& list, std::size_t from, double time_s, double survival) const;
+    double most_with(const FieldList& list, std::size_t place, int task) const;
+    double value_with(const FieldList& list, const Stays& stays, std::size_t place, int task,
+                      double least, bool& meets_slots);
     void extend(int uav, const Stays& stays, const ListLabel* from, int count, int task,
                 std::vector<ListLabel>& into, bool& meets_slots);
     void reach_bases(int uav, const Stays& stays, const Progress& from, bool& meets_slots);
@@ -109,39 +146,9 @@ class ListSolver {
     std::vector<Progress> ready_;  // after a swap at each base
     std::vector<int> before_;      // the base before that one; -1: none, -2: can't be reached
     std::vector<ListLabel> here_, next_;
+    std::vector<double> most_;     // by place, what a task could make the list worth there
     Random* random_ = nullptr;
     double overlooks_ = 0.0;
-};
-
-// All lists flown together, as slots make them wait.
-class TeamFlight {
-  public:
-    TeamFlight(const FieldProblem& problem, const FieldTeam& team)
-        : problem_(problem), team_(team), pilots_(problem.n_uav), free_s_(problem.n_base) {}
-
-    // Whether list `uav` takes part: others neither wait nor make wait.
-    static bool takes_part(const FieldTeam& team, const Stays& stays, const FieldList& list);
-
-    // Fly those that take part; `value` and `stays` of these are set. The UAV whose list can't be
-    // done, or -1; `failed_at` is then the item that it can't do.
-    int fly(const std::vector<FieldList>& lists, Stays& stays, std::vector<double>& value,
-            std::size_t& failed_at);
-
-  private:
-    struct Pilot {
-        int uav;
-        Progress progress;
-        std::size_t next;
-        double arrive_s;   // above the base that is next
-        bool waits;
-        std::vector<Stay> stays;
-    };
-    bool fly_on(const FieldList& list, const Stays& stays, Pilot& pilot, double& depart_s);
-
-    const FieldProblem& problem_;
-    const FieldTeam& team_;
-    std::vector<Pilot> pilots_;
-    std::vector<std::vector<double>> free_s_;  // of each base's slots
 };
 
 }  // namespace peckorder

@@ -24,7 +24,7 @@ FieldLane::FieldLane(const FieldProblem& problem, const FieldTeam& team, std::ui
       team_(team),
       random_(seed),
       solver_(problem, team, last_version_),
-      flight_(problem, team),
+      flown_(problem.n_uav),
       stays_(problem, team, last_version_),
       lists_(problem.n_uav),
       value_(problem.n_uav, 0.0),
@@ -41,6 +41,7 @@ FieldLane::FieldLane(const FieldProblem& problem, const FieldTeam& team, std::ui
     for (int base = 0; base < problem.n_base; ++base) any_limited_ |= stays_.limited(base);
     for (int uav = 0; uav < problem.n_uav; ++uav) {
         lists_[uav].uav = uav;
+        believe_stays(uav, nullptr, 0);
         solver_.solve(lists_[uav], stays_, 0);
         if (team.active[uav] && std::isfinite(team.free_s[uav])) uavs_.push_back(uav);
         any_swaps_ |= problem.n_base > 0 && std::isfinite(problem.full_s[uav]);
@@ -60,12 +61,11 @@ FieldLane::FieldLane(const FieldProblem& problem, const FieldTeam& team, std::ui
 }
 
 void FieldLane::find_doable() {
-    bool ignored = false;
     for (int task = 0; task < problem_.n_task; ++task) {
         if (!team_.open[task]) continue;
         for (const int uav : uavs_) {
             if (!problem_.capable[problem_.at(uav, task)]) continue;
-            if (solver_.value_with(lists_[uav], stays_, 0, task, ignored) == -kInfinity) continue;
+            if (!solver_.can_do(lists_[uav], stays_, task)) continue;
             able_[task].push_back(uav);
             weight_[task] = std::max(weight_[task], problem_.weight[problem_.at(uav, task)]);
         }
@@ -126,29 +126,11 @@ void FieldLane::load(const ItemLists& lists) {
         for (const Item item : lists[uav]) n_task += !is_base(item);
         if (n_task == lists_[uav].order.size()) lists_[uav].items = lists[uav];
     }
-    std::size_t failed_at = 0;
-    const auto chain = [&](const FieldList& list) {
-        Progress progress = team_.begin(problem_, list.uav);
-        Times times;
-        for (const Item item : list.items) {
-            if (do_item(problem_, list.uav, item, progress, times) != Refusal::kNone)
-                return -kInfinity;
-        }
-        return progress.value;
-    };
-    bool flies = true;
-    for (const int uav : uavs_) {
-        const bool together = TeamFlight::takes_part(team_, stays_, lists_[uav]);
-        value_[uav] = together ? 0.0 : chain(lists_[uav]);
-        flies = flies && value_[uav] > -kInfinity;
-    }
-    if (flies && flight_.fly(lists_, stays_, value_, failed_at) < 0) {
-        note_best(worth());
-    } else {
+    if (!fly()) {
         for (const int uav : uavs_) lists_[uav].items = solved[uav];
         fly_together();
-        note_best(worth());
     }
+    note_best(worth());
     touched_.clear();
     std::fill(is_touched_.begin(), is_touched_.end(), 0);
     moved_.clear();
@@ -219,47 +201,70 @@ void FieldLane::settle(int uav, std::size_t kept, double overlooks) {
 // The stays of a list as its labels believe.
 void FieldLane::believe_stays(int uav) {
     if (!any_limited_) return;
-    const FieldList& list = lists_[uav];
-    std::vector<Stay> stays;
-    if (TeamFlight::takes_part(team_, stays_, list)) {
-        Progress progress = team_.begin(problem_, uav);
-        int base = team_.landed_at[uav];
-        double arrived_s = -kInfinity;
-        for (const Item item : list.items) {
-            Times times;
-            double arrive_s = 0.0;
-            if (is_base(item)) {
-                arrive_s = arrival_s(problem_, base_of(item), progress);
-                double begin_s = arrive_s;
-                if (stays_.limited(base_of(item)))
-                    begin_s = stays_.begin_s(base_of(item), uav, arrive_s);
-                if (swap_battery(problem_, uav, base_of(item), begin_s, progress, times) !=
-                    Refusal::kNone)
-                    break;
-            } else if (do_task(problem_, uav, item, progress, times) != Refusal::kNone) {
-                break;
-            }
-            if (base >= 0 && stays_.limited(base))
-                stays.push_back({base, arrived_s, times.depart_s});
-            base = is_base(item) ? base_of(item) : -1;
-            arrived_s = arrive_s;
+    Progress progress = team_.begin(problem_, uav);
+    times_.clear();
+    for (const Item item : lists_[uav].items) {
+        Times times;
+        Refusal refusal;
+        if (is_base(item)) {
+            const int base = base_of(item);
+            double begin_s = arrival_s(problem_, base, progress);
+            if (stays_.limited(base)) begin_s = stays_.begin_s(base, uav, begin_s);
+            refusal = swap_battery(problem_, uav, base, begin_s, progress, times);
+        } else {
+            refusal = do_task(problem_, uav, item, progress, times);
         }
+        if (refusal != Refusal::kNone) break;
+        times_.push_back(times);
     }
-    stays_.set(uav, stays);
+    believe_stays(uav, times_.data(), times_.size());
+}
+
+// The same by the times of its first `count` items.
+void FieldLane::believe_stays(int uav, const Times* times, std::size_t count) {
+    if (!any_limited_) return;
+    own_stays_.clear();
+    int base = team_.landed_at[uav];
+    double arrive_s = -kInfinity;
+    double end_s = team_.active[uav] ? team_.free_s[uav] : kInfinity;
+    for (std::size_t k = 0; k < count; ++k) {
+        if (base >= 0 && stays_.limited(base))
+            own_stays_.push_back({base, arrive_s, times[k].depart_s});
+        const Item item = lists_[uav].items[k];
+        base = is_base(item) ? base_of(item) : -1;
+        arrive_s = times[k].arrive_s;
+        end_s = times[k].end_s;
+    }
+    if (base >= 0 && stays_.limited(base)) own_stays_.push_back({base, arrive_s, end_s});
+    stays_.set(uav, own_stays_);
+}
+
+// Fly all lists together: what they are worth, and who is at which base when. False: some list
+// can't be done.
+bool FieldLane::fly() {
+    for (const int uav : uavs_) {
+        const std::vector<Item>& items = lists_[uav].items;
+        flown_[uav] = {items.data(), static_cast<int>(items.size())};
+    }
+    if (!flights_.fly(problem_, team_, flown_.data(), true)) return false;
+    for (const int uav : uavs_) {
+        value_[uav] = flights_.flight(uav).value();
+        const int count = flown_[uav].count;
+        believe_stays(uav, count == 0 ? nullptr : &flights_.times(uav, 0),
+                      static_cast<std::size_t>(count));
+    }
+    return true;
 }
 
 void FieldLane::fly_together() {
-    for (const int uav : uavs_) {
-        if (TeamFlight::takes_part(team_, stays_, lists_[uav])) continue;
-        value_[uav] = lists_[uav].value;
-        stays_.set(uav, {});
-    }
-    std::size_t failed_at = 0;
-    for (int uav; (uav = flight_.fly(lists_, stays_, value_, failed_at)) >= 0;) {
+    while (!fly()) {
+        const int uav = *std::find_if(uavs_.begin(), uavs_.end(), [&](int each) {
+            return flights_.flight(each).refusal != Refusal::kNone;
+        });
         touch(uav);
         FieldList& list = lists_[uav];
         std::size_t number = 0;
-        for (std::size_t k = 0; k < failed_at; ++k) number += !is_base(list.items[k]);
+        for (int k = 0; k < flights_.flight(uav).done; ++k) number += !is_base(list.items[k]);
         number = std::min(number, list.order.size() - 1);
         const int task = task_of(list.order[number]);
         list.order.erase(list.order.begin() + static_cast<std::ptrdiff_t>(number));
@@ -280,23 +285,26 @@ void FieldLane::remove(int uav, std::size_t from, std::size_t count) {
     settle(uav, from);
 }
 
-FieldLane::Insertion FieldLane::best_place(int uav, int task) {
+FieldLane::Known& FieldLane::known(int uav, int task) { return known_[problem_.at(uav, task)]; }
+
+bool FieldLane::still_known(int uav, const Known& known) const {
+    const bool same = !precise_ || !known.meets_slots || known.stays == stays_.version();
+    return known.list == lists_[uav].version && same;
+}
+
+// Where a list would take a task best, if that gains more than `least`.
+Insertion FieldLane::best_place(int uav, int task, double least) {
     FieldList& list = lists_[uav];
     if (precise_) solver_.refresh(list, stays_);
-    Known& known = known_[problem_.at(uav, task)];
-    const bool same = !precise_ || !known.meets_slots || known.stays == stays_.version();
-    if (known.list == list.version && same) return known.best;
-    known.list = list.version;
-    known.stays = stays_.version();
-    known.meets_slots = list.meets_slots;
-    known.best = {-kInfinity, 0};
-    if (list.value == -kInfinity) return known.best;
-    for (std::size_t place = 0; place <= list.order.size(); ++place) {
-        const double gain =
-            solver_.value_with(list, stays_, place, task, known.meets_slots) - list.value;
-        if (gain > known.best.gain) known.best = {gain, place};
-    }
-    return known.best;
+    Known& here = known(uav, task);
+    if (still_known(uav, here) && (here.best.gain >= here.most || here.most <= least))
+        return here.best;
+    here.list = list.version;
+    here.stays = stays_.version();
+    here.meets_slots = list.meets_slots;
+    here.best = solver_.best_place(list, stays_, task, least, here.meets_slots);
+    here.most = std::max(here.best.gain, least);
+    return here.best;
 }
 
 void FieldLane::insert(int uav, std::size_t place, int task) {
@@ -314,13 +322,19 @@ bool FieldLane::put_back(int task) {
     double best = problem_.required[task] ? -kInfinity : 0.0;
     int best_uav = -1;
     std::size_t best_at = 0;
-    for (const int uav : able_[task]) {
-        if (random_.uniform() < kListBlink) continue;
-        const Insertion insertion = best_place(uav, task);
-        if (insertion.gain > best) {
-            best = insertion.gain;
-            best_uav = uav;
-            best_at = insertion.place;
+    asked_.clear();
+    for (const int uav : able_[task])
+        if (random_.uniform() >= kListBlink) asked_.push_back(uav);
+    // Lists of which it is known first: what they gain spares the others most of the work.
+    for (const bool still : {true, false}) {
+        for (const int uav : asked_) {
+            if (still_known(uav, known(uav, task)) != still) continue;
+            const Insertion insertion = best_place(uav, task, best);
+            if (insertion.gain > best) {
+                best = insertion.gain;
+                best_uav = uav;
+                best_at = insertion.place;
+            }
         }
     }
     if (best_uav < 0) return false;
@@ -375,7 +389,7 @@ void FieldLane::put_back_by_regret() {
             double first = problem_.required[task] ? -prize_ : 0.0, second = first;
             bool any = false;
             for (const int uav : able_[task]) {
-                const double gain = best_place(uav, task).gain;
+                const double gain = best_place(uav, task, -kInfinity).gain;
                 any = any || gain > -kInfinity;
                 if (gain > first) {
                     second = first;

@@ -47,14 +47,11 @@ class FieldLane {
     double scale() const { return scale_; }  // what a displaced task costs, about
 
   private:
-    struct Insertion {
-        double gain;
-        std::size_t place;
-    };
     struct Known {
         std::uint64_t list = 0, stays = 0;
         bool meets_slots = false;
-        Insertion best{0.0, 0};
+        Insertion best;
+        double most = 0.0;  // no place gains more than that
     };
 
     void find_doable();
@@ -71,11 +68,15 @@ class FieldLane {
     void arrange();
     bool put_back(int task);
     void put_back_by_regret();
-    Insertion best_place(int uav, int task);
+    Known& known(int uav, int task);
+    bool still_known(int uav, const Known& known) const;
+    Insertion best_place(int uav, int task, double least);
     void insert(int uav, std::size_t place, int task);
     void remove(int uav, std::size_t from, std::size_t count);
     void settle(int uav, std::size_t kept, double overlooks = 0.0);
     void believe_stays(int uav);
+    void believe_stays(int uav, const Times* times, std::size_t count);
+    bool fly();
     void fly_together();
     Worth worth() const;
     void touch(int uav);
@@ -88,7 +89,8 @@ class FieldLane {
     Random random_;
     std::uint64_t last_version_ = 0;
     ListSolver solver_;
-    TeamFlight flight_;
+    TeamFlights flights_;
+    std::vector<ItemList> flown_;
     Stays stays_;
     bool any_limited_ = false;
     bool any_swaps_ = false;
@@ -105,6 +107,9 @@ class FieldLane {
     std::vector<int> out_, place_out_;    // tasks on no list, and where each is among these
     std::size_t placed_ = 0;              // tasks that had their first turn
     std::vector<Known> known_;            // (n_uav, n_task)
+    std::vector<int> asked_;
+    std::vector<Times> times_;
+    std::vector<Stay> own_stays_;
     double scale_ = 0.0;
     double prize_ = 0.0;
 
