@@ -8,7 +8,7 @@ namespace peckorder {
 namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMostLabels = 16;
-constexpr int kMostBases = 4;  // so many are tried between two tasks, those of the earliest arrival
+constexpr int kMostBases = 4;  // between two tasks; those of the earliest arrival that help
 
 // Put `label` among those after the same tasks, unless one of them makes it needless.
 void keep(std::vector<ListLabel>& labels, const ListLabel& label) {
@@ -154,16 +154,19 @@ void ListSolver::reach_bases(int uav, const Stays& stays, const Progress& from,
     }
 }
 
-void ListSolver::try_task(int uav, const Progress& from, int parent, int base, int task,
+bool ListSolver::try_task(int uav, const Progress& from, int parent, int base, int task,
                           std::vector<ListLabel>& into) {
+    bool can = false;
     for (int backwards = 0; backwards <= problem_.is_line[task]; ++backwards) {
         ListLabel label{from, parent, item_of_task(task, backwards), base};
         Times times;
         ++steps;
         if (do_task(problem_, uav, label.item, label.progress, times) == Refusal::kNone) {
             keep(into, label);
+            can = true;
         }
     }
+    return can;
 }
 
 void ListSolver::extend(int uav, const Stays& stays, const ListLabel* from, int count, int task,
@@ -186,7 +189,7 @@ void ListSolver::extend(int uav, const Stays& stays, const ListLabel* from, int 
         const int enter = problem_.enter_node(item_of_task(task, 0));
         double last_s = -kInfinity;
         int last = -1;
-        for (int tried = 0; tried < kMostBases; ++tried) {
+        for (int helpful = 0; helpful < kMostBases;) {
             int next = -1;
             double next_s = kInfinity;
             for (int base = 0; base < problem_.n_base; ++base) {
@@ -199,7 +202,7 @@ void ListSolver::extend(int uav, const Stays& stays, const ListLabel* from, int 
                 }
             }
             if (next < 0) break;
-            try_task(uav, ready_[next], k, next, task, into);
+            helpful += try_task(uav, ready_[next], k, next, task, into);
             last = next;
             last_s = next_s;
         }
@@ -344,6 +347,9 @@ bool ListSolver::solve(FieldList& list, const Stays& stays, std::size_t kept, Ra
         list.labels.assign(1, ListLabel{team_.begin(problem_, list.uav), 0, 0, -1});
         list.offsets.assign({0, 1});
     }
+    // A list that could not be done has labels of its beginning alone.
+    kept = std::min(kept, list.offsets.size() - 2);
+    while (kept > 0 && list.offsets[kept] == list.offsets[kept + 1]) --kept;
     list.offsets.resize(kept + 2);
     list.labels.resize(list.offsets.back());
     for (std::size_t k = kept; k < list.order.size(); ++k) {
@@ -371,10 +377,16 @@ bool ListSolver::solve(FieldList& list, const Stays& stays, std::size_t kept, Ra
 
 void ListSolver::refresh(FieldList& list, const Stays& stays) {
     if (!list.meets_slots || list.stays_version == stays.version()) return;
-    std::vector<Item> items = list.items, order = list.order;
-    if (!solve(list, stays, 0)) list.value = -kInfinity;
-    list.items = std::move(items);
-    list.order = std::move(order);
+    before_refresh_ = list;
+    const bool can = solve(list, stays, 0);
+    list.items.swap(before_refresh_.items);
+    list.order.swap(before_refresh_.order);
+    if (can) return;
+    // Labels are beliefs: those of before stay, for whoever works on the list expects some.
+    list.labels.swap(before_refresh_.labels);
+    list.offsets.swap(before_refresh_.offsets);
+    list.value = -kInfinity;
+    list.meets_slots = true;
 }
 
 // From the last label back; which bases lie between two tasks is worked out again.

@@ -20,6 +20,12 @@ struct Stay {
     double arrive_s, leave_s;
 };
 
+// Until when somebody without a list keeps the slot of the base at which it stands: it leaves when it
+// is free, or never if it takes no part.
+inline double idle_until_s(const FieldTeam& team, int uav) {
+    return team.active[uav] ? team.free_s[uav] : std::numeric_limits<double>::infinity();
+}
+
 // Who holds slots when, as it is now believed. Who arrives waits for those that arrived earlier;
 // that it makes later ones wait is not seen here, but where all lists are flown together.
 class Stays {
@@ -114,7 +120,8 @@ class ListSolver {
     Insertion best_place(FieldList& list, const Stays& stays, int task, double least,
                          bool& meets_slots);
 
-    // The same list under other stays: its labels and value anew, but no other bases.
+    // The same list under other stays: its labels and value anew, but no other bases. Where it can't
+    // be done under these its value is -infinity.
     void refresh(FieldList& list, const Stays& stays);
 
     // ListLabel extensions so far: a measure of the work done.
@@ -136,7 +143,7 @@ class ListSolver {
     void reach_bases(int uav, const Stays& stays, const Progress& from, bool& meets_slots);
     bool hop(int uav, const Stays& stays, const Progress& from, int base, bool& meets_slots,
              Progress& ready);
-    void try_task(int uav, const Progress& from, int parent, int base, int task,
+    bool try_task(int uav, const Progress& from, int parent, int base, int task,
                   std::vector<ListLabel>& into);
     void write_items(FieldList& list, const Stays& stays, int last);
 
@@ -149,6 +156,7 @@ class ListSolver {
     std::vector<double> most_;     // by place, what a task could make the list worth there
     Random* random_ = nullptr;
     double overlooks_ = 0.0;
+    FieldList before_refresh_;
 };
 
 }  // namespace peckorder

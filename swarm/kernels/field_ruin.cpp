@@ -101,6 +101,7 @@ void FieldLane::tear_about(int task) {
         const std::size_t count = 1 + static_cast<std::size_t>(random_.below(3));
         std::size_t here = 0;
         while (here + 1 < list.order.size() && here + 2 < list.offsets.size() &&
+               list.offsets[here + 1] < list.offsets[here + 2] &&
                list.labels[list.offsets[here + 1]].progress.time_s < time_s) {
             ++here;
         }

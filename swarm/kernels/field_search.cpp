@@ -124,7 +124,7 @@ void FieldLane::load(const ItemLists& lists) {
         solved[uav] = lists_[uav].items;
         std::size_t n_task = 0;
         for (const Item item : lists[uav]) n_task += !is_base(item);
-        if (n_task == lists_[uav].order.size()) lists_[uav].items = lists[uav];
+        if (n_task > 0 && n_task == lists_[uav].order.size()) lists_[uav].items = lists[uav];
     }
     if (!fly()) {
         for (const int uav : uavs_) lists_[uav].items = solved[uav];
@@ -226,7 +226,7 @@ void FieldLane::believe_stays(int uav, const Times* times, std::size_t count) {
     own_stays_.clear();
     int base = team_.landed_at[uav];
     double arrive_s = -kInfinity;
-    double end_s = team_.active[uav] ? team_.free_s[uav] : kInfinity;
+    double end_s = idle_until_s(team_, uav);
     for (std::size_t k = 0; k < count; ++k) {
         if (base >= 0 && stays_.limited(base))
             own_stays_.push_back({base, arrive_s, times[k].depart_s});

@@ -9,17 +9,17 @@ required tasks left out, then largest J), all of them flown together as slots ma
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelField
+from swarm.kernels.field import FieldTeamArrays
+from swarm.kernels.lower_level import default_threads
 
 _MAX_SEED = 2**64 - 1
 _SLICES = 64
@@ -32,50 +32,6 @@ _GATHER_FRACS = (0.5, 0.8)
 """Of the search, when all lanes go on from the best lists."""
 _ITERATIONS_FOR_FULL_HEAT = 400.0
 """Per task; the annealing of a shorter search begins cooler, by the fourth root."""
-
-
-class TeamRows(Protocol):
-    """Where the team stands (swarm.allocation.field.FieldState)."""
-
-    @property
-    def free_s(self) -> npt.NDArray[np.float64]:
-        """(n_uav,) when it is free to depart [s]."""
-        ...
-
-    @property
-    def sortie_end_s(self) -> npt.NDArray[np.float64]:
-        """(n_uav,) when it has landed at the latest [s]."""
-        ...
-
-    @property
-    def first_s(self) -> npt.NDArray[np.float64]:
-        """(n_uav, n_node) legs from where it is then [s]."""
-        ...
-
-    @property
-    def survived(self) -> npt.NDArray[np.float64]:
-        """(n_uav,) S of eq. 1 so far."""
-        ...
-
-    @property
-    def active(self) -> npt.NDArray[np.bool_]:
-        """(n_uav,) whether it may be given tasks."""
-        ...
-
-    @property
-    def open(self) -> npt.NDArray[np.bool_]:
-        """(n_task,) tasks that may be put on lists."""
-        ...
-
-    @property
-    def landed_at(self) -> npt.NDArray[np.int32]:
-        """(n_uav,) base where it stands ready, or -1."""
-        ...
-
-    @property
-    def rank(self) -> npt.NDArray[np.int64]:
-        """(n_uav,) place in the sequence."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +50,7 @@ class SearchedLists:
 
 def optimise_lists(
     problem: KernelField,
-    team: TeamRows,
+    team: FieldTeamArrays,
     *,
     seed: int = 0,
     iterations: int | None = None,
@@ -146,7 +102,7 @@ def optimise_lists(
         *_flat(begin, n_uav),
         seed,
     )
-    kernel_threads = (os.cpu_count() or 1) if threads is None else threads
+    kernel_threads = default_threads() if threads is None else threads
     done = _anneal(search, int(np.sum(team.open)), iterations, spent_frac, progress, kernel_threads)
     n_left_out, objective = search.best_worth()
     flat, offsets = search.best()

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 
 from swarm.allocation.field.problem import FieldProblem
 from swarm.allocation.field.state import FieldState
+from swarm.kernels.field import fly_lists
 from swarm.kernels.field_search import optimise_lists
+from tests.support.field_dilemmas import dilemma
 from tests.support.field_missions import mission_of
 from tests.support.field_oracle.made_up import made_up
 
@@ -62,3 +66,53 @@ def test_what_a_callable_raises_ends_the_search(problem: FieldProblem) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         optimise_lists(problem.kernel, FieldState.at_start(problem), spent_frac=fail)
+
+
+def some_landed(problem: FieldProblem, rng: random.Random) -> FieldState:
+    """Mission time 0, but that some UAVs stand at bases; of these some take no part."""
+    state = FieldState.at_start(problem)
+    for uav in range(problem.n_uav):
+        if rng.random() < 0.5:
+            base = rng.randrange(problem.n_base)
+            state.landed_at[uav] = base
+            state.free_s[uav] = rng.uniform(0.0, 80.0)
+            state.first_s[uav] = problem.leg_s[problem.kind[uav], problem.n_uav + base]
+            state.active[uav] = rng.random() < 0.6
+    return state
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_lists_heed_who_stands_at_bases_and_has_none(seed: int) -> None:
+    draft = dilemma(seed, n_uavs=3, n_tasks=8, slots=True)
+    problem = FieldProblem.from_mission(mission_of(draft).known_at_start())
+    state = some_landed(problem, random.Random(seed))
+
+    found = optimise_lists(problem.kernel, state, seed=seed, iterations=400, threads=1)
+
+    flown = fly_lists(problem.kernel, state, found.lists)
+    assert flown.feasible
+    assert float(flown.value.sum()) == pytest.approx(found.objective)
+
+
+def test_a_base_that_alone_helps_is_found_behind_many_that_are_nearer() -> None:
+    near = [{"id": f"near-{n}", "position_m": [10.0 * n, 0.0]} for n in range(1, 6)]
+    draft = {
+        "name": "far",
+        "mission": {"horizon_s": 600.0},
+        "uav": [
+            {
+                "id": "u",
+                "position_m": [0.0, 0.0],
+                "speed_m_s": 10.0,
+                "endurance_s": 100.0,
+                "reserve_frac": 0.0,
+            }
+        ],
+        "base": [*near, {"id": "far", "position_m": [800.0, 0.0], "swap_s": 60.0}],
+        "task": [{"id": "t", "position_m": [900.0, 0.0], "value": 1.0, "service_s": 20.0}],
+    }
+    problem = FieldProblem.from_mission(mission_of(draft))
+
+    found = optimise_lists(problem.kernel, FieldState.at_start(problem), iterations=50)
+
+    assert found.lists == ((-6, 0),)
