@@ -94,6 +94,22 @@ def test_lists_heed_who_stands_at_bases_and_has_none(seed: int) -> None:
     assert float(flown.value.sum()) == pytest.approx(found.objective)
 
 
+def test_lists_are_worth_what_they_say_when_slots_become_free_behind_them() -> None:
+    problem = FieldProblem.from_mission(mission_of(dilemma(2626, 3, 5, slots=True)))
+    state = FieldState.at_start(problem)
+    state.active[1] = False
+    state.landed_at[:] = 1, 0, 0
+    state.free_s[:] = 71.7, 61.5, 28.2
+    for uav, base in enumerate(state.landed_at):
+        state.first_s[uav] = problem.leg_s[problem.kind[uav], problem.n_uav + base]
+
+    found = optimise_lists(problem.kernel, state, seed=2626, iterations=500, threads=1)
+
+    flown = fly_lists(problem.kernel, state, found.lists)
+    assert flown.feasible
+    assert float(flown.value.sum()) == pytest.approx(found.objective)
+
+
 def test_a_base_that_alone_helps_is_found_behind_many_that_are_nearer() -> None:
     near = [{"id": f"near-{n}", "position_m": [10.0 * n, 0.0]} for n in range(1, 6)]
     draft = {
