@@ -13,3 +13,9 @@ def seeds(quick: int, thorough: int) -> list[object]:
     """
     later = (pytest.param(seed, marks=pytest.mark.slow) for seed in range(quick, thorough))
     return [*range(quick), *later]
+
+
+def sweeps(quick: int, thorough: int) -> list[object]:
+    """The same for a test that goes through many seeds by itself: two ranges, the second slow."""
+    night = pytest.param(range(quick, thorough), marks=pytest.mark.slow, id="night")
+    return [pytest.param(range(quick), id="day"), night]

@@ -21,8 +21,8 @@ from tests.support import field_missions
 from tests.support.field_oracle import brute, checker, scenario
 from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.made_up import KINDS, made_up
+from tests.support.seeds import sweeps
 
-SEEDS = range(8)
 FEW = after_evaluations(150)
 
 
@@ -39,9 +39,10 @@ def told(mission: Mission, method: str, **options: Any) -> dict[str, Any]:
     return said
 
 
+@pytest.mark.parametrize("sweep", sweeps(3, 20))
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_plan_is_right_by_the_oracle(kind: str) -> None:
-    for seed in SEEDS:
+def test_every_plan_is_right_by_the_oracle(kind: str, sweep: range) -> None:
+    for seed in sweep:
         draft = made_up(seed, kind, n_uavs=2 + seed % 2, n_tasks=4 + seed % 3)
         mission, meant = mission_of(draft), scenario.read(draft)
         times = FlightTimes(meant)
@@ -56,9 +57,10 @@ def test_every_plan_is_right_by_the_oracle(kind: str) -> None:
             assert ahead < 0 or (ahead == 0 and plan["objective"] <= best["objective"] + 1e-6)
 
 
+@pytest.mark.parametrize("sweep", sweeps(1, 10))
 @pytest.mark.parametrize("kind", KINDS)
-def test_exact_plans_are_the_best_that_brute_force_finds(kind: str) -> None:
-    for seed in range(3):
+def test_exact_plans_are_the_best_that_brute_force_finds(kind: str, sweep: range) -> None:
+    for seed in sweep:
         draft = made_up(seed + 50, kind, n_uavs=2, n_tasks=3)
         meant = scenario.read(draft)
         times = FlightTimes(meant)

@@ -15,6 +15,7 @@ from tests.support.field_missions import mission_of
 from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.made_up import KINDS, made_up
 from tests.support.field_oracle.scenario import FieldScenario, Stop, read
+from tests.support.seeds import sweeps
 
 ARCS_IN_WIND = 1e-5
 """The oracle flies arcs in straight pieces of half a degree."""
@@ -33,9 +34,10 @@ def stops_of(scenario: FieldScenario) -> list[Stop]:
     return stops
 
 
+@pytest.mark.parametrize("sweep", sweeps(3, 20))
 @pytest.mark.parametrize("kind", KINDS)
-def test_tables_are_those_of_the_oracle(kind: str) -> None:
-    for seed in range(8):
+def test_tables_are_those_of_the_oracle(kind: str, sweep: range) -> None:
+    for seed in sweep:
         _, problem = made(seed, kind)
         scenario = read(made_up(seed, kind))
         times, stops = FlightTimes(scenario), stops_of(scenario)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import random
 from dataclasses import replace
 from typing import Any
@@ -23,9 +22,8 @@ from tests.support.field_oracle.schedule import Swap, Work
 from tests.support.field_oracle.slots import fly_all
 from tests.support.field_reference import Flown, PlainField, greedy_base, greedy_step
 from tests.support.field_states import random_state
-from tests.support.seeds import seeds
+from tests.support.seeds import seeds, sweeps
 
-SEEDS = 10
 LISTS = 6
 ARCS_IN_WIND = 1e-3
 """The oracle flies arcs in straight pieces of half a degree."""
@@ -68,9 +66,10 @@ def assert_same(flown: field.FlownLists, plain: list[Flown], lists: list[list[in
         first += len(lists[uav])
 
 
+@pytest.mark.parametrize("sweep", sweeps(4, 30))
 @pytest.mark.parametrize("kind", KINDS)
-def test_schedules_are_those_of_plain_loops_and_of_the_oracle(kind: str) -> None:
-    for seed in range(SEEDS):
+def test_schedules_are_those_of_plain_loops_and_of_the_oracle(kind: str, sweep: range) -> None:
+    for seed in sweep:
         rng = random.Random(seed)
         n_uav = rng.choice([2, 3, 4])
         draft = made_up(seed, kind, n_uavs=n_uav, n_tasks=6)
@@ -112,7 +111,7 @@ def test_schedules_are_those_of_plain_loops_and_of_the_oracle(kind: str) -> None
 @pytest.mark.parametrize("kind", ["slots", "energy", "windows", "all"])
 def test_schedules_from_mid_mission_are_those_of_plain_loops(kind: str) -> None:
     waits = 0
-    for seed in range(2 * SEEDS):
+    for seed in range(20):
         rng = random.Random(f"mid-{seed}")
         problem = problem_of(made_up(seed, kind, n_uavs=4, n_tasks=6))
         for _ in range(LISTS):
@@ -164,9 +163,10 @@ def twins(sequence: list[int], **first: float) -> tuple[FieldProblem, FieldState
     return problem, FieldState.at_start(problem, sequence)
 
 
+@pytest.mark.parametrize("sweep", sweeps(4, 30))
 @pytest.mark.parametrize("kind", KINDS)
-def test_greedy_takes_what_plain_loops_take(kind: str) -> None:
-    for seed in range(SEEDS):
+def test_greedy_takes_what_plain_loops_take(kind: str, sweep: range) -> None:
+    for seed in sweep:
         rng = random.Random(f"greedy-{seed}")
         problem = problem_of(made_up(seed, kind, n_uavs=3, n_tasks=6))
 
@@ -193,27 +193,23 @@ def test_waits_for_slots_that_greedy_reckons_with_are_many() -> None:
 
 
 def crowd(seed: int) -> dict[str, Any]:
-    """Five UAVs round a base with one slot that need it at about the same time, and can wait."""
+    """Five UAVs west of a base with one slot that all need it for the tasks east of it."""
     rng = random.Random(f"crowd-{seed}")
-
-    def place(nearest_m: float, farthest_m: float) -> list[float]:
-        angle, reach_m = rng.uniform(0.0, math.tau), rng.uniform(nearest_m, farthest_m)
-        return [reach_m * math.cos(angle), reach_m * math.sin(angle)]
-
     battery = {"endurance_s": 300.0, "reserve_frac": 0.0, "charge_frac": 0.09}
+    starts_m = [[rng.uniform(-120.0, -90.0), rng.uniform(-50.0, 50.0)] for _ in range(5)]
+    places_m = [[rng.uniform(100.0, 180.0), rng.uniform(-150.0, 150.0)] for _ in range(8)]
+    base = {"id": "b", "position_m": [0.0, 0.0], "swap_s": rng.uniform(2.0, 6.0), "slots": 1}
     return {
         "name": "crowd",
         "mission": {"horizon_s": 600.0},
         "uav": [
-            {"id": f"u{i}", "position_m": place(80.0, 120.0), "speed_m_s": 10.0} | battery
-            for i in range(5)
+            {"id": f"u{i}", "position_m": place_m, "speed_m_s": 10.0} | battery
+            for i, place_m in enumerate(starts_m)
         ],
-        "base": [
-            {"id": "b", "position_m": [0.0, 0.0], "swap_s": rng.uniform(2.0, 6.0), "slots": 1}
-        ],
+        "base": [base],
         "task": [
-            {"id": f"t{i}", "position_m": place(100.0, 180.0), "value": 1.0 + i, "opens_s": 9.0 * i}
-            for i in range(8)
+            {"id": f"t{i}", "position_m": place_m, "value": 1.0}
+            for i, place_m in enumerate(places_m)
         ],
     }
 
@@ -254,7 +250,7 @@ def check_greedy(problem: FieldProblem, state: FieldState) -> None:
 
 @pytest.mark.parametrize("kind", ["slots", "energy", "all"])
 def test_lists_of_greedy_fly_as_it_has_flown_them(kind: str) -> None:
-    for seed in range(4 * SEEDS):
+    for seed in range(20):
         rng = random.Random(f"slots-{seed}")
         problem = problem_of(made_up(seed, kind, n_uavs=4, n_tasks=6))
         state = random_state(rng, problem)

@@ -12,12 +12,14 @@ from tests.support.field_oracle import scenario
 from tests.support.field_oracle.brute import can_do_alone
 from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.made_up import KINDS, made_up
+from tests.support.seeds import sweeps
 
 
+@pytest.mark.parametrize("sweep", sweeps(4, 30))
 @pytest.mark.parametrize("kind", KINDS)
-def test_who_can_do_what_alone_is_as_the_oracle_has_it(kind: str) -> None:
+def test_who_can_do_what_alone_is_as_the_oracle_has_it(kind: str, sweep: range) -> None:
     found = []
-    for seed in range(4 if "all" in kind else 12):
+    for seed in sweep:
         draft = made_up(seed, kind, n_uavs=2, n_tasks=4)
         meant = scenario.read(draft)
         times = FlightTimes(meant)
