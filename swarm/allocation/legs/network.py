@@ -6,6 +6,7 @@ it, dz the difference of the ends' heights, gained evenly. Leaves out: who flies
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -284,14 +285,45 @@ def _arc_s(model: FlightModel, arcs: Arcs, hops: Sequence[Hop], rise: FloatArray
     begin_rad = arcs.begin_rad[arc_of(node)]
     half_rad = np.maximum(0.0, to_rad - from_rad) / 2.0
     middle_rad = (to_rad + from_rad) / 2.0
-    place, weight = _GAUSS
-    progress_rad = middle_rad + place[:, None] * half_rad
+    begins_rad = [from_rad, *_kinks_rad(model, begin_rad, sense, from_rad, to_rad, rise), to_rad]
+    low_rad, high_rad = np.stack(begins_rad[:-1]), np.stack(begins_rad[1:])
+    half_rad = np.maximum(0.0, high_rad - low_rad) / 2.0
+    middle_rad = (high_rad + low_rad) / 2.0
+    place, weight = (column[:, None, None] for column in _GAUSS)
+    progress_rad = (middle_rad + place * half_rad).reshape(-1, len(node))
     # Counter-clockwise the progress is the angle from where the arc begins, clockwise minus it.
     heading_rad = begin_rad + sense * (progress_rad + np.pi / 2.0)
-    length_m = weight[:, None] * (half_rad * arcs.radius_m)
+    length_m = (weight * (half_rad * arcs.radius_m)).reshape(-1, len(node))
     # Added up one by one: numpy's sum goes another way for one path than for many.
     piece_s: FloatArray = np.add.accumulate(_piece_s(model, length_m, heading_rad, rise))[-1]
     return piece_s
+
+
+def _kinks_rad(
+    model: FlightModel,
+    begin_rad: FloatArray,
+    sense: FloatArray,
+    from_rad: FloatArray,
+    to_rad: FloatArray,
+    rise: FloatArray,
+) -> FloatArray:
+    """(2, k) where on arcs wind begins or ends to keep UAVs below their speed; else an end [rad].
+
+    There the speed over ground has a kink, across which no quadrature is good. At that speed v
+    the air is met at the airspeed a: |v·e − w| = a, so w·e = (v² + w² − a²) ÷ 2·v.
+    """
+    wind_m_s = math.hypot(*model.wind_enu_m_s)
+    if model.airspeed_m_s is None or wind_m_s == 0.0:
+        return np.stack([from_rad, to_rad])
+    v_m_s = model.speed_m_s
+    along_m_s = (v_m_s**2 + wind_m_s**2 - model.airspeed_m_s**2) / (2.0 * v_m_s)
+    cosine = along_m_s / wind_m_s * np.sqrt(1.0 + rise * rise)
+    off_rad = np.arccos(np.clip(cosine, -1.0, 1.0))
+    wind_rad = math.atan2(model.wind_enu_m_s[1], model.wind_enu_m_s[0])
+    heading_rad = wind_rad + np.stack([off_rad, -off_rad])
+    progress_rad = sense * (heading_rad - begin_rad) - np.pi / 2.0
+    progress_rad = from_rad + np.mod(progress_rad - from_rad, 2.0 * np.pi)
+    return np.sort(np.minimum(progress_rad, np.maximum(from_rad, to_rad)), axis=0)
 
 
 def _piece_s(

@@ -24,6 +24,8 @@ from tests.support.seeds import seeds
 
 N_SEED = dict.fromkeys(KINDS, 20) | dict.fromkeys(("zones", "margin", "all", "all-but-margin"), 6)
 """How many of each kind by day; the oracle is slow where there are zones."""
+ARCS_IN_WIND = 5e-6
+"""The oracle flies round corners in straight pieces of half a degree [value·s]."""
 N_TASK = {"energy": 3, "zones": 3, "margin": 3}
 """Of each scenario; 4 where nothing is said."""
 
@@ -45,7 +47,9 @@ def check(draft: Draft, in_a_row: int = 2) -> None:
 
     assert found.outcome is ProofOutcome.PROVEN
     assert found.n_left_out == expected.n_left_out
-    assert found.objective == pytest.approx(expected.objective, rel=1e-9, abs=1e-9)
+    arcs_in_wind = scenario.margin_m > 0.0 and scenario.wind_m_s != (0.0, 0.0)
+    close = ARCS_IN_WIND if arcs_in_wind else 1e-9
+    assert found.objective == pytest.approx(expected.objective, rel=1e-9, abs=close)
     check_lists(problem, found)
 
 
@@ -62,6 +66,12 @@ def check_lists(problem: FieldProblem, found: FieldLists) -> None:
 def test_equals_brute_force(kind: str) -> None:
     for seed in range(N_SEED[kind]):
         check(made_up(seed, kind, n_tasks=N_TASK.get(kind, 4)))
+
+
+def test_legs_round_corners_are_exact_where_wind_begins_to_slow_them() -> None:
+    """The value was off in the eighth digit when quadrature went across that kink."""
+    check(made_up(1047, "all", n_uavs=1, n_tasks=3))
+    check(made_up(1042, "all", n_tasks=3))
 
 
 @pytest.mark.parametrize(
