@@ -10,7 +10,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMostLabels = 16;
 constexpr int kMostBases = 4;  // between two tasks; those of the earliest arrival that help
 
-// Put `label` among those after the same tasks, unless one of them makes it needless.
+// Put `label` among those after the same tasks, unless one of them makes it needless. That is not
+// exact where a battery is swapped later: who departs from a base earlier may have to wait longer in
+// the air, for what opens later. Keeping the later label there made no plan better, and took time.
 void keep(std::vector<ListLabel>& labels, const ListLabel& label) {
     const Progress& one = label.progress;
     std::size_t kept = 0;
@@ -316,22 +318,22 @@ double ListSolver::value_with(const FieldList& list, const Stays& stays, std::si
     const double survival = problem_.survival[problem_.at(list.uav, task)];
     extend(list.uav, stays, list.labels.data() + first, list.offsets[place + 1] - first, task,
            here_, meets_slots);
-    for (std::size_t k = place;; ++k) {
-        double best = -kInfinity, first_s = kInfinity;
-        for (const ListLabel& label : here_) {
-            best = std::max(best, label.progress.value);
-            first_s = std::min(first_s, label.progress.time_s);
-        }
-        if (k == list.order.size()) return best > least ? best : -kInfinity;
-        if (here_.empty()) return -kInfinity;
+    for (std::size_t k = place; k < list.order.size(); ++k) {
         const int next = task_of(list.order[k]);
-        const double step_s =
-            k == place ? least_leg_s(list.uav, task, next) : list.on[k].step_s;
-        if (!(best + most_value(list, k, first_s + step_s, survival) > least)) return -kInfinity;
-        extend(list.uav, stays, here_.data(), static_cast<int>(here_.size()), next, next_,
-               meets_slots);
+        const double step_s = k == place ? least_leg_s(list.uav, task, next) : list.on[k].step_s;
+        int hopeful = 0;
+        for (const ListLabel& label : here_) {
+            const Progress& now = label.progress;
+            if (now.value + most_value(list, k, now.time_s + step_s, survival) > least)
+                here_[hopeful++] = label;
+        }
+        if (hopeful == 0) return -kInfinity;
+        extend(list.uav, stays, here_.data(), hopeful, next, next_, meets_slots);
         std::swap(here_, next_);
     }
+    double best = -kInfinity;
+    for (const ListLabel& label : here_) best = std::max(best, label.progress.value);
+    return best > least ? best : -kInfinity;
 }
 
 bool ListSolver::solve(FieldList& list, const Stays& stays, std::size_t kept, Random* random,
