@@ -302,7 +302,7 @@ def _arc_s(model: FlightModel, arcs: Arcs, hops: Sequence[Hop], rise: FloatArray
 def _kinks_rad(
     model: FlightModel,
     begin_rad: FloatArray,
-    sense: FloatArray,
+    sense: IntArray,
     from_rad: FloatArray,
     to_rad: FloatArray,
     rise: FloatArray,
