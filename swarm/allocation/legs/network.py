@@ -283,8 +283,6 @@ def _arc_s(model: FlightModel, arcs: Arcs, hops: Sequence[Hop], rise: FloatArray
     to_rad = np.concatenate([hop.to_rad for hop in hops])
     sense = sense_of(node)
     begin_rad = arcs.begin_rad[arc_of(node)]
-    half_rad = np.maximum(0.0, to_rad - from_rad) / 2.0
-    middle_rad = (to_rad + from_rad) / 2.0
     begins_rad = [from_rad, *_kinks_rad(model, begin_rad, sense, from_rad, to_rad, rise), to_rad]
     low_rad, high_rad = np.stack(begins_rad[:-1]), np.stack(begins_rad[1:])
     half_rad = np.maximum(0.0, high_rad - low_rad) / 2.0
