@@ -82,19 +82,20 @@ double BaseTraffic::begin_s(const FieldProblem& problem, int base, const Arrival
 }
 
 FieldChoice FieldDecider::decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic,
-                                 bool may_swap) {
-    if (rule == FieldRule::kLookahead) return lookahead(view, traffic, may_swap);
-    return by_greedy(view, traffic, may_swap);
+                                 Swaps swaps) {
+    if (rule == FieldRule::kLookahead) return lookahead(view, traffic, swaps);
+    return by_greedy(view, traffic, swaps);
 }
 
-FieldChoice FieldDecider::by_greedy(const FieldView& view, BaseTraffic& traffic, bool may_swap) {
+FieldChoice FieldDecider::by_greedy(const FieldView& view, BaseTraffic& traffic, Swaps swaps) {
     const FieldChoice choice = greedy(view);
-    return choice.home && may_swap ? base(view, traffic) : choice;
+    return choice.home && swaps == Swaps::kNow ? base(view, traffic) : choice;
 }
 
 // The first item of its own best list; where that is a base without a slot in time, greedy.
-FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic, bool may_swap) {
+FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic, Swaps swaps) {
     const FieldProblem& problem = view.problem;
+    const bool may_swap = swaps != Swaps::kNever;
     FieldList begin_with;
     if (able_for(problem, view.uav, view.open).size() > static_cast<std::size_t>(kExactOwnTasks)) {
         begin_with = greedy_list(view, may_swap);
@@ -102,6 +103,9 @@ FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic,
     const OwnPlan plan =
         own_plan(problem, view.uav, view.progress, view.here, view.open, may_swap, begin_with);
     if (plan.list.empty()) return {};
+    if (is_base(plan.list.front()) && swaps == Swaps::kLater) {
+        return lookahead(view, traffic, Swaps::kNever);
+    }
     FieldChoice choice{false, plan.list.front(), true, false, plan.value, 0.0, Times{}};
     Progress progress = view.progress;
     Refusal refusal = Refusal::kNone;
@@ -115,7 +119,7 @@ FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic,
     } else {
         refusal = do_task(problem, view.uav, choice.item, progress, choice.times);
     }
-    return refusal == Refusal::kNone ? choice : by_greedy(view, traffic, true);
+    return refusal == Refusal::kNone ? choice : by_greedy(view, traffic, swaps);
 }
 
 // What greedy would do next and next, alone.
@@ -129,7 +133,7 @@ std::vector<Item> FieldDecider::greedy_list(const FieldView& view, bool may_swap
     while (!open.empty()) {
         const FieldChoice choice =
             by_greedy({problem, open, view.uav, view.rank, progress, here}, nobody_,
-                      may_swap && n_since_task < problem.n_base);
+                      may_swap && n_since_task < problem.n_base ? Swaps::kNow : Swaps::kNever);
         if (choice.home) break;
         Times times;
         if (do_item(problem, view.uav, choice.item, progress, times) != Refusal::kNone) break;
@@ -323,11 +327,13 @@ void FieldRun::decide(const FieldProblem& problem, FieldRule rule, int uav, Watc
     const double now_s = self.progress.time_s;
     const int here = self.progress.landed ? self.base : -1;
     // As many swaps in a row as there are bases lead everywhere.
-    const bool may_swap = self.n_item < most_items_[uav] && self.n_since_task < problem.n_base;
+    const Swaps swaps = self.n_item >= most_items_[uav]        ? Swaps::kNever
+                        : self.n_since_task >= problem.n_base ? Swaps::kLater
+                                                               : Swaps::kNow;
     FieldChoice choice;
     if (!watch.stops_after(steps_of(rule, open_.size()))) {
         choice = decider_.decide(rule, {problem, open_, uav, rank_[uav], self.progress, here},
-                                 traffic_, may_swap);
+                                 traffic_, swaps);
     }
     const bool holds = here >= 0 && traffic_.limited(here);
     if (choice.home) {

@@ -72,15 +72,18 @@ struct FieldView {
     int here;  // the base at which it stands ready, or -1
 };
 
+// Whether a UAV may visit a base: as its next item, only behind a task, or not at all.
+enum class Swaps : std::uint8_t { kNow, kLater, kNever };
+
 // Rules with their working memory.
 class FieldDecider {
  public:
     // By `rule`; may be infeasible only in as far as `traffic` turns out to be another.
-    FieldChoice decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic, bool may_swap);
+    FieldChoice decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic, Swaps swaps);
 
  private:
-    FieldChoice by_greedy(const FieldView& view, BaseTraffic& traffic, bool may_swap);
-    FieldChoice lookahead(const FieldView& view, BaseTraffic& traffic, bool may_swap);
+    FieldChoice by_greedy(const FieldView& view, BaseTraffic& traffic, Swaps swaps);
+    FieldChoice lookahead(const FieldView& view, BaseTraffic& traffic, Swaps swaps);
     std::vector<Item> greedy_list(const FieldView& view, bool may_swap);
     FieldChoice greedy(const FieldView& view) const;
     FieldChoice base(const FieldView& view, BaseTraffic& traffic);

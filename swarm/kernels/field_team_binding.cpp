@@ -143,7 +143,7 @@ std::optional<Fields> decide(const BoundField& field, const BoundFieldTeam& give
     const Progress progress = team.begin(problem, uav);
     FieldDecider decider;
     const FieldChoice choice = decider.decide(
-        rule, {problem, open, uav, team.rank[uav], progress, team.landed_at[uav]}, traffic, true);
+        rule, {problem, open, uav, team.rank[uav], progress, team.landed_at[uav]}, traffic, Swaps::kNow);
     if (choice.home) return std::nullopt;
     const auto known = [](bool has, double score) {
         return has ? std::optional<double>(score) : std::nullopt;
