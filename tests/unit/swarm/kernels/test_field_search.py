@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 
+import numpy as np
 import pytest
 
 from swarm.allocation.field.problem import FieldProblem
@@ -132,3 +133,20 @@ def test_a_base_that_alone_helps_is_found_behind_many_that_are_nearer() -> None:
     found = optimise_lists(problem.kernel, FieldState.at_start(problem), iterations=50)
 
     assert found.lists == ((-6, 0),)
+
+
+@pytest.mark.parametrize("active", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_who_stands_at_a_base_keeps_its_slot_from_others(seed: int, active: bool) -> None:
+    problem = FieldProblem.from_mission(mission_of(made_up(seed, "slots", 3, 8)).known_at_start())
+    state = FieldState.at_start(problem)
+    state.landed_at[0] = 0
+    state.first_s[0] = problem.leg_s[problem.kind[0], problem.n_uav]
+    state.sortie_end_s[0] = np.inf
+    state.active[0] = active
+
+    found = optimise_lists(problem.kernel, state, iterations=300)
+
+    flown = fly_lists(problem.kernel, state, found.lists)
+    assert flown.feasible
+    assert flown.value.sum() == pytest.approx(found.objective, rel=1e-12)
