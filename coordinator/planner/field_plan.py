@@ -108,25 +108,6 @@ def make_field_plan(asked: FieldRequest) -> Plan:
     return replace(plan, elapsed_s=asked.clock.now_s() - begin_s)
 
 
-def with_schedule(plan: Plan, mission: Mission) -> Plan:
-    """A ``plan`` of the planner for the paper's missions with its schedule, flown straight."""
-    problem = FieldProblem.from_mission(mission.known_at_start())
-    sequence = tuple(uav.id for uav in mission.uavs) if plan.sequence is None else plan.sequence
-    places = {task: index for index, task in enumerate(problem.task_ids)}
-    lists = tuple(tuple(2 * places[task] for task in plan.routes[uav]) for uav in problem.uav_ids)
-    order = tuple(problem.uav_ids.index(uav) for uav in sequence)
-    flown = fly_lists(problem.kernel, FieldState.at_start(problem, order), lists)
-    told = _described(plan.scenario, plan.method, problem, _FieldLists(lists, order, 0), flown)
-    return replace(
-        plan,
-        sequence=sequence,
-        schedule=told.schedule,
-        left_out=told.left_out,
-        required_left_out=told.required_left_out,
-        fewest_left_out=told.required_left_out,
-    )
-
-
 def _field_method(asked: FieldRequest) -> str:
     method = asked.method
     if isinstance(method, str) and method in FIELD_METHODS:

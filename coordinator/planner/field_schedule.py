@@ -1,18 +1,20 @@
-"""The schedule of lists in the field, and why tasks are on none of them.
+"""The schedule of lists, straight or in the field, and why tasks are on none of them.
 
-Leaves out: which lists (coordinator.planner.field_plan).
+Leaves out: which lists (coordinator.planner.plan, coordinator.planner.field_plan).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from swarm.allocation.field.problem import FieldProblem
+from swarm.allocation.problem import FloatArray, Problem
 from swarm.kernels.field import FlownLists
 from swarm.kernels.field_alone import earliest_alone
-from swarm.model import TaskId, UavId
+from swarm.model import Plan, TaskId, UavId
 from swarm.model.plan import START, LeftOut, ScheduleEntry, at_base
 
 
@@ -74,6 +76,48 @@ def _entry(
     return ScheduleEntry(
         go, places[0], tuple(places[1:]), depart_s, arrive_s, begin_s, end_s, is_reversed
     )
+
+
+def with_straight_schedule(plan: Plan, problem: Problem) -> Plan:
+    """A ``plan`` of the planner for the paper's missions with its schedule.
+
+    Legs are straight, work begins at once and each list ends with the way home to the start, so
+    nothing is worked out but the legs that are flown.
+    """
+    columns = {task: column for column, task in enumerate(problem.task_ids)}
+    schedule = {}
+    for uav, name in enumerate(problem.uav_ids):
+        route = [columns[task] for task in plan.routes[name]]
+        start_m = problem.start_enu_m[uav]
+        legs_s = problem.travel_along_s(uav, start_m, route).tolist()
+        here, now_s, entries = _on_map(start_m), 0.0, []
+        for task, leg_s in zip(route, legs_s, strict=True):
+            there, arrive_s = _on_map(problem.task_enu_m[task]), now_s + leg_s
+            end_s = arrive_s + float(problem.service_s[task])
+            go = problem.task_ids[task]
+            entries.append(
+                ScheduleEntry(go, here, (there,), now_s, arrive_s, arrive_s, end_s, False)
+            )
+            here, now_s = there, end_s
+        if route:
+            home_s = now_s + float(problem.travel_along_s(uav, start_m, route[-1:])[0])  # both ways
+            way = (_on_map(start_m),)
+            entries.append(ScheduleEntry(START, here, way, now_s, home_s, home_s, home_s, False))
+        schedule[name] = tuple(entries)
+    missing = [task for task in problem.task_ids if task not in plan.completion_s]
+    return replace(
+        plan,
+        sequence=problem.uav_ids if plan.sequence is None else plan.sequence,
+        schedule=schedule,
+        left_out=dict.fromkeys(missing, LeftOut.NOBODY_CAN),
+        required_left_out=len(missing),
+        fewest_left_out=len(missing),
+    )
+
+
+def _on_map(place_enu_m: FloatArray) -> tuple[float, float]:
+    east_m, north_m, _ = place_enu_m.tolist()
+    return east_m, north_m
 
 
 def left_out(problem: FieldProblem, done: Sequence[int]) -> Mapping[TaskId, LeftOut]:

@@ -17,8 +17,8 @@ from coordinator.planner.field_plan import (
     FieldRequest,
     is_field,
     make_field_plan,
-    with_schedule,
 )
+from coordinator.planner.field_schedule import with_straight_schedule
 from coordinator.planner.options import (
     Limit,
     ShouldStop,
@@ -234,7 +234,7 @@ def make_plan(
         seed=seed,
         bound=bound,
     )
-    return plan if mission.schema == 1 else with_schedule(plan, mission)
+    return plan if mission.schema == 1 else with_straight_schedule(plan, problem)
 
 
 @dataclass(frozen=True, slots=True)
