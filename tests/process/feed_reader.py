@@ -73,6 +73,9 @@ class FeedReader:
         while not self._left.is_set() and self.end is None:
             try:
                 with connect(self._url, max_size=None) as feed:
+                    # What the server before knew says nothing of what this one knows.
+                    self.head = {}
+                    self.rows = {name: {} for name in KEYS}
                     self.connections += 1
                     while not self._left.is_set() and self.end is None:
                         try:

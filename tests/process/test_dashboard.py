@@ -58,7 +58,10 @@ def test_an_operator_sees_and_steers_a_run(tmp_path: Path) -> None:
             wait_until(lambda: page.connections == 2, SOON_S, "another connection")
             wait_until(lambda: page.head.get("phase") == "running", SOON_S, "the mission again")
 
-            wait_until(lambda: page.tasks["op1"]["state"] == "done", 120.0, "the new task done")
+            def done() -> bool:
+                return page.tasks.get("op1", {}).get("state") == "done"
+
+            wait_until(done, 120.0, "the new task done")
 
             assert post(url, "api/command", {"command": "hold", "uav": "uav9"})[0] == 400
             status, said = post(url, "api/command", {"command": "abort", "reason": "storm"})
