@@ -33,6 +33,8 @@ from swarm.runtime.errors import SwarmError
 
 DIAL_S = 2.0
 """How long a connection may take before it is given up [wall s]."""
+LOOPBACK_S = 10.0
+"""How long a session on loopback may take to answer before it is said not to work [wall s]."""
 SETTLE_S = 0.6
 """How long tokens are waited for once there is a session [wall s]."""
 ANSWER_S = 1.0
@@ -102,11 +104,14 @@ async def _answer(bus: Bus) -> None:
 
 
 async def _until_answered(bus: Bus, key: str) -> list[float]:
-    """When answers came [s of the loop]; asked a few times."""
-    for _ in range(20):
-        answers = await bus.query(key, timeout_s=0.1)
+    """When answers came [s of the loop]; asked for a while, as a busy machine is slow to answer."""
+    loop = asyncio.get_running_loop()
+    until_s = loop.time() + LOOPBACK_S
+    while (left_s := until_s - loop.time()) > 0.0:
+        answers = await bus.query(key, timeout_s=min(left_s, DIAL_S))
         if answers:
             return [answer.arrived_s for answer in answers]
+        await asyncio.sleep(0.05)
     return []
 
 
