@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -58,6 +58,14 @@ class DecisionTurn:
     """How late a UAV may be at its task and still be expected to decide in its turn."""
     excluded: Collection[str]
     """Tasks this UAV cannot take, whatever their value."""
+    sortie_end_s: float = math.inf
+    """By then it must have landed [s]; infinite: endless, or of no matter as it stands at a base."""
+    landed_at: str | None = None
+    """Base at which it stands ready, with a full battery; None: it is in the air."""
+    parked: bool = False
+    """Whether it stands there beside the slots."""
+    blocking: Mapping[str, str] = field(default_factory=dict)
+    """Lost UAV -> base on whose slot it stands; see `swarm.protocol.bases.blocking`."""
 
 
 def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: DecisionTurn) -> Decision | None:

@@ -107,6 +107,20 @@ class FieldNetwork:
         _, network = self._kind_of(uav)
         return network.legs_from(*self._placed(uav, place_enu_m, flown_m)).corners_m(0, end)
 
+    def flown_enu_m(self, uav: int, corners_enu_m: FloatArray, end: int) -> FloatArray:
+        """(k, 3) corners [m; ENU] of a leg to a node, with the heights at which ``uav`` flies them.
+
+        Its layer is added where it keeps to it: at the beginning, and at the end unless the task
+        there gives its own height. In between height is gained evenly.
+        """
+        layer_m = self._layers_m[uav]
+        piece_m = np.hypot(*np.diff(corners_enu_m[:, :2], axis=0).T)
+        along_m = np.concatenate([[0.0], np.cumsum(piece_m)])
+        share = along_m / along_m[-1] if along_m[-1] > 0.0 else np.ones(len(along_m))
+        flown_m = corners_enu_m.copy()
+        flown_m[:, 2] += layer_m if self._in_layer[end] else layer_m * (1.0 - share)
+        return flown_m
+
     def _kind_of(self, uav: int) -> tuple[FlightModel, LegNetwork]:
         return self._kinds[int(self.kind[uav])]
 

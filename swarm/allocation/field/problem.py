@@ -216,6 +216,20 @@ class FieldProblem:
         """(k, 3) places [m; ENU] of the leg between two nodes, both included; None: no way."""
         return self._known_network().corners_m(uav, begin, end)
 
+    def corners_from_m(
+        self,
+        uav: int,
+        place_enu_m: Sequence[float] | FloatArray,
+        end: int,
+        flown_m: float | None = None,
+    ) -> FloatArray | None:
+        """The same from anywhere, see `FieldNetwork.corners_from_m`."""
+        return self._known_network().corners_from_m(uav, place_enu_m, end, flown_m)
+
+    def flown_enu_m(self, uav: int, corners_enu_m: FloatArray, end: int) -> FloatArray:
+        """(k, 3) corners [m; ENU] to a node with the heights flown, see `FieldNetwork`."""
+        return self._known_network().flown_enu_m(uav, corners_enu_m, end)
+
     def _known_network(self) -> FieldNetwork:
         if self.network is None:
             raise ValueError("a problem that was made of tables alone knows no places")

@@ -1,0 +1,89 @@
+"""Who may land at a base: slots are held like tasks, by claims and without a referee.
+
+A claim on a base is as strong as its arrival is early: of two that wait above it the one that
+arrived first goes first, then rank, then id. Who stands on a slot keeps it, lost or not, until it
+is heard to have left or the operator says that it is ready. Who is alive each process judges for
+itself, and passes in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
+
+
+def arrival_order(uav: str, claim: Claim) -> tuple[float, int, str]:
+    """Sort key of claims on one base: the smallest goes first. Who tells no time goes last."""
+    arrives_s = math.inf if claim.arrives_s is None else claim.arrives_s
+    return arrives_s, claim.rank, uav
+
+
+def holds_slot(claim: Claim) -> bool:
+    """Whether who claims so stands on a slot of its base, or is about to touch down on one."""
+    return claim.base is not None and claim.stage is BaseStage.LANDED
+
+
+def blocking(
+    claims: Mapping[str, Claim], lost: Collection[str], ready: Collection[str] = ()
+) -> dict[str, str]:
+    """UAV id -> base, of the lost ones that still stand on its slot.
+
+    Args:
+        claims: by UAV, of all that are known.
+        lost: UAVs no longer believed alive.
+        ready: of them, those of which the operator has said so since they landed.
+    """
+    return {
+        uav: claim.base
+        for uav, claim in claims.items()
+        if uav in lost and uav not in ready and claim.base is not None and holds_slot(claim)
+    }
+
+
+def may_land(
+    uav: str,
+    base: str,
+    slots: int | None,
+    claims: Mapping[str, Claim],
+    blocking: Mapping[str, str],
+    *,
+    waited: bool,
+) -> bool:
+    """Whether ``uav``, which is above ``base``, may land there now.
+
+    At once when its claim is held and everybody who claims the base finds a slot; else when it has
+    waited and fewer than there are slots stand there or wait in front of it.
+
+    Args:
+        uav: who asks; its own claim is among ``claims``.
+        base: where.
+        slots: UAVs served there at a time; None: no limit.
+        claims: its own and those of credible others.
+        blocking: of the lost, see `blocking`; lost ones that were on their way block nothing.
+        waited: whether it has said that it waits, an objection window ago or more.
+    """
+    own = claims.get(uav)
+    if slots is None:
+        return True
+    if own is None or own.base != base:
+        return False
+    others = {
+        other: claim
+        for other, claim in claims.items()
+        if other != uav and claim.base == base and claim.stage is not BaseStage.PARKED
+    }
+    stands = {other for other, where in blocking.items() if where == base and other != uav}
+    if own.phase is ClaimPhase.HELD and len(others.keys() | stands) < slots:
+        return True
+    if not waited:
+        return False
+    place = arrival_order(uav, own)
+    before = {
+        other
+        for other, claim in others.items()
+        if holds_slot(claim)
+        or (claim.stage is BaseStage.WAITING and arrival_order(other, claim) < place)
+    }
+    return len(before | stands) < slots
