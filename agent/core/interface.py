@@ -48,6 +48,23 @@ class GoTo:
     """Id of the task there, for a payload; None for any other place."""
     attempt: int = field(default=1, compare=False)
     """How many times this UAV will then have tried that task."""
+    via_enu_m: tuple[tuple[float, float, float], ...] = field(default=(), repr=False)
+    """Corners to fly through before, in that order and without stopping [m; mission origin,
+    height included]. A vehicle on the ground takes off first, straight up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Swap:
+    """Land on the spot, and get the battery changed.
+
+    The vehicle says `Landed`, then `Swapped` once its battery is full. Where a person has to
+    let it start again, it says so only after that.
+    """
+
+    leg: int
+    """Number of this order; `Landed` and `Swapped` repeat it."""
+    position_enu_m: tuple[float, float, float]
+    """The place on the ground [m; mission origin, height included]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +91,13 @@ class Return:
     via_enu_m: tuple[float, float, float] | None = None
     """Where to fly first [m; mission origin, height included], if nothing is in the way of it:
     return modes fly at a height of the vehicle's own. None to return at once."""
+    path_enu_m: tuple[tuple[float, float, float], ...] = field(default=(), repr=False)
+    """Corners to fly through before `via_enu_m`, in that order and without stopping."""
+    land: bool = field(default=False, repr=False)
+    """Land at `via_enu_m` rather than return to launch from there."""
 
 
-VehicleOrder = Prepare | GoTo | Hold | Return
+VehicleOrder = Prepare | GoTo | Swap | Hold | Return
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +122,20 @@ class Caution:
 @dataclass(frozen=True, slots=True)
 class Arrived:
     """The vehicle is at the target of that leg and has stopped there."""
+
+    leg: int
+
+
+@dataclass(frozen=True, slots=True)
+class Landed:
+    """The vehicle has touched down at the place of that `Swap`, and is disarmed."""
+
+    leg: int
+
+
+@dataclass(frozen=True, slots=True)
+class Swapped:
+    """The vehicle of that `Swap` has a full battery, and may take off."""
 
     leg: int
 
@@ -192,6 +227,8 @@ VehicleReport = (
     | NotReady
     | Caution
     | Arrived
+    | Landed
+    | Swapped
     | AttemptFailed
     | Telemetry
     | Refused

@@ -23,6 +23,7 @@ from agent.core.interface import (
     Prepare,
     Return,
     ReturnAdvised,
+    Swap,
     Telemetry,
 )
 from agent.vehicle.activity import Activity, FlightPhase, Idle
@@ -101,7 +102,7 @@ class Bridge:
             case BytesReceived(data, source):
                 for heard in session.codec.decode(data, source, now_s):
                     self._hear(heard)
-            case Prepare() | GoTo() | Hold() | Return():
+            case Prepare() | GoTo() | Swap() | Hold() | Return():
                 self._activity = obey(self._activity, event, session)
             case LinkOpened():
                 session.contact.link_up = True

@@ -28,7 +28,7 @@ from agent.vehicle.messages import (
     GroundHeartbeat,
     Heartbeat,
     Inbound,
-    Landed,
+    LandedState,
     MissionAck,
     MissionClearAll,
     MissionCount,
@@ -58,7 +58,7 @@ _FRAME_BY_WIRE = {
     3: AltitudeFrame.HOME,
     6: AltitudeFrame.HOME,
 }
-_LANDED_BY_WIRE = {int(state): state for state in Landed}
+_LANDED_BY_WIRE = {int(state): state for state in LandedState}
 
 
 class MavlinkCodec:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from agent.core.interface import HandedOver, HandOverExplained, HeardAgain
 from agent.vehicle.activity import Activity, FlightPhase
-from agent.vehicle.messages import ExtendedState, Heartbeat, Inbound, Landed
+from agent.vehicle.messages import ExtendedState, Heartbeat, Inbound, LandedState
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.supervision import intervention
 from swarm.protocol.fields import Point
@@ -155,7 +155,7 @@ class LinkLoss:
         match message:
             case Heartbeat():
                 self._heartbeats += 1
-            case ExtendedState(landed) if landed is not Landed.UNDEFINED:
+            case ExtendedState(landed) if landed is not LandedState.UNDEFINED:
                 self._tells_whether_it_flies = True
             case _:
                 pass

@@ -21,7 +21,7 @@ from agent.vehicle.commands import (
 )
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.leg import TARGET_TAG
-from agent.vehicle.messages import Heartbeat, Landed, Position
+from agent.vehicle.messages import Heartbeat, LandedState, Position
 from agent.vehicle.returning import Returning
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import wgs84_from_enu
@@ -116,7 +116,7 @@ class Holding(Activity):
         vehicle, heartbeat = self._session.vehicle, self._session.vehicle.heartbeat
         if self.done or self.failure is not None or heartbeat is None:
             return
-        self.aloft = heartbeat.armed and vehicle.landed is not Landed.ON_GROUND
+        self.aloft = heartbeat.armed and vehicle.landed is not LandedState.ON_GROUND
         if not heartbeat.armed and not self._motors_asked:
             self.done = True
         elif not self.aloft:

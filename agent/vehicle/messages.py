@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 
-class Landed(IntEnum):
+class LandedState(IntEnum):
     """MAV_LANDED_STATE."""
 
     UNDEFINED = 0
@@ -91,7 +91,7 @@ class EkfStatus:
 class ExtendedState:
     """EXTENDED_SYS_STATE."""
 
-    landed: Landed
+    landed: LandedState
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, RepeatedCommand, VehicleCommand, result_text
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.leg import RepositionLeg
-from agent.vehicle.messages import Heartbeat, Inbound, Landed, Outbound, Position
+from agent.vehicle.messages import Heartbeat, Inbound, LandedState, Outbound, Position
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.preflight import CruiseSpeedSetting, FailsafeCheck, home_alt_m, start_fault
 from agent.vehicle.session import VehicleSession
@@ -330,7 +330,7 @@ class _Preparation:
     @property
     def _resumes(self) -> bool:
         """Whether it flies on orders of an earlier life, beyond its takeoff."""
-        taking_off = self._saw_takeoff or self._session.vehicle.landed is Landed.TAKEOFF
+        taking_off = self._saw_takeoff or self._session.vehicle.landed is LandedState.TAKEOFF
         return self._order.resume and not self.took_off and not taking_off
 
     def _upload_way_home(self, mission: OnboardMission) -> list[Outbound]:

@@ -14,7 +14,7 @@ from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, result_text
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware
 from agent.vehicle.leg import TARGET_TAG, RepositionLeg
-from agent.vehicle.messages import Heartbeat, Landed, Position
+from agent.vehicle.messages import Heartbeat, LandedState, Position
 from agent.vehicle.session import VehicleSession
 from swarm.protocol.fields import Point
 
@@ -130,7 +130,7 @@ class Returning(Activity):
         session, since_s = self._session, self._disarmed_since_s
         if session.vehicle.heartbeat is None or session.vehicle.armed:
             return False
-        if session.vehicle.landed in (Landed.ON_GROUND, Landed.UNDEFINED):
+        if session.vehicle.landed in (LandedState.ON_GROUND, LandedState.UNDEFINED):
             return True
         return since_s is not None and session.now_s - since_s >= _DISARMED_LONG_S
 

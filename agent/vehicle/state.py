@@ -18,7 +18,7 @@ from agent.vehicle.messages import (
     ExtendedState,
     Heartbeat,
     Inbound,
-    Landed,
+    LandedState,
     Position,
     StatusText,
     SystemStatus,
@@ -83,7 +83,7 @@ class VehicleState:
     fence_enabled: bool = False
     """Whether it minds a fence of its own."""
     ekf_flags: int | None = None
-    landed: Landed = Landed.UNDEFINED
+    landed: LandedState = LandedState.UNDEFINED
     battery_frac: float | None = None
     _warnings: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=_WARNINGS))
     """The autopilot's last warnings, and when each came."""

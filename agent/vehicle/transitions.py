@@ -21,6 +21,7 @@ from agent.core.interface import (
     Return,
     ReturnAdvised,
     ReturnBegun,
+    Swap,
     VehicleOrder,
     VehicleReady,
 )
@@ -30,7 +31,7 @@ from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.hand_over import HandOver, hand_over
 from agent.vehicle.holding import Holding, modes_to_leave
 from agent.vehicle.leg import Flying
-from agent.vehicle.messages import Landed
+from agent.vehicle.messages import LandedState
 from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning, ReturnVia
 from agent.vehicle.session import VehicleSession
@@ -54,6 +55,10 @@ SUCCESSORS: Final[dict[FlightPhase, frozenset[FlightPhase]]] = {
 """What may follow which within one step: nothing is flown to that was not prepared, and a
 vehicle that was handed over is neither sent anywhere nor stopped."""
 
+
+_NO_SWAP: Final = "landing for another battery is not flown on autopilots yet"
+_NO_CORNERS: Final = "paths with corners are not flown on autopilots yet"
+_NO_LANDING: Final = "landing elsewhere than at home is not flown on autopilots yet"
 
 _UNHEARD_TIMEOUTS = 3.0
 """A vehicle that may be in the air has that many silence timeouts to be heard at all."""
@@ -91,7 +96,7 @@ class Searching(Activity):
         session = self._session
         if not session.vehicle.armed:
             return None
-        if isinstance(self.order, Hold) and session.vehicle.landed is Landed.UNDEFINED:
+        if isinstance(self.order, Hold) and session.vehicle.landed is LandedState.UNDEFINED:
             return "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
         if session.mission is not None and session.flies_unknown_mission():
             session.mission.look()
@@ -108,8 +113,14 @@ def obey(activity: Activity, order: VehicleOrder, session: VehicleSession) -> Ac
             return _go_to(activity, order, session)
         case Hold():
             return _hold(activity, order, session)
+        case Return() if fault := _not_flown_yet(order):
+            session.report(Refused(order, fault))
+            return activity
         case Return():
             return _return_home(activity, order, session)
+        case Swap():
+            session.report(Refused(order, _NO_SWAP))
+            return activity
 
 
 def follow(activity: Activity, session: VehicleSession) -> Activity:
@@ -176,7 +187,7 @@ def _must_stop_first(activity: Activity, session: VehicleSession) -> bool:
         and heartbeat is not None
         and heartbeat.armed
         and not firmware.is_commanded(heartbeat.custom_mode)
-        and session.vehicle.landed is not Landed.ON_GROUND
+        and session.vehicle.landed is not LandedState.ON_GROUND
     )
 
 
@@ -331,8 +342,17 @@ def _fault_of(order: Prepare | GoTo, config: BridgeConfig) -> str | None:
             return f"speed {speed_m_s} m/s is not > 0"
         case GoTo(stay_s=stay_s) if not (math.isfinite(stay_s) and stay_s >= 0.0):
             return f"a stay of {stay_s} s is not >= 0"
+        case GoTo():
+            return _not_flown_yet(order)
         case _:
             return None
+
+
+def _not_flown_yet(order: GoTo | Return) -> str | None:
+    """What of the order the bridge has no activity for, in words; None if it has one for all."""
+    if order.via_enu_m if isinstance(order, GoTo) else order.path_enu_m:
+        return _NO_CORNERS
+    return _NO_LANDING if isinstance(order, Return) and order.land else None
 
 
 # By the end of the activity before.
@@ -354,7 +374,7 @@ def _after_search(search: Searching, session: VehicleSession) -> Activity:
 def _hold_found(search: Searching, order: Hold, session: VehicleSession) -> Activity:
     """Stop a vehicle that an earlier life left in the air."""
     firmware, heartbeat = session.firmware, session.vehicle.heartbeat
-    aloft = session.vehicle.landed is not Landed.ON_GROUND
+    aloft = session.vehicle.landed is not LandedState.ON_GROUND
     if firmware is None or heartbeat is None or not (heartbeat.armed and aloft):
         session.report(Held())
         return Idle(session)

@@ -32,7 +32,7 @@ from agent.vehicle.messages import (
     CommandLong,
     GroundHeartbeat,
     Inbound,
-    Landed,
+    LandedState,
     MissionSetCurrent,
     Outbound,
     ParameterRead,
@@ -346,7 +346,8 @@ class Ground:
     def down(self) -> None:
         """Wait until the vehicle has landed and stopped its motors."""
         self.wait(
-            lambda: not self.state.armed and self.state.landed is Landed.ON_GROUND, "the ground"
+            lambda: not self.state.armed and self.state.landed is LandedState.ON_GROUND,
+            "the ground",
         )
         self.listen(6.0)
 

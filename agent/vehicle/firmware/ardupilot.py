@@ -20,7 +20,7 @@ from agent.vehicle.messages import (
     EkfStatus,
     ExtendedState,
     Heartbeat,
-    Landed,
+    LandedState,
     MissionCurrent,
     SystemStatus,
 )
@@ -105,8 +105,8 @@ class ArduCopter(Firmware):
 
     def airborne(self, vehicle: VehicleState) -> bool:
         """By EXTENDED_SYS_STATE; before it comes, by the heartbeat's ACTIVE."""
-        if vehicle.landed is not Landed.UNDEFINED:
-            return vehicle.landed is not Landed.ON_GROUND
+        if vehicle.landed is not LandedState.UNDEFINED:
+            return vehicle.landed is not LandedState.ON_GROUND
         return vehicle.heartbeat is not None and vehicle.heartbeat.system_status >= _STATE_ACTIVE
 
     def alarmed(self, heartbeat: Heartbeat) -> bool:

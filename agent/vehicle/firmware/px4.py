@@ -20,7 +20,7 @@ from agent.vehicle.messages import (
     EkfStatus,
     ExtendedState,
     Heartbeat,
-    Landed,
+    LandedState,
     ParameterValue,
     SystemStatus,
 )
@@ -113,9 +113,9 @@ class Px4Copter(Firmware):
 
     def airborne(self, vehicle: VehicleState) -> bool | None:
         """By EXTENDED_SYS_STATE alone: the heartbeat is ACTIVE on the ground too, once armed."""
-        if vehicle.landed is Landed.UNDEFINED:
+        if vehicle.landed is LandedState.UNDEFINED:
             return None if vehicle.armed else False
-        return vehicle.landed is not Landed.ON_GROUND
+        return vehicle.landed is not LandedState.ON_GROUND
 
     def alarmed(self, heartbeat: Heartbeat) -> bool:
         """CRITICAL or EMERGENCY: PX4 warns, or holds for some seconds before it acts."""
