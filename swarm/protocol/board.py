@@ -14,13 +14,21 @@ from itertools import islice
 
 import numpy as np
 
+from swarm.allocation.field import FieldProblem
 from swarm.allocation.lower_level import Rule, TeamState
 from swarm.allocation.problem import BoolArray, Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.model.mission import PLAIN_CONSTRAINTS
+from swarm.protocol.encoding import FIELD_DEFAULTS
+from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import MissionConfig, TaskEntry, UavSpec
+from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
+
+_UNLIMITED = FIELD_DEFAULTS[TaskEntry]
+"""Of a task of which a plain problem tells all."""
 
 
 def claim_strength(uav: str, claim: Claim) -> tuple[bool, float, int, str]:
@@ -92,9 +100,15 @@ class TaskBoard:
         self._entries_version = -1
         self._brief: MissionConfig | None = None
         self._fleet: Mission | None = None
-        """The mission of that brief, without any tasks."""
+        """The mission of that brief, without tasks and zones."""
         self._tasks: dict[str, tuple[TaskEntry, Task]] = {}
         """By id, with the entry each was made from."""
+        self._limited: set[str] = set()
+        """Of these, tasks that a plain problem does not tell all of."""
+        self._mission: Mission | None = None
+        self._mission_version = -1
+        self._field_problem: FieldProblem | None = None
+        self._field_version = -1
         self._states: dict[str, TaskState] = {}
         self._unfinished = False
         self._basis: tuple[int, int] | None = None
@@ -103,6 +117,7 @@ class TaskBoard:
         """How many outcomes the states take into account."""
         self._columns: list[Task] = []
         """Of the problem."""
+        self._fleet_of_problem: Mission | None = None
         self._problem: Problem | None = None
         self._problem_version = -1
 
@@ -120,31 +135,82 @@ class TaskBoard:
 
     @property
     def problem(self) -> Problem | None:
-        """Every UAV of the brief and every task posted so far; None before the brief."""
+        """Every UAV of the brief and every task posted so far; None before the brief.
+
+        Times of its legs hold where there is no `field_problem`.
+        """
         if self._problem_version != self.replica.board_version:
             self._problem = self._problem_now()
             self._problem_version = self.replica.board_version
         return self._problem
 
+    @property
+    def mission(self) -> Mission | None:
+        """The same with the zones in force; None before the brief."""
+        if self._mission_version != self.replica.board_version:
+            fleet, tasks, brief = self._fleet_now(), self._tasks_now(), self.replica.brief
+            zones = zones_in_force(self.replica)
+            self._mission = (
+                None
+                if fleet is None or brief is None
+                else _mission(self._name, brief, fleet.uavs, tasks, zones)
+            )
+            self._mission_version = self.replica.board_version
+        return self._mission
+
+    @property
+    def field_problem(self) -> FieldProblem | None:
+        """Of `mission`, each UAV in its layer of the brief; None where `problem` tells all."""
+        if self._field_version != self.replica.board_version:
+            self._field_problem = self._field_problem_now()
+            self._field_version = self.replica.board_version
+        return self._field_problem
+
+    def _field_problem_now(self) -> FieldProblem | None:
+        fleet, tasks = self._fleet_now(), self._tasks_now()
+        brief = self.replica.brief
+        if fleet is None or brief is None:
+            return None
+        limited = not self._limited.isdisjoint(task.id for task in tasks)
+        if not (limited or zones_in_force(self.replica) or is_of_field(fleet)):
+            return None
+        mission = self.mission
+        layers_m = [uav.layer_m for uav in brief.uavs]
+        return None if mission is None else FieldProblem.from_mission(mission, layers_m)
+
     def _problem_now(self) -> Problem | None:
         """Of `mission_of`; what nothing new was said of is not made anew."""
-        brief = self.replica.brief
-        if brief is None:
+        known, fleet = self._problem, self._fleet_now()
+        if fleet is None:
             return None
-        if self._fleet is None or brief is not self._brief:
-            self._brief, self._problem = brief, None
-            self._fleet = _mission(self._name, brief, map(_uav_of, brief.uavs), ())
+        tasks = self._tasks_now()
+        before = known if fleet is self._fleet_of_problem else None
+        had = {id(task): column for column, task in enumerate(self._columns)}
+        columns = [had.get(id(task), -1) for task in tasks]
+        self._columns, self._fleet_of_problem = tasks, fleet
+        if before is None:
+            return Problem.from_mission(fleet, tasks=tasks)
+        return before.with_tasks(fleet, tasks, columns)
+
+    def _fleet_now(self) -> Mission | None:
+        """The mission without tasks and zones, made once per brief; None before the brief."""
+        brief = self.replica.brief
+        if brief is not None and brief is not self._brief:
+            self._brief = brief
+            self._fleet = _mission(self._name, brief, map(_uav_of, brief.uavs), (), ())
+        return self._fleet
+
+    def _tasks_now(self) -> list[Task]:
+        """In board order; what nothing new was said of is the same as before."""
         self._sort()
         for entry in self._entries:
             if (known := self._tasks.get(entry.task)) is None or known[0] is not entry:
                 self._tasks[entry.task] = entry, _task_of(entry)
-        tasks = [self._tasks[entry.task][1] for entry in self._entries]
-        before, had = self._problem, {id(task): column for column, task in enumerate(self._columns)}
-        columns = [had.get(id(task), -1) for task in tasks]
-        self._columns = tasks
-        if before is None:
-            return Problem.from_mission(self._fleet, tasks=tasks)
-        return before.with_tasks(self._fleet, tasks, columns)
+                limited = any(
+                    getattr(entry, name) != default for name, default in _UNLIMITED.items()
+                )
+                (self._limited.add if limited else self._limited.discard)(entry.task)
+        return [self._tasks[entry.task][1] for entry in self._entries]
 
     def _sort(self) -> None:
         if self._entries_version != self.replica.board_version:
@@ -181,14 +247,24 @@ class TaskBoard:
         self._basis = basis
 
 
+def is_of_field(mission: Mission) -> bool:
+    """Whether it asks for more than `swarm.allocation.Problem` heeds."""
+    return not PLAIN_CONSTRAINTS.issuperset(mission.constraints)
+
+
 def mission_of(replica: Replica, name: str, brief: MissionConfig) -> Mission:
-    """The mission as the board shows it now: all posted tasks, in board order."""
+    """The mission as the board shows it now: all posted tasks, in board order, zones in force."""
     entries = sorted(replica.board.values(), key=_order)
-    return _mission(name, brief, map(_uav_of, brief.uavs), map(_task_of, entries))
+    zones = zones_in_force(replica) if replica.brief is brief else brief.zones
+    return _mission(name, brief, map(_uav_of, brief.uavs), map(_task_of, entries), zones)
 
 
 def _mission(
-    name: str, brief: MissionConfig, uavs: Iterable[Uav], tasks: Iterable[Task]
+    name: str,
+    brief: MissionConfig,
+    uavs: Iterable[Uav],
+    tasks: Iterable[Task],
+    zones: Iterable[ZoneSpec],
 ) -> Mission:
     return Mission(
         name=name,
@@ -199,6 +275,11 @@ def _mission(
         survival_default=brief.survival_default,
         reattempt_failed=brief.reattempt_failed,
         origin=Origin(*brief.origin),
+        bases=tuple(base.base() for base in brief.bases),
+        zones=tuple(zone.zone() for zone in zones),
+        wind_enu_m_s=brief.wind_enu_m_s,
+        zone_margin_m=brief.zone_margin_m,
+        band_m=brief.band_m,
     )
 
 
@@ -211,6 +292,10 @@ def _uav_of(entry: UavSpec) -> Uav:
         survival=entry.survival,
         kind=entry.kind,
         acceleration_m_s2=entry.acceleration_m_s2,
+        airspeed_m_s=entry.airspeed_m_s,
+        endurance_s=entry.endurance_s,
+        reserve_frac=entry.reserve_frac,
+        charge_frac=entry.charge_frac,
     )
 
 
@@ -221,6 +306,11 @@ def _task_of(entry: TaskEntry) -> Task:
         value=entry.value,
         service_s=entry.service_s,
         kind=entry.kind,
+        due_s=entry.due_s,
+        opens_s=entry.opens_s,
+        closes_s=entry.closes_s,
+        path_enu_m=entry.path_enu_m,
+        height_m=entry.height_m,
     )
 
 

@@ -20,7 +20,7 @@ statement alone, and so knows no mission, instead of flying it by other times of
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Final
@@ -35,6 +35,7 @@ from swarm.protocol.encoding import (
     LARGE,
     LARGE_LIMIT_BYTES,
     NAMES,
+    SINCE_FIELD,
     SMALL_LIMIT_BYTES,
     SNAPSHOT_LIMIT_BYTES,
     encode,
@@ -43,6 +44,7 @@ from swarm.protocol.encoding import (
     snapshot_bytes,
     unpacked,
 )
+from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.fields import LATEST_S, MAX_COUNT
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import (
@@ -83,6 +85,13 @@ UNKNOWN_VERSION: Final = "unknown version"
 WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {}
 """By kind, what a field means that an older release does not say; of fields that were added
 to the end of a body under the `SCHEMA_VERSION` in force."""
+
+
+_PLAIN: Final[Mapping[str, frozenset[str]]] = {
+    kind: frozenset(FIELDS[body]) - SINCE_FIELD.get(body, frozenset())
+    for kind, body in KINDS.items()
+}
+"""By kind, the fields that every statement of it has."""
 
 
 @cache
@@ -323,9 +332,8 @@ class Codec:
             raise UnacceptableError("unknown kind")
         if not isinstance(fields, dict):
             raise UnacceptableError("malformed")
-        known = FIELDS[KINDS[kind]]
-        if fields.keys() != set(known) or len(parts) > 7:
-            fields = self._understood(kind, fields, known)
+        if fields.keys() != _PLAIN[kind] or len(parts) > 7:
+            fields = self._understood(kind, fields)
         try:
             stamp = _stamps().validate_python({"incarnation": incarnation, "counter": counter})
             body = _bodies(kind).validate_python(fields)
@@ -338,19 +346,18 @@ class Codec:
         _require(mission == self._mission, "another mission")
         _require(isinstance(writer, str) and valid_id(writer), "malformed")
 
-    def _understood(
-        self, kind: str, fields: Mapping[str, object], known: Sequence[str]
-    ) -> dict[str, object]:
+    def _understood(self, kind: str, fields: Mapping[str, object]) -> dict[str, object]:
         """The fields of a body that another release has written, as this one has them.
 
         A Python default is for those who write messages: on the wire every field is needed
-        but those in `WIRE_DEFAULTS`.
+        but those in `WIRE_DEFAULTS` and, where they are as by default, in `SINCE_FIELD`.
         """
         told = {**WIRE_DEFAULTS.get(kind, {}), **fields}
-        _require(told.keys() >= set(known), "malformed")
-        if fields.keys() - set(known):
+        _require(told.keys() >= _PLAIN[kind], "malformed")
+        known = FIELDS[KINDS[kind]]
+        if not fields.keys() <= set(known):
             self.newer.add(kind)
-        return {name: told[name] for name in known}
+        return {name: told[name] for name in known if name in told}
 
 
 def _may_say(writer: str, body: Body) -> bool:
@@ -358,7 +365,7 @@ def _may_say(writer: str, body: Body) -> bool:
     match body:
         case MissionConfig() | PlanEpoch() | TaskEntry():
             return writer == COORDINATOR
-        case OperatorCommand() | TaskEdit() | StartWithout():
+        case OperatorCommand() | TaskEdit() | StartWithout() | ZoneEdit() | UavReady():
             return writer == OPERATOR
         case SignedRoster():
             return writer == AUTHORITY

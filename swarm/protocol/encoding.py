@@ -13,6 +13,7 @@ from typing import Final
 
 import msgpack
 
+from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.messages import (
     FIELD_VERSION,
     SCHEMA_VERSION,
@@ -46,17 +47,36 @@ KINDS: Final[dict[str, type[Body]]] = {
     "command": OperatorCommand,
     "task": TaskEdit,
     "start": StartWithout,
+    "zone": ZoneEdit,
+    "ready": UavReady,
     "roster": SignedRoster,
 }
 NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in KINDS.items()}
 FIELDS: Final[dict[type, tuple[str, ...]]] = {
     part: tuple(field.name for field in dataclasses.fields(part))
-    for part in (*KINDS.values(), UavSpec, ChoiceBasis, Candidate)
+    for part in (*KINDS.values(), UavSpec, BaseSpec, ZoneSpec, ChoiceBasis, Candidate)
 }
 """Of everything that a message is made of."""
-SINCE_FIELD: Final[dict[type, frozenset[str]]] = {UavSpec: frozenset({"acceleration_m_s2"})}
-"""Fields that came with `FIELD_VERSION`; left out where they are None, so that a statement that has
-none of them is to the last byte what every release understands."""
+_OF_TASKS: Final = frozenset({"due_s", "opens_s", "closes_s", "path_enu_m", "height_m"})
+_OF_CLAIMS: Final = ("base", "stage", "arrives_s", "sortie_end_s", "reversed", "departs_s")
+_OF_UAVS: Final = ("airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
+_OF_BRIEFS: Final = ("bases", "zones", "wind_enu_m_s", "zone_margin_m", "band_m")
+SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
+    UavSpec: frozenset({"acceleration_m_s2", *_OF_UAVS}),
+    MissionConfig: frozenset(_OF_BRIEFS),
+    TaskEntry: _OF_TASKS,
+    TaskEdit: _OF_TASKS,
+    Claim: frozenset(_OF_CLAIMS),
+    Outcome: frozenset({"reversed"}),
+}
+"""Fields that came with `FIELD_VERSION`; left out where they are as by default, so that a statement
+that has none of them is to the last byte what every release understands."""
+FIELD_DEFAULTS: Final[dict[type, dict[str, object]]] = {
+    part: {field.name: field.default for field in dataclasses.fields(part) if field.name in names}
+    for part, names in SINCE_FIELD.items()
+}
+"""What they are then."""
+_NOTHING: Final[dict[str, object]] = {}
 LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
 
 
@@ -112,8 +132,8 @@ def _message_bytes(message: Message) -> bytes:
     def fields_of(part: object) -> dict[str, object]:
         nonlocal version
         told = {name: getattr(part, name) for name in FIELDS[type(part)]}
-        for name in SINCE_FIELD.get(type(part), ()):
-            if told[name] is None:
+        for name, default in FIELD_DEFAULTS.get(type(part), _NOTHING).items():
+            if told[name] == default:
                 del told[name]
             else:
                 version = FIELD_VERSION

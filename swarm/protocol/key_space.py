@@ -2,8 +2,8 @@
 
 ``swarm/<mission>/…``: ``brief``, ``plan`` and ``board/<task>`` are written by the
 coordinator, ``uav/<id>/…`` by that UAV's agent, ``operator/<target>``,
-``operator/task/<task>`` and ``operator/start/<uav>`` by the operator, ``roster`` by the
-mission authority;
+``operator/task/<task>``, ``operator/start/<uav>``, ``operator/zone/<zone>`` and
+``operator/ready/<uav>`` by the operator, ``roster`` by the mission authority;
 ``alive/<id>`` holds the liveliness token of a process and ``state/<id>`` answers what that
 process knows.
 """
@@ -88,6 +88,14 @@ class KeySpace:
         """That the mission may start without a UAV; ``*`` for all."""
         return f"{self.root}/operator/start/{uav}"
 
+    def operator_zone(self, zone: str) -> str:
+        """A zone that the operator has drawn or taken away; ``*`` for all."""
+        return f"{self.root}/operator/zone/{zone}"
+
+    def operator_ready(self, uav: str) -> str:
+        """That a UAV on the ground may start again; ``*`` for all."""
+        return f"{self.root}/operator/ready/{uav}"
+
     def choice(self, uav: str) -> str:
         """Why a UAV took a task; ``*`` for all."""
         return f"{self.root}/uav/{uav}/choice"
@@ -105,7 +113,7 @@ class KeySpace:
         match key.removeprefix(f"{self.root}/").split("/"):
             case ["brief"] | ["plan"] | ["board", _]:
                 return COORDINATOR
-            case ["operator", _] | ["operator", "task" | "start", _]:
+            case ["operator", _] | ["operator", "task" | "start" | "zone" | "ready", _]:
                 return OPERATOR
             case ["roster"]:
                 return AUTHORITY

@@ -6,8 +6,9 @@ swarm.protocol.uav_messages.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated
@@ -17,6 +18,7 @@ from pydantic import Strict
 
 from swarm.model import Origin
 from swarm.model.ids import AUTHORITY, FLEET, RESERVED
+from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.fields import (
     MAX_COUNT,
     Acceleration,
@@ -24,14 +26,17 @@ from swarm.protocol.fields import (
     Count,
     Duration,
     Flag,
+    Height,
     Horizon,
     Id,
     Instant,
+    Limit,
     Metres,
     Point,
     Probability,
     Speed,
     Value,
+    WindSpeed,
     Words,
 )
 from swarm.protocol.key_space import KeySpace
@@ -74,6 +79,14 @@ class UavSpec(Checked):
     """Height layer this UAV flies at [m], added to every place it flies to."""
     acceleration_m_s2: Acceleration | None = None
     """None: its speed changes at once."""
+    airspeed_m_s: Speed | None = None
+    """Speed through the air [m/s]; None: wind has no effect."""
+    endurance_s: Horizon | None = None
+    """Airborne time that a full battery gives [s]; None: endless."""
+    reserve_frac: Probability = 0.2
+    """Share of the endurance that is never planned with."""
+    charge_frac: Probability = 1.0
+    """Charge of the battery at mission time 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +102,31 @@ class MissionConfig(Checked):
     origin: Point
     """Latitude [deg], longitude [deg], height above mean sea level [m]."""
     uavs: tuple[UavSpec, ...]
+    bases: tuple[BaseSpec, ...] = ()
+    """Where batteries are swapped."""
+    zones: tuple[ZoneSpec, ...] = ()
+    """Where not to fly, as long as the operator says nothing else."""
+    wind_enu_m_s: tuple[WindSpeed, WindSpeed] = (0.0, 0.0)
+    """Steady wind by where it blows to [m/s; east, north]."""
+    zone_margin_m: Height = 0.0
+    """Paths stay that far away from zones [m]."""
+    band_m: tuple[Height, Height] | None = None
+    """Heights above the ground that may be used [m]; None: each UAV in its own layer."""
 
     def __post_init__(self) -> None:
         Origin(*self.origin)
         ids = {uav.id for uav in self.uavs}
         if len(ids) != len(self.uavs) or not ids.isdisjoint(RESERVED):
             raise ValueError(f"UAV ids must differ, from each other and from {', '.join(RESERVED)}")
+        for what, named in (("base", self.bases), ("zone", self.zones)):
+            if len({spec.id for spec in named}) != len(named):
+                raise ValueError(f"{what} ids must differ from each other")
+        wind_m_s = math.hypot(*self.wind_enu_m_s)
+        speeds_m_s = (uav.airspeed_m_s for uav in self.uavs if uav.airspeed_m_s is not None)
+        if min(speeds_m_s, default=math.inf) <= wind_m_s:
+            raise ValueError(f"a UAV is not faster than the wind of {wind_m_s:g} m/s")
+        if self.band_m is not None and self.band_m[0] >= self.band_m[1]:
+            raise ValueError(f"band_m must be two growing heights, not {self.band_m}")
 
 
 class MissionPhase(StrEnum):
@@ -130,10 +162,27 @@ class PostedTask(Checked):
     number: Count
     """Position on the board; ties between equally good tasks go to the smaller."""
     position_enu_m: Point
+    """Of a line its first point."""
     value: Value
     service_s: Duration
     kind: Id | None
     withdrawn: Flag
+    _: KW_ONLY
+    due_s: Limit | None = None
+    """Mission time by which it ends, or it is worth nothing [s]; it may be left out."""
+    opens_s: Limit = 0.0
+    """Mission time before which work on the spot does not begin [s]."""
+    closes_s: Limit | None = None
+    """Mission time after which work on the spot does not begin [s]."""
+    path_enu_m: tuple[Point, ...] = ()
+    """Points of a line [m; mission origin]; empty of a place."""
+    height_m: Metres | None = None
+    """Where it is flown [m above the origin]; None: in the UAV's own layer above the place."""
+
+    def __post_init__(self) -> None:
+        path = self.path_enu_m
+        if path and (len(path) < 2 or path[0] != self.position_enu_m):
+            raise ValueError(f"path of task {self.task} must begin at its position and go on")
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,6 +270,8 @@ Body = (
     | OperatorCommand
     | TaskEdit
     | StartWithout
+    | ZoneEdit
+    | UavReady
     | SignedRoster
 )
 
@@ -313,6 +364,10 @@ def _key_of(mission: str, writer: str, body: Body) -> str:
             return keys.operator_task(task)
         case StartWithout(uav=uav):
             return keys.operator_start(uav)
+        case ZoneEdit(zone=zone):
+            return keys.operator_zone(zone.id)
+        case UavReady(uav=uav):
+            return keys.operator_ready(uav)
         case SignedRoster():
             return keys.roster
 

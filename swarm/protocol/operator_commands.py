@@ -1,4 +1,4 @@
-"""What the operator has said about the flight that is on: which command counts for whom.
+"""What the operator has said about the flight that is on: which word counts for whom.
 
 A command names the run it was given for, so a new flight of the same mission inherits none.
 Of those to one UAV and those to the fleet the newest decides what the UAV does; that the
@@ -8,6 +8,7 @@ mission is aborted holds whatever is said to a single UAV afterwards.
 from __future__ import annotations
 
 from swarm.model.ids import FLEET
+from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
 from swarm.protocol.messages import CommandKind, OperatorCommand, Stamp, StartWithout
 from swarm.protocol.registers import Replica
 
@@ -49,6 +50,40 @@ def dispensable(replica: Replica) -> dict[str, StartWithout]:
     if brief is None:
         return {}
     return {uav: start for uav, start in replica.starts.items() if start.run == brief.run}
+
+
+def zone_edits(replica: Replica) -> dict[str, ZoneEdit]:
+    """Zone -> the operator's word about it in this flight, in the order of their ids."""
+    brief = replica.brief
+    if brief is None or not replica.zone_edits:
+        return {}
+    words = sorted(replica.zone_edits.items())
+    return {zone: edit for zone, edit in words if edit.run == brief.run}
+
+
+def zones_in_force(replica: Replica) -> tuple[ZoneSpec, ...]:
+    """Where not to fly in this flight: the brief's zones as the operator has left them, then his.
+
+    Equal wherever the registers are; who has no brief knows of none.
+    """
+    brief = replica.brief
+    if brief is None:
+        return ()
+    zones = {zone.id: zone for zone in brief.zones}
+    for name, edit in zone_edits(replica).items():
+        if edit.withdrawn:
+            zones.pop(name, None)
+        else:
+            zones[name] = edit.zone
+    return tuple(zones.values())
+
+
+def readiness(replica: Replica) -> dict[str, Stamp]:
+    """UAV -> stamp of the newest word that it may start again; each stamp counts once."""
+    brief = replica.brief
+    if brief is None:
+        return {}
+    return {uav: stamp for uav, (stamp, word) in replica.readies.items() if word.run == brief.run}
 
 
 def describe_command(command: OperatorCommand) -> str:

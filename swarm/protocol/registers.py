@@ -3,7 +3,7 @@
 A `Replica` keeps of every register the statement with the highest stamp. Joining is
 commutative, associative and idempotent, so loss, duplication and reordering delay agreement
 and never break it. Claims and outcomes count of UAVs that the mission's configuration names.
-On the board the operator's word about a task comes before the coordinator's. Who is alive is for
+Of tasks and zones the operator's word comes before the coordinator's. Who is alive is for
 swarm.protocol.membership to say.
 """
 
@@ -16,6 +16,7 @@ from typing import Final
 
 from swarm.model.ids import FLEET
 from swarm.protocol.encoding import FIELDS, encode
+from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.messages import (
     Message,
     MissionConfig,
@@ -42,6 +43,8 @@ MOST_UNBRIEFED: Final = 20_000
 """The same as long as there is no brief, which may name any of them."""
 MOST_TASKS: Final = 20_000
 """Tasks of the coordinator and of the operator."""
+MOST_ZONES: Final = 1000
+"""Zones of the operator."""
 NO_ROOM: Final = "no room"
 """Reason under which is counted what these leave out."""
 
@@ -80,6 +83,10 @@ class Replica:
         All have one writer, so their stamps tell which is the newest of several."""
         self.starts: dict[str, StartWithout] = {}
         """By UAV id, for whom the operator does not wait; see swarm.protocol.operator_commands."""
+        self.zone_edits: dict[str, ZoneEdit] = {}
+        """By zone id, what the operator says, words for other flights among it; see there, too."""
+        self.readies: dict[str, tuple[Stamp, UavReady]] = {}
+        """By UAV id, what a person has seen to, words for other flights among it likewise."""
         self.stale = 0
         """Statements that were older than what was known."""
         self.overfull = 0
@@ -135,6 +142,10 @@ class Replica:
                 self.commands[target] = message.stamp, command
             case StartWithout(uav=uav) as start:
                 self.starts[uav] = start
+            case ZoneEdit() as edit:
+                self._take_zone(edit)
+            case UavReady(uav=uav) as ready:
+                self.readies[uav] = message.stamp, ready
         return True
 
     def _has_room(self, message: Message) -> bool:
@@ -147,6 +158,8 @@ class Replica:
         body, writer = message.body, message.writer
         if isinstance(body, TaskEntry | TaskEdit):
             return len(self.posted) + len(self.task_orders) < MOST_TASKS
+        if isinstance(body, ZoneEdit):
+            return len(self.zone_edits) < MOST_ZONES
         strange = self._is_strange(message)
         if strange and self._strange >= (MOST_UNBRIEFED if self._fleet is None else MOST_STRANGE):
             return False
@@ -164,6 +177,8 @@ class Replica:
                 name = message.writer
             case OperatorCommand(target=target) if target != FLEET:
                 name = target
+            case UavReady(uav=uav):
+                name = uav
             case _:
                 return False
         return self._fleet is None or name not in self._fleet
@@ -184,6 +199,8 @@ class Replica:
             self._digest[message.writer] = self._digest.get(message.writer, 0) ^ number
             if isinstance(message.body, OperatorCommand):
                 del self.commands[message.body.target]
+            elif isinstance(message.body, UavReady):
+                del self.readies[message.body.uav]
         kept = {writer: list[Stamp]() for writer in writers}
         for message in self._registers.values() if writers else ():
             if message.writer in writers:
@@ -229,6 +246,14 @@ class Replica:
                     self._note(message)
         self.board_version += 1
         self.task_version += 1
+
+    def _take_zone(self, edit: ZoneEdit) -> None:
+        """Where one may fly is part of the mission, and so of the board."""
+        before, self.zone_edits[edit.zone.id] = self.zone_edits.get(edit.zone.id), edit
+        run = None if self.brief is None else self.brief.run
+        if any(word is not None and word.run == run for word in (before, edit)):
+            self.board_version += 1
+            self.task_version += 1
 
     def _takes_part(self, writer: str) -> bool:
         """Whether what that UAV claims and has done counts: it must be one of those briefed."""
@@ -283,6 +308,8 @@ class Replica:
                     self.epoch_stamp = message.stamp
                 case OperatorCommand(target=target) as command:
                     self.commands[target] = message.stamp, command
+                case UavReady(uav=uav) as ready:
+                    self.readies[uav] = message.stamp, ready
                 case _:
                     pass
         for writer in {message.writer for _, message in words}:

@@ -116,26 +116,63 @@ class ClaimPhase(StrEnum):
     """Not taking part (any more)."""
 
 
+class BaseStage(StrEnum):
+    """How far a visit to a base is."""
+
+    APPROACHING = "approaching"
+    WAITING = "waiting"
+    """Above it, until a slot is free."""
+    LANDED = "landed"
+    """Holds a slot: its battery is being changed, or it waits on the ground."""
+    PARKED = "parked"
+    """On the ground, but off the slots."""
+
+
 @dataclass(frozen=True, slots=True)
 class Claim(Checked):
-    """Register ``uav/<id>/claim``: the task a UAV has taken."""
+    """Register ``uav/<id>/claim``: the task or base, or both, that a UAV has taken."""
 
     phase: ClaimPhase
     task: Id | None
-    """None exactly when idle, paused or out: the tombstone of an earlier claim."""
+    """None when idle, paused or out, the tombstone of an earlier claim, and of a base alone."""
     decided_s: Instant
     """Mission time at which the UAV was free to decide [s]."""
     rank: Count
     completion_s: Instant
-    """Predicted completion [s mission time]."""
+    """Predicted completion [s mission time]; of a base alone, when the UAV is ready there."""
     handed_over: Flag = False
     """Out because somebody else has the vehicle: no later life of this agent commands it."""
+    base: Id | None = None
+    """It flies to it, or stands at it."""
+    stage: BaseStage | None = None
+    """Of the visit to that base; None exactly when there is none."""
+    arrives_s: Instant | None = None
+    """Predicted, then true arrival above the base [s mission time]."""
+    sortie_end_s: Instant | None = None
+    """Mission time by which it must have landed, its reserve kept [s]; None: endless, or landed."""
+    reversed: Flag | None = None
+    """The task, a line, is flown from its last point to its first; None of a place."""
+    departs_s: Instant | None = None
+    """Mission time until which it waits at the base before it flies to the task [s]."""
 
     def __post_init__(self) -> None:
         if self.handed_over and self.phase is not ClaimPhase.OUT:
             raise ValueError(f"handed over, but {self.phase}")
-        if (self.task is None) != (self.phase not in (ClaimPhase.PROPOSED, ClaimPhase.HELD)):
+        taken = self.phase in (ClaimPhase.PROPOSED, ClaimPhase.HELD)
+        if taken and self.task is None and self.base is None:
+            raise ValueError(f"a claim that is {self.phase} names nothing")
+        if not taken and self.task is not None:
             raise ValueError(f"a claim that is {self.phase} names {self.task}")
+        if (self.base is None) != (self.stage is None):
+            raise ValueError(f"a claim on {self.base} is {self.stage}")
+        if not taken and self.stage in (BaseStage.APPROACHING, BaseStage.WAITING):
+            raise ValueError(f"a claim that is {self.phase} is {self.stage}")
+        if self.base is None and self.arrives_s is not None:
+            raise ValueError("arrives at no base")
+        if self.task is None and self.reversed is not None:
+            raise ValueError("reversed, but no task")
+        if self.departs_s is not None and (self.task is None or self.base is None):
+            raise ValueError("departs from a base to a task, but lacks one of them")
 
 
 class AttemptResult(StrEnum):
@@ -154,6 +191,8 @@ class Outcome(Checked):
     attempt: Annotated[int, Strict(), Ge(1), Le(MAX_COUNT)]
     completed_s: Instant
     """Mission time [s]."""
+    reversed: Flag | None = None
+    """The task, a line, was flown from its last point to its first; None of a place."""
 
 
 class StatusPhase(StrEnum):

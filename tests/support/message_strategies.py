@@ -5,6 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
+from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import (
     CommandKind,
@@ -22,6 +23,7 @@ from swarm.protocol.messages import (
 from swarm.protocol.uav_messages import (
     MAX_CANDIDATES,
     AttemptResult,
+    BaseStage,
     Candidate,
     Choice,
     ChoiceBasis,
@@ -56,6 +58,34 @@ fleets = st.builds(
     st.none() | ids,
     numbers,
     st.none() | positives,
+    st.none() | st.floats(50.0, 1e6),
+    st.none() | positives,
+    probabilities,
+    probabilities,
+)
+bases = st.builds(BaseSpec, ids, points, not_negatives, st.none() | st.integers(1, MAX_COUNT))
+corners = st.tuples(numbers, numbers)
+
+
+def _box(corner: tuple[float, float], size_m: float) -> tuple[tuple[float, float], ...]:
+    east_m, north_m = corner
+    return (corner, (east_m + size_m, north_m), (east_m + size_m, north_m + size_m))
+
+
+rings = st.builds(_box, corners, st.floats(1.0, 1e6))
+holed = st.tuples(
+    st.just(((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0))),
+    st.just((((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)), ((5.0, 5.0), (6.0, 5.0), (6.0, 6.0)))),
+)
+zones = st.builds(
+    lambda rings, floor_m, ceiling_m, name, inclusive: ZoneSpec(
+        name, *rings, floor_m, ceiling_m, inclusive
+    ),
+    rings.map(lambda ring: (ring, ())) | holed,
+    st.none() | st.floats(-1e6, 0.0),
+    st.none() | st.floats(1.0, 1e6),
+    ids,
+    st.booleans(),
 )
 origins = st.tuples(st.floats(-89, 89), st.floats(-180, 180), numbers)
 briefs = st.builds(
@@ -67,6 +97,11 @@ briefs = st.builds(
     counts,
     origins,
     st.lists(fleets, max_size=4, unique_by=lambda fleet: fleet.id).map(tuple),
+    st.lists(bases, max_size=2, unique_by=lambda base: base.id).map(tuple),
+    st.lists(zones, max_size=2, unique_by=lambda zone: zone.id).map(tuple),
+    st.tuples(st.floats(-30.0, 30.0), st.floats(-30.0, 30.0)),
+    not_negatives,
+    st.none() | st.tuples(st.floats(0.0, 50.0), st.floats(51.0, 200.0)),
 )
 epochs = st.builds(
     PlanEpoch,
@@ -78,36 +113,84 @@ epochs = st.builds(
     notes,
     st.dictionaries(uav_ids, st.lists(task_ids, unique=True, max_size=3).map(tuple), max_size=3),
 )
-boards = st.builds(
-    TaskEntry,
-    task_ids,
-    counts,
-    points,
-    not_negatives,
-    not_negatives,
-    st.none() | ids,
-    st.booleans(),
-)
+
+
+@st.composite
+def _of_tasks(draw: st.DrawFn, kind: type[TaskEntry | TaskEdit]) -> TaskEntry | TaskEdit:
+    """What coordinator or operator says of a task, which may be a line or have limits."""
+    place = draw(points)
+    further = draw(st.lists(points, max_size=3))
+    more = (draw(counts), draw(notes)) if kind is TaskEdit else ()
+    return kind(
+        draw(task_ids),
+        draw(counts),
+        place,
+        draw(not_negatives),
+        draw(not_negatives),
+        draw(st.none() | ids),
+        draw(st.booleans()),
+        *more,
+        due_s=draw(st.none() | not_negatives),
+        opens_s=draw(st.just(0.0) | not_negatives),
+        closes_s=draw(st.none() | not_negatives),
+        path_enu_m=(place, *further) if further else (),
+        height_m=draw(st.none() | numbers),
+    )
+
+
+boards = _of_tasks(TaskEntry)
+_taken = st.sampled_from([ClaimPhase.PROPOSED, ClaimPhase.HELD])
+_free = st.sampled_from([ClaimPhase.IDLE, ClaimPhase.PAUSED, ClaimPhase.OUT])
+_on_the_ground = st.sampled_from([BaseStage.LANDED, BaseStage.PARKED])
+_reversed = st.none() | st.booleans()
+_maybe_s = st.none() | numbers
 claims = st.one_of(
+    st.builds(Claim, _taken, task_ids, numbers, counts, numbers),
+    st.builds(Claim, _free, st.none(), numbers, counts, numbers),
     st.builds(
         Claim,
-        st.sampled_from([ClaimPhase.PROPOSED, ClaimPhase.HELD]),
-        task_ids,
-        numbers,
-        counts,
-        numbers,
-    ),
-    st.builds(
-        Claim,
-        st.sampled_from([ClaimPhase.IDLE, ClaimPhase.PAUSED, ClaimPhase.OUT]),
+        _taken,
         st.none(),
         numbers,
         counts,
         numbers,
+        base=ids,
+        stage=st.sampled_from(BaseStage),
+        arrives_s=_maybe_s,
+        sortie_end_s=_maybe_s,
+    ),
+    st.builds(
+        Claim,
+        _taken,
+        task_ids,
+        numbers,
+        counts,
+        numbers,
+        base=ids,
+        stage=_on_the_ground,
+        reversed=_reversed,
+        departs_s=_maybe_s,
+    ),
+    st.builds(
+        Claim,
+        _free,
+        st.none(),
+        numbers,
+        counts,
+        numbers,
+        base=ids,
+        stage=_on_the_ground,
+        arrives_s=_maybe_s,
+        sortie_end_s=_maybe_s,
     ),
 )
 outcomes = st.builds(
-    Outcome, task_ids, st.sampled_from(AttemptResult), st.integers(1, MAX_COUNT), numbers
+    Outcome,
+    task_ids,
+    st.sampled_from(AttemptResult),
+    st.integers(1, MAX_COUNT),
+    numbers,
+    reversed=_reversed,
 )
 statuses = st.builds(
     Status,
@@ -159,22 +242,13 @@ commands = st.one_of(
     ),
     st.builds(OperatorCommand, st.just(FLEET), st.just(CommandKind.ABORT), counts, notes),
 )
-task_orders = st.builds(
-    TaskEdit,
-    task_ids,
-    counts,
-    points,
-    not_negatives,
-    not_negatives,
-    st.none() | ids,
-    st.booleans(),
-    counts,
-    notes,
-)
+task_orders = _of_tasks(TaskEdit)
 starts = st.builds(StartWithout, uav_ids, counts, notes)
+zone_edits = st.builds(ZoneEdit, zones, st.booleans(), counts, notes)
+readies = st.builds(UavReady, uav_ids, counts, notes)
 by_coordinator = briefs | epochs | boards
 by_uav = claims | outcomes | statuses | choices
-by_operator = commands | task_orders | starts
+by_operator = commands | task_orders | starts | zone_edits | readies
 
 
 def messages(

@@ -1,0 +1,128 @@
+"""What the field adds to what is said: bases and zones, and the operator's word about them.
+
+Zones of the brief are what a mission begins with. The operator's word about one counts before the
+brief's, for the flight of the mission that it names; see swarm.protocol.operator_commands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge, Le, Len
+from pydantic import Strict
+
+from swarm.model import Base, BaseId, Zone, ZoneId
+from swarm.protocol.fields import (
+    MAX_COUNT,
+    Checked,
+    Count,
+    Duration,
+    Flag,
+    FlatPoint,
+    Id,
+    Metres,
+    Point,
+    Words,
+)
+
+Slots = Annotated[int, Strict(), Ge(1), Le(MAX_COUNT)]
+Ring = Annotated[tuple[FlatPoint, ...], Len(3)]
+"""Corners [m; east, north of the mission origin]."""
+
+
+@dataclass(frozen=True, slots=True)
+class BaseSpec(Checked):
+    """One base as the brief describes it."""
+
+    id: Id
+    position_enu_m: Point
+    """Place [m; mission origin]."""
+    swap_s: Duration
+    """From touch-down to ready [s]."""
+    slots: Slots | None
+    """UAVs served at a time; None: no limit."""
+
+    def base(self) -> Base:
+        """As missions have it."""
+        return Base(BaseId(self.id), self.position_enu_m, self.swap_s, self.slots)
+
+    @classmethod
+    def of(cls, base: Base) -> BaseSpec:
+        """``base`` as a brief describes it."""
+        return cls(base.id, base.position_enu_m, base.swap_s, base.slots)
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneSpec(Checked):
+    """One zone as brief and operator describe it.
+
+    Raises:
+        ValueError: it is no zone that a mission could have.
+    """
+
+    id: Id
+    polygon_enu_m: Ring
+    holes_enu_m: tuple[Ring, ...]
+    """Inside of these the zone is not."""
+    floor_m: Metres | None
+    """Lowest height [m above the mission origin]; None: from the ground up."""
+    ceiling_m: Metres | None
+    """Greatest height [m above the mission origin]; None: unlimited."""
+    inclusive: Flag
+    """Keeps out of all that is not inside, instead of what is."""
+
+    def __post_init__(self) -> None:
+        self.zone()
+
+    def zone(self) -> Zone:
+        """As missions have it."""
+        return Zone(
+            ZoneId(self.id),
+            self.polygon_enu_m,
+            self.holes_enu_m,
+            self.floor_m,
+            self.ceiling_m,
+            self.inclusive,
+        )
+
+    @classmethod
+    def of(cls, zone: Zone) -> ZoneSpec:
+        """``zone`` as a brief describes it."""
+        return cls(
+            zone.id,
+            zone.polygon_enu_m,
+            zone.holes_enu_m,
+            zone.floor_m,
+            zone.ceiling_m,
+            zone.inclusive,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneEdit(Checked):
+    """Register ``operator/zone/<zone>``: a zone that the operator draws, or takes away.
+
+    For a zone that the brief has, too, the operator's word counts.
+    """
+
+    zone: ZoneSpec
+    withdrawn: Flag
+    run: Count
+    """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
+    reason: Words
+    """Why, in the operator's words; empty when there are none."""
+
+
+@dataclass(frozen=True, slots=True)
+class UavReady(Checked):
+    """Register ``operator/ready/<uav>``: a person has seen to a UAV on the ground.
+
+    Its battery is changed and it may start again. It counts once; a later swap needs another.
+    """
+
+    uav: Id
+    run: Count
+    """The flight of the mission that it is meant for, as in the brief; it counts in no other."""
+    reason: Words
+    """Why, in the operator's words; empty when there are none."""
