@@ -105,32 +105,34 @@ class IdealMotion:
         """Where the vehicle is going to stop [m]."""
         self.arrives_s: float | None = None
         """When the last ordered target is reached [s], also if that is past."""
-        self._start_enu_m = start_enu_m
-        self._leaves_s = 0.0
-        self._ramps: _Ramps | None = None
+        self.start_enu_m = start_enu_m
+        """Where it has set off [m]."""
+        self.leaves_s = 0.0
+        """When [s]."""
+        self.ramps: Ramps | None = None
         """Of the way with acceleration."""
 
     def position_enu_m(self, now_s: float) -> Point:
         """Place at that instant [m]; the target exactly from the arrival on."""
         if self.arrives_s is None or now_s >= self.arrives_s:
             return self.target_enu_m
-        if now_s <= self._leaves_s:
-            return self._start_enu_m
-        flown_frac = (now_s - self._leaves_s) / (self.arrives_s - self._leaves_s)
-        if self._ramps is not None:
-            duration_s = self._ramps.duration_s
-            flown_frac = self._ramps.flown_m(flown_frac * duration_s) / self._ramps.length_m
-        return between(self._start_enu_m, self.target_enu_m, flown_frac)
+        if now_s <= self.leaves_s:
+            return self.start_enu_m
+        flown_frac = (now_s - self.leaves_s) / (self.arrives_s - self.leaves_s)
+        if self.ramps is not None:
+            duration_s = self.ramps.duration_s
+            flown_frac = self.ramps.flown_m(flown_frac * duration_s) / self.ramps.length_m
+        return between(self.start_enu_m, self.target_enu_m, flown_frac)
 
     def velocity_enu_m_s(self, now_s: float) -> Point:
         """Velocity at that instant [m/s]; zero before the start and from the arrival on."""
-        if self.arrives_s is None or not self._leaves_s <= now_s < self.arrives_s:
+        if self.arrives_s is None or not self.leaves_s <= now_s < self.arrives_s:
             return _AT_REST
-        duration_s = self.arrives_s - self._leaves_s
-        way_m = minus(self.target_enu_m, self._start_enu_m)
-        if self._ramps is not None:
-            speed_m_s = self._ramps.speed_m_s(now_s - self._leaves_s)
-            return _scaled(way_m, speed_m_s / self._ramps.length_m)
+        duration_s = self.arrives_s - self.leaves_s
+        way_m = minus(self.target_enu_m, self.start_enu_m)
+        if self.ramps is not None:
+            speed_m_s = self.ramps.speed_m_s(now_s - self.leaves_s)
+            return _scaled(way_m, speed_m_s / self.ramps.length_m)
         east_m, north_m, up_m = way_m
         return east_m / duration_s, north_m / duration_s, up_m / duration_s
 
@@ -147,14 +149,14 @@ class IdealMotion:
             ValueError: the speed is not positive and finite.
         """
         _check_speed(speed_m_s)
-        self._start_enu_m, self._leaves_s = self.position_enu_m(now_s), now_s
+        self.start_enu_m, self.leaves_s = self.position_enu_m(now_s), now_s
         self.target_enu_m = target_enu_m
-        length_m = math.dist(self._start_enu_m, target_enu_m)
+        length_m = math.dist(self.start_enu_m, target_enu_m)
         self.arrives_s = now_s + flown_s(length_m, speed_m_s, acceleration_m_s2)
-        self._ramps = None
+        self.ramps = None
         if acceleration_m_s2 is not None:
-            ramps = _ramps(length_m, 0.0, speed_m_s, acceleration_m_s2, acceleration_m_s2)
-            self._ramps = ramps if ramps.length_m > 0.0 else None
+            ramps = ramps_over(length_m, 0.0, speed_m_s, acceleration_m_s2, acceleration_m_s2)
+            self.ramps = ramps if ramps.length_m > 0.0 else None
 
     def stop(self, now_s: float) -> None:
         """Stay where the vehicle is."""
@@ -170,7 +172,7 @@ _LEAST_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class _Ramps:
+class Ramps:
     """Speed along a line: from one speed to a second, there for a while, then to rest."""
 
     first_m_s: float
@@ -202,6 +204,19 @@ class _Ramps:
             return self.first_m_s + self.change_m_s2 * at_s
         return self.cruise_m_s - self.brake_m_s2 * max(0.0, at_s - self.braking_s)
 
+    def reached_s(self, way_m: float) -> float:
+        """When so much of the way is flown [s]; the inverse of `flown_m`."""
+        change_m, length_m = self.flown_m(self.change_s), self.length_m
+        if way_m >= length_m:
+            return self.duration_s
+        if way_m <= change_m:
+            root_m_s = math.sqrt(max(0.0, self.first_m_s**2 + 2.0 * self.change_m_s2 * way_m))
+            both_m_s = self.first_m_s + root_m_s
+            return 2.0 * way_m / both_m_s if both_m_s > 0.0 else 0.0
+        if way_m <= self.flown_m(self.braking_s):
+            return self.change_s + (way_m - change_m) / self.cruise_m_s
+        return self.duration_s - math.sqrt(2.0 * (length_m - way_m) / self.brake_m_s2)
+
     def flown_m(self, at_s: float) -> float:
         """Way flown after a time [m]."""
         changing_s = min(at_s, self.change_s)
@@ -213,9 +228,9 @@ class _Ramps:
         )
 
 
-def _ramps(
+def ramps_over(
     length_m: float, first_m_s: float, speed_m_s: float, change_m_s2: float, brake_m_s2: float
-) -> _Ramps:
+) -> Ramps:
     """The fastest way over a length that leaves room to brake from the first speed."""
     if first_m_s > speed_m_s:
         cruise_m_s, change_m_s2 = speed_m_s, -brake_m_s2
@@ -230,7 +245,7 @@ def _ramps(
     change_s = (cruise_m_s - first_m_s) / change_m_s2
     ramped_m = 0.5 * (first_m_s + cruise_m_s) * change_s + 0.5 * cruise_m_s**2 / brake_m_s2
     cruise_s = max(0.0, length_m - ramped_m) / cruise_m_s if cruise_m_s > 0.0 else 0.0
-    return _Ramps(first_m_s, cruise_m_s, change_m_s2, brake_m_s2, change_s, cruise_s)
+    return Ramps(first_m_s, cruise_m_s, change_m_s2, brake_m_s2, change_s, cruise_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +254,7 @@ class _Part:
 
     way: Point
     """Direction, of length 1."""
-    ramps: _Ramps
+    ramps: Ramps
     end_m: Point
     """Displacement in the end, exactly."""
 
@@ -391,7 +406,7 @@ def _part(
     length_m = math.hypot(*whole)
     if length_m == 0.0:
         return ()
-    ramps = _ramps(length_m, first_m_s, speed_m_s, change_m_s2, brake_m_s2)
+    ramps = ramps_over(length_m, first_m_s, speed_m_s, change_m_s2, brake_m_s2)
     return (_Part(_scaled(whole, 1.0 / length_m), ramps, whole),)
 
 
@@ -401,5 +416,5 @@ def _brake(velocity: Point, brake_m_s2: float) -> _Part | None:
     if speed_m_s == 0.0:
         return None
     way = _scaled(velocity, 1.0 / speed_m_s)
-    ramps = _Ramps(speed_m_s, speed_m_s, 0.0, brake_m_s2, 0.0, 0.0)
+    ramps = Ramps(speed_m_s, speed_m_s, 0.0, brake_m_s2, 0.0, 0.0)
     return _Part(way, ramps, _scaled(way, 0.5 * speed_m_s**2 / brake_m_s2))

@@ -27,7 +27,9 @@ from agent.core.interface import (
     VehicleReport,
 )
 from sim.world.engine import EventQueue
+from sim.world.flown_path import FlownPath, MotionPiece
 from sim.world.motion import IdealMotion, Point, between, flown_s, minus, plus
+from sim.world.track import Track, drifting
 from sim.world.uncertainty import Realization
 from swarm.model import UavId
 
@@ -63,10 +65,13 @@ class IdealVehicle:
     ) -> None:
         self.speed_frac = 1.0
         """Share of the ordered speed at which it flies from its next order on."""
+        self.track = Track()
+        """Where it truly was."""
         self._queue = queue
         self._report = report
         self._takeoff_s = takeoff_s
         self._motion: IdealMotion | None = None
+        self._start_enu_m: Point | None = None
         self._speed_m_s = 1.0
         self._acceleration_m_s2: float | None = None
         self._orders = 0
@@ -82,8 +87,10 @@ class IdealVehicle:
             case Hold():
                 if self._motion is not None:
                     self._motion.stop(self._queue.now_s())
+                    self._trace([], self._motion.target_enu_m)
                 self._later(self._queue.now_s(), Held())
             case Return():
+                self._trace_home()
                 self._motion = None
                 self._later(self._queue.now_s(), Home())
             case _:
@@ -93,6 +100,7 @@ class IdealVehicle:
         speed_m_s = self._speed_m_s * self.speed_frac
         now_s = self._queue.now_s()
         motion.fly_to(order.position_enu_m, speed_m_s, now_s, self._acceleration_m_s2)
+        self._trace(FlownPath.of(motion).pieces(now_s), motion.target_enu_m)
         if motion.arrives_s is not None:
             self._later(motion.arrives_s, Arrived(order.leg))
 
@@ -101,13 +109,31 @@ class IdealVehicle:
         self._speed_m_s, self._acceleration_m_s2 = order.speed_m_s, order.acceleration_m_s2
         if motion is None:
             self._motion = IdealMotion(order.position_enu_m)
+            self._start_enu_m = order.position_enu_m
+            self.track.lift_off(order.position_enu_m, now_s + self._takeoff_s)
             self._later(now_s + self._takeoff_s, ready)
         elif order.resume:
             self._later(now_s, self._telemetry(motion))
             self._later(now_s, ready)
         else:
             motion.fly_to(order.position_enu_m, self._speed_m_s, now_s, self._acceleration_m_s2)
+            self._trace(FlownPath.of(motion).pieces(now_s), motion.target_enu_m)
             self._later(max(now_s, motion.arrives_s or now_s), ready)
+
+    def _trace(self, pieces: list[MotionPiece], stop: Point) -> None:
+        """Its true motion from now on, until the next order; what it believes to fly is true."""
+        self.track.fly(pieces, stop, self._queue.now_s())
+
+    def _trace_home(self) -> None:
+        """It says at once that it is home, as no plan waits for that, but flies there in time."""
+        motion, start = self._motion, self._start_enu_m
+        if motion is None or start is None:
+            return
+        now_s = self._queue.now_s()
+        home = IdealMotion(motion.position_enu_m(now_s))
+        home.fly_to(start, self._speed_m_s * self.speed_frac, now_s, self._acceleration_m_s2)
+        self._trace(FlownPath.of(home).pieces(now_s), start)
+        self.track.touch_down(home.arrives_s or now_s)
 
     def leave(self) -> None:
         """Its agent has ended; it flies on."""
@@ -179,9 +205,15 @@ class StochasticVehicle(IdealVehicle):
         shown_m_s2 = None if true_m_s2 is None else true_m_s2 * shown
         motion.fly_to(order.position_enu_m, true_m_s * shown, now_s, shown_m_s2)
         self._way_s = now_s, arrives_s
+        self._trace(FlownPath.of(motion).pieces(now_s), motion.target_enu_m)
         if task is not None and not self._fate.succeeds(self._uav, task, order.attempt):
             self._later(arrives_s, AttemptFailed(order.leg))
         self._later(arrives_s, Arrived(order.leg))
+
+    def _trace(self, pieces: list[MotionPiece], stop: Point) -> None:
+        """It is beside where it believes to be."""
+        true = drifting(pieces, self._astray_m, self._becomes_m)
+        self.track.fly(true, plus(stop, self._becomes_m), self._queue.now_s())
 
     def _astray_now_m(self) -> Point:
         leaves_s, arrives_s = self._way_s

@@ -1,0 +1,132 @@
+"""How near two vehicles came to each other in flight, in closed form between pieces of motion."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.world.flown_path import MotionPiece
+from sim.world.track import Track
+
+FloatArray = npt.NDArray[np.float64]
+
+_AT_ONCE = 100_000
+"""Pieces of two vehicles that are looked at together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """Two vehicles at the instant at which they are nearest."""
+
+    distance_m: float
+    """In all three dimensions."""
+    at_s: float
+    uavs: tuple[str, str]
+
+
+def closest_approach(
+    tracks: dict[str, Track], since_s: float = 0.0, until_s: float = math.inf
+) -> Approach | None:
+    """Of all pairs the nearest, both in the air; None if never two were.
+
+    While both accelerate evenly the square of their distance is a polynomial of degree four, so its
+    least value is at an end or at a root of a cubic one. Of equals the first pair and instant.
+
+    Args:
+        tracks: by UAV.
+        since_s: what was before is left out [s].
+        until_s: what comes later, alike [s].
+    """
+    flown = {uav: track.pieces(since_s, until_s) for uav, track in tracks.items()}
+    nearest: Approach | None = None
+    for one, other in itertools.combinations(flown, 2):
+        common = list(_common(flown[one], flown[other]))
+        for first in range(0, len(common), _AT_ONCE):
+            distance_m, at_s = _nearest(common[first : first + _AT_ONCE])
+            if nearest is None or distance_m < nearest.distance_m:
+                nearest = Approach(distance_m, at_s, (one, other))
+    return nearest
+
+
+def _common(
+    ones: Sequence[MotionPiece], others: Sequence[MotionPiece]
+) -> Iterable[tuple[MotionPiece, MotionPiece, float, float]]:
+    """Pieces of both that overlap, with the beginning and the end of that; both in order."""
+    one, other = 0, 0
+    while one < len(ones) and other < len(others):
+        mine, its = ones[one], others[other]
+        begin_s, end_s = max(mine.begin_s, its.begin_s), min(mine.end_s, its.end_s)
+        if begin_s <= end_s and begin_s < math.inf:
+            yield mine, its, begin_s, end_s
+        if mine.end_s <= its.end_s:
+            one += 1
+        else:
+            other += 1
+
+
+def _nearest(
+    common: Sequence[tuple[MotionPiece, MotionPiece, float, float]],
+) -> tuple[float, float]:
+    """Least distance [m] of two that are there at the same time, and when [s]."""
+    begin_s = np.array([begin for _, _, begin, _ in common])
+    lasts_s = np.array([0.0 if end == math.inf else end - begin for _, _, begin, end in common])
+    place, velocity, acceleration = (
+        _motion([mine for mine, _, _, _ in common], begin_s)
+        - _motion([its for _, its, _, _ in common], begin_s)
+    )
+    # d² = |p + v t + a t²/2|², its slope half: p·v + (v² + p·a) t + 1.5 v·a t² + a²/2 t³.
+    slope = np.stack(
+        [
+            0.5 * (acceleration * acceleration).sum(axis=1),
+            1.5 * (velocity * acceleration).sum(axis=1),
+            (velocity * velocity).sum(axis=1) + (place * acceleration).sum(axis=1),
+            (place * velocity).sum(axis=1),
+        ]
+    )
+    candidates_s = np.concatenate([np.zeros((1, len(common))), lasts_s[None], _roots(slope)])
+    candidates_s = np.clip(candidates_s, 0.0, lasts_s)
+    at_s = candidates_s[:, :, None]
+    offset_m = place + at_s * (velocity + 0.5 * at_s * acceleration)
+    distance_m = np.sqrt((offset_m * offset_m).sum(axis=2))
+    best = np.unravel_index(distance_m.T.argmin(), distance_m.T.shape)
+    row, number = int(best[1]), int(best[0])
+    return float(distance_m[row, number]), float(begin_s[number] + candidates_s[row, number])
+
+
+def _motion(pieces: Sequence[MotionPiece], at_s: FloatArray) -> FloatArray:
+    """(3, n, 3) places, velocities and accelerations of n pieces at n instants."""
+    place = np.array([piece.place_enu_m for piece in pieces])
+    velocity = np.array([piece.velocity_enu_m_s for piece in pieces])
+    acceleration = np.array([piece.acceleration_enu_m_s2 for piece in pieces])
+    since_s = (at_s - np.array([piece.begin_s for piece in pieces]))[:, None]
+    return np.stack(
+        [
+            place + since_s * (velocity + 0.5 * since_s * acceleration),
+            velocity + since_s * acceleration,
+            acceleration,
+        ]
+    )
+
+
+def _roots(cubic: FloatArray) -> FloatArray:
+    """(3, n) real roots of (4, n) polynomials, highest power first; 0 where there are fewer.
+
+    What is no real root is harmless too: a place on the way is never nearer than the nearest.
+    """
+    cubed, squared, linear, constant = cubic
+    roots = np.zeros((3, cubic.shape[1]))
+    curved = cubed > 1e-12 * (np.abs(squared) + np.abs(linear) + np.abs(constant))
+    straight = ~curved & (linear > 0.0)
+    roots[0, straight] = -constant[straight] / linear[straight]
+    if curved.any():
+        monic = cubic[1:, curved] / cubed[curved]
+        companion = np.zeros((monic.shape[1], 3, 3))
+        companion[:, 0, :] = -monic.T
+        companion[:, 1, 0] = companion[:, 2, 1] = 1.0
+        roots[:, curved] = np.linalg.eigvals(companion).real.T
+    return roots
