@@ -45,8 +45,10 @@ from swarm.protocol.events import (
     SnapshotsReceived,
     Stop,
 )
+from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import Message, Snapshot, StartWithout, TaskEdit
+from swarm.protocol.operator_commands import zone_edits
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import StallDetector, Timing, earliest
 from swarm.protocol.uav_messages import Claim, ClaimPhase, Status, StatusPhase
@@ -208,6 +210,12 @@ class CoordinatorCore:
         elif news and isinstance(body, StartWithout):
             told: dict[str, object] = {"uav": body.uav, "reason": body.reason}
             self._actions.append(LogLine("the operator starts without it", told))
+        elif news and isinstance(body, ZoneEdit) and body in zone_edits(self.replica).values():
+            what = "zone taken away by the operator" if body.withdrawn else "zone by the operator"
+            self._actions.append(LogLine(what, {"zone": body.zone.id, "reason": body.reason}))
+        elif news and isinstance(body, UavReady):
+            told = {"uav": body.uav, "reason": body.reason}
+            self._actions.append(LogLine("the operator lets it start again", told))
         elif isinstance(body, Status):
             self._refuse_older(message.writer, body)
         if self.stage is MissionStage.BRIEFED and self._mission.gate.is_forestalled:
@@ -339,7 +347,8 @@ class CoordinatorCore:
         if not self._mission.is_over and self._state_query.due(now_s):
             self._actions.append(Ask())
         epoch = self.replica.epoch
-        commands = *self.replica.commands.values(), *self.replica.starts.values()
+        words = self.replica
+        commands = *words.commands.values(), *words.starts.values(), *words.readies.values()
         state = self.replica.task_version, epoch and (epoch.number, epoch.phase), commands
         if self._mission.is_led and state != self._saved:
             self._saved = state

@@ -16,9 +16,11 @@ from coordinator.planner.online import EpochPolicy, ReplanResult, Situation
 from swarm.model import Mission, Plan, UavId
 from swarm.protocol.board import TaskBoard, TaskState, doable, mission_of
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
+from swarm.protocol.field_board import doable_in_field
+from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import MissionPhase, PlanEpoch
-from swarm.protocol.operator_commands import dispensable
+from swarm.protocol.operator_commands import dispensable, zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import ClaimPhase
@@ -142,6 +144,7 @@ class StartGate:
         self._seen: set[UavId] = set()
         self._planned_for: tuple[UavId, ...] = ()
         self._planned_tasks: set[str] = set()
+        self._planned_zones: tuple[ZoneSpec, ...] = ()
         self._request = 0
 
     def begin(self, now_s: float) -> list[CoordinatorAction]:
@@ -162,7 +165,7 @@ class StartGate:
     @property
     def is_forestalled(self) -> bool:
         """Whether the fleet is at work already, so that its mission runs: find it, begin none."""
-        at_work = any(claim.task is not None for claim in self._replica.claims.values())
+        at_work = any(claim.is_taken for claim in self._replica.claims.values())
         return at_work or bool(self._replica.outcomes)
 
     def advance(self, now_s: float) -> tuple[StartDecision, list[CoordinatorAction]]:
@@ -198,6 +201,9 @@ class StartGate:
             return StartDecision.WAIT, [note, *self._make_plan(ready)]
         if self._planned_tasks != self._open_tasks:
             note = LogLine("plans anew", {"because": "the operator has added or withdrawn tasks"})
+            return StartDecision.WAIT, [note, *self._make_plan(ready)]
+        if self._planned_zones != zones_in_force(self._replica):
+            note = LogLine("plans anew", {"because": "the operator has changed zones"})
             return StartDecision.WAIT, [note, *self._make_plan(ready)]
         if self.plan is None:
             return StartDecision.WAIT, []
@@ -272,6 +278,7 @@ class StartGate:
     def _make_plan(self, uavs: tuple[UavId, ...]) -> list[CoordinatorAction]:
         self._request += 1
         self._planned_for, self._planned_tasks, self.plan = uavs, self._open_tasks, None
+        self._planned_zones = zones_in_force(self._replica)
         brief = self._replica.brief
         if brief is None:
             return []
@@ -310,9 +317,15 @@ class MissionEndCondition:
         if self._over_at_s is not None:
             self._over_at_s = max(self._over_at_s, grace_until_s)
 
-    def reason(self, now_s: float, *, more_to_come: bool) -> str | None:
-        """Why the mission is over; None if it is not. More tasks may be yet to come."""
-        prospect, patience_s = self._outlook(more_to_come=more_to_come)
+    def reason(self, now_s: float, mission_s: float, *, more_to_come: bool) -> str | None:
+        """Why the mission is over; None if it is not. More tasks may be yet to come.
+
+        Args:
+            now_s: of the own clock [s].
+            mission_s: mission time [s]; in the field what can be done depends on it.
+            more_to_come: whether tasks have yet to appear.
+        """
+        prospect, patience_s = self._outlook(mission_s, more_to_come=more_to_come)
         if prospect is None:
             self._prospect = self._over_at_s = None
             return None
@@ -339,15 +352,22 @@ class MissionEndCondition:
         """When `reason` may find that it has waited long enough."""
         return self._over_at_s
 
-    def _outlook(self, *, more_to_come: bool) -> tuple[str | None, float]:
+    def _can_go_on(self, present: Collection[str], mission_s: float) -> bool:
+        """Whether an open task is left that one of those could still do."""
+        field = self._board.field_problem
+        if field is None:
+            return bool(doable(self._board, present))
+        return bool(present) and bool(doable_in_field(field, self._board, present, mission_s))
+
+    def _outlook(self, mission_s: float, *, more_to_come: bool) -> tuple[str | None, float]:
         """How the mission will end if nothing changes, and how long that may yet change [s]."""
         claims, problem = self._board.replica.claims, self._board.problem
         fleet = () if problem is None else problem.uav_ids
         taking_part = {u for u in fleet if u in claims and claims[u].phase is not ClaimPhase.OUT}
         here = taking_part & self._membership.present
-        if doable(self._board, here) or (more_to_come and here):
+        if self._can_go_on(here, mission_s) or (more_to_come and here):
             paused = {uav for uav in here if claims[uav].phase is ClaimPhase.PAUSED}
-            if doable(self._board, paused) or (more_to_come and paused):
+            if self._can_go_on(paused, mission_s) or (more_to_come and paused):
                 return None, 0.0  # the operator has stopped whom it may take: it is for them to say
             idle = all(claims[uav].phase is ClaimPhase.IDLE for uav in here - paused)
             # Every UAV may refuse a task for reasons of its own, such as a geofence.
@@ -357,5 +377,5 @@ class MissionEndCondition:
         if TaskState.OPEN not in self._board.states.values() and not more_to_come:
             return ALL_ENDED, 0.0
         # Who was lost and never said that it is out may have been cut off, and come back.
-        may_return = doable(self._board, taking_part) or (more_to_come and taking_part)
+        may_return = self._can_go_on(taking_part, mission_s) or (more_to_come and taking_part)
         return NOBODY_LEFT, self._timing.abandon_s if may_return else 0.0

@@ -11,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from swarm.model import Mission, Origin, Task
+from coordinator.planner.field_schedule import left_out
+from swarm.model import Mission, Origin, Task, Uav
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.model.ids import COORDINATOR
 from swarm.model.layers import FlightLayers
+from swarm.model.plan import LeftOut
 from swarm.protocol.board import TaskBoard, TaskState
 from swarm.protocol.events import LogLine, Publish
+from swarm.protocol.field_messages import BaseSpec, ZoneSpec
 from swarm.protocol.messages import (
     Body,
     Message,
@@ -56,10 +59,25 @@ def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> Missi
                 kind=uav.kind,
                 layer_m=layers.layer_m(index),
                 acceleration_m_s2=uav.acceleration_m_s2,
+                airspeed_m_s=uav.airspeed_m_s,
+                endurance_s=uav.endurance_s,
+                **_shares_of(uav),
             )
             for index, uav in enumerate(mission.uavs)
         ),
+        bases=tuple(map(BaseSpec.of, mission.bases)),
+        zones=tuple(map(ZoneSpec.of, mission.zones)),
+        wind_enu_m_s=mission.wind_enu_m_s,
+        zone_margin_m=mission.zone_margin_m,
+        band_m=mission.band_m,
     )
+
+
+def _shares_of(uav: Uav) -> dict[str, float]:
+    """Of a battery that ends: of others they mean nothing, and older releases can do without."""
+    if uav.endurance_s is None:
+        return {}
+    return {"reserve_frac": uav.reserve_frac, "charge_frac": uav.charge_frac}
 
 
 def height_warning(mission: Mission, layers: FlightLayers) -> str | None:
@@ -92,6 +110,11 @@ def task_entry_of(task: Task, number: int) -> TaskEntry:
         service_s=task.service_s,
         kind=task.kind,
         withdrawn=False,
+        due_s=task.due_s,
+        opens_s=task.opens_s,
+        closes_s=task.closes_s,
+        path_enu_m=task.path_enu_m,
+        height_m=task.height_m,
     )
 
 
@@ -104,7 +127,7 @@ def scenario_differences(mission: Mission, layers: FlightLayers, replica: Replic
     found = []
     brief = replica.brief
     if brief is not None and brief != mission_config_of(mission, layers, brief.run):
-        found.append("fleet, horizon or defaults")
+        found.append("fleet, horizon, defaults, bases, zones or wind")
     for number, task in enumerate(mission.tasks):
         entry = replica.posted.get(task.id)
         if entry is not None and replace(entry, withdrawn=False) != task_entry_of(task, number):
@@ -113,9 +136,22 @@ def scenario_differences(mission: Mission, layers: FlightLayers, replica: Replic
 
 
 def exit_status(board: TaskBoard, mission: Mission) -> int:
-    """0 if every task of ``mission`` has appeared and was done or withdrawn, else 1."""
-    done = all(s in (TaskState.DONE, TaskState.WITHDRAWN) for s in board.states.values())
-    return 0 if done and not unreleased_tasks(board.replica, mission) else 1
+    """0 if every task of ``mission`` has appeared and was done or withdrawn, else 1.
+
+    In the field a task may be left that has a time by which it is due, or that nobody could have
+    done even as its only one.
+    """
+    closed = {t for t, s in board.states.items() if s in (TaskState.DONE, TaskState.WITHDRAWN)}
+    to_come, problem = unreleased_tasks(board.replica, mission), board.field_problem
+    if problem is None:
+        return 0 if closed.issuperset(board.states) and not to_come else 1
+    if any(task.due_s is None for task in to_come):
+        return 1
+    ids = problem.task_ids
+    found = left_out(problem, [column for column, task in enumerate(ids) if task in closed])
+    required = {task for task, due in zip(ids, problem.required, strict=True) if due}
+    could = {task for task, why in found.items() if why is not LeftOut.NOBODY_CAN}
+    return 0 if required.isdisjoint(could) else 1
 
 
 def unreleased_tasks(replica: Replica, mission: Mission) -> list[Task]:

@@ -110,13 +110,16 @@ class StagedMission:
         self._announcer = announcer
         self._board = board
         self._timing = timing
+        self._keeps_epoch = False
+        """Whether it has been told that the first epoch stays in force."""
         self._leave_at_s: float | None = None
         """When it leaves a mission that has ended, unless agents are there then."""
 
     @property
     def asks_for(self) -> tuple[str, ...]:
         """What releases before this one cannot read of it, by the keys of a scenario file."""
-        return self._mission.constraints
+        asked = self._mission.constraints
+        return (*asked, "zone_margin_m") if self._mission.zone_margin_m else asked
 
     @property
     def is_over(self) -> bool:
@@ -137,7 +140,8 @@ class StagedMission:
             case MissionStage.RUNNING:
                 yield self.end_condition.next_deadline_s()
                 yield self._announcer.next_release_s()
-                yield self.replan_policy.next_deadline_s()
+                if self._board.field_problem is None:
+                    yield self.replan_policy.next_deadline_s()
             case MissionStage.ENDED:
                 yield self._leave_at_s
             case _:
@@ -158,12 +162,13 @@ class StagedMission:
         if self.stage is MissionStage.RUNNING:
             actions += self._announcer.post(now_s)
             more_to_come = self._announcer.more_to_come
-            reason = self.end_condition.reason(now_s, more_to_come=more_to_come)
+            mission_s = self._announcer.mission_s(now_s)
+            reason = self.end_condition.reason(now_s, mission_s, more_to_come=more_to_come)
             if reason is not None:
                 actions += self.end(reason, now_s)
         epoch = self._replica.epoch
         if self.stage is MissionStage.RUNNING and epoch is not None:
-            actions += self.replan_policy.pursue(lambda: self._situation(now_s), epoch, now_s)
+            actions += self._plan_anew(epoch, now_s)
         if not self.is_over:
             actions += self._announcer.repeat(now_s)
         return actions
@@ -200,7 +205,7 @@ class StagedMission:
         epoch, situation = self._replica.epoch, None
         if self.stage is MissionStage.RUNNING:
             situation = self._situation(now_s)
-        if epoch is None or situation is None:
+        if epoch is None or situation is None or self._board.field_problem is not None:
             self.replan_policy.drop()
             return []
         better = self.replan_policy.judge(replanned, situation, epoch, now_s)
@@ -244,6 +249,17 @@ class StagedMission:
         self.end_condition.settle()
         self._leave_at_s = now_s + self._timing.linger_s
         return self.replan_policy.stop()
+
+    def _plan_anew(self, epoch: PlanEpoch, now_s: float) -> list[CoordinatorAction]:
+        """Have the rest planned, if that is wanted; not yet where the field asks for more."""
+        if self._board.field_problem is None:
+            return self.replan_policy.pursue(lambda: self._situation(now_s), epoch, now_s)
+        if self._keeps_epoch:
+            return []
+        self._keeps_epoch = True
+        told: dict[str, object] = {"epoch": epoch.number}
+        told["because"] = "missions in the field are not planned anew in flight yet"
+        return [*self.replan_policy.stop(), LogLine("keeps its epoch", told)]
 
     def _start_if_ready(self, now_s: float) -> list[CoordinatorAction]:
         verdict, actions = self.gate.advance(now_s)

@@ -11,7 +11,7 @@ from coordinator.mission_view.results import lists_objective
 from coordinator.planner.bound import upper_bound
 from coordinator.planner.options import ShouldStop
 from swarm.allocation.problem import Problem
-from swarm.protocol.board import mission_of
+from swarm.protocol.board import is_of_field, mission_of
 from swarm.protocol.messages import MissionPhase
 from swarm.protocol.registers import Replica
 
@@ -51,6 +51,8 @@ def baseline_of(replica: Replica, name: str) -> Baseline | None:
     if not listed or not listed <= replica.board.keys():
         return None
     mission = mission_of(replica, name, brief)
+    if is_of_field(mission):  # its lists tell neither waiting nor visits to bases
+        return None
     tasks = [task for task in mission.tasks if task.id in listed]
     if len(tasks) != len(listed):
         return None

@@ -296,7 +296,9 @@ class Feed:
 
     def _look_at_progress(self, problem: Problem, mission_state: MissionState) -> None:
         before = [] if self._progress is None else self._progress.curve
-        self._progress = progress_of(problem, mission_state.replica.outcomes)
+        entries = mission_state.replica.board.values()
+        due_s = {entry.task: entry.due_s for entry in entries if entry.due_s is not None}
+        self._progress = progress_of(problem, mission_state.replica.outcomes, due_s)
         curve = self._progress.curve
         if curve[: len(before)] != before:
             # Somebody has told late of what was done early: the page draws it all again.

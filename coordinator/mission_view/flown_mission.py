@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from coordinator.mission_view.results import MissionResult, progress_of
+from coordinator.mission_view.results import MissionResult, dues_of, progress_of
 from swarm.allocation.objective import executed_objective
 from swarm.allocation.problem import Problem
-from swarm.model import Mission, Task, TaskId, UavId
-from swarm.protocol.board import TaskBoard, TaskState
+from swarm.model import Mission, TaskId, UavId
+from swarm.protocol.board import TaskBoard, TaskState, task_of
 from swarm.protocol.messages import TaskEdit
+from swarm.protocol.operator_commands import zone_edits, zones_in_force
 
 
 class FlownMission:
@@ -48,22 +49,20 @@ class FlownMission:
         self.complete()
 
     def complete(self) -> None:
-        """Put the tasks that the operator has ordered into the mission as it was given."""
+        """Put the operator's tasks and zones into the mission as it was given."""
         tasks = {task.id: task for task in self._given.tasks}
         for order in self._replica.task_orders.values():
             if self._replica.ordered(order.task) is not order:
                 continue
             known = tasks.get(TaskId(order.task))
             if known is None or not order.withdrawn:
-                tasks[TaskId(order.task)] = Task(
-                    TaskId(order.task),
-                    order.position_enu_m,
-                    order.value,
-                    order.service_s,
-                    order.kind,
-                    self._added_s.get(order.task, 0.0) if known is None else known.appears_s,
-                )
-        self._mission = replace(self._given, tasks=tuple(tasks.values()))
+                added_s = self._added_s.get(order.task, 0.0)
+                appears_s = added_s if known is None else known.appears_s
+                tasks[TaskId(order.task)] = replace(task_of(order), appears_s=appears_s)
+        zones = self._given.zones
+        if zone_edits(self._replica):
+            zones = tuple(spec.zone() for spec in zones_in_force(self._replica))
+        self._mission = replace(self._given, tasks=tuple(tasks.values()), zones=zones)
         self._problem = None
 
     def result(self, *, repeated_visits: int, lost: Sequence[UavId], epochs: int) -> MissionResult:
@@ -75,7 +74,8 @@ class FlownMission:
         if self._problem is None:
             self._problem = Problem.from_mission(mission)
         problem = self._problem
-        progress = progress_of(problem, self._replica.outcomes)
+        due_s = dues_of(mission)
+        progress = progress_of(problem, self._replica.outcomes, due_s)
         index = {str(task): number for number, task in enumerate(problem.task_ids)}
         rows = {str(uav): number for number, uav in enumerate(problem.uav_ids)}
         nobody = "", float("nan")
@@ -85,6 +85,7 @@ class FlownMission:
             [[index[task] for task in route] for route in progress.flown.values()],
             [completed_s for _, completed_s in first],
             [rows.get(uav, -1) for uav, _ in first],
+            [due_s.get(task, problem.horizon_s) for task in problem.task_ids],
         )
         done = {
             task: (UavId(uav), completed_s)

@@ -30,6 +30,7 @@ from swarm.protocol.events import (
     PeerSeen,
     SnapshotsReceived,
 )
+from swarm.protocol.field_messages import ZoneEdit
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import (
     REVOKED_INCARNATION,
@@ -283,7 +284,9 @@ class MissionState:
                     return
             case TaskEdit() as edit:
                 self._flown.edit(edit, max(0.0, self.mission_s(now_s) or 0.0))
-            case MissionConfig() if self.replica.task_orders:
+            case ZoneEdit():
+                self._flown.complete()
+            case MissionConfig() if self.replica.task_orders or self.replica.zone_edits:
                 self._flown.complete()
             case _:
                 pass

@@ -17,9 +17,11 @@ from coordinator.mission_view.wording import (
     entry_in_words,
     listed,
     order_in_words,
+    zone_in_words,
 )
 from swarm.model import Mission
 from swarm.protocol.board import TaskBoard, TaskState
+from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import (
     CommandKind,
@@ -31,7 +33,7 @@ from swarm.protocol.messages import (
     TaskEdit,
     TaskEntry,
 )
-from swarm.protocol.operator_commands import dispensable, in_force
+from swarm.protocol.operator_commands import dispensable, in_force, readiness, zone_edits
 from swarm.protocol.uav_messages import (
     AttemptResult,
     Choice,
@@ -132,6 +134,11 @@ class MissionNarrator:
                 self._hear_edit(body, now_s)
             case StartWithout() if body.uav in dispensable(self._replica):
                 text = f"operator does not wait for {body.uav} to start{because(body.reason)}"
+                self.tell(EventKind.COMMAND, text, now_s, uavs=[body.uav])
+            case ZoneEdit() if body in zone_edits(self._replica).values():
+                self.tell(EventKind.COMMAND, zone_in_words(body), now_s)
+            case UavReady() if body.uav in readiness(self._replica):
+                text = f"operator lets {body.uav} start again{because(body.reason)}"
                 self.tell(EventKind.COMMAND, text, now_s, uavs=[body.uav])
             case _:
                 pass

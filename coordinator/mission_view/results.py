@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from types import MappingProxyType
 
 from coordinator.mission_view.wording import counted, listed, shown_s
 from swarm.allocation.objective import evaluate
@@ -90,12 +91,22 @@ def lists_objective(problem: Problem, lists: Mapping[str, Sequence[str]]) -> flo
     return evaluate(problem, routes)[0] if len(set(listed)) == len(listed) else None
 
 
-def progress_of(problem: Problem, outcomes: Mapping[tuple[str, str], Outcome]) -> Progress:
+def dues_of(mission: Mission) -> dict[str, float]:
+    """Task -> when it is due [s mission time], of those that are before the horizon."""
+    return {task.id: task.due_s for task in mission.tasks if task.due_s is not None}
+
+
+def progress_of(
+    problem: Problem,
+    outcomes: Mapping[tuple[str, str], Outcome],
+    due_s: Mapping[str, float] = MappingProxyType({}),
+) -> Progress:
     """Eq. 1 along the visits, in the order in which they ended.
 
     Args:
         problem: the mission, with every task that may have been done.
         outcomes: newest of each UAV at each task.
+        due_s: of tasks that are due before the horizon [s mission time].
 
     Returns:
         Lists and times of the `MissionResult`, and the same J but for the order of its sum.
@@ -119,7 +130,7 @@ def progress_of(problem: Problem, outcomes: Mapping[tuple[str, str], Outcome]) -
         flown[uav].append(task)
         if task not in completed:
             completed[task] = uav, completed_s
-            left_s = problem.horizon_s - completed_s
+            left_s = due_s.get(task, problem.horizon_s) - completed_s
             objective += survived[uav] * float(problem.weight[at]) * left_s
             curve.append((completed_s, objective))
         survived[uav] *= float(problem.survival[at])

@@ -113,6 +113,8 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
     problem = mission_state.board.problem
     if plan is not None:
         planned_objective: float | None = plan.objective
+    elif mission_state.board.field_problem is not None:
+        planned_objective = None  # its lists tell neither waiting nor visits to bases
     elif problem is not None and epoch is not None and any(epoch.routes.values()):
         planned_objective = lists_objective(problem, epoch.routes)
     else:

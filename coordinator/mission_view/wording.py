@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from swarm.model.ids import FLEET
 from swarm.protocol.board import claim_strength
+from swarm.protocol.field_messages import ZoneEdit
 from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit, TaskEntry
 from swarm.protocol.operator_commands import describe_command
 from swarm.protocol.uav_messages import Choice, Claim, ClaimPhase
@@ -92,6 +93,14 @@ def command_in_words(command: OperatorCommand) -> str:
     return f"{whom} {describe_command(command)}"
 
 
+def zone_in_words(edit: ZoneEdit) -> str:
+    """What the operator does to a zone, and why."""
+    if edit.withdrawn:
+        return f"operator takes zone {edit.zone.id} away{because(edit.reason)}"
+    keeps = "keeps the fleet inside" if edit.zone.inclusive else "draws"
+    return f"operator {keeps} zone {edit.zone.id}{because(edit.reason)}"
+
+
 def seconds_in_words(time_s: float) -> str:
     """A duration, or a moment of mission time."""
     return f"{shown_s(time_s)} s"
@@ -149,7 +158,22 @@ def entry_in_words(entry: TaskEntry | TaskEdit) -> str:
     service = f", service {seconds_in_words(entry.service_s)}" if entry.service_s else ""
     kind = f", kind {entry.kind}" if entry.kind else ""
     where = place_in_words(entry.position_enu_m)
-    return f"value {value_in_words(entry.value)}, {where}{service}{kind}"
+    if entry.path_enu_m:
+        where = f"a line of {len(entry.path_enu_m)} points from {where}"
+    limits = _limits_in_words(entry)
+    return f"value {value_in_words(entry.value)}, {where}{service}{kind}{limits}"
+
+
+def _limits_in_words(entry: TaskEntry | TaskEdit) -> str:
+    """When a task may be done, and how high it is flown; empty if it does not say."""
+    opens_s, closes_s, due_s = entry.opens_s, entry.closes_s, entry.due_s
+    parts = [
+        f", opens at {seconds_in_words(opens_s)}" if opens_s else "",
+        "" if closes_s is None else f", closes at {seconds_in_words(closes_s)}",
+        "" if due_s is None else f", due by {seconds_in_words(due_s)}",
+        "" if entry.height_m is None else f", {entry.height_m:.4g} m high",
+    ]
+    return "".join(parts)
 
 
 def contest_in_words(winner: tuple[str, Claim], loser: tuple[str, Claim]) -> str:

@@ -14,7 +14,7 @@ from rich.text import Text
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import MissionObserver
 from coordinator.mission_view.presentation import BAD
-from coordinator.mission_view.results import progress_of
+from coordinator.mission_view.results import dues_of, progress_of
 from coordinator.mission_view.story import EventKind, MissionEvent
 from coordinator.mission_view.wording import clean, listed, seconds_in_words, shown_value
 from coordinator.recording.reader import Recording
@@ -198,7 +198,8 @@ def _worths(mission_state: MissionState) -> dict[str, tuple[str, float, float]]:
     problem = mission_state.board.problem
     if problem is None:
         return {}
-    progress = progress_of(problem, mission_state.replica.outcomes)
+    due_s = dues_of(mission_state.mission)
+    progress = progress_of(problem, mission_state.replica.outcomes, due_s)
     worths = progress.worths
     return {task: (*by_at, worths[task]) for task, by_at in progress.completed.items()}
 

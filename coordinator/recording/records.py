@@ -26,6 +26,7 @@ from swarm.protocol.events import (
     SnapshotsReceived,
     Tick,
 )
+from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.fields import Count, Flag, Id, Instant
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import (
@@ -57,6 +58,8 @@ _BODIES: Final[dict[str, type[Body]]] = {
     "Command": OperatorCommand,
     "TaskOrder": TaskEdit,
     "StartWithout": StartWithout,
+    "Zone": ZoneEdit,
+    "Ready": UavReady,
     "SignedRoster": SignedRoster,
 }
 """By the second part of their schemas' names, which files keep whatever the classes are called."""
@@ -328,6 +331,8 @@ def _topic(message: Message) -> str:
     key = f"/{message.key}"
     match message.body:
         case TaskEntry() | Outcome() | TaskEdit() | OperatorCommand() | StartWithout():
+            return key.rpartition("/")[0]
+        case ZoneEdit() | UavReady():
             return key.rpartition("/")[0]
         case _:
             return key

@@ -50,6 +50,7 @@ def executed_objective(
     routes: Sequence[Sequence[int]],
     completion_s: npt.ArrayLike,
     done_by: npt.ArrayLike | None = None,
+    until_s: npt.ArrayLike | None = None,
 ) -> float:
     """Eq. 1 with the completion times that came about.
 
@@ -60,11 +61,14 @@ def executed_objective(
         completion_s: (n_task,) real completion times [s]; NaN for tasks not done, which count 0.
         done_by: (n_task,) index of the UAV whose visit counts, where several visited one task;
             the first list that names the task when left out.
+        until_s: (n_task,) what completions are subtracted from, where tasks are due before D [s];
+            D for all when left out.
 
     Raises:
         ValueError: a list too many or too few, an unknown task, or a wrong shape.
     """
     _require_lists(problem, routes)
+    until = np.full(problem.n_task, problem.horizon_s) if until_s is None else np.asarray(until_s)
     times_s = np.asarray(completion_s, dtype=np.float64)
     if times_s.shape != (problem.n_task,):
         raise ValueError(f"completion_s must have shape {(problem.n_task,)}, not {times_s.shape}")
@@ -76,7 +80,7 @@ def executed_objective(
         for task in route:
             if not counted[task] and (by is None or by[task] == uav):
                 counted[task] = True
-                left_s = problem.horizon_s - times_s[task]
+                left_s = until[task] - times_s[task]
                 objective += survived * problem.weight[uav, task] * left_s
             survived *= problem.survival[uav, task]
     return float(objective)

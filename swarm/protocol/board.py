@@ -22,7 +22,7 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.protocol.encoding import FIELD_DEFAULTS
 from swarm.protocol.field_messages import ZoneSpec
-from swarm.protocol.messages import MissionConfig, TaskEntry, UavSpec
+from swarm.protocol.messages import MissionConfig, PostedTask, TaskEntry, UavSpec
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
@@ -205,7 +205,7 @@ class TaskBoard:
         self._sort()
         for entry in self._entries:
             if (known := self._tasks.get(entry.task)) is None or known[0] is not entry:
-                self._tasks[entry.task] = entry, _task_of(entry)
+                self._tasks[entry.task] = entry, task_of(entry)
                 limited = any(
                     getattr(entry, name) != default for name, default in _UNLIMITED.items()
                 )
@@ -256,7 +256,7 @@ def mission_of(replica: Replica, name: str, brief: MissionConfig) -> Mission:
     """The mission as the board shows it now: all posted tasks, in board order, zones in force."""
     entries = sorted(replica.board.values(), key=_order)
     zones = zones_in_force(replica) if replica.brief is brief else brief.zones
-    return _mission(name, brief, map(_uav_of, brief.uavs), map(_task_of, entries), zones)
+    return _mission(name, brief, map(_uav_of, brief.uavs), map(task_of, entries), zones)
 
 
 def _mission(
@@ -299,7 +299,8 @@ def _uav_of(entry: UavSpec) -> Uav:
     )
 
 
-def _task_of(entry: TaskEntry) -> Task:
+def task_of(entry: PostedTask) -> Task:
+    """The task that ``entry`` tells of, as missions have it."""
     return Task(
         id=TaskId(entry.task),
         position_enu_m=entry.position_enu_m,

@@ -158,7 +158,7 @@ class Claim(Checked):
     def __post_init__(self) -> None:
         if self.handed_over and self.phase is not ClaimPhase.OUT:
             raise ValueError(f"handed over, but {self.phase}")
-        taken = self.phase in (ClaimPhase.PROPOSED, ClaimPhase.HELD)
+        taken = self.is_taken
         if taken and self.task is None and self.base is None:
             raise ValueError(f"a claim that is {self.phase} names nothing")
         if not taken and self.task is not None:
@@ -173,6 +173,11 @@ class Claim(Checked):
             raise ValueError("reversed, but no task")
         if self.departs_s is not None and (self.task is None or self.base is None):
             raise ValueError("departs from a base to a task, but lacks one of them")
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether the UAV is at something, or about to be."""
+        return self.phase in (ClaimPhase.PROPOSED, ClaimPhase.HELD)
 
 
 class AttemptResult(StrEnum):

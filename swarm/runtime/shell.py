@@ -367,8 +367,8 @@ def join_mission(
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
     Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
-    ``operator/*``, ``operator/task/*`` and ``operator/start/*``, where there are keys ``roster``,
-    watches ``alive/*``.
+    ``operator/*``, ``operator/task/*``, ``operator/start/*``, ``operator/zone/*`` and
+    ``operator/ready/*``, where there are keys ``roster``, watches ``alive/*``.
 
     Args:
         bus: an open bus.
@@ -388,6 +388,8 @@ def join_mission(
         keys.operator("*"),
         keys.operator_task("*"),
         keys.operator_start("*"),
+        keys.operator_zone("*"),
+        keys.operator_ready("*"),
     ):
         bus.subscribe(key_expr)
     if status:

@@ -78,13 +78,11 @@ holed = st.tuples(
     st.just((((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)), ((5.0, 5.0), (6.0, 5.0), (6.0, 6.0)))),
 )
 zones = st.builds(
-    lambda rings, floor_m, ceiling_m, name, inclusive: ZoneSpec(
-        name, *rings, floor_m, ceiling_m, inclusive
-    ),
+    lambda name, rings, *more: ZoneSpec(name, rings[0], rings[1], *more),
+    ids,
     rings.map(lambda ring: (ring, ())) | holed,
     st.none() | st.floats(-1e6, 0.0),
     st.none() | st.floats(1.0, 1e6),
-    ids,
     st.booleans(),
 )
 origins = st.tuples(st.floats(-89, 89), st.floats(-180, 180), numbers)
