@@ -11,7 +11,7 @@ from rich.text import Text
 
 from coordinator.planner.schedule_report import SCHEDULE_COLUMNS, around, flown, reasons
 from swarm.model import Mission, Plan, TaskId, Uav, UavId
-from swarm.model.plan import LeftOut, ScheduleEntry
+from swarm.model.plan import LeftOut, Schedule, ScheduleEntry
 from swarm.runtime.table import NONE, Column, ResultTable
 
 _LATE = "bold red"
@@ -39,10 +39,7 @@ def plan_as_json(plan: Plan) -> dict[str, object]:
         "basis": plan.basis,
     }
     if plan.schedule is not None:
-        said["schedule"] = {
-            uav: [_entry_as_json(entry) for entry in entries]
-            for uav, entries in plan.schedule.items()
-        }
+        said["schedule"] = schedule_as_json(plan.schedule)
         said["left_out"] = {task: reason.value for task, reason in plan.left_out.items()}
         said["required_left_out"] = plan.required_left_out
         said["fewest_left_out"] = plan.fewest_left_out
@@ -69,6 +66,11 @@ def plan_from_json(said: Mapping[str, Any]) -> Plan:
         required_left_out=said.get("required_left_out", 0),
         fewest_left_out=said.get("fewest_left_out"),
     )
+
+
+def schedule_as_json(schedule: Schedule) -> dict[str, object]:
+    """Lists by UAV as JSON-ready values, of a plan or of what was flown."""
+    return {uav: [_entry_as_json(entry) for entry in entries] for uav, entries in schedule.items()}
 
 
 def _entry_as_json(entry: ScheduleEntry) -> dict[str, object]:

@@ -28,8 +28,9 @@ from coordinator.mission_view.results import (
 )
 from coordinator.mission_view.story import MissionEvent, notable
 from coordinator.mission_view.wording import clean, shown_s, shown_value
-from coordinator.planner.plan_report import plan_as_json
+from coordinator.planner.plan_report import plan_as_json, schedule_as_json
 from swarm.model import Mission, Plan, UavId
+from swarm.model.plan import Schedule
 from swarm.runtime.errors import Fault, InputError
 
 REPORT_SUFFIXES = (".json", ".md")
@@ -68,6 +69,10 @@ class MissionReport:
     """What was flown is worth by what was drawn in a simulation [value·s]; None if unknown."""
     security: ProtectionSummary | None = None
     """What protected it; None if nothing did, or nothing had to."""
+    executed_schedule: Schedule = field(default_factory=dict)
+    """Where UAVs really went, and when, as far as that is known."""
+    closest_approach_m: float | None = None
+    """Least distance of two UAVs in the air [m]; None of a single one, or if it is not known."""
     hint: str = _HINT
     """How to get more; the last line of `render`."""
 
@@ -87,6 +92,8 @@ class MissionReport:
             "executed_routes": {uav: list(tasks) for uav, tasks in result.executed_routes.items()},
             "executed_completion_s": dict(result.executed_completion_s),
             "executed_objective": result.executed_objective,
+            "executed_schedule": schedule_as_json(self.executed_schedule),
+            "closest_approach_m": self.closest_approach_m,
             "done": list(result.done),
             "failed": list(result.failed),
             "open": list(result.open),

@@ -125,6 +125,8 @@ def simulate(
             story=tuple(flown.world.mission_state.story),
             lost_because=flown.lost_because,
             value=flown.value,
+            executed_schedule=flown.world.executed_schedule(),
+            closest_approach_m=flown.world.closest_approach_m(),
         )
         return print_report(told, json=json, report=report)
 
@@ -153,7 +155,12 @@ def _fly_with_faults(
         typer.echo(f"broken: {verdict.broken}", err=True)
     state = verdict.world.mission_state
     told = MissionReport(
-        mission=state.mission, plan=state.plan, result=state.result(), story=tuple(state.story)
+        mission=state.mission,
+        plan=state.plan,
+        result=state.result(),
+        story=tuple(state.story),
+        executed_schedule=verdict.world.executed_schedule(),
+        closest_approach_m=verdict.world.closest_approach_m(),
     )
     return told, verdict.broken is not None
 

@@ -75,9 +75,8 @@ def _nearest(
     """Least distance [m] of two that are there at the same time, and when [s]."""
     begin_s = np.array([begin for _, _, begin, _ in common])
     lasts_s = np.array([0.0 if end == math.inf else end - begin for _, _, begin, end in common])
-    place, velocity, acceleration = (
-        _motion([mine for mine, _, _, _ in common], begin_s)
-        - _motion([its for _, its, _, _ in common], begin_s)
+    place, velocity, acceleration = _motion([mine for mine, _, _, _ in common], begin_s) - _motion(
+        [its for _, its, _, _ in common], begin_s
     )
     # d² = |p + v t + a t²/2|², its slope half: p·v + (v² + p·a) t + 1.5 v·a t² + a²/2 t³.
     slope = np.stack(

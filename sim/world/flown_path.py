@@ -5,7 +5,7 @@ Leaves out: how long it takes (swarm.allocation.legs.flight).
 
 from __future__ import annotations
 
-import math
+import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -76,6 +76,10 @@ class FlownPath:
         ends = (motion.start_enu_m, motion.target_enu_m)
         return cls(ends, (0.0, 1.0), duration_s, motion.ramps)
 
+    def lasting(self, duration_s: float) -> FlownPath:
+        """The same way in another time."""
+        return replace(self, duration_s=duration_s)
+
     def share(self, at_s: float) -> float:
         """What share of the way is flown after a time."""
         if at_s >= self.duration_s:
@@ -108,7 +112,7 @@ class FlownPath:
             return []
         cuts_s = sorted({0.0, self.duration_s, *self._ramp_ends_s(), *self._corners_s()})
         pieces = []
-        for begin_s, end_s in zip(cuts_s, cuts_s[1:], strict=False):
+        for begin_s, end_s in itertools.pairwise(cuts_s):
             if end_s - begin_s <= _LEAST_S:
                 continue
             middle_s = 0.5 * (begin_s + end_s)

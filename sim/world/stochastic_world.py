@@ -19,6 +19,8 @@ from agent.core.agent_core import AgentCore
 from agent.core.interface import GoTo, VehicleReport
 from coordinator.mission_view.mission_state import MissionState
 from sim.world.engine import EventQueue, Process
+from sim.world.field_paths import FieldPaths
+from sim.world.field_vehicle import FieldVehicle
 from sim.world.motion import flown_s
 from sim.world.network import IdealNetwork, Network, NetworkConditions, Topology
 from sim.world.outcome import Tally
@@ -26,10 +28,16 @@ from sim.world.rough_network import RoughNetwork
 from sim.world.scripted_operator import ScriptedOperator
 from sim.world.settings import QUIET, Planner, WorldSettings
 from sim.world.uncertainty import FleetPartition, Realization, Uncertainty
-from sim.world.vehicles import IdealVehicle, SimulatedVehicle, StochasticVehicle
+from sim.world.vehicles import (
+    IdealVehicle,
+    SimulatedVehicle,
+    StochasticVehicle,
+    VehicleFactory,
+)
 from sim.world.virtual_world import World
 from swarm.model import Mission, Task, Uav, UavId
 from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.messages import Message, MissionPhase, PlanEpoch
 from swarm.protocol.timing import PRESETS, LinkKind, LinkPreset, Timing
@@ -105,7 +113,7 @@ class StochasticWorld:
             setting=WorldSettings(
                 network=partial(_network, fate),
                 start_timeout_s=_START_S,
-                vehicle=partial(_vehicle, fate),
+                vehicle=_vehicles(fate),
                 agent=make_agent,
                 observer=lambda mission_state: (
                     mission_state if make_observer is None else make_observer(mission_state, timing)
@@ -113,6 +121,7 @@ class StochasticWorld:
             ),
             watch=self,
         )
+        self.world.when_fallen = self._fall
 
     def run(self) -> bool:
         """Fly the mission; False if it had to be broken off, since somebody waits for ever."""
@@ -169,6 +178,10 @@ class StochasticWorld:
         if not self.world.processes[uav].over:
             self.lost[uav] = why
             self.world.lose(uav)
+
+    def _fall(self, uav: str) -> None:
+        at_s = self.world.queue.now_s() - (self.world.zero_s or 0.0)
+        self.lost[UavId(uav)] = f"fell at {at_s:.4g} s with an empty battery"
 
     def _lose_coordinator(self) -> None:
         """It dies, but not before anybody has heard that the mission has begun."""
@@ -241,14 +254,36 @@ def _last_change_s(mission: Mission, fate: Realization) -> float:
     return max([*appear_s, *fate.withdrawn_at_s.values()], default=-1.0)
 
 
+def _vehicles(fate: Realization) -> VehicleFactory:
+    if PLAIN_CONSTRAINTS.issuperset(fate.mission.constraints):
+        return partial(_vehicle, fate)
+    return partial(_field_vehicle, fate, FieldPaths(fate.mission))
+
+
+def _field_vehicle(
+    fate: Realization,
+    paths: FieldPaths,
+    queue: EventQueue,
+    uav: str,
+    report: Callable[[VehicleReport], None],
+) -> SimulatedVehicle:
+    takeoff_s = 0.0 if fate.uncertainty.ideal_communication else _TAKEOFF_S
+    return FieldVehicle(queue, uav, report, paths, takeoff_s, fate if _troubled(fate) else None)
+
+
+def _troubled(fate: Realization) -> bool:
+    """Whether anything can happen to a vehicle but its loss."""
+    what = fate.uncertainty
+    troubles = what.speed_sd_frac, what.leg_sd_frac, what.wind_m_s, what.position_error_m
+    return what.outcomes or any(troubles)
+
+
 def _vehicle(
     fate: Realization, queue: EventQueue, uav: str, report: Callable[[VehicleReport], None]
 ) -> SimulatedVehicle:
     """An ideal one where nothing can happen to it."""
-    what = fate.uncertainty
-    troubles = what.speed_sd_frac, what.leg_sd_frac, what.wind_m_s, what.position_error_m
-    takeoff_s = 0.0 if what.ideal_communication else _TAKEOFF_S
-    if not (what.outcomes or any(troubles)):
+    takeoff_s = 0.0 if fate.uncertainty.ideal_communication else _TAKEOFF_S
+    if not _troubled(fate):
         return IdealVehicle(queue, report, takeoff_s)
     return StochasticVehicle(queue, uav, report, fate, takeoff_s)
 

@@ -78,9 +78,7 @@ class Track:
             self._pieces[-1] = replace(self._pieces[-1], end_s=at_s)
 
 
-def drifting(
-    pieces: Iterable[MotionPiece], before_m: Point, after_m: Point
-) -> list[MotionPiece]:
+def drifting(pieces: Iterable[MotionPiece], before_m: Point, after_m: Point) -> list[MotionPiece]:
     """``pieces`` as flown by one that is ``before_m`` beside them first and ``after_m`` in the end.
 
     The offset changes evenly from the beginning of the first to the end of the last.

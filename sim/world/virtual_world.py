@@ -8,6 +8,7 @@ network on which more goes wrong, and clocks that disagree.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -37,7 +38,10 @@ from coordinator.core.standby import StandbyCore
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.operator.commands import CommandRequest
 from coordinator.operator.requests import OperatorClient, OperatorRequest
+from sim.world.closest_approach import closest_approach
 from sim.world.engine import EventQueue, LocalClock, Process
+from sim.world.field_vehicle import FieldVehicle
+from sim.world.flight_log import FlightLog
 from sim.world.network import IdealNetwork
 from sim.world.settings import (
     QUIET,
@@ -47,13 +51,16 @@ from sim.world.settings import (
     WorldListener,
     WorldSettings,
 )
+from sim.world.track import Track
 from sim.world.vehicles import IdealVehicle, SimulatedVehicle
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.model.layers import FlightLayers
+from swarm.model.plan import Schedule
 from swarm.protocol.events import Ask, Finish, LogLine, Publish, PublishLast, Save
 from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.timing import Timing
+from swarm.protocol.uav_messages import Outcome
 from swarm.runtime.shell import Core
 
 ONLOOKER = "onlooker"
@@ -122,6 +129,14 @@ class World:
         """The latest life of every process, by name."""
         self.operators: list[OperatorClient] = []
         """Every command given so far, and what has come of it."""
+        self.fallen_s: dict[str, float] = {}
+        """UAVs that fell out of the sky with an empty battery, and when [s virtual time]."""
+        self.when_fallen: Callable[[str], None] = lambda _: None
+        """Is told of each of them."""
+        self.tracks: dict[str, Track] = {}
+        """Where vehicles truly were, those that are lost included; bridged ones have none."""
+        self.flight_log = FlightLog(mission, self.tracks)
+        """What they did."""
         self._vehicles = {str(uav.id): self._vehicle(uav.id) for uav in mission.uavs}
         self._commanders: dict[str, Process] = {}
 
@@ -145,12 +160,22 @@ class World:
         cores = {name: process.core for name, process in self.processes.items()}
         return {name: core for name, core in cores.items() if isinstance(core, AgentCore)}
 
+    def executed_schedule(self) -> Schedule:
+        """Where UAVs went, when, and what they did there, in mission time."""
+        return self.flight_log.executed_schedule(self.zero_s)
+
+    def closest_approach_m(self) -> float | None:
+        """Least distance of two UAVs while both were in the air [m]; None if never two were."""
+        nearest = closest_approach(self.tracks)
+        return None if nearest is None else nearest.distance_m
+
     # -- what befalls processes -------------------------------------------------------
 
     def lose(self, name: str) -> None:
         """A process disappears, and with it the vehicle it flies."""
         self.crash(name)
-        self._vehicles.pop(name, None)
+        if self._vehicles.pop(name, None) is not None and name in self.tracks:
+            self.tracks[name].touch_down(self.queue.now_s())
 
     def crash(self, name: str) -> None:
         """A process dies; its vehicle flies on."""
@@ -174,8 +199,14 @@ class World:
     def slow(self, uav: str, speed_frac: float) -> None:
         """Let an ideal vehicle fly at that share of its speed, from its next order on."""
         vehicle = self._vehicles.get(uav)
-        if isinstance(vehicle, IdealVehicle):
+        if isinstance(vehicle, IdealVehicle | FieldVehicle):
             vehicle.speed_frac = speed_frac
+
+    def drain(self, uav: str, drain: float) -> None:
+        """Let the battery of a simulated vehicle drain so much faster than planned."""
+        vehicle = self._vehicles.get(uav)
+        if isinstance(vehicle, FieldVehicle):
+            vehicle.drain_by(drain)
 
     def withdraw(self, task: str) -> None:
         """Take a task off the board, as an operator would ask every coordinator there is."""
@@ -277,7 +308,13 @@ class World:
         running = isinstance(message.body, PlanEpoch) and message.body.phase is MissionPhase.RUNNING
         if running and self.zero_s is None:
             self.zero_s = self.queue.now_s()
+            for vehicle in self._vehicles.values():
+                if isinstance(vehicle, FieldVehicle):
+                    vehicle.begin_mission()
             self._schedule_faults(self.zero_s)
+        if isinstance(message.body, Outcome) and message.writer == process.name:
+            ended, times_s = message.body, (self.queue.now_s(), self.zero_s or 0.0)
+            self.flight_log.attempt_ended(process.name, ended.task, ended.attempt, *times_s)
         self.network.publish(process, message)
         if self._watch is not None:
             self._watch.said(process, message)
@@ -291,16 +328,31 @@ class World:
             self.queue.after(0.0, lambda: process.step(refused))
             return
         self._commanders[process.name] = process
+        telemetry = vehicle.telemetry()
+        place_enu_m = None if telemetry is None else telemetry.position_enu_m
+        self.flight_log.ordered(process.name, order, place_enu_m, self.queue.now_s())
         vehicle.order(order, VehicleReady())
 
     def _vehicle(self, uav: str) -> SimulatedVehicle:
         def report(news: VehicleReport) -> None:
+            self.flight_log.reported(uav, news, self.queue.now_s())
             # A process that starts anew knows nothing of what an earlier one had ordered.
             commander = self._commanders.get(uav)
             if uav in self._vehicles and commander is self.processes[uav]:
                 commander.step(news)
 
-        return self._setting.vehicle(self.queue, uav, report)
+        vehicle = self._setting.vehicle(self.queue, uav, report)
+        if isinstance(vehicle, IdealVehicle | FieldVehicle):
+            self.tracks[uav] = vehicle.track
+        if isinstance(vehicle, FieldVehicle):
+            vehicle.when_empty = partial(self._fall, uav)
+        return vehicle
+
+    def _fall(self, uav: str) -> None:
+        """Its battery is empty in the air: it is lost."""
+        self.fallen_s[uav] = self.queue.now_s()
+        self.when_fallen(uav)
+        self.lose(uav)
 
     def _telemetry(self, uav: str) -> Telemetry | None:
         return self._vehicles[uav].telemetry()

@@ -70,6 +70,10 @@ class LeftOut(Enum):
     ENERGY = "energy"
 
 
+Schedule = Mapping[UavId, tuple[ScheduleEntry, ...]]
+"""Per UAV in the order of flight."""
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
     """The result of planning one mission."""

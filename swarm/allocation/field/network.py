@@ -57,7 +57,7 @@ class FieldNetwork:
         kind = []
         self._kinds: list[tuple[FlightModel, LegNetwork]] = []
         for uav, layer_m in zip(uavs, self._layers_m, strict=True):
-            model = _model(uav, mission.wind_enu_m_s)
+            model = flight_model(uav, mission.wind_enu_m_s)
             low_m, high_m = self._heights_m(layer_m)
             sides = self._sides(low_m, high_m)
             if sides not in networks:
@@ -209,7 +209,8 @@ def _points(task: Task) -> list[tuple[float, float, float]]:
     return [(east_m, north_m, task.height_m) for east_m, north_m, _ in points]
 
 
-def _model(uav: Uav, wind_enu_m_s: tuple[float, float]) -> FlightModel:
+def flight_model(uav: Uav, wind_enu_m_s: tuple[float, float]) -> FlightModel:
+    """How ``uav`` flies in that wind [m/s; east, north]."""
     airspeed_m_s, speed_m_s = uav.airspeed_m_s, uav.speed_m_s
     if airspeed_m_s is None:
         return FlightModel(speed_m_s, uav.acceleration_m_s2)
