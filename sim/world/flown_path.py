@@ -110,11 +110,12 @@ class FlownPath:
         """What it is made of, if it is begun at ``leaves_s``."""
         if self.duration_s <= 0.0:
             return []
-        cuts_s = sorted({0.0, self.duration_s, *self._ramp_ends_s(), *self._corners_s()})
+        cuts_s = [0.0]
+        for cut_s in sorted((*self._ramp_ends_s(), *self._corners_s())):
+            if cuts_s[-1] + _LEAST_S < cut_s < self.duration_s - _LEAST_S:
+                cuts_s.append(cut_s)
         pieces = []
-        for begin_s, end_s in itertools.pairwise(cuts_s):
-            if end_s - begin_s <= _LEAST_S:
-                continue
+        for begin_s, end_s in itertools.pairwise([*cuts_s, self.duration_s]):
             middle_s = 0.5 * (begin_s + end_s)
             number = self._piece_at(self.share(middle_s))
             rate_per_s, change_per_s2 = self._rates(middle_s)
