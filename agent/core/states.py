@@ -27,6 +27,11 @@ class AgentState(Enum):
     IDLE = "is free: decides, or has found nothing to do"
     FLYING = "flies to the task that it claims"
     SERVING = "is at the task that it claims, until the service is over"
+    FLYING_TO_BASE = "flies to the base that it claims"
+    ABOVE_BASE = "waits above the base that it claims, until a slot is free"
+    SWAPPING = "is on a slot of the base that it claims, until its battery is full"
+    READY_ON_GROUND = "stands at a base with a full battery, and is free"
+    DEPARTING = "stands at a base until it is to take off for the task that it claims"
     PAUSED = "stopped by the operator; takes part again when told to resume"
     PAUSED_HOMEBOUND = "stopped by the operator; all that is left to do is to fly home"
     RETURNING_VIA_START = "flies to its start in its own layer, then returns to launch and lands"
@@ -45,9 +50,14 @@ class Trigger(Enum):
     VEHICLE_READY = "the vehicle is in the air and takes targets"
     DECIDED = "it has chosen a task"
     DIVERTED = "it has chosen a better task on the way to one"
-    ARRIVED = "the vehicle is at the task"
+    BASE_CHOSEN = "it has chosen a base"
+    ARRIVED = "the vehicle is at the task, or above the base"
     SERVED = "the service is over, the attempt done or failed"
-    CLAIM_LOST = "the task is over, somebody else's, or refused by the vehicle"
+    SLOT_FREE = "the base has a slot for it: it lands"
+    SWAPPED = "its battery is full"
+    DEPARTED = "it takes off for the task that it claims"
+    STANDS_AT_BASE = "it stands at a base still: by an earlier life, a hold, or an order refused"
+    CLAIM_LOST = "the task or base is no more to be had, somebody else's, or refused by the vehicle"
     HOLD = "the operator stops it"
     RESUME = "the operator lets it go on"
     MISSION_OVER = "the mission has ended while the operator holds it"
@@ -81,7 +91,11 @@ _GOING_HOME: Final[Mapping[Trigger, AgentState]] = {
 }
 
 TRANSITIONS: Final[Mapping[AgentState, Mapping[Trigger, AgentState]]] = {
-    _S.SYNCING: {**_TAKING_PART, _T.SYNCED: _S.PREPARING},
+    _S.SYNCING: {
+        **_TAKING_PART,
+        _T.SYNCED: _S.PREPARING,
+        _T.STANDS_AT_BASE: _S.SWAPPING,
+    },
     _S.PREPARING: {
         **_TAKING_PART,
         _T.CLAIM_RECOVERED: _S.RESUMING,
@@ -89,17 +103,37 @@ TRANSITIONS: Final[Mapping[AgentState, Mapping[Trigger, AgentState]]] = {
     },
     _S.RESUMING: {**_TAKING_PART, _T.VEHICLE_READY: _S.FLYING, _T.CLAIM_LOST: _S.WAITING},
     _S.WAITING: {**_TAKING_PART, _T.VEHICLE_READY: _S.IDLE},
-    _S.IDLE: {**_TAKING_PART, _T.DECIDED: _S.FLYING},
+    _S.IDLE: {**_TAKING_PART, _T.DECIDED: _S.FLYING, _T.BASE_CHOSEN: _S.FLYING_TO_BASE},
     _S.FLYING: {
         **_TAKING_PART,
         _T.ARRIVED: _S.SERVING,
         _T.DIVERTED: _S.FLYING,
         _T.CLAIM_LOST: _S.IDLE,
+        _T.STANDS_AT_BASE: _S.SWAPPING,
     },
     _S.SERVING: {**_TAKING_PART, _T.SERVED: _S.IDLE, _T.CLAIM_LOST: _S.IDLE},
+    _S.FLYING_TO_BASE: {
+        **_TAKING_PART,
+        _T.ARRIVED: _S.ABOVE_BASE,
+        _T.CLAIM_LOST: _S.IDLE,
+        _T.STANDS_AT_BASE: _S.SWAPPING,
+    },
+    _S.ABOVE_BASE: {**_TAKING_PART, _T.SLOT_FREE: _S.SWAPPING, _T.CLAIM_LOST: _S.IDLE},
+    _S.SWAPPING: {**_TAKING_PART, _T.SWAPPED: _S.READY_ON_GROUND, _T.CLAIM_LOST: _S.IDLE},
+    _S.READY_ON_GROUND: {
+        **_TAKING_PART,
+        _T.DECIDED: _S.DEPARTING,
+        _T.BASE_CHOSEN: _S.FLYING_TO_BASE,
+    },
+    _S.DEPARTING: {
+        **_TAKING_PART,
+        _T.DEPARTED: _S.FLYING,
+        _T.CLAIM_LOST: _S.READY_ON_GROUND,
+    },
     _S.PAUSED: {
         **_TAKING_PART,
         _T.RESUME: _S.PREPARING,
+        _T.STANDS_AT_BASE: _S.SWAPPING,
         _T.MISSION_OVER: _S.PAUSED_HOMEBOUND,
     },
     _S.PAUSED_HOMEBOUND: {**_TAKING_PART, _T.HOLD: _S.PAUSED_HOMEBOUND, _T.LANDED: _S.HOME},
@@ -121,6 +155,7 @@ FROM_OUTSIDE: Final = frozenset(
     {
         _T.VEHICLE_READY,
         _T.ARRIVED,
+        _T.SWAPPED,
         _T.HOLD,
         _T.RESUME,
         _T.RETURN,
@@ -133,11 +168,25 @@ FROM_OUTSIDE: Final = frozenset(
 )
 """What the vehicle says and what the operator or the mission wants: it may come late, or twice."""
 
-TAKES_TARGETS: Final = frozenset({_S.IDLE, _S.FLYING, _S.SERVING})
-"""The vehicle is in the air and under command."""
-FREE: Final = frozenset({_S.WAITING, _S.IDLE})
+TAKES_TARGETS: Final = frozenset(
+    {
+        _S.IDLE,
+        _S.FLYING,
+        _S.SERVING,
+        _S.FLYING_TO_BASE,
+        _S.ABOVE_BASE,
+        _S.READY_ON_GROUND,
+        _S.DEPARTING,
+    }
+)
+"""The vehicle is under command and goes where it is sent, at a base from the ground up."""
+AT_BASE: Final = frozenset({_S.SWAPPING, _S.READY_ON_GROUND, _S.DEPARTING})
+"""The vehicle is on the ground, or about to touch down."""
+VISITS_BASE: Final = frozenset({_S.FLYING_TO_BASE, _S.ABOVE_BASE, _S.SWAPPING})
+"""It stands by a base that it claims, and by no task."""
+FREE: Final = frozenset({_S.WAITING, _S.IDLE, _S.READY_ON_GROUND})
 """It stands by no task; what its claim register names is over, or about to be replaced."""
-TAKES_TASKS: Final = TAKES_TARGETS | {_S.RESUMING, _S.WAITING}
+TAKES_TASKS: Final = TAKES_TARGETS | {_S.RESUMING, _S.WAITING, _S.SWAPPING}
 """Its claim register is the word of this life; in the other states it tells of the past."""
 PAUSED_BY_OPERATOR: Final = frozenset({_S.PAUSED, _S.PAUSED_HOMEBOUND})
 HEADED_HOME: Final = frozenset({_S.PAUSED_HOMEBOUND, _S.RETURNING_VIA_START, _S.RETURNING})
@@ -153,6 +202,11 @@ STATUS_PHASE: Final[Mapping[AgentState, StatusPhase]] = {
     _S.IDLE: StatusPhase.IDLE,
     _S.FLYING: StatusPhase.FLYING,
     _S.SERVING: StatusPhase.SERVING,
+    _S.FLYING_TO_BASE: StatusPhase.FLYING,
+    _S.ABOVE_BASE: StatusPhase.FLYING,
+    _S.SWAPPING: StatusPhase.SERVING,
+    _S.READY_ON_GROUND: StatusPhase.IDLE,
+    _S.DEPARTING: StatusPhase.FLYING,
     _S.PAUSED: StatusPhase.HOLDING,
     _S.PAUSED_HOMEBOUND: StatusPhase.HOLDING,
     _S.RETURNING_VIA_START: StatusPhase.RETURNING,
@@ -248,7 +302,20 @@ class TaskAttempt:
     """When the service is over."""
     fails: bool = False
     """Whether the attempt is known to fail."""
+    departs_at_s: float | None = None
+    """When the UAV takes off for it, from the ground."""
+    begins_at_s: float | None = None
+    """When the work on the spot begins, where that is not at once."""
+    too_late_at_s: float | None = None
+    """From when on the UAV can't be there in time any more."""
 
     def next_deadline_s(self) -> float | None:
         """When any of that is due."""
-        return earliest(self.held_at_s, self.served_at_s, self.ready_by_s)
+        return earliest(
+            self.held_at_s,
+            self.served_at_s,
+            self.ready_by_s,
+            self.departs_at_s,
+            self.begins_at_s,
+            self.too_late_at_s,
+        )
