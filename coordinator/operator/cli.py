@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coordinator.operator.completion import complete_uav
+from coordinator.operator.points import PointsCommand
+from coordinator.operator.task_limits import NO_LIMITS, TaskLimits
 from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.runtime.errors import Fault, InputError, SwarmError
 from swarm.runtime.option_groups import with_options
@@ -139,7 +141,7 @@ def start(
 
     check_reason_and_ids(reason, ("--mission", mission), ("--without", without))
     reach = MissionConnection(mission, timeout_s, seat, speedup)
-    return _submit(StartRequest(without, reason), reach, "--without", json=json)
+    return submit(StartRequest(without, reason), reach, "--without", json=json)
 
 
 @with_options
@@ -183,6 +185,7 @@ Examples:
     swarm task add --position 120,80
     swarm task add leak --position=-40,65,10 --value 8 --service-s 20 --kind inspect
     swarm task add --lat-deg 47.3981 --lon-deg 8.5470 --reason "smoke reported"
+    swarm task add ridge --path 0,0 200,0 200,80 --opens-s 60 --due-s 600
 """
 _WITHDRAW_HELP = """Take a task off the board of a running mission.
 
@@ -224,7 +227,7 @@ AltOption = Annotated[
 ]
 
 
-@task.command("add", help=_ADD_HELP, short_help="Add a task.")
+@task.command("add", help=_ADD_HELP, short_help="Add a task.", cls=PointsCommand)
 @with_options
 def add(
     name: Annotated[
@@ -266,6 +269,7 @@ def add(
             show_default=False,
         ),
     ] = None,
+    limits: TaskLimits = NO_LIMITS,
     reason: ReasonOption = "",
     mission: SomeMissionOption = None,
     timeout_s: TimeoutOption = 10.0,
@@ -278,10 +282,30 @@ def add(
     from coordinator.operator.task_edits import NewTask
 
     check_reason_and_ids(reason, ("--mission", mission), ("ID", name), ("--kind", kind))
-    place = _place(position, lat_deg, lon_deg, alt_m)
-    wish = NewTask(place, name, value, service_s, kind, reason)
+    path = limits.points
+    place = None if path else _place(position, lat_deg, lon_deg, alt_m)
+    if path and (position, lat_deg, lon_deg, alt_m) != (None, None, None, None):
+        remedy = "give either a place, or the points of a line"
+        raise InputError(Fault("swarm task add", "", "a place was given beside a line", remedy))
+    try:
+        wish = NewTask(
+            place,
+            name,
+            value,
+            service_s,
+            kind,
+            reason,
+            limits.due_s,
+            limits.opens_s,
+            limits.closes_s,
+            path,
+            limits.height_m,
+        )
+    except ValueError as fault:
+        remedy = "see swarm task add --help"
+        raise InputError(Fault("swarm task add", "", str(fault), remedy)) from fault
     reach = MissionConnection(mission, timeout_s, seat, speedup)
-    return _submit(wish, reach, "ID", json=json)
+    return submit(wish, reach, "ID", json=json)
 
 
 @task.command("withdraw", help=_WITHDRAW_HELP, short_help="Take a task off the board.")
@@ -301,7 +325,7 @@ def withdraw(
 
     check_reason_and_ids(reason, ("--mission", mission), ("ID", name))
     reach = MissionConnection(mission, timeout_s, seat, speedup)
-    return _submit(TaskWithdrawal(name, reason), reach, "ID", json=json)
+    return submit(TaskWithdrawal(name, reason), reach, "ID", json=json)
 
 
 def _place(
@@ -341,10 +365,10 @@ def _give(name: str, target: str, reason: str, reach: MissionConnection, *, json
     from swarm.protocol.messages import CommandKind
 
     check_reason_and_ids(reason, ("--mission", reach.mission), ("UAV", target))
-    return _submit(CommandRequest(CommandKind(name), target, reason), reach, "UAV", json=json)
+    return submit(CommandRequest(CommandKind(name), target, reason), reach, "UAV", json=json)
 
 
-def _submit(wish: OperatorRequest, reach: MissionConnection, source: str, *, json: bool) -> int:
+def submit(wish: OperatorRequest, reach: MissionConnection, source: str, *, json: bool) -> int:
     """Say what is wanted, and tell what came of it; ``source`` is the argument that it is about."""
     from json import dumps
 

@@ -25,7 +25,7 @@ from swarm.protocol.messages import (
     Stamp,
     StartWithout,
 )
-from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD, dispensable
+from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD, abort_command, dispensable
 from swarm.protocol.uav_messages import ClaimPhase, Status, StatusPhase
 
 
@@ -36,6 +36,7 @@ class RequestResult(Enum):
     NOT_OBEYED = "not obeyed"
     UNKNOWN_UAV = "no such UAV"
     UNKNOWN_TASK = "no such task"
+    UNKNOWN_ZONE = "no such zone"
     TAKEN_ID = "that id is taken"
     UNKNOWN_MISSION = "nothing known of the mission"
 
@@ -45,6 +46,7 @@ class RequestResult(Enum):
         return self in (
             RequestResult.UNKNOWN_UAV,
             RequestResult.UNKNOWN_TASK,
+            RequestResult.UNKNOWN_ZONE,
             RequestResult.TAKEN_ID,
         )
 
@@ -134,6 +136,21 @@ class RequestHandler(ABC, Generic[Wish, Statement]):
     def _fleet(self) -> list[str]:
         brief = self._mission_state.replica.brief
         return [] if brief is None else [str(uav.id) for uav in brief.uavs]
+
+    @property
+    def _expected(self) -> set[str]:
+        """Who is there and takes part, and so ought to know of what concerns everybody."""
+        claims = self._mission_state.replica.claims.items()
+        out = {uav for uav, claim in claims if claim.phase is ClaimPhase.OUT}
+        return ({*self._fleet} - out | {COORDINATOR}) & self._mission_state.present
+
+    @property
+    def _is_over(self) -> bool:
+        mission_state = self._mission_state
+        return (
+            mission_state.phase is MissionPhase.ENDED
+            or abort_command(mission_state.replica) is not None
+        )
 
     def _no_such_uav(self) -> RequestVerdict:
         return RequestVerdict(RequestResult.UNKNOWN_UAV, f"the fleet is {', '.join(self._fleet)}")

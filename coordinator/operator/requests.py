@@ -33,18 +33,23 @@ from coordinator.operator.commands import (
     StartHandler,
     StartRequest,
 )
+from coordinator.operator.readiness import ReadyHandler, ReadyRequest
 from coordinator.operator.task_edits import NewTask, TaskEditHandler, TaskWithdrawal
+from coordinator.operator.zone_edits import NewZone, ZoneEditHandler, ZoneRemoval
 from swarm.model.ids import OPERATOR
 from swarm.protocol.events import Ask, CommonAction, CommonEvent, Finish, Publish, SnapshotsReceived
+from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.messages import Message, OperatorCommand, StartWithout, TaskEdit
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.timing import Timing, earliest
 
-OperatorRequest = CommandRequest | StartRequest | NewTask | TaskWithdrawal
-OperatorStatement = OperatorCommand | StartWithout | TaskEdit
+OperatorRequest = (
+    CommandRequest | StartRequest | NewTask | TaskWithdrawal | NewZone | ZoneRemoval | ReadyRequest
+)
+OperatorStatement = OperatorCommand | StartWithout | TaskEdit | ZoneEdit | UavReady
 
 
-AnyHandler = CommandHandler | StartHandler | TaskEditHandler
+AnyHandler = CommandHandler | StartHandler | TaskEditHandler | ZoneEditHandler | ReadyHandler
 
 
 class TrackedRequest:
@@ -94,14 +99,8 @@ class RequestTracker:
 
     def give(self, wish: OperatorRequest, now_s: float) -> TrackedRequest:
         """Say what the operator wants, from the next step on; with a verdict if it cannot."""
-        mission_state, brief = self._mission_state, self._mission_state.replica.brief
-        handler: AnyHandler
-        if isinstance(wish, CommandRequest):
-            handler = CommandHandler(wish, mission_state, self._patience_s)
-        elif isinstance(wish, StartRequest):
-            handler = StartHandler(wish, mission_state, self._patience_s)
-        else:
-            handler = TaskEditHandler(wish, mission_state, self._timing, self._patience_s)
+        brief = self._mission_state.replica.brief
+        handler = self._handler_of(wish, now_s)
         request = TrackedRequest(wish, handler)
         unknown = RequestVerdict(RequestResult.UNKNOWN_MISSION, "nothing is known of the mission")
         body = unknown if brief is None else handler.body(brief)
@@ -114,6 +113,21 @@ class RequestTracker:
             request.ask_at_s = now_s + self._timing.ask_gap_s
         self.open.append(request)
         return request
+
+    def _handler_of(self, wish: OperatorRequest, now_s: float) -> AnyHandler:
+        mission_state, patience_s = self._mission_state, self._patience_s
+        match wish:
+            case CommandRequest():
+                return CommandHandler(wish, mission_state, patience_s)
+            case StartRequest():
+                return StartHandler(wish, mission_state, patience_s)
+            case ReadyRequest():
+                return ReadyHandler(wish, mission_state, patience_s)
+            case NewZone() | ZoneRemoval():
+                return ZoneEditHandler(wish, mission_state, patience_s)
+            case NewTask() | TaskWithdrawal():
+                given_s = mission_state.mission_s(now_s)
+                return TaskEditHandler(wish, mission_state, self._timing, patience_s, given_s)
 
     def step(self, fact: CommonEvent, now_s: float) -> list[CommonAction]:
         """Follow what has been given; call it after the observer has taken note of ``fact``."""
@@ -245,9 +259,14 @@ class OperatorClient:
                 about: dict[str, object] = {"command": wish.kind.value, "target": wish.target}
             case StartRequest():
                 about = {"command": "start", "without": wish.target}
+            case ReadyRequest():
+                about = {"command": "ready", "target": wish.target}
+            case NewZone() | ZoneRemoval():
+                done = "add" if isinstance(wish, NewZone) else "remove"
+                about = {"command": f"zone {done}", "zone": wish.zone}
             case _:
                 about = {"command": f"task {'add' if isinstance(wish, NewTask) else 'withdraw'}"}
-                about |= {} if handler is None else handler.told
+        about |= {} if handler is None else handler.told
         text = "" if self.verdict is None else self.verdict.text
         about |= {"reason": wish.reason, "obeyed": self.obeyed, "text": text}
         return about | {"uavs": self._does} if isinstance(wish, CommandRequest) else about

@@ -13,7 +13,10 @@ from coordinator.operator.commands import (
     RequestVerdict,
     StartRequest,
 )
+from coordinator.operator.readiness import ReadyRequest
 from coordinator.operator.requests import OperatorClient, OperatorRequest
+from coordinator.operator.task_edits import NewTask, TaskWithdrawal
+from coordinator.operator.zone_edits import NewZone, ZoneRemoval
 from swarm.bus.connection import ConnectionOptions
 from swarm.identity import Role
 from swarm.model.ids import ID_RULE, OPERATOR, valid_id
@@ -84,7 +87,7 @@ def submit_request(
         if verdict is None:
             raise SwarmError("nothing was said")
         if verdict.result.is_wrong_input:
-            name = wish.target if isinstance(wish, CommandRequest | StartRequest) else wish.task
+            name = _named(wish)
             taken = verdict.result is RequestResult.TAKEN_ID
             problem = f"{name!r} is {'taken' if taken else 'not'} in mission {mission}"
             raise InputError(Fault(source, "", problem, verdict.text))
@@ -94,6 +97,17 @@ def submit_request(
         return 0
 
     return asyncio.run(run_until_stopped(work()))
+
+
+def _named(wish: OperatorRequest) -> str | None:
+    """What it is about, by its id."""
+    match wish:
+        case CommandRequest() | StartRequest() | ReadyRequest():
+            return wish.target
+        case NewZone() | ZoneRemoval():
+            return wish.zone
+        case NewTask() | TaskWithdrawal():
+            return wish.task
 
 
 async def _submit(wish: OperatorRequest, reach: MissionConnection) -> tuple[str, OperatorClient]:

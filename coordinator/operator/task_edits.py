@@ -19,18 +19,20 @@ from coordinator.mission_view.wording import listed
 from coordinator.operator.commands import RequestHandler, RequestResult, RequestVerdict
 from swarm.model import Origin
 from swarm.model.frames import enu_from_wgs84
-from swarm.model.ids import COORDINATOR, ID_RULE, valid_id
+from swarm.model.ids import ID_RULE, valid_id
 from swarm.protocol.board import TaskState
+from swarm.protocol.encoding import FIELD_DEFAULTS
+from swarm.protocol.field_board import doable_in_field
 from swarm.protocol.fields import MAX_COUNT, Point
-from swarm.protocol.messages import Message, MissionConfig, MissionPhase, TaskEdit, TaskEntry
-from swarm.protocol.operator_commands import abort_command
+from swarm.protocol.messages import Message, MissionConfig, TaskEdit, TaskEntry
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import ClaimPhase
 
 FARTHEST_M: Final = 1e8
 MOST_VALUE: Final = 1e12
 LONGEST_S: Final = 1e9
 """As far as a message can say it: `swarm.protocol.fields`."""
+MOST_POINTS: Final = 120
+"""Of a line: as many as a message has room for, beside the longest of everything else."""
 OWN_PREFIX: Final = "op"
 """Of ids that are not chosen by hand. They differ from a scenario's: the next free one in its
 manner might be that of a task which is yet to appear, and this one would take its place."""
@@ -69,8 +71,8 @@ class NewTask:
         ValueError: something is out of bounds; says what, and what would be right.
     """
 
-    place: Point | Wgs84
-    """[m; east, north, up from the mission's origin], or on the earth."""
+    place: Point | Wgs84 | None
+    """[m; east, north, up from the mission's origin], or on the earth; None of a line."""
     task: str | None = None
     """Id; None for the next free one."""
     value: float | None = None
@@ -78,14 +80,40 @@ class NewTask:
     service_s: float = 0.0
     kind: str | None = None
     reason: str = ""
+    due_s: float | None = None
+    """Mission time by which it ends, or it is worth nothing [s]."""
+    opens_s: float = 0.0
+    """Mission time before which work on the spot does not begin [s]."""
+    closes_s: float | None = None
+    """Mission time after which work on the spot does not begin [s]."""
+    path: tuple[Point | Wgs84, ...] = ()
+    """Points of a line, as places are given; empty of a place."""
+    height_m: float | None = None
+    """Where it is flown [m above the mission's origin]; None: in the UAV's own layer."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.place, Wgs84):
-            for metres in self.place:
+        if (self.place is None) == (not self.path) or len(self.path) == 1:
+            raise ValueError("a task has either a place, or a line of two points or more")
+        for place in self.path if self.place is None else (self.place,):
+            for metres in () if isinstance(place, Wgs84) else place:
                 _require("position", metres, -FARTHEST_M, FARTHEST_M)
         if self.value is not None:
             _require("value", self.value, 0.0, MOST_VALUE)
         _require("time on the spot", self.service_s, 0.0, LONGEST_S)
+        if self.height_m is not None:
+            _require("height", self.height_m, -FARTHEST_M, FARTHEST_M)
+        limits = (("due", self.due_s), ("opening", self.opens_s), ("closing", self.closes_s))
+        for what, time_s in limits:
+            if time_s is not None:
+                _require(f"{what} time", time_s, 0.0, LONGEST_S)
+        if self.closes_s is not None and self.closes_s < self.opens_s:
+            raise ValueError(f"it closes at {self.closes_s:g} s, before it opens")
+        if self.due_s is not None and self.due_s <= self.opens_s:
+            raise ValueError(f"it is due by {self.due_s:g} s, before it opens")
+        if len(self.path) > MOST_POINTS:
+            raise ValueError(
+                f"its line has {len(self.path)} points, and a message has room for {MOST_POINTS}"
+            )
         for what, text in (("id", self.task), ("kind", self.kind)):
             if text is not None and not valid_id(text):
                 raise ValueError(f"{what} {text!r} is not {ID_RULE}")
@@ -114,8 +142,11 @@ class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
         mission_state: MissionState,
         timing: Timing,
         patience_s: float,
+        given_s: float | None = None,
     ) -> None:
         super().__init__(wish, mission_state, patience_s)
+        self._given_s = given_s
+        """Mission time at which it was given [s]; None before the start."""
         self.entry: TaskEdit | None = None
         """What is said; None when nothing could be."""
         self._look_s = 2.0 * timing.patience_s
@@ -144,18 +175,29 @@ class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
             state = states[wish.task].value if wish.task in board else "yet to appear"
             text = f"{wish.task} is {state}: give another id, or none"
             return RequestVerdict(RequestResult.TAKEN_ID, text)
+        for what, limit_s in (("due by", wish.due_s), ("closed from", wish.closes_s)):
+            if limit_s is not None and limit_s <= (self._given_s or 0.0):
+                past = f"{limit_s:g} s, and the mission is at {self._given_s or 0.0:.1f} s"
+                return RequestVerdict.bad(f"it would be {what} {past}")
         values = [entry.value for entry in board.values() if not entry.withdrawn]
-        place = wish.place
+        origin = Origin(*brief.origin)
+        places = wish.path if wish.place is None else (wish.place,)
+        points = tuple(
+            place.enu_m(origin) if isinstance(place, Wgs84) else place for place in places
+        )
         return TaskEntry(
             task=wish.task or next_id(self._used_ids),
             number=self._next_number,
-            position_enu_m=(
-                place.enu_m(Origin(*brief.origin)) if isinstance(place, Wgs84) else place
-            ),
+            position_enu_m=points[0],
             value=wish.value if wish.value is not None else median(values) if values else 1.0,
             service_s=wish.service_s,
             kind=wish.kind,
             withdrawn=False,
+            due_s=wish.due_s,
+            opens_s=wish.opens_s,
+            closes_s=wish.closes_s,
+            path_enu_m=points if wish.path else (),
+            height_m=wish.height_m,
         )
 
     def _withdrawal(self, wish: TaskWithdrawal) -> TaskEntry | RequestVerdict:
@@ -241,7 +283,8 @@ class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
     def _taken(self, order: TaskEdit, now_s: float, late: bool) -> RequestVerdict | None:
         """What is told of a task that is on the board; None to look a little longer."""
         state, uav = self._mission_state.board.states.get(order.task), self.uav
-        somebody_can = self._able(self._expected)
+        mission_s = self._mission_state.mission_s(now_s)
+        somebody_can = self._able(self._expected, mission_s)
         if uav is None and state is TaskState.OPEN and somebody_can and not late:
             if math.isinf(self._look_until_s):
                 self._look_until_s = now_s + self._look_s
@@ -254,6 +297,8 @@ class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
             what = f"it is {state}"
         elif not self._able(self._fleet):
             what = "but no UAV is capable of it: the success of each there is 0"
+        elif not self._able(self._fleet, mission_s):
+            what = "but no UAV can do it in time, or with its battery, or come there"
         elif not somebody_can:
             verdict = RequestVerdict.bad
             what = "but nobody who could do it takes part any more"
@@ -298,12 +343,20 @@ class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
         }
         if (entry := self.entry) is None:
             return told
-        return told | {
-            "position": list(entry.position_enu_m),
-            "value": entry.value,
-            "service_s": entry.service_s,
-            "kind": entry.kind,
-        }
+        return (
+            told
+            | {
+                "position": list(entry.position_enu_m),
+                "value": entry.value,
+                "service_s": entry.service_s,
+                "kind": entry.kind,
+            }
+            | {
+                name: [list(point) for point in limit] if name == "path_enu_m" else limit
+                for name, default in FIELD_DEFAULTS[TaskEdit].items()
+                if (limit := getattr(entry, name)) != default
+            }
+        )
 
     @property
     def uav(self) -> str | None:
@@ -311,29 +364,18 @@ class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
         return None if self.task is None else self._mission_state.holders.get(self.task)
 
     @property
-    def _is_over(self) -> bool:
-        mission_state = self._mission_state
-        return (
-            mission_state.phase is MissionPhase.ENDED
-            or abort_command(mission_state.replica) is not None
-        )
-
-    @property
-    def _expected(self) -> set[str]:
-        """Who is there and takes part, and so ought to know of it."""
-        claims = self._mission_state.replica.claims.items()
-        out = {uav for uav, claim in claims if claim.phase is ClaimPhase.OUT}
-        return ({*self._fleet} - out | {COORDINATOR}) & self._mission_state.present
-
-    @property
     def _claimants(self) -> list[str]:
         claims = self._mission_state.replica.claims.items()
         there = self._mission_state.present
         return sorted(u for u, claim in claims if claim.task == self.task and u in there)
 
-    def _able(self, uavs: Collection[str]) -> bool:
-        """Whether one of ``uavs`` is capable of the task."""
-        problem = self._mission_state.board.problem
+    def _able(self, uavs: Collection[str], mission_s: float | None = None) -> bool:
+        """Whether one of ``uavs`` is capable of the task; in the field, from ``mission_s`` on."""
+        board = self._mission_state.board
+        field = board.field_problem
+        if field is not None and mission_s is not None:
+            return self.task in doable_in_field(field, board, uavs, mission_s)
+        problem = board.problem
         if problem is None:
             return False
         capable = zip(problem.task_ids, problem.capable.T, strict=True)

@@ -29,6 +29,8 @@ PANELS: Mapping[str, tuple[str, ...]] = {
         "dashboard",
         "start",
         "task",
+        "zone",
+        "ready",
         "hold",
         "resume",
         "return",

@@ -272,6 +272,19 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
 }
 
 
+class _Zones(StrictTable):
+    """What a file says about zones."""
+
+    origin: OriginTable | None = None
+    zone: list[ZoneTable] = Field(default_factory=list)
+
+
+def validate_zones(document: Document) -> tuple[list[ZoneTable], list[Finding]]:
+    """The zones of a document that has nothing else, and what is wrong with their shapes."""
+    zones, findings = validate_tables(_Zones, document, _TABLES, _RIGHT)
+    return [] if zones is None else zones.zone, findings
+
+
 def validate(document: Document) -> tuple[Scenario | None, list[Finding]]:
     """The scenario if every shape, type and range is right, and all findings otherwise."""
     scenario, findings = validate_tables(Scenario, without_later(document), _TABLES, _RIGHT)
